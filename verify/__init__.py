@@ -1,0 +1,9 @@
+"""A verification lab for cutting: scenes, solvers, comparison, verdicts, reports.
+
+Importing this package is cheap and needs neither FEniCSx nor gmsh; every sub-package is
+imported when it is asked for.
+"""
+
+__version__ = "0.1.0"
+
+__all__ = ["__version__"]

@@ -1,0 +1,220 @@
+"""The result model: one record per solve, one per judged requirement. Versioned JSON.
+
+`verify.report`, baselines and the pytest plugin read this and nothing else. A failed, refused
+or timed-out solve is a record like any other, with its reason.
+"""
+
+import json
+import os
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from verify.errors import InputError
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "CaseResult",
+    "Metric",
+    "Rate",
+    "SolveRecord",
+    "Status",
+    "Verdict",
+    "VerdictRecord",
+    "read_result",
+    "write_result",
+]
+
+SCHEMA_VERSION = 1
+
+
+class Status(StrEnum):
+    """How a solve ended."""
+
+    SOLVED = "solved"
+    REFUSED = "refused"
+    FAILED = "failed"
+    TIMEOUT = "timeout"
+    MEMORY = "memory"
+
+
+class Verdict(StrEnum):
+    """What is known about a requirement."""
+
+    PASS = "PASS"
+    FAIL = "FAIL"
+    UNDECIDED = "UNDECIDED"
+    ERROR = "ERROR"  # could not be judged because a solve did not finish
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number that was measured, with what is known about its truth.
+
+    Parameters
+    ----------
+    name : str
+        ``displacement_l2``, ``energy_norm``, ``jump_l2`` (relative errors), ``strain_energy``
+        or the name of a quantity of interest.
+    value : float
+    unit : str
+        ``"1"`` for relative errors.
+    reference : float or None
+        Reference value of a quantity; None for an error, whose reference value is 0.
+    uncertainty : float
+        Half-width of the interval that the reference's imperfection puts around `value` (for
+        an error) or around `reference` (for a quantity), in the metric's unit. It includes
+        the integration error of the comparison.
+    source : str
+        What the reference is, e.g. ``"exact: griffith"`` or
+        ``"conforming P2, 3 levels, GCI"``.
+    """
+
+    name: str
+    value: float
+    unit: str
+    reference: float | None = None
+    uncertainty: float = 0.0
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class SolveRecord:
+    """One solve: one solver on one mesh level of one case.
+
+    `timings` are wall seconds by phase: median and the list of repetitions. `unknowns`,
+    `size` and the rest are as in `verify.solution.Solution`.
+    """
+
+    case: str
+    solver: str
+    level: int
+    status: Status
+    reason: str = ""
+    parameters: dict[str, Any] = field(default_factory=dict)
+    size: float | None = None
+    unknowns: int | None = None
+    metrics: list[Metric] = field(default_factory=list)
+    timings: dict[str, list[float]] = field(default_factory=dict)
+    peak_memory: float | None = None  # bytes, of the solving process
+    wall: float | None = None  # seconds, of the solving process, start-up included
+    iterations: dict[str, int] = field(default_factory=dict)
+    regularisations: list[dict[str, Any]] = field(default_factory=list)
+    notes: dict[str, str] = field(default_factory=dict)
+    solution: str | None = None  # path of the stored solution, relative to the run directory
+
+    def metric(self, name: str) -> Metric | None:
+        """The metric called `name`, if it was measured."""
+        return next((metric for metric in self.metrics if metric.name == name), None)
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Observed order of an error under refinement, or why there is none.
+
+    Parameters
+    ----------
+    solver, metric : str
+    order : float or None
+        Slope of log(error) over log(h) between the finest levels.
+    uncertainty : float
+        Half-width from the spread of the levels and the reference's uncertainty.
+    reason : str
+        Empty if the order means something; else ``"floor"`` (errors at round-off or at the
+        reference's uncertainty), ``"oscillating"``, ``"diverging"``, ``"too few levels"``,
+        followed by the numbers that say so.
+    pairwise : list of float
+        Slope between each pair of successive levels.
+    """
+
+    solver: str
+    metric: str
+    order: float | None
+    uncertainty: float
+    reason: str
+    pairwise: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class VerdictRecord:
+    """The verdict on one acceptance check of a case.
+
+    `observed` is what was measured, `low`/`high` the interval in which its true value lies
+    given the reference's uncertainty, `limit` what the case demands (as text), `reason` one
+    sentence.
+    """
+
+    check: str
+    solver: str
+    metric: str
+    verdict: Verdict
+    observed: float | None
+    low: float | None
+    high: float | None
+    limit: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """All that is known about one case of a run."""
+
+    case: str
+    title: str
+    requirement: str
+    scene_hash: str
+    scene: dict[str, Any]
+    reference: dict[str, Any]  # kind, source, levels, per metric: values, uncertainty, order
+    solves: list[SolveRecord]
+    rates: list[Rate]
+    verdicts: list[VerdictRecord]
+    pictures: dict[str, str] = field(default_factory=dict)  # name -> path in the run directory
+    provenance: dict[str, Any] = field(default_factory=dict)
+    schema: int = SCHEMA_VERSION
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of the case (ERROR > FAIL > UNDECIDED > PASS)."""
+        order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
+        return max((v.verdict for v in self.verdicts), key=order.index, default=Verdict.UNDECIDED)
+
+
+def write_result(result: CaseResult, path: Path) -> None:
+    """Write `result` as JSON, in one step (a reader never sees half a file)."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(path.suffix + ".partial")
+    partial.write_text(json.dumps(asdict(result), indent=1), encoding="utf-8")
+    os.replace(partial, path)
+
+
+def read_result(path: Path) -> CaseResult:
+    """Read what `write_result` wrote.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, or of another schema version.
+    """
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError("no such file; expected a result", str(path)) from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"not a JSON file ({error})", str(path)) from None
+    if not isinstance(record, dict) or record.get("schema") != SCHEMA_VERSION:
+        raise InputError(f"not a result of schema version {SCHEMA_VERSION}", str(path))
+    try:
+        record["solves"] = [
+            SolveRecord(
+                **{**s, "status": Status(s["status"]), "metrics": [Metric(**m) for m in s["metrics"]]}
+            )
+            for s in record["solves"]
+        ]
+        record["rates"] = [Rate(**rate) for rate in record["rates"]]
+        record["verdicts"] = [
+            VerdictRecord(**{**v, "verdict": Verdict(v["verdict"])}) for v in record["verdicts"]
+        ]
+        return CaseResult(**record)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"not a readable result ({error})", str(path)) from None

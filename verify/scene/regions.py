@@ -1,0 +1,147 @@
+"""Regions of the body said by inequalities, such as ``x < 0.01 and y > 0.5``.
+
+The text is parsed into a syntax tree of which only comparisons, ``and``/``or``/``not``,
+arithmetic and a few functions are accepted; nothing is ever evaluated as Python.
+"""
+
+import ast
+import operator
+from collections.abc import Callable
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+
+__all__ = ["Region", "parse_region"]
+
+Array = NDArray[np.float64]
+Region = Callable[[Array], NDArray[np.bool_]]
+
+_COORDINATES = ("x", "y", "z")
+_ARITHMETIC = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_COMPARISONS = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
+_FUNCTIONS = {"abs": np.abs, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "hypot": np.hypot}
+_MEANING = (
+    "an inequality in x, y, z such as 'x < 0.01 and y > 0.5' "
+    "(comparisons < <= > >=, and/or/not, + - * / **, abs sqrt sin cos hypot, pi)"
+)
+
+
+def parse_region(text: str, dimension: int) -> Region:
+    """Turn an inequality into a function of points.
+
+    Parameters
+    ----------
+    text : str
+        The inequality, in metres.
+    dimension : int
+        2 or 3: which of x, y, z may be named.
+
+    Returns
+    -------
+    callable
+        Maps points (n, dimension) to booleans (n,).
+
+    Raises
+    ------
+    InputError
+        If the text is not such an inequality; the message names the part that is not.
+    """
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except SyntaxError:
+        raise InputError(f"'{text}' is not {_MEANING}") from None
+    _check_condition(tree, text, dimension)
+
+    def region(points: Array) -> NDArray[np.bool_]:
+        values = _condition(tree, np.asarray(points, dtype=float))
+        return np.broadcast_to(values, (len(points),)).astype(bool)
+
+    return region
+
+
+def _reject(node: ast.AST, text: str) -> InputError:
+    return InputError(f"'{ast.unparse(node)}' in '{text}' is not allowed; expected {_MEANING}")
+
+
+def _check_condition(node: ast.AST, text: str, dimension: int) -> None:
+    match node:
+        case ast.BoolOp(values=values):
+            for value in values:
+                _check_condition(value, text, dimension)
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            _check_condition(operand, text, dimension)
+        case ast.Compare(left=left, ops=ops, comparators=comparators) if all(
+            type(op) in _COMPARISONS for op in ops
+        ):
+            for value in (left, *comparators):
+                _check_number(value, text, dimension)
+        case _:
+            raise _reject(node, text)
+
+
+def _check_number(node: ast.AST, text: str, dimension: int) -> None:
+    match node:
+        case ast.Constant(value=bool()):
+            raise _reject(node, text)
+        case ast.Constant(value=int() | float()):
+            pass
+        case ast.Name(id=name) if name in (*_COORDINATES[:dimension], "pi"):
+            pass
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
+            _check_number(operand, text, dimension)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _ARITHMETIC:
+            _check_number(left, text, dimension)
+            _check_number(right, text, dimension)
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if (
+            name in _FUNCTIONS and len(arguments) == (2 if name == "hypot" else 1)
+        ):
+            for argument in arguments:
+                _check_number(argument, text, dimension)
+        case _:
+            raise _reject(node, text)
+
+
+def _condition(node: ast.AST, points: Array) -> NDArray[np.bool_]:
+    match node:
+        case ast.BoolOp(op=op, values=values):
+            combine = np.logical_and if isinstance(op, ast.And) else np.logical_or
+            return reduce(combine, (_condition(value, points) for value in values))
+        case ast.UnaryOp(operand=operand):
+            return np.logical_not(_condition(operand, points))
+        case ast.Compare(left=left, ops=ops, comparators=comparators):
+            terms = [_number(value, points) for value in (left, *comparators)]
+            steps = zip(ops, terms[:-1], terms[1:], strict=True)
+            return reduce(np.logical_and, (_COMPARISONS[type(op)](a, b) for op, a, b in steps))
+    raise AssertionError(ast.dump(node))  # _check_condition lets nothing else through
+
+
+def _number(node: ast.AST, points: Array) -> Array:
+    match node:
+        case ast.Constant(value=value):
+            return np.float64(value)  # type: ignore[arg-type, return-value]
+        case ast.Name(id="pi"):
+            return np.float64(np.pi)  # type: ignore[return-value]
+        case ast.Name(id=name):
+            return points[:, _COORDINATES.index(name)]
+        case ast.UnaryOp(op=op, operand=operand):
+            value = _number(operand, points)
+            return -value if isinstance(op, ast.USub) else value
+        case ast.BinOp(left=left, op=op, right=right):
+            return _ARITHMETIC[type(op)](_number(left, points), _number(right, points))
+        case ast.Call(func=ast.Name(id=name), args=arguments):
+            return _FUNCTIONS[name](*(_number(argument, points) for argument in arguments))
+    raise AssertionError(ast.dump(node))  # _check_number lets nothing else through

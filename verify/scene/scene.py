@@ -1,0 +1,69 @@
+"""The scene: a requirement and the solver-neutral physics that decides it."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from verify.scene.acceptance import Acceptance, Quantity, StrainEnergyQuantity
+from verify.scene.cuts import Cut
+from verify.scene.geometry import Geometry
+from verify.scene.mesh import MeshLevels, ReferenceLevels
+from verify.scene.physics import Analysis, Exact, Load, Material, Support
+from verify.scene.placement import check_placement
+from verify.scene.strict import Strict
+
+__all__ = ["Scene"]
+
+
+class Scene(Strict):
+    """One case. Solver-neutral: it says what is asked, never how a solver shall do it."""
+
+    schema_: Literal[1] = Field(default=1, alias="schema", description="version of this schema")
+    title: str = Field(description="one line")
+    requirement: str = Field(description="what shall hold, in one sentence")
+    tags: list[str] = Field(default_factory=list, description="e.g. demo, quick, heavy")
+    geometry: Geometry
+    mesh: MeshLevels
+    material: Material
+    supports: list[Support] = Field(min_length=1)
+    loads: list[Load] = Field(default_factory=list)
+    exact: Exact | None = None
+    cuts: list[Cut] = Field(default_factory=list)
+    analysis: Analysis = Field(default_factory=Analysis)
+    reference: ReferenceLevels = Field(default_factory=ReferenceLevels)
+    quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
+        default_factory=lambda: [StrainEnergyQuantity(kind="strain_energy")]
+    )
+    acceptance: list[Acceptance] = Field(default_factory=list)
+
+    # where it was read from; set by `load_scene`
+    _file: Path | None = PrivateAttr(default=None)
+    _name: str = PrivateAttr(default="scene")
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> "Scene":
+        check_placement(self)
+        return self
+
+    @property
+    def name(self) -> str:
+        """Name of the case: its path below the case folder, e.g. ``statics/f1_patch``."""
+        return self._name
+
+    @property
+    def file(self) -> Path | None:
+        """The case file, if it came from one."""
+        return self._file
+
+    @property
+    def dimension(self) -> int:
+        """Space dimension, 2 or 3."""
+        return self.geometry.dimension
+
+    @property
+    def judged_by_exact(self) -> bool:
+        """Whether the exact solution is the reference."""
+        if self.reference.kind is None:
+            return self.exact is not None
+        return self.reference.kind == "exact"

@@ -1,0 +1,276 @@
+"""The neutral solution that every solver returns, whatever its method.
+
+A `Solution` is a displacement field on a simplicial mesh *of the uncut material
+configuration that conforms to the solver's own realised cut* (nodes doubled on the cut), with
+what the solver did to get there. It says nothing about how good it is: that is measured by
+`verify.compare`, from the `Solution` alone.
+
+Stored as one VTU file (mesh, fields) and one JSON file beside it (the rest). The same pair is
+the file exchange for programs that are not written in Python.
+"""
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+
+__all__ = ["SCHEMA_VERSION", "Regularisation", "Solution", "read_solution", "write_solution"]
+
+SCHEMA_VERSION = 1
+
+# VTK cell names by (dimension, order); node order is VTK's (corners, then edge mid-points)
+_CELL_TYPES = {
+    (2, 1): "triangle",
+    (2, 2): "triangle6",
+    (3, 1): "tetra",
+    (3, 2): "tetra10",
+}
+_NODES_PER_CELL = {"triangle": 3, "triangle6": 6, "tetra": 4, "tetra10": 10}
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """Something the solver dropped, snapped, clamped, scaled or floored.
+
+    Parameters
+    ----------
+    kind : str
+        What was done, e.g. ``"zero-volume piece dropped"``.
+    count : int
+        How often.
+    size : float
+        Its largest contribution, in the unit of `unit`.
+    unit : str
+        Unit of `size`, e.g. ``"volume fraction"``.
+    """
+
+    kind: str
+    count: int
+    size: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A displacement field on a mesh that conforms to the realised cut.
+
+    Parameters
+    ----------
+    points : (n, d) float array
+        Nodes in the material configuration, in metres; doubled on the cut.
+    cells : (m, k) int array
+        Simplices: k = d + 1 for order 1, VTK's quadratic simplex for order 2 (3, 6, 4 or 10
+        nodes; corners first). A quadratic field is isoparametric.
+    displacement : (t, n, d) float array
+        Nodal displacement at each output time, in metres.
+    times : (t,) float array
+        Output times in seconds; ``[0.0]`` for a static solution.
+    order : {1, 2}
+        Polynomial order of the field.
+    cut_facets : (f, d, d) float array
+        The cut as realised: segments (2D) or triangles (3D) by their corner coordinates.
+    cell_sides : (m,) int array
+        Labels of the piece of material that a cell belongs to, as far as the solver knows
+        them (0 away from the cut). Information for pictures; the comparison decides sides by
+        geometry alone.
+    velocity : (t, n, d) float array, optional
+        Nodal velocity in m/s.
+    ledger : dict of str to (t,) float array
+        Energies by name (``"strain"``, ``"kinetic"``, …) at each output time, in joules (per
+        metre of thickness in 2D), as the solver itself adds them up.
+    quantities : dict of str to float
+        Further scalar results of the solver's own, by the name of the quantity.
+    unknowns : int
+        Number of scalar unknowns of the solver's system, constrained ones included.
+    size : float
+        Characteristic element size h of the solver's mesh, in metres.
+    timings : dict of str to list of float
+        Wall seconds of each phase (``"meshing"``, ``"enrichment"``, ``"assembly"``,
+        ``"factorisation"``, ``"solve"``), one entry per repetition; the first call
+        (compilation) is not among them.
+    iterations : dict of str to int
+        Iterations by solver (``"newton"``, ``"cg"``).
+    regularisations : list of Regularisation
+        Everything that was dropped, snapped, clamped, scaled or floored.
+    notes : dict of str to str
+        Versions and choices (linear solver, basis, mesh generator …).
+    """
+
+    points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    displacement: NDArray[np.float64]
+    times: NDArray[np.float64] = field(default_factory=lambda: np.zeros(1))
+    order: int = 1
+    cut_facets: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    cell_sides: NDArray[np.int64] | None = None
+    velocity: NDArray[np.float64] | None = None
+    ledger: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    quantities: dict[str, float] = field(default_factory=dict)
+    unknowns: int = 0
+    size: float = float("nan")
+    timings: dict[str, list[float]] = field(default_factory=dict)
+    iterations: dict[str, int] = field(default_factory=dict)
+    regularisations: list[Regularisation] = field(default_factory=list)
+    notes: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check shapes, so that a wrong solver fails where it hands over, not later."""
+        n, d = self.points.shape
+        t = len(self.times)
+        if (d, self.order) not in _CELL_TYPES:
+            raise InputError(f"a solution of dimension {d} and order {self.order}; expected 2, 3 and 1, 2")
+        k = _NODES_PER_CELL[self.cell_type]
+        if self.cells.ndim != 2 or self.cells.shape[1] != k:
+            raise InputError(f"cells of shape {self.cells.shape}; expected (m, {k}) for {self.cell_type}")
+        if len(self.cells) == 0:
+            raise InputError("a solution without cells")
+        if self.cells.min() < 0 or self.cells.max() >= n:
+            raise InputError(f"cell nodes outside 0..{n - 1}")
+        if self.displacement.shape != (t, n, d):
+            raise InputError(f"displacement of shape {self.displacement.shape}; expected {(t, n, d)}")
+        if not np.isfinite(self.displacement).all():
+            raise InputError("displacement has values that are not finite")
+        if self.velocity is not None and self.velocity.shape != (t, n, d):
+            raise InputError(f"velocity of shape {self.velocity.shape}; expected {(t, n, d)}")
+
+    @property
+    def dimension(self) -> int:
+        """Space dimension, 2 or 3."""
+        return int(self.points.shape[1])
+
+    @property
+    def cell_type(self) -> str:
+        """VTK (meshio) name of the cells."""
+        return _CELL_TYPES[self.dimension, self.order]
+
+
+def write_solution(solution: Solution, path: Path) -> None:
+    """Write `solution` as ``path.vtu`` (or one VTU per output time) and ``path.json``.
+
+    The JSON file is written last and in one step, so that its presence means that the
+    solution is whole.
+
+    Parameters
+    ----------
+    solution : Solution
+    path : Path
+        Path without ending, e.g. ``out/solution``.
+    """
+    import meshio
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    points = np.zeros((len(solution.points), 3))
+    points[:, : solution.dimension] = solution.points
+    sides = solution.cell_sides
+    names = _vtu_names(path, len(solution.times))
+    for step, name in enumerate(names):
+        fields = {"displacement": _three(solution.displacement[step])}
+        if solution.velocity is not None:
+            fields["velocity"] = _three(solution.velocity[step])
+        mesh = meshio.Mesh(
+            points,
+            [(solution.cell_type, solution.cells)],
+            point_data=fields,
+            cell_data={} if sides is None else {"side": [sides.astype(np.int32)]},
+        )
+        mesh.write(path.parent / name, file_format="vtu")
+    record = {
+        "schema": SCHEMA_VERSION,
+        "files": names,
+        "dimension": solution.dimension,
+        "order": solution.order,
+        "times": solution.times.tolist(),
+        "cut_facets": solution.cut_facets.tolist(),
+        "ledger": {name: np.asarray(v, dtype=float).tolist() for name, v in solution.ledger.items()},
+        "quantities": solution.quantities,
+        "unknowns": int(solution.unknowns),
+        "size": solution.size,
+        "timings": solution.timings,
+        "iterations": solution.iterations,
+        "regularisations": [vars(entry) for entry in solution.regularisations],
+        "notes": solution.notes,
+    }
+    target = path.with_suffix(".json")
+    partial = target.with_suffix(".json.partial")
+    partial.write_text(json.dumps(record, indent=1), encoding="utf-8")
+    os.replace(partial, target)
+
+
+def read_solution(path: Path) -> Solution:
+    """Read what `write_solution`, or another program, wrote.
+
+    Parameters
+    ----------
+    path : Path
+        Path without ending, as for `write_solution`.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    InputError
+        If a file is missing, damaged or not of this form.
+    """
+    import meshio
+
+    source = path.with_suffix(".json")
+    try:
+        record: dict[str, Any] = json.loads(source.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError("no such file; expected the JSON half of a solution", str(source)) from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"not a JSON file ({error})", str(source)) from None
+    if record.get("schema") != SCHEMA_VERSION:
+        raise InputError(f"schema {record.get('schema')!r}; expected {SCHEMA_VERSION}", str(source))
+    try:
+        d, order = int(record["dimension"]), int(record["order"])
+        meshes = [meshio.read(path.parent / name) for name in record["files"]]
+        first = meshes[0]
+        cells = first.cells_dict[_CELL_TYPES[d, order]]
+        sides = first.cell_data_dict.get("side", {}).get(_CELL_TYPES[d, order])
+        velocity = [mesh.point_data.get("velocity") for mesh in meshes]
+        return Solution(
+            points=np.ascontiguousarray(first.points[:, :d], dtype=float),
+            cells=cells.astype(np.int64),
+            displacement=np.stack([m.point_data["displacement"][:, :d] for m in meshes]).astype(float),
+            times=np.asarray(record["times"], dtype=float),
+            order=order,
+            cut_facets=np.asarray(record["cut_facets"], dtype=float).reshape(-1, d, d),
+            cell_sides=None if sides is None else np.asarray(sides, dtype=np.int64),
+            velocity=None
+            if any(v is None for v in velocity)
+            else np.stack([v[:, :d] for v in velocity if v is not None]).astype(float),
+            ledger={name: np.asarray(v, dtype=float) for name, v in record["ledger"].items()},
+            quantities=record["quantities"],
+            unknowns=record["unknowns"],
+            size=record["size"],
+            timings=record["timings"],
+            iterations=record["iterations"],
+            regularisations=[Regularisation(**entry) for entry in record["regularisations"]],
+            notes=record["notes"],
+        )
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # meshio exits on unreadable files
+        raise InputError(f"not a readable solution ({type(error).__name__}: {error})", str(source)) from None
+
+
+def _three(field_values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pad vectors (n, 2) to (n, 3), which VTK wants."""
+    vectors = np.zeros((len(field_values), 3))
+    vectors[:, : field_values.shape[1]] = field_values
+    return vectors
+
+
+def _vtu_names(path: Path, steps: int) -> list[str]:
+    if steps == 1:
+        return [f"{path.name}.vtu"]
+    return [f"{path.name}-{step:05d}.vtu" for step in range(steps)]

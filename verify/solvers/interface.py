@@ -1,0 +1,80 @@
+"""The interface that every solver implements, and how a solver is found by its name."""
+
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any, Protocol
+
+from verify.errors import InputError
+from verify.scene import Scene
+from verify.scene.nearest import nearest
+from verify.solution import Solution
+
+__all__ = ["Solver", "find_solver", "solver_names"]
+
+# module:class, imported only when asked for, so that one solver's missing dependency
+# (FEniCSx, say) does not hinder the others
+_BUILT_IN = {
+    "xfem": "verify.solvers.xfem:XfemSolver",
+    "conforming": "verify.solvers.conforming:ConformingSolver",
+    "reference": "verify.solvers.conforming:ReferenceSolver",
+}
+_GROUP = "verify.solvers"
+
+
+class Solver(Protocol):
+    """What a solver must offer. A solver never sees the reference and never grades itself."""
+
+    name: str
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Why this solver cannot do `scene`, in one sentence, or None if it can."""
+        ...
+
+    def levels(self, scene: Scene) -> int:
+        """Number of mesh levels on which it can solve `scene`."""
+        ...
+
+    def solve(
+        self, scene: Scene, level: int, repetitions: int = 1, **parameters: Any
+    ) -> Solution:
+        """Solve `scene` on mesh `level` (0 is the coarsest).
+
+        The first call inside a process compiles; timings of `repetitions` further calls go
+        into ``Solution.timings`` phase by phase.
+
+        Raises
+        ------
+        UnsupportedSceneError
+            If `refuses` would give a reason.
+        InputError
+            If something that the scene names (a mesh file) is bad.
+        """
+        ...
+
+
+def solver_names() -> list[str]:
+    """Names of all solvers: built in, and registered as entry points ``verify.solvers``."""
+    return sorted({*_BUILT_IN, *(point.name for point in entry_points(group=_GROUP))})
+
+
+def find_solver(name: str) -> Solver:
+    """The solver called `name`.
+
+    Raises
+    ------
+    InputError
+        If there is no such solver, or what it needs is not installed.
+    """
+    try:
+        if name in _BUILT_IN:
+            module, _, attribute = _BUILT_IN[name].partition(":")
+            found = getattr(import_module(module), attribute)
+        else:
+            points = {point.name: point for point in entry_points(group=_GROUP)}
+            if name not in points:
+                raise InputError(f"no solver '{name}'{nearest(name, solver_names())}")
+            found = points[name].load()
+    except ImportError as error:
+        raise InputError(f"solver '{name}' needs '{error.name}', which is not installed") from None
+    solver: Solver = found()
+    return solver
