@@ -16,10 +16,13 @@ from verify.scene.loading import (
     list_cases,
     load_scene,
     mesh_path,
+    restore_scene,
+    scene_content,
     scene_hash,
     scene_schema,
 )
 from verify.scene.mesh import MeshLevels, ReferenceLevels
+from verify.scene.mesh_file import read_mesh
 from verify.scene.physics import (
     Analysis,
     BodyForce,
@@ -63,6 +66,9 @@ __all__ = [
     "load_scene",
     "mesh_path",
     "parse_region",
+    "read_mesh",
+    "restore_scene",
+    "scene_content",
     "scene_hash",
     "scene_schema",
 ]

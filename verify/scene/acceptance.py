@@ -18,7 +18,7 @@ __all__ = [
     "ValueCheck",
 ]
 
-Metric = Literal["displacement_l2", "energy_norm", "jump_l2", "strain_energy"]
+METRICS = ("displacement_l2", "energy_norm", "jump_l2", "strain_energy")
 
 
 class StrainEnergyQuantity(Strict):
@@ -47,7 +47,9 @@ class OpeningQuantity(Strict):
     kind: Literal["opening"]
     name: str
     cut: str = "cut"
-    at: float = Field(ge=0.0, le=1.0, description="position as a fraction of the cut's length")
+    at: float = Field(
+        strict=True, ge=0.0, le=1.0, description="position as a fraction of the cut's length"
+    )
     component: Literal["normal", "tangential"] = "normal"
 
 

@@ -44,7 +44,9 @@ class ArcCut(Strict):
     centre: Point2 = Field(description="m")
     radius: Positive = Field(description="m")
     start: Finite = Field(default=0.0, description="angle of the first end, degrees")
-    sweep: float = Field(default=360.0, gt=0.0, le=360.0, description="angle covered, degrees")
+    sweep: float = Field(
+        strict=True, default=360.0, gt=0.0, le=360.0, description="angle covered, degrees"
+    )
     expected: Literal["through", "edge", "inner"] | None = None
     opens_at: NonNegative = Field(default=0.0, description="time at which it opens, s")
 

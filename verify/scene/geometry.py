@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from verify.scene.planar import polygon_defect
 from verify.scene.strict import Point2, Point3, Strict
 
 __all__ = ["Box", "Geometry", "MeshFile", "Polygon", "Rectangle"]
@@ -24,7 +25,9 @@ class Rectangle(Strict):
     @model_validator(mode="after")
     def _has_area(self) -> "Rectangle":
         if not all(b > a for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError(f"upper {self.upper} must exceed lower {self.lower} in both coordinates")
+            raise ValueError(
+                f"upper {self.upper} must exceed lower {self.lower} in both coordinates"
+            )
         return self
 
     @property
@@ -53,8 +56,6 @@ class Polygon(Strict):
 
     @model_validator(mode="after")
     def _is_simple(self) -> "Polygon":
-        from verify.scene.planar import polygon_defect
-
         if self.names is not None and len(self.names) != len(self.corners):
             raise ValueError(f"{len(self.names)} names for {len(self.corners)} edges")
         if defect := polygon_defect(np.array(self.corners, dtype=float)):
@@ -88,7 +89,9 @@ class Box(Strict):
     @model_validator(mode="after")
     def _has_volume(self) -> "Box":
         if not all(b > a for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError(f"upper {self.upper} must exceed lower {self.lower} in all coordinates")
+            raise ValueError(
+                f"upper {self.upper} must exceed lower {self.lower} in all coordinates"
+            )
         return self
 
     @property

@@ -10,14 +10,24 @@ from pydantic import ValidationError
 
 from verify.errors import InputError
 from verify.scene.geometry import MeshFile
+from verify.scene.messages import first_fault
 from verify.scene.nearest import nearest
 from verify.scene.scene import Scene
 
-__all__ = ["case_folder", "list_cases", "load_scene", "scene_hash", "scene_schema"]
+__all__ = [
+    "case_folder",
+    "list_cases",
+    "load_scene",
+    "mesh_path",
+    "restore_scene",
+    "scene_content",
+    "scene_hash",
+    "scene_schema",
+]
 
 
 def case_folder() -> Path:
-    """The folder of the cases that come with the project (installed or in a checkout)."""
+    """Return the folder of the cases that come with the project (installed or in a checkout)."""
     package = Path(__file__).resolve().parent.parent
     installed = package / "_cases"
     return installed if installed.is_dir() else package.parent / "cases"
@@ -27,7 +37,8 @@ def list_cases(folder: Path | None = None) -> dict[str, Path]:
     """Case files below `folder` by name, e.g. ``{"statics/f1_patch": Path(…)}``."""
     root = folder or case_folder()
     return {
-        path.relative_to(root).with_suffix("").as_posix(): path for path in sorted(root.rglob("*.toml"))
+        path.relative_to(root).with_suffix("").as_posix(): path
+        for path in sorted(root.rglob("*.toml"))
     }
 
 
@@ -59,7 +70,7 @@ def load_scene(source: str | Path) -> Scene:
     elif path.resolve().is_relative_to(case_folder().resolve()):
         name = path.resolve().relative_to(case_folder().resolve()).with_suffix("").as_posix()
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError("no such file; expected a case file", str(path)) from None
     except (OSError, UnicodeDecodeError) as error:
@@ -69,10 +80,27 @@ def load_scene(source: str | Path) -> Scene:
     try:
         scene = Scene.model_validate(content)
     except ValidationError as error:
-        raise InputError(_first_line(error, content), str(path)) from None
+        raise InputError(first_fault(error, content, scene_schema()), str(path)) from None
     scene._file, scene._name = path.resolve(), name
     if isinstance(scene.geometry, MeshFile) and not mesh_path(scene).is_file():
         raise InputError(f"geometry.file: no mesh file '{scene.geometry.file}'", str(path))
+    return scene
+
+
+def scene_content(scene: Scene) -> dict[str, Any]:
+    """Write the scene, its name and its file as plain values, for another process."""
+    return {
+        "name": scene.name,
+        "file": str(scene.file) if scene.file else None,
+        "scene": scene.model_dump(mode="json", by_alias=True),
+    }
+
+
+def restore_scene(content: dict[str, Any]) -> Scene:
+    """Read the scene that `scene_content` wrote down."""
+    scene = Scene.model_validate(content["scene"])
+    scene._name = content["name"]
+    scene._file = Path(content["file"]) if content["file"] else None
     return scene
 
 
@@ -95,64 +123,3 @@ def scene_hash(scene: Scene) -> str:
 def scene_schema() -> dict[str, Any]:
     """JSON Schema of a case file, for editors."""
     return Scene.model_json_schema(by_alias=True)
-
-
-def _first_line(error: ValidationError, content: dict[str, Any]) -> str:
-    """The most telling of pydantic's errors as one line: key, what is wrong, what is valid."""
-    found = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-    key = _key(found["loc"], content)
-    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    message = found["msg"].removeprefix("Value error, ")
-    match found["type"]:
-        case "extra_forbidden":
-            valid = _valid_keys(found["loc"][:-1])
-            word = str(found["loc"][-1])
-            return f"{key}: unknown key{nearest(word, valid)}{more}"
-        case "missing":
-            return f"{key}: missing{more}"
-        case "union_tag_not_found":
-            return f"{key}.kind: missing; expected a kind or check{more}"
-        case "union_tag_invalid":
-            tags = [tag.strip(" '") for tag in found["ctx"]["expected_tags"].split(",")]
-            return f"{key}: no kind '{found['ctx']['tag']}'{nearest(found['ctx']['tag'], tags)}{more}"
-        case "value_error":
-            return f"{key}: {message}{more}" if key else f"{message}{more}"
-    return f"{key}: {message[0].lower() + message[1:]}, got {found['input']!r}{more}"
-
-
-def _key(location: tuple[int | str, ...], content: Any) -> str:
-    """``cuts[0].points`` from pydantic's location, without the tags of its unions."""
-    text, inner = "", content
-    for part in location:
-        if isinstance(part, int):
-            text += f"[{part}]"
-            inner = inner[part] if isinstance(inner, list) and part < len(inner) else None
-        elif isinstance(inner, dict) and part in inner:
-            text += f".{part}"
-            inner = inner[part]
-        elif part == location[-1]:
-            text += f".{part}"
-    return text.lstrip(".")
-
-
-def _valid_keys(location: tuple[int | str, ...]) -> list[str]:
-    """Keys that the schema allows at `location`."""
-    schema = scene_schema()
-    node: Any = schema
-    for part in location:
-        node = _resolve(node, schema)
-        if "discriminator" in node and part in node["discriminator"]["mapping"]:
-            node = {"$ref": node["discriminator"]["mapping"][part]}
-        elif isinstance(part, int):
-            node = node.get("items", {})
-        else:
-            node = node.get("properties", {}).get(part, node)
-    return list(_resolve(node, schema).get("properties", {}))
-
-
-def _resolve(node: Any, schema: dict[str, Any]) -> Any:
-    if "anyOf" in node:
-        node = next((n for n in node["anyOf"] if n.get("type") != "null"), node)
-    if "$ref" in node:
-        node = schema["$defs"][node["$ref"].rsplit("/", 1)[-1]]
-    return node

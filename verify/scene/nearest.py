@@ -7,7 +7,7 @@ __all__ = ["nearest"]
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """A phrase to put behind "no such …": the nearest of `words`, or all of them."""
+    """Give a phrase to put behind "no such …": the nearest of `words`, or all of them."""
     known = sorted(words)
     close = get_close_matches(word, known, n=1, cutoff=0.6)
     if close:

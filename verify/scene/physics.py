@@ -24,7 +24,7 @@ class Material(Strict):
     """Homogeneous isotropic elasticity."""
 
     young: Positive = Field(description="Young's modulus E, Pa")
-    poisson: float = Field(gt=-1.0, lt=0.5, description="Poisson's ratio")
+    poisson: float = Field(strict=True, gt=-1.0, lt=0.5, description="Poisson's ratio")
     density: Positive | None = Field(default=None, description="density, kg/m³")
     plane: Literal["strain", "stress"] | None = Field(
         default=None, description="2D only: plane strain or plane stress"
@@ -55,7 +55,7 @@ class Support(Strict):
         return self
 
     def held(self, dimension: int) -> tuple[int, ...]:
-        """Indices of the components held."""
+        """Return the indices of the components held."""
         if self.components is None:
             return tuple(range(dimension))
         return tuple("xyz".index(name) for name in self.components)
@@ -90,7 +90,7 @@ class Exact(Strict):
     """An exact solution by name; it can prescribe supports and loads, and judge results."""
 
     solution: str = Field(description="name; `verify list --exact` shows them")
-    parameters: dict[str, float | list[float] | list[list[float]]] = Field(
+    parameters: dict[str, Finite | list[Finite] | list[list[Finite]]] = Field(
         default_factory=dict, description="parameters of that solution, SI units"
     )
 

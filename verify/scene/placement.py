@@ -4,20 +4,30 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from verify.scene.acceptance import METRICS, DisplacementQuantity, OpeningQuantity
 from verify.scene.cuts import ArcCut, PolygonCut, PolylineCut
 from verify.scene.geometry import MeshFile, Polygon, Rectangle
 from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, Gravity, Traction
-from verify.scene.planar import distance_to_outline, inside_polygon
+from verify.scene.planar import (
+    distance_to_outline,
+    distance_to_polyline,
+    inner_parts,
+    inside_polygon,
+    overlap_length,
+    point_along,
+    polylines_meet,
+)
 from verify.scene.regions import parse_region
 
 if TYPE_CHECKING:
     from verify.scene.scene import Scene
 
-__all__ = ["boundary_condition_names", "check_placement"]
+Array = NDArray[np.float64]
 
-METRICS = ("displacement_l2", "energy_norm", "jump_l2", "strain_energy")
+__all__ = ["boundary_condition_names", "check_placement", "crossing_cuts"]
 
 
 def check_placement(scene: "Scene") -> None:
@@ -26,8 +36,10 @@ def check_placement(scene: "Scene") -> None:
     _check_regions(scene)
     _check_exact(scene)
     _check_names(scene)
-    for cut in scene.cuts:
-        _check_cut(scene, cut)
+    for i, cut in enumerate(scene.cuts):
+        _check_cut(scene, cut, f"cuts[{i}] ('{cut.name}')")
+    _check_overlaps(scene)
+    _check_points(scene)
 
 
 def boundary_condition_names(scene: "Scene") -> tuple[str, ...]:
@@ -44,7 +56,9 @@ def _check_dimensions(scene: "Scene") -> None:
     for cells in scene.mesh.cells or []:
         if len(cells) != d:
             raise ValueError(f"mesh.cells: {list(cells)} has {len(cells)} numbers; expected {d}")
-    if scene.mesh.pattern == "structured" and isinstance(scene.geometry, Polygon | MeshFile):
+    if isinstance(scene.geometry, MeshFile) != (scene.mesh.pattern == "given"):
+        raise ValueError("mesh.pattern: 'given' and a geometry of kind 'file' belong together")
+    if scene.mesh.pattern == "structured" and isinstance(scene.geometry, Polygon):
         raise ValueError(
             "mesh.pattern: only rectangles and boxes have structured meshes; use 'unstructured'"
         )
@@ -112,52 +126,84 @@ def _check_names(scene: "Scene") -> None:
         raise ValueError(f"quantities: names must differ, got {quantities}")
     for i, quantity in enumerate(scene.quantities):
         if quantity.kind == "opening" and quantity.cut not in cuts:
-            raise ValueError(f"quantities[{i}].cut: no cut '{quantity.cut}'{nearest(quantity.cut, cuts)}")
+            raise ValueError(
+                f"quantities[{i}].cut: no cut '{quantity.cut}'{nearest(quantity.cut, cuts)}"
+            )
         if quantity.kind == "displacement" and len(quantity.point) != scene.dimension:
             raise ValueError(f"quantities[{i}].point: expected {scene.dimension} coordinates")
-    known = (*METRICS, *quantities)
+    known = dict.fromkeys((*METRICS, *quantities))
     for i, check in enumerate(scene.acceptance):
         if check.metric not in known:
-            raise ValueError(f"acceptance[{i}].metric: no '{check.metric}'{nearest(check.metric, known)}")
+            raise ValueError(
+                f"acceptance[{i}].metric: no '{check.metric}'{nearest(check.metric, known)}"
+            )
         if check.metric == "jump_l2" and not cuts:
             raise ValueError(f"acceptance[{i}].metric: jump_l2 needs a cut")
         if check.check == "rate" and scene.mesh.count < 2:
             raise ValueError(f"acceptance[{i}]: a rate needs at least two mesh levels")
 
 
-def _check_cut(scene: "Scene", cut: PolylineCut | ArcCut | PolygonCut) -> None:
+def _check_cut(scene: "Scene", cut: PolylineCut | ArcCut | PolygonCut, place: str) -> None:
     if not isinstance(scene.geometry, Rectangle | Polygon) or isinstance(cut, PolygonCut):
         return  # checked against the mesh by the solvers
     outline = scene.geometry.outline()
-    size = float(np.ptp(outline, axis=0).max())
     vertices = cut.vertices()
-    # enough samples that a cut through a corner of the body is not taken for one outside
-    samples = np.concatenate(
-        [a + np.linspace(0, 1, 65)[:, None] * (b - a) for a, b in zip(vertices, vertices[1:], strict=False)]
-    )
-    border = distance_to_outline(samples, outline) <= 1e-9 * size
-    if not (inside_polygon(samples, outline) & ~border).any():
-        place = f"cuts[{scene.cuts.index(cut)}] ('{cut.name}')"
+    if not inner_parts(vertices, outline):
         raise ValueError(f"{place}: lies outside the body or along its boundary; it cuts nothing")
-    ends = vertices[[0, -1]]
-    inner = inside_polygon(ends, outline) & (distance_to_outline(ends, outline) > 1e-9 * size)
-    kind = {0: "through", 1: "edge", 2: "inner"}[int(inner.sum())]
-    if cut.expected and cut.expected != kind and not np.array_equal(ends[0], ends[1]):
-        place = f"cuts[{scene.cuts.index(cut)}] ('{cut.name}')"
+    kind = {0: "through", 1: "edge", 2: "inner"}[int(_inside(vertices[[0, -1]], outline).sum())]
+    if cut.expected and cut.expected != kind and not np.array_equal(vertices[0], vertices[-1]):
         raise ValueError(f"{place}: expected '{cut.expected}' but it is '{kind}'")
+
+
+def _check_overlaps(scene: "Scene") -> None:
+    plane = [cut for cut in scene.cuts if not isinstance(cut, PolygonCut)]
+    for a, b in combinations(plane, 2):
+        length = overlap_length(a.vertices(), b.vertices())
+        if length > 0.0:
+            raise ValueError(
+                f"cuts: '{a.name}' and '{b.name}' lie on each other over {length:.3g} m"
+            )
+
+
+def _check_points(scene: "Scene") -> None:
+    """Quantities are asked for where there is material, and on one side of each cut."""
+    if not isinstance(scene.geometry, Rectangle | Polygon):
+        return
+    outline = scene.geometry.outline()
+    tolerance = 1e-9 * float(np.ptp(outline, axis=0).max())
+    cuts = {cut.name: cut.vertices() for cut in scene.cuts if not isinstance(cut, PolygonCut)}
+    for i, quantity in enumerate(scene.quantities):
+        if isinstance(quantity, DisplacementQuantity):
+            place, point = f"quantities[{i}].point:", np.array([quantity.point], dtype=float)
+        elif isinstance(quantity, OpeningQuantity):
+            place = f"quantities[{i}].at: {quantity.at} of cut '{quantity.cut}' is at"
+            point = point_along(cuts[quantity.cut], quantity.at)[None]
+        else:
+            continue
+        where = f"{place} ({', '.join(f'{x:.6g}' for x in point[0])})"
+        on_boundary = distance_to_outline(point, outline)[0] <= tolerance
+        if not (on_boundary or inside_polygon(point, outline)[0]):
+            raise ValueError(f"{where}, which is not in the body")
+        on_cut = [n for n, v in cuts.items() if distance_to_polyline(point, v)[0] <= tolerance]
+        if isinstance(quantity, DisplacementQuantity) and on_cut:
+            raise ValueError(
+                f"{where} lies on cut '{on_cut[0]}', where the displacement has two values; "
+                "ask for an opening"
+            )
+
+
+def _inside(points: Array, outline: Array) -> NDArray[np.bool_]:
+    """Whether `points` (n, 2) lie inside the body and not on its boundary."""
+    tolerance = 1e-9 * float(np.ptp(outline, axis=0).max())
+    inner: NDArray[np.bool_] = inside_polygon(points, outline)
+    return inner & (distance_to_outline(points, outline) > tolerance)
 
 
 def crossing_cuts(scene: "Scene") -> list[tuple[str, str]]:
     """Pairs of names of plane cuts whose polylines share a point."""
-    from verify.scene.planar import _meet
-
-    pairs = []
-    for a, b in combinations([c for c in scene.cuts if not isinstance(c, PolygonCut)], 2):
-        p, q = a.vertices(), b.vertices()
-        if any(
-            _meet(p[i], p[i + 1], q[j], q[j + 1])
-            for i in range(len(p) - 1)
-            for j in range(len(q) - 1)
-        ):
-            pairs.append((a.name, b.name))
-    return pairs
+    plane = [cut for cut in scene.cuts if not isinstance(cut, PolygonCut)]
+    return [
+        (a.name, b.name)
+        for a, b in combinations(plane, 2)
+        if polylines_meet(a.vertices(), b.vertices())
+    ]

@@ -1,9 +1,21 @@
 """Planar predicates that validation needs: simple polygons, polylines, points inside."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["distance_to_outline", "inside_polygon", "polygon_defect", "polyline_defect"]
+__all__ = [
+    "distance_to_outline",
+    "distance_to_polyline",
+    "inner_parts",
+    "inside_polygon",
+    "overlap_length",
+    "point_along",
+    "polygon_defect",
+    "polyline_defect",
+    "polylines_meet",
+]
 
 Array = NDArray[np.float64]
 
@@ -35,9 +47,7 @@ def inside_polygon(points: Array, corners: Array) -> NDArray[np.bool_]:
     p = points[:, None, :]
     a, b = corners[None], np.roll(corners, -1, axis=0)[None]
     above_a, above_b = a[..., 1] <= p[..., 1], b[..., 1] <= p[..., 1]
-    left = (b[..., 0] - a[..., 0]) * (p[..., 1] - a[..., 1]) - (p[..., 0] - a[..., 0]) * (
-        b[..., 1] - a[..., 1]
-    )
+    left = _cross(b - a, p - a)
     winding = np.sum(above_a & ~above_b & (left > 0), axis=1) - np.sum(
         ~above_a & above_b & (left < 0), axis=1
     )
@@ -46,11 +56,89 @@ def inside_polygon(points: Array, corners: Array) -> NDArray[np.bool_]:
 
 def distance_to_outline(points: Array, corners: Array) -> Array:
     """Distance (n,) of each of `points` (n, 2) to the closed outline `corners` (k, 2)."""
-    a, b = corners[None], np.roll(corners, -1, axis=0)[None]
-    edge = b - a
-    p = points[:, None, :] - a
+    return _distance(points, corners, np.roll(corners, -1, axis=0))
+
+
+def distance_to_polyline(points: Array, vertices: Array) -> Array:
+    """Distance (n,) of each of `points` (n, 2) to the polyline `vertices` (k, 2)."""
+    return _distance(points, vertices[:-1], vertices[1:])
+
+
+def point_along(vertices: Array, fraction: float) -> Array:
+    """Find the point (2,) at `fraction` of the length of the polyline `vertices` (k, 2)."""
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1))])
+    where = fraction * lengths[-1]
+    return np.array([np.interp(where, lengths, vertices[:, c]) for c in range(2)])
+
+
+def inner_parts(vertices: Array, corners: Array) -> list[tuple[Array, Array]]:
+    """Find the parts of a polyline that lie inside a polygon and not along its boundary.
+
+    Parameters
+    ----------
+    vertices : (n, 2) array
+        The polyline.
+    corners : (k, 2) array
+        The polygon.
+
+    Returns
+    -------
+    list of (start, end)
+        Straight parts in the order of the polyline.
+    """
+    tolerance = 1e-9 * float(np.ptp(corners, axis=0).max())
+    edges = np.roll(corners, -1, axis=0) - corners
+    parts = []
+    for a, b in pairwise(vertices):
+        direction, offset = b - a, corners - a
+        det = _cross(direction, edges)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = _cross(offset, edges) / det
+            t = _cross(offset, direction) / det
+        # corners too, for segments that run along an edge and leave it there
+        along = offset @ direction / (direction @ direction)
+        stops = np.concatenate([s[(t >= 0) & (t <= 1)], along, [0.0, 1.0]])
+        stops = np.unique(stops[(stops >= 0) & (stops <= 1)])
+        middle = a + (0.5 * (stops[1:] + stops[:-1]))[:, None] * direction
+        inside = inside_polygon(middle, corners)
+        inside &= distance_to_outline(middle, corners) > tolerance
+        parts += [
+            (a + stops[i] * direction, a + stops[i + 1] * direction) for i in np.flatnonzero(inside)
+        ]
+    return parts
+
+
+def polylines_meet(p: Array, q: Array) -> bool:
+    """Whether the polylines `p` (n, 2) and `q` (m, 2) share a point."""
+    return any(bool(_meet(a, b, q[:-1], q[1:]).any()) for a, b in pairwise(p))
+
+
+def overlap_length(p: Array, q: Array) -> float:
+    """Length over which the polylines `p` (n, 2) and `q` (m, 2) lie on each other."""
+    scale = float(np.ptp(np.vstack([p, q]), axis=0).max())
+    total = 0.0
+    for a, b in pairwise(p):
+        length = float(np.linalg.norm(b - a))
+        u = (b - a) / length
+        off = np.maximum(np.abs(_cross(u, q[:-1] - a)), np.abs(_cross(u, q[1:] - a)))
+        s, e = (q[:-1] - a) @ u, (q[1:] - a) @ u
+        shared = np.clip(np.maximum(s, e), 0, length) - np.clip(np.minimum(s, e), 0, length)
+        total += float(shared[off <= 1e-12 * scale].sum())
+    return total
+
+
+def _cross(u: Array, v: Array) -> Array:
+    cross: Array = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    return cross
+
+
+def _distance(points: Array, starts: Array, ends: Array) -> Array:
+    """Distance (n,) of points (n, 2) to the nearest of the segments (k, 2)–(k, 2)."""
+    edge = (ends - starts)[None]
+    p = points[:, None, :] - starts[None]
     t = np.clip(np.sum(p * edge, axis=2) / np.sum(edge * edge, axis=2), 0.0, 1.0)
-    return np.linalg.norm(p - t[..., None] * edge, axis=2).min(axis=1)
+    nearest: Array = np.linalg.norm(p - t[..., None] * edge, axis=2).min(axis=1)
+    return nearest
 
 
 def _segments_defect(points: Array, closed: bool) -> str | None:
@@ -60,35 +148,37 @@ def _segments_defect(points: Array, closed: bool) -> str | None:
     if short.size:
         return f"repeats point {int(short[0])} {tuple(points[short[0]].tolist())}"
     n = len(lengths)
-    for i in range(n):
-        for j in range(i + 1, n):
-            neighbours = j == i + 1 or (closed and i == 0 and j == n - 1)
-            if neighbours:
-                if _folds_back(points, i, j, n):
-                    return f"folds back onto itself between segments {i} and {j}"
-            elif _meet(points[i], points[i + 1], points[j], points[j + 1]):
-                return f"intersects itself (segments {i} and {j})"
+    for i in range(n - 1):
+        if _folds_back(points[i : i + 3]):
+            return f"folds back onto itself between segments {i} and {i + 1}"
+        last = n - 1 if closed and i == 0 else n  # the closing segment is a neighbour too
+        met = _meet(points[i], points[i + 1], points[i + 2 : last], points[i + 3 : last + 1])
+        if met.any():
+            return f"intersects itself (segments {i} and {i + 2 + int(np.argmax(met))})"
+    if closed and _folds_back(np.array([points[n - 1], points[0], points[1]])):
+        return f"folds back onto itself between segments {n - 1} and 0"
     return None
 
 
-def _folds_back(points: Array, i: int, j: int, n: int) -> bool:
-    first, second = (i, j) if j == i + 1 else (n - 1, 0)
-    u = points[first + 1] - points[first]
-    v = points[second + 1] - points[second]
-    cross = u[0] * v[1] - u[1] * v[0]
-    return bool(np.dot(u, v) < 0 and abs(cross) <= 1e-12 * np.linalg.norm(u) * np.linalg.norm(v))
+def _folds_back(points: Array) -> bool:
+    """Whether the path through three points turns by half a turn at the second."""
+    u, v = points[1] - points[0], points[2] - points[1]
+    size = float(np.linalg.norm(u) * np.linalg.norm(v))
+    return bool(np.dot(u, v) < 0 and abs(float(_cross(u, v))) <= 1e-12 * size)
 
 
-def _meet(a: Array, b: Array, c: Array, d: Array) -> bool:
-    """Whether segments ab and cd share a point (end points included)."""
+def _meet(a: Array, b: Array, c: Array, d: Array) -> NDArray[np.bool_]:
+    """Whether segment ab shares a point with each of the segments c (m, 2) – d (m, 2)."""
     u, v, w = b - a, d - c, c - a
-    scale = float(np.linalg.norm(u) * np.linalg.norm(v))
-    det = u[0] * v[1] - u[1] * v[0]
-    if abs(det) > 1e-14 * scale:
-        s = (w[0] * v[1] - w[1] * v[0]) / det
-        t = (w[0] * u[1] - w[1] * u[0]) / det
-        return bool(-1e-12 <= s <= 1 + 1e-12 and -1e-12 <= t <= 1 + 1e-12)
-    if abs(w[0] * u[1] - w[1] * u[0]) > 1e-12 * np.linalg.norm(u) * max(np.linalg.norm(w), 1e-300):
-        return False
-    along = sorted((float(np.dot(c - a, u)), float(np.dot(d - a, u))))
-    return along[0] <= float(np.dot(u, u)) and along[1] >= 0.0
+    size = np.linalg.norm(u) * np.linalg.norm(v, axis=1)
+    det = _cross(u, v)
+    parallel = np.abs(det) <= 1e-14 * size
+    safe = np.where(parallel, 1.0, det)
+    s, t = _cross(w, v) / safe, _cross(w, u) / safe
+    crossing = (s >= -1e-12) & (s <= 1 + 1e-12) & (t >= -1e-12) & (t <= 1 + 1e-12)
+    reach = np.maximum(np.linalg.norm(w, axis=1), np.linalg.norm(v, axis=1))
+    on_line = np.abs(_cross(w, u)) <= 1e-12 * np.linalg.norm(u) * reach
+    first, second = w @ u, (d - a) @ u
+    touching = (np.minimum(first, second) <= u @ u) & (np.maximum(first, second) >= 0.0)
+    met: NDArray[np.bool_] = np.where(parallel, on_line & touching, crossing)
+    return met

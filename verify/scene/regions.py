@@ -62,12 +62,16 @@ def parse_region(text: str, dimension: int) -> Region:
     """
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-    except SyntaxError:
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise InputError(f"'{text}' is not {_MEANING}") from None
-    _check_condition(tree, text, dimension)
+    try:
+        _check_condition(tree, text, dimension)
+    except RecursionError:
+        raise InputError(f"the inequality is nested too deep; expected {_MEANING}") from None
 
     def region(points: Array) -> NDArray[np.bool_]:
-        values = _condition(tree, np.asarray(points, dtype=float))
+        with np.errstate(all="ignore"):  # sqrt of a negative number is nan, which is not < 1
+            values = _condition(tree, np.asarray(points, dtype=float))
         return np.broadcast_to(values, (len(points),)).astype(bool)
 
     return region
@@ -97,7 +101,7 @@ def _check_number(node: ast.AST, text: str, dimension: int) -> None:
     match node:
         case ast.Constant(value=bool()):
             raise _reject(node, text)
-        case ast.Constant(value=int() | float()):
+        case ast.Constant(value=int() | float() as value) if abs(value) <= 1e300:
             pass
         case ast.Name(id=name) if name in (*_COORDINATES[:dimension], "pi"):
             pass
@@ -138,8 +142,8 @@ def _number(node: ast.AST, points: Array) -> Array:
         case ast.Name(id=name):
             return points[:, _COORDINATES.index(name)]
         case ast.UnaryOp(op=op, operand=operand):
-            value = _number(operand, points)
-            return -value if isinstance(op, ast.USub) else value
+            inner = _number(operand, points)
+            return -inner if isinstance(op, ast.USub) else inner
         case ast.BinOp(left=left, op=op, right=right):
             return _ARITHMETIC[type(op)](_number(left, points), _number(right, points))
         case ast.Call(func=ast.Name(id=name), args=arguments):

@@ -11,18 +11,22 @@ from verify.scene.geometry import Geometry
 from verify.scene.mesh import MeshLevels, ReferenceLevels
 from verify.scene.physics import Analysis, Exact, Load, Material, Support
 from verify.scene.placement import check_placement
-from verify.scene.strict import Strict
+from verify.scene.strict import Line, Strict
 
 __all__ = ["Scene"]
+
+
+def _strain_energy_only() -> list[Quantity]:
+    return [StrainEnergyQuantity(kind="strain_energy")]
 
 
 class Scene(Strict):
     """One case. Solver-neutral: it says what is asked, never how a solver shall do it."""
 
     schema_: Literal[1] = Field(default=1, alias="schema", description="version of this schema")
-    title: str = Field(description="one line")
-    requirement: str = Field(description="what shall hold, in one sentence")
-    tags: list[str] = Field(default_factory=list, description="e.g. demo, quick, heavy")
+    title: Line = Field(description="one line")
+    requirement: Line = Field(description="what shall hold, in one sentence")
+    tags: list[Line] = Field(default_factory=list, description="e.g. demo, quick, heavy")
     geometry: Geometry
     mesh: MeshLevels
     material: Material
@@ -33,7 +37,7 @@ class Scene(Strict):
     analysis: Analysis = Field(default_factory=Analysis)
     reference: ReferenceLevels = Field(default_factory=ReferenceLevels)
     quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
-        default_factory=lambda: [StrainEnergyQuantity(kind="strain_energy")]
+        default_factory=_strain_energy_only
     )
     acceptance: list[Acceptance] = Field(default_factory=list)
 

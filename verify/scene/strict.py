@@ -4,11 +4,24 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Finite", "NonNegative", "Point2", "Point3", "Positive", "Strict", "Vector"]
+__all__ = [
+    "Count",
+    "Finite",
+    "Line",
+    "NonNegative",
+    "Point2",
+    "Point3",
+    "Positive",
+    "Strict",
+    "Vector",
+]
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+# `strict`: a number is a number; "1e4" and true are not
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True, ge=1)]
+Line = Annotated[str, Field(min_length=1, pattern=r"^[^\r\n]*$")]
 Point2 = tuple[Finite, Finite]
 Point3 = tuple[Finite, Finite, Finite]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
@@ -17,4 +30,4 @@ Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
 class Strict(BaseModel):
     """A part of a scene. Unknown keys are refused; values do not change after validation."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)

@@ -1,0 +1,85 @@
+"""Reading the mesh file of a scene: simplices in any format that meshio knows."""
+
+import contextlib
+import io
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+from verify.scene.geometry import MeshFile
+from verify.scene.loading import mesh_path
+from verify.scene.scene import Scene
+
+__all__ = ["read_mesh"]
+
+_SIMPLEX = {2: "triangle", 3: "tetra"}
+_BELOW = {2: {"vertex", "line"}, 3: {"vertex", "line", "triangle"}}  # parts, which are not used
+
+
+def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Read the mesh file of a scene whose geometry is one.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a geometry of kind ``file``.
+
+    Returns
+    -------
+    points : (n, d) array
+        Nodes that some cell uses, m.
+    cells : (m, d + 1) array
+        Simplices of positive orientation.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable, not simplicial, or degenerate.
+    """
+    import meshio
+
+    assert isinstance(scene.geometry, MeshFile)
+    path, d = mesh_path(scene), scene.dimension
+    if not path.is_file():
+        raise InputError(f"geometry.file: no mesh file '{path}'", str(scene.file or ""))
+    try:
+        # meshio reports some bad files by printing and leaving the interpreter
+        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+            mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:
+        why = str(error).strip().splitlines()
+        reason = f"{type(error).__name__}{': ' + why[0] if why and why[0] != '1' else ''}"
+        raise InputError(f"not a mesh that meshio can read ({reason})", str(path)) from None
+    kinds = {block.type for block in mesh.cells if len(block.data)}
+    strange = kinds - _BELOW[d] - {_SIMPLEX[d]}
+    if strange or _SIMPLEX[d] not in kinds:
+        found = ", ".join(sorted(strange or kinds)) or "no cells"
+        raise InputError(f"not simplicial: has {found}; expected {_SIMPLEX[d]}s", str(path))
+    if d == 2 and mesh.points.shape[1] == 3 and np.ptp(mesh.points[:, 2]) > 0:
+        raise InputError("not plane: its z coordinates differ", str(path))
+    points = np.ascontiguousarray(mesh.points[:, :d], dtype=float)
+    cells = mesh.cells_dict[_SIMPLEX[d]].astype(np.int64)
+    if cells.min() < 0 or cells.max() >= len(points):
+        raise InputError(f"a cell names a node outside 0..{len(points) - 1}", str(path))
+    used, compact = np.unique(cells, return_inverse=True)
+    points, cells = points[used], compact.reshape(cells.shape).astype(np.int64)
+    if not np.isfinite(points).all():
+        raise InputError("has coordinates that are not finite", str(path))
+    return points, _oriented(points, cells, str(path))
+
+
+def _oriented(
+    points: NDArray[np.float64], cells: NDArray[np.int64], where: str
+) -> NDArray[np.int64]:
+    """Swap two corners of every cell of negative orientation; refuse cells without volume."""
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    volume = np.linalg.det(edges)
+    size = np.linalg.norm(edges, axis=2).max(axis=1) ** points.shape[1]
+    flat = np.flatnonzero(~(np.abs(volume) > 1e-14 * size))
+    if flat.size:
+        raise InputError(f"{flat.size} cells without volume, first cell {flat[0]}", where)
+    cells = cells.copy()
+    negative = volume < 0
+    cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()
+    return cells

@@ -1,0 +1,139 @@
+"""What is wrong with a case file, in one line: the key, the fault, what is valid there."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import ValidationError
+
+from verify.scene.nearest import nearest
+
+__all__ = ["first_fault"]
+
+
+def first_fault(error: ValidationError, content: dict[str, Any], schema: dict[str, Any]) -> str:
+    """Say the most telling of pydantic's errors in one line.
+
+    Parameters
+    ----------
+    error : ValidationError
+    content : dict
+        What was validated, as read from the file.
+    schema : dict
+        JSON Schema of it, for the valid keys.
+    """
+    faults = error.errors()
+    # a misspelt key is usually also a missing one: the misspelling is what to mend
+    found = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
+    key = _key(found, content)
+    same = [fault for fault in faults if _key(fault, content) == key]
+    others = len({_key(fault, content) for fault in faults} - {key})
+    more = f" (and {others} more)" if others else ""
+    return f"{_sentence(found, same, key, schema)}{more}"
+
+
+def _sentence(found: Any, same: list[Any], key: str, schema: dict[str, Any]) -> str:
+    match found["type"]:
+        case "extra_forbidden":
+            valid = _valid_keys(found["loc"][:-1], schema)
+            return f"{key}: unknown key{nearest(str(found['loc'][-1]), valid)}"
+        case "missing":
+            return f"{key}: missing"
+        case "union_tag_not_found":
+            tag = found["ctx"]["discriminator"].strip("'")
+            return f"{key}.{tag}: missing{_tags(found, schema)}"
+        case "union_tag_invalid":
+            tag = found["ctx"]["discriminator"].strip("'")
+            return f"{key}.{tag}: no '{found['ctx']['tag']}'{_tags(found, schema)}"
+        case "value_error":
+            message = found["msg"].removeprefix("Value error, ")
+            return f"{key}: {message}" if key else message
+    wanted = " or ".join(dict.fromkeys(_wanted(fault) for fault in same))
+    return f"{key}: expected {wanted}, got {_shown(found['input'])}"
+
+
+def _tags(found: Any, schema: dict[str, Any]) -> str:
+    """Name the valid tags of a union, or the nearest one."""
+    given = str(found["ctx"].get("tag", ""))
+    if "expected_tags" in found["ctx"]:
+        tags = [tag.strip(" '") for tag in found["ctx"]["expected_tags"].split(",")]
+    else:
+        node = _node(found["loc"], schema)
+        tags = list(node.get("discriminator", {}).get("mapping", {}))
+    return nearest(given, tags)
+
+
+def _wanted(fault: Any) -> str:
+    """Say what pydantic expected in words of a case file (it speaks of tuples)."""
+    context = fault.get("ctx", {})
+    match fault["type"]:
+        case "float_type" | "finite_number":
+            return "a finite number"
+        case "int_type" | "int_from_float":
+            return "a whole number"
+        case "string_type":
+            return "a text in quotes"
+        case "string_too_short" | "string_pattern_mismatch":
+            return "one line of text"
+        case "list_type" | "tuple_type":
+            table = isinstance(fault["input"], dict)
+            return "a list of tables ([[…]], not […])" if table else "a list in brackets"
+        case "dict_type" | "model_type" | "model_attributes_type":
+            return "a table of keys"
+        case "too_short":
+            return f"at least {context['min_length']} entries"
+        case "too_long":
+            return f"at most {context['max_length']} entries"
+        case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
+            sign = {"greater_than": ">", "greater_than_equal": "≥", "less_than": "<"}
+            return f"a number {sign.get(fault['type'], '≤')} {next(iter(context.values())):g}"
+        case "literal_error":
+            return str(context["expected"])
+    return str(fault["msg"]).removeprefix("Input should be ")
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"
+
+
+def _key(fault: Any, content: Any) -> str:
+    """``cuts[0].points`` from pydantic's location, without the tags of its unions."""
+    location = fault["loc"]
+    text, inner = "", content
+    for part in location:
+        if isinstance(part, int):
+            text += f"[{part}]"
+            inner = inner[part] if isinstance(inner, list) and part < len(inner) else None
+        elif isinstance(inner, dict) and part in inner:
+            text += f".{part}"
+            inner = inner[part]
+        elif part == location[-1] and fault["type"] == "missing":
+            text += f".{part}"
+    return text.lstrip(".")
+
+
+def _valid_keys(location: Iterable[int | str], schema: dict[str, Any]) -> list[str]:
+    """Keys that the schema allows at `location`."""
+    return list(_node(location, schema).get("properties", {}))
+
+
+def _node(location: Iterable[int | str], schema: dict[str, Any]) -> dict[str, Any]:
+    """Find the part of the schema that describes `location`."""
+    node = schema
+    for part in location:
+        node = _resolved(node, schema)
+        if "discriminator" in node and part in node["discriminator"]["mapping"]:
+            node = {"$ref": node["discriminator"]["mapping"][part]}
+        elif isinstance(part, int):
+            node = node.get("items", {})
+        else:
+            node = node.get("properties", {}).get(part, node)
+    return _resolved(node, schema)
+
+
+def _resolved(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
+    if "anyOf" in node:
+        node = next((n for n in node["anyOf"] if n.get("type") != "null"), node)
+    if "$ref" in node:
+        node = schema["$defs"][node["$ref"].rsplit("/", 1)[-1]]
+    return node
