@@ -1,0 +1,118 @@
+"""Compiled loops over virtual cells: stiffness into its place, and forces without a matrix.
+
+With b_i the gradient of shape function i and w the volume of the piece,
+K_ij = w (λ b_i b_jᵀ + μ b_j b_iᵀ + μ (b_i·b_j) I), the same for every dimension.
+"""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["add_stiffness", "constrain", "linear_force"]
+
+
+@njit(cache=True)
+def add_stiffness(targets, gradients, parent, volumes, lam, mu, blocks):  # type: ignore[no-untyped-def]
+    """Add the stiffness of all pieces to `blocks` (B, d, d).
+
+    Parameters
+    ----------
+    targets : (p, c, c) int array
+    gradients : (m, c, d) float array
+        Of the cells of the uncut mesh, in 1/m.
+    parent : (p,) int array
+    volumes : (p,) float array
+        Volumes of the pieces.
+    lam, mu : (m,) float array
+        Lamé parameters of the cells of the uncut mesh.
+    blocks : (B, d, d) float array
+        Added to.
+    """
+    count, corners, _ = targets.shape
+    dim = gradients.shape[2]
+    for piece in range(count):
+        cell = parent[piece]
+        b = gradients[cell]
+        wl = volumes[piece] * lam[cell]
+        wm = volumes[piece] * mu[cell]
+        for i in range(corners):
+            for j in range(i, corners):
+                dot = 0.0
+                for k in range(dim):
+                    dot += b[i, k] * b[j, k]
+                upper = blocks[targets[piece, i, j]]
+                lower = blocks[targets[piece, j, i]]
+                for k in range(dim):
+                    for l in range(dim):
+                        value = wl * b[i, k] * b[j, l] + wm * b[j, k] * b[i, l]
+                        if k == l:
+                            value += wm * dot
+                        upper[k, l] += value
+                        if i != j:
+                            lower[l, k] += value
+
+
+@njit(cache=True)
+def linear_force(cells, gradients, parent, volumes, lam, mu, displacement, force):  # type: ignore[no-untyped-def]
+    """Add the internal force K u (N, d) of the displacement (N, d) to `force`; return ½ uᵀKu."""
+    count, corners = cells.shape
+    dim = gradients.shape[2]
+    gradient = np.empty((dim, dim))
+    stress = np.empty((dim, dim))
+    energy = 0.0
+    for piece in range(count):
+        cell = parent[piece]
+        b = gradients[cell]
+        gradient[:] = 0.0
+        for i in range(corners):
+            u = displacement[cells[piece, i]]
+            for k in range(dim):
+                for l in range(dim):
+                    gradient[k, l] += u[k] * b[i, l]
+        trace = 0.0
+        for k in range(dim):
+            trace += gradient[k, k]
+        density = 0.0
+        for k in range(dim):
+            for l in range(dim):
+                stress[k, l] = mu[cell] * (gradient[k, l] + gradient[l, k])
+            stress[k, k] += lam[cell] * trace
+        for k in range(dim):
+            for l in range(dim):
+                density += 0.5 * stress[k, l] * gradient[k, l]
+        energy += volumes[piece] * density
+        for i in range(corners):
+            f = force[cells[piece, i]]
+            for k in range(dim):
+                total = 0.0
+                for l in range(dim):
+                    total += stress[k, l] * b[i, l]
+                f[k] += volumes[piece] * total
+    return energy
+
+
+@njit(cache=True)
+def constrain(starts, columns, fixed, blocks):  # type: ignore[no-untyped-def]
+    """Decouple the fixed components: zero their rows and columns but for the diagonal.
+
+    Parameters
+    ----------
+    starts, columns : int arrays
+        Pattern of the blocks.
+    fixed : (N, d) bool array
+    blocks : (B, d, d) float array
+        Changed in place; the diagonal entries stay, so that scaling stays meaningful.
+    """
+    dim = fixed.shape[1]
+    constrained = np.zeros(len(fixed), dtype=np.bool_)
+    for node in range(len(fixed)):
+        for k in range(dim):
+            constrained[node] |= fixed[node, k]
+    for row in range(len(starts) - 1):
+        for at in range(starts[row], starts[row + 1]):
+            column = columns[at]
+            if not (constrained[row] or constrained[column]):
+                continue
+            for k in range(dim):
+                for l in range(dim):
+                    if (fixed[row, k] or fixed[column, l]) and not (row == column and k == l):
+                        blocks[at, k, l] = 0.0

@@ -1,0 +1,174 @@
+"""What a cut is, and the cuts without curvature: plane and planar polygon.
+
+A cut is a geometric object in the material frame. The solver asks it two things only:
+
+``level_set(points)``
+    Signed distance φ in metres, positive on the side of the normal, extended past the ends of
+    the cut along its tangent there.
+``depth(points)``
+    How far inside the ends of the cut a point of its (extended) zero set lies, in metres:
+    positive inside, negative past an end, infinite where there is no end.
+
+One nodal φ per cut, interpolated linearly, makes the realised cut planar in every element and the
+same on shared faces.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+
+__all__ = ["Cut", "ImplicitCut", "Plane", "PolygonPatch"]
+
+_Floats = NDArray[np.float64]
+
+
+class Cut(Protocol):
+    """A surface (3D) or curve (2D) that separates material."""
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Signed distance (n,) of points (n, d), in metres."""
+        ...
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Distance (n,) to the nearest end of the cut, negative past it, in metres."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane (3D) or straight line (2D) without end.
+
+    Parameters
+    ----------
+    point : (d,) array_like
+        A point of the plane, in metres.
+    normal : (d,) array_like
+        Normal of any length; it points to the positive side.
+
+    Raises
+    ------
+    XfemError
+        If the normal vanishes, or shapes do not match.
+    """
+
+    point: _Floats
+    normal: _Floats
+
+    def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
+        origin, direction = np.asarray(point, dtype=float), np.asarray(normal, dtype=float)
+        if origin.shape != direction.shape or origin.shape not in ((2,), (3,)):
+            raise XfemError(f"plane with point {origin.tolist()}, normal {direction.tolist()}")
+        length = np.linalg.norm(direction)
+        if not np.isfinite(origin).all() or not np.isfinite(length) or length == 0.0:
+            raise XfemError(f"plane with normal {direction.tolist()}; expected a non-zero vector")
+        object.__setattr__(self, "point", origin)
+        object.__setattr__(self, "normal", direction / length)
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Signed distance to the plane."""
+        return (points - self.point) @ self.normal
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Infinite: a plane has no end."""
+        return np.full(len(points), np.inf)
+
+
+@dataclass(frozen=True)
+class ImplicitCut:
+    """A cut given by its level set, e.g. an exact circle.
+
+    Parameters
+    ----------
+    function : callable
+        Level set (n,) of points (n, d), in metres; near the cut it should be a distance.
+    extent : callable, optional
+        `Cut.depth`; without it the cut has no end.
+    """
+
+    function: Callable[[_Floats], _Floats]
+    extent: Callable[[_Floats], _Floats] | None = None
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """The given function."""
+        return np.asarray(self.function(points), dtype=float)
+
+    def depth(self, points: _Floats) -> _Floats:
+        """The given extent."""
+        if self.extent is None:
+            return np.full(len(points), np.inf)
+        return np.asarray(self.extent(points), dtype=float)
+
+
+@dataclass(frozen=True)
+class PolygonPatch:
+    """A flat polygon in space; its level set is that of its plane.
+
+    Parameters
+    ----------
+    corners : (k, 3) array_like
+        Corners in order, in metres; they turn anticlockwise seen from the positive side.
+
+    Raises
+    ------
+    XfemError
+        If there are fewer than three corners, no area, or the corners are not in one plane.
+    """
+
+    corners: _Floats
+    plane: Plane
+
+    def __init__(self, corners: ArrayLike) -> None:
+        polygon = np.asarray(corners, dtype=float)
+        if polygon.ndim != 2 or polygon.shape[1] != 3 or len(polygon) < 3:
+            raise XfemError(f"polygon of shape {polygon.shape}; expected (k, 3) with k ≥ 3")
+        spokes = polygon - polygon[0]
+        normal = np.cross(spokes[1:-1], spokes[2:]).sum(axis=0)
+        size = np.linalg.norm(spokes, axis=1).max()
+        if not np.linalg.norm(normal) > 1e-12 * size**2:
+            raise XfemError("polygon without area")
+        plane = Plane(polygon[0], normal)
+        off = np.abs(plane.level_set(polygon)).max()
+        if off > 1e-9 * size:
+            raise XfemError(f"polygon is not flat: a corner is {off:.3g} m off its plane")
+        object.__setattr__(self, "corners", polygon)
+        object.__setattr__(self, "plane", plane)
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Signed distance to the plane of the polygon."""
+        return self.plane.level_set(points)
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Distance to the outline in the plane, negative outside."""
+        first, second = _tangents(self.plane.normal)
+        axes = np.stack([first, second], axis=1)
+        return _outline_depth((points - self.plane.point) @ axes, self._outline(axes))
+
+    def _outline(self, axes: _Floats) -> _Floats:
+        return (self.corners - self.plane.point) @ axes
+
+
+def _tangents(normal: _Floats) -> tuple[_Floats, _Floats]:
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(normal, helper)
+    first /= np.linalg.norm(first)
+    return first, np.cross(normal, first)
+
+
+def _outline_depth(points: _Floats, outline: _Floats) -> _Floats:
+    """Signed distance to a closed polygon in the plane, positive inside."""
+    start, end = outline, np.roll(outline, -1, axis=0)
+    along = end - start
+    to_point = points[:, None, :] - start
+    share = np.clip((to_point * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
+    distance = np.linalg.norm(to_point - share[..., None] * along, axis=-1).min(axis=1)
+    # even-odd rule with half-open edges
+    crosses = (start[:, 1] <= points[:, None, 1]) != (end[:, 1] <= points[:, None, 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = start[:, 0] + along[:, 0] * to_point[..., 1] / along[:, 1]
+    inside = (crosses & (points[:, None, 0] < at)).sum(axis=1) % 2 == 1
+    return np.where(inside, distance, -distance)

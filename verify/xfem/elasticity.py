@@ -1,0 +1,59 @@
+"""Isotropic linear elasticity: Lamé parameters of plane strain, plane stress and solids."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+
+__all__ = ["Material", "State", "isotropic"]
+
+State = Literal["plane strain", "plane stress", "solid"]
+
+
+@dataclass(frozen=True)
+class Material:
+    """σ = λ tr(ε) I + 2 μ ε, with the λ that suits the state.
+
+    Attributes
+    ----------
+    lam, mu : (m,) or () float array
+        Lamé parameters in pascal, for all cells of the uncut mesh or one for each.
+    """
+
+    lam: NDArray[np.float64]
+    mu: NDArray[np.float64]
+
+
+def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
+    """Lamé parameters from Young's modulus and Poisson's ratio.
+
+    Parameters
+    ----------
+    young : float or (m,) array_like
+        Young's modulus in pascal.
+    poisson : float or (m,) array_like
+        Poisson's ratio, in (−1, ½); in plane stress in (−1, 1).
+    state : {"plane strain", "plane stress", "solid"}
+        In plane stress λ becomes 2λμ/(λ + 2μ) = Eν/(1 − ν²).
+
+    Raises
+    ------
+    XfemError
+        If a parameter is outside its bounds or the state is unknown.
+    """
+    E, nu = np.asarray(young, dtype=float), np.asarray(poisson, dtype=float)
+    if state not in ("plane strain", "plane stress", "solid"):
+        raise XfemError(f"state '{state}'; expected plane strain, plane stress or solid")
+    if not (np.isfinite(E).all() and (E > 0.0).all()):
+        raise XfemError(f"Young's modulus {E.min():g} Pa; expected positive and finite")
+    bound = 1.0 if state == "plane stress" else 0.5
+    if not ((nu > -1.0) & (nu < bound)).all():
+        worst = nu.flat[int(np.argmax(np.abs(nu)))]
+        raise XfemError(f"Poisson's ratio {worst:g}; expected within (-1, {bound:g}) in {state}")
+    mu = E / (2.0 * (1.0 + nu))
+    if state == "plane stress":
+        return Material(E * nu / (1.0 - nu**2), mu)
+    return Material(E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), mu)

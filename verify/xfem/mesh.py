@@ -1,0 +1,152 @@
+"""Simplicial meshes: triangles in the plane, triangles in space, tetrahedra.
+
+The dimension is a number, not a case: ``dim`` is that of the simplex, ``space`` that of its
+points, and every formula below holds for any of them.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import factorial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+
+__all__ = ["SimplexMesh"]
+
+# A cell whose volume is below this fraction of (longest edge)^dim is called degenerate: its
+# gradients would lose all digits.
+_DEGENERATE = 1e-14
+
+
+@dataclass(frozen=True)
+class SimplexMesh:
+    """A mesh of simplices.
+
+    Parameters
+    ----------
+    points : (n, space) array_like of float
+        Node coordinates, in metres.
+    cells : (m, dim + 1) array_like of int
+        Nodes of each simplex, in any orientation.
+
+    Raises
+    ------
+    XfemError
+        If shapes or indices are wrong, a coordinate is not finite, a cell is degenerate, a node
+        belongs to no cell, or a facet is shared by more than two cells.
+    """
+
+    points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+
+    def __init__(self, points: ArrayLike, cells: ArrayLike) -> None:
+        coordinates = np.ascontiguousarray(points, dtype=np.float64)
+        nodes = np.ascontiguousarray(cells)
+        _check(coordinates, nodes)
+        object.__setattr__(self, "points", coordinates)
+        object.__setattr__(self, "cells", nodes.astype(np.int64, copy=False))
+        longest = np.linalg.norm(self.edge_vectors, axis=2).max(axis=1)
+        flat = self.measures <= _DEGENERATE * longest**self.dim
+        if flat.any():
+            where = int(np.argmax(flat))
+            raise XfemError(
+                f"cell {where} (nodes {self.cells[where].tolist()}) is degenerate: measure "
+                f"{self.measures[where]:.3g} with edges up to {longest[where]:.3g}"
+            )
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the simplices: 2 or 3."""
+        return self.cells.shape[1] - 1
+
+    @property
+    def space(self) -> int:
+        """Dimension of the points; ``dim``, or ``dim + 1`` for a membrane."""
+        return self.points.shape[1]
+
+    @property
+    def edge_vectors(self) -> NDArray[np.float64]:
+        """(m, dim, space) vectors from the first node of a cell to the others."""
+        corners = self.points[self.cells]
+        return corners[:, 1:] - corners[:, :1]
+
+    @cached_property
+    def measures(self) -> NDArray[np.float64]:
+        """(m,) areas or volumes, positive whatever the orientation."""
+        edges = self.edge_vectors
+        if self.dim == self.space:
+            return np.abs(np.linalg.det(edges)) / factorial(self.dim)
+        gram = edges @ edges.transpose(0, 2, 1)
+        return np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / factorial(self.dim)
+
+    @cached_property
+    def gradients(self) -> NDArray[np.float64]:
+        """(m, dim + 1, space) gradients of the linear shape functions, in 1/m."""
+        edges = self.edge_vectors
+        if self.dim == self.space:
+            others = np.linalg.inv(edges).transpose(0, 2, 1)
+        else:
+            others = np.linalg.solve(edges @ edges.transpose(0, 2, 1), edges)
+        return np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
+
+    @cached_property
+    def neighbours(self) -> NDArray[np.int64]:
+        """(m, dim + 1) cell across the facet opposite to each node, -1 on the boundary."""
+        return _neighbours(self.cells)
+
+    @cached_property
+    def boundary_facets(self) -> NDArray[np.int64]:
+        """(b, 2) pairs (cell, local node opposite to the facet) of all boundary facets."""
+        return np.argwhere(self.neighbours < 0)
+
+    @cached_property
+    def node_cells(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Cells around each node, as (starts (n + 1,), cells): a compressed list."""
+        order = np.argsort(self.cells.ravel(), kind="stable")
+        counts = np.bincount(self.cells.ravel(), minlength=len(self.points))
+        return np.concatenate([[0], np.cumsum(counts)]), order // (self.dim + 1)
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest coordinate or side of the bounding box: the scale of round-off, in metres."""
+        box = self.points.max(axis=0) - self.points.min(axis=0)
+        return float(max(np.abs(self.points).max(), box.max()))
+
+
+def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise XfemError(f"points of shape {points.shape}; expected (n, 2) or (n, 3)")
+    if not np.isfinite(points).all():
+        raise XfemError(f"point {int(np.argmin(np.isfinite(points).all(axis=1)))} is not finite")
+    if cells.ndim != 2 or not 3 <= cells.shape[1] <= points.shape[1] + 1:
+        raise XfemError(
+            f"cells of shape {cells.shape} on points in {points.shape[1]}D; expected (m, 3) "
+            "triangles" + (" or (m, 4) tetrahedra" if points.shape[1] == 3 else "")
+        )
+    if len(cells) == 0:
+        raise XfemError("a mesh without cells")
+    if not np.issubdtype(cells.dtype, np.integer):
+        raise XfemError(f"cells of type {cells.dtype}; expected integers")
+    if cells.min() < 0 or cells.max() >= len(points):
+        raise XfemError(f"a cell has a node outside 0..{len(points) - 1}")
+    used = np.bincount(cells.ravel(), minlength=len(points)) > 0
+    if not used.all():
+        raise XfemError(f"point {int(np.argmin(used))} belongs to no cell")
+
+
+def _neighbours(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    corners = cells.shape[1]
+    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
+    facets = np.sort(cells[:, keep].reshape(-1, corners - 1), axis=1)
+    order = np.lexsort(facets.T[::-1])
+    in_order = facets[order]
+    same = (in_order[1:] == in_order[:-1]).all(axis=1)
+    if (same[1:] & same[:-1]).any():
+        where = in_order[int(np.argmax(same[1:] & same[:-1]))]
+        raise XfemError(f"facet {where.tolist()} is shared by more than two cells")
+    first, second = order[:-1][same], order[1:][same]
+    across = np.full(len(facets), -1, dtype=np.int64)
+    across[first], across[second] = second // corners, first // corners
+    return across.reshape(cells.shape)

@@ -1,0 +1,70 @@
+"""Linear stiffness of a cut body: assembled into nodal blocks, or applied without a matrix."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.assembly_kernels import add_stiffness, linear_force
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.elasticity import Material
+from verify.xfem.errors import XfemError
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["LinearStiffness"]
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearStiffness:
+    """Σ over pieces of V_piece/V · Kᵉ(parent): the whole effect of the cut on the stiffness.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    material : Material
+
+    Raises
+    ------
+    XfemError
+        If the material has neither one value nor one per cell of the uncut mesh, or the mesh is
+        a membrane.
+    """
+
+    virtual: VirtualMesh
+    lam: _Floats
+    mu: _Floats
+
+    def __init__(self, virtual: VirtualMesh, material: Material) -> None:
+        mesh = virtual.mesh
+        if mesh.dim != mesh.space:
+            raise XfemError("linear stiffness of a membrane in space: it has none across itself")
+        count = len(mesh.cells)
+        for name, values in (("λ", material.lam), ("μ", material.mu)):
+            if np.shape(values) not in ((), (count,)):
+                raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
+        object.__setattr__(self, "virtual", virtual)
+        object.__setattr__(self, "lam", np.broadcast_to(material.lam, count).astype(float))
+        object.__setattr__(self, "mu", np.broadcast_to(material.mu, count).astype(float))
+
+    def assemble(self, pattern: BlockPattern, out: _Floats | None = None) -> _Floats:
+        """(B, d, d) nodal blocks of the stiffness, in N/m (per metre of thickness in 2D)."""
+        dim = self.virtual.mesh.dim
+        blocks = np.zeros((len(pattern.columns), dim, dim)) if out is None else out
+        if out is not None:
+            blocks[:] = 0.0
+        v = self.virtual
+        add_stiffness(
+            pattern.targets, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, blocks
+        )
+        return blocks
+
+    def force(self, displacement: _Floats) -> tuple[_Floats, float]:
+        """Internal force (N, d) in newtons and strain energy in joules of a displacement (N, d)."""
+        v = self.virtual
+        force = np.zeros_like(displacement)
+        energy = linear_force(
+            v.cells, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, displacement, force
+        )
+        return force, float(energy)

@@ -1,0 +1,108 @@
+"""Structured simplicial meshes of a rectangle and of a box."""
+
+from collections.abc import Sequence
+from itertools import permutations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+
+__all__ = ["Diagonal", "box_mesh", "rectangle_mesh"]
+
+Diagonal = Literal["right", "left", "alternating", "crossed"]
+
+
+def rectangle_mesh(
+    divisions: Sequence[int],
+    lower: ArrayLike = (0.0, 0.0),
+    upper: ArrayLike = (1.0, 1.0),
+    diagonal: Diagonal = "right",
+) -> SimplexMesh:
+    """Triangles of a rectangle divided into equal rectangles.
+
+    Parameters
+    ----------
+    divisions : (2,) sequence of int
+        Rectangles along x and y.
+    lower, upper : (2,) array_like
+        Opposite corners, in metres.
+    diagonal : {"right", "left", "alternating", "crossed"}
+        ``right`` splits from the lower left to the upper right; ``crossed`` puts a node in the
+        middle of every rectangle.
+
+    Raises
+    ------
+    XfemError
+        If a number of divisions or a side is not positive, or the diagonal is unknown.
+    """
+    nodes, points = _grid(divisions, lower, upper)
+    a, b = nodes[:-1, :-1], nodes[1:, :-1]
+    c, d = nodes[1:, 1:], nodes[:-1, 1:]
+    right = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], 2)
+    left = np.stack([np.stack([a, b, d], -1), np.stack([b, c, d], -1)], 2)
+    if diagonal == "right":
+        return SimplexMesh(points, right.reshape(-1, 3))
+    if diagonal == "left":
+        return SimplexMesh(points, left.reshape(-1, 3))
+    if diagonal == "alternating":
+        odd = (np.indices(a.shape).sum(axis=0) % 2 == 1)[:, :, None, None]
+        return SimplexMesh(points, np.where(odd, left, right).reshape(-1, 3))
+    if diagonal == "crossed":
+        centre = len(points) + np.arange(a.size).reshape(a.shape)
+        centres = points[np.stack([a, b, c, d], -1)].mean(axis=2).reshape(-1, 2)
+        sides = [(a, b), (b, c), (c, d), (d, a)]
+        fans = np.stack([np.stack([p, q, centre], -1) for p, q in sides], 2)
+        return SimplexMesh(np.concatenate([points, centres]), fans.reshape(-1, 3))
+    raise XfemError(f"diagonal '{diagonal}'; expected right, left, alternating or crossed")
+
+
+def box_mesh(
+    divisions: Sequence[int],
+    lower: ArrayLike = (0.0, 0.0, 0.0),
+    upper: ArrayLike = (1.0, 1.0, 1.0),
+) -> SimplexMesh:
+    """Tetrahedra of a box divided into equal boxes, six to a box (Kuhn's triangulation).
+
+    All six share the diagonal from the lower to the upper corner of their box, so the mesh is
+    conforming and translation invariant.
+
+    Raises
+    ------
+    XfemError
+        If a number of divisions or a side is not positive.
+    """
+    nodes, points = _grid(divisions, lower, upper)
+    counts = [k - 1 for k in nodes.shape]
+    cells = []
+    for order in permutations(range(3)):
+        offset = np.zeros(3, dtype=int)
+        path = []
+        for axis in (None, *order):
+            if axis is not None:
+                offset[axis] = 1
+            window = tuple(slice(o, o + k) for o, k in zip(offset, counts, strict=True))
+            path.append(nodes[window])
+        cells.append(np.stack(path, -1))
+    return SimplexMesh(points, np.stack(cells, 3).reshape(-1, 4))
+
+
+def _grid(
+    divisions: Sequence[int], lower: ArrayLike, upper: ArrayLike
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Node numbers by grid index (first axis slowest in x), and their coordinates."""
+    low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    counts = np.asarray(divisions)
+    if counts.shape != low.shape or (counts < 1).any() or counts.dtype.kind != "i":
+        raise XfemError(f"divisions {divisions!r}; expected {len(low)} positive integers")
+    if low.shape != high.shape or not (high > low).all():
+        raise XfemError(f"box from {low.tolist()} to {high.tolist()}; expected lower < upper")
+    # x runs fastest in the node numbers, as in a picture read line by line
+    nodes = np.arange(np.prod(counts + 1)).reshape(tuple(counts[::-1] + 1)).T
+    axes = [np.linspace(a, b, k + 1) for a, b, k in zip(low, high, counts, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+    points = np.empty((nodes.size, len(low)))
+    points[nodes.ravel()] = grid.reshape(-1, len(low))
+    return nodes, points

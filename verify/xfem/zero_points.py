@@ -1,0 +1,81 @@
+"""Points where edges cross the zero sets of the cuts, one number each for the whole mesh.
+
+An edge is a pair of numbered points: mesh nodes, or zero points of cuts applied before. Asking
+twice for the same edge and cut gives the same number, so that neighbouring elements agree on the
+position, and on the sign of every other cut there, to the last bit.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ZeroPoints"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class ZeroPoints:
+    """Mesh nodes followed by the zero points found so far.
+
+    Parameters
+    ----------
+    positions : (n, d) float array
+        Mesh nodes, in metres.
+    values : (n, cuts) float array
+        Nodal level sets, already snapped.
+    snap : float
+        Level-set values up to this size are taken as exactly zero, in metres.
+
+    Attributes
+    ----------
+    positions, values
+        The same, with the zero points appended.
+    """
+
+    def __init__(self, positions: _Floats, values: _Floats, snap: float) -> None:
+        self.positions = positions
+        self.values = values
+        self._snap = snap
+        cuts = values.shape[1]
+        self._keys = [np.zeros(0, dtype=np.int64) for _ in range(cuts)]
+        self._numbers = [np.zeros(0, dtype=np.int64) for _ in range(cuts)]
+
+    def shares(self, cut: int, plus: _Ints, minus: _Ints) -> tuple[_Floats, _Floats]:
+        """(r, s) of the zero points z = s·plus + r·minus on edges from φ ≥ 0 to φ < 0."""
+        above, below = self.values[plus, cut], self.values[minus, cut]
+        return above / (above - below), -below / (above - below)
+
+    def find(self, cut: int, plus: _Ints, minus: _Ints) -> _Ints:
+        """Numbers of the zero points of `cut` on edges (plus, minus).
+
+        Where φ is exactly zero at the plus end, the zero point is that end.
+        """
+        keys = (plus << 32) | minus
+        wanted, back = np.unique(keys, return_inverse=True)
+        known = self._keys[cut]
+        at = np.searchsorted(known, wanted)
+        old = np.zeros(len(wanted), dtype=bool)
+        inside = at < len(known)
+        old[inside] = known[at[inside]] == wanted[inside]
+        if not old.all():
+            self._append(cut, wanted[~old])
+            at = np.searchsorted(self._keys[cut], wanted)
+        return self._numbers[cut][at][back]
+
+    def _append(self, cut: int, keys: _Ints) -> None:
+        plus, minus = keys >> 32, keys & 0xFFFFFFFF
+        r, s = self.shares(cut, plus, minus)
+        new = r > 0.0
+        numbers = np.where(new, len(self.positions) - 1 + np.cumsum(new), plus)
+        r, s, p, m = r[new, None], s[new, None], plus[new], minus[new]
+        values = s * self.values[p] + r * self.values[m]
+        values[np.abs(values) <= self._snap] = 0.0
+        values[:, cut] = 0.0
+        self.values = np.concatenate([self.values, values])
+        self.positions = np.concatenate(
+            [self.positions, s * self.positions[p] + r * self.positions[m]]
+        )
+        all_keys = np.concatenate([self._keys[cut], keys])
+        order = np.argsort(all_keys)
+        self._keys[cut] = all_keys[order]
+        self._numbers[cut] = np.concatenate([self._numbers[cut], numbers])[order]
