@@ -34,9 +34,7 @@ class Solver(Protocol):
         """Number of mesh levels on which it can solve `scene`."""
         ...
 
-    def solve(
-        self, scene: Scene, level: int, repetitions: int = 1, **parameters: Any
-    ) -> Solution:
+    def solve(self, scene: Scene, level: int, repetitions: int = 1, **parameters: Any) -> Solution:
         """Solve `scene` on mesh `level` (0 is the coarsest).
 
         The first call inside a process compiles; timings of `repetitions` further calls go
@@ -60,6 +58,11 @@ def solver_names() -> list[str]:
 def find_solver(name: str) -> Solver:
     """The solver called `name`.
 
+    Parameters
+    ----------
+    name : str
+        One of `solver_names`, or ``module:Class`` for a class of the user's own.
+
     Raises
     ------
     InputError
@@ -69,6 +72,11 @@ def find_solver(name: str) -> Solver:
         if name in _BUILT_IN:
             module, _, attribute = _BUILT_IN[name].partition(":")
             found = getattr(import_module(module), attribute)
+        elif ":" in name:
+            module, _, attribute = name.partition(":")
+            found = getattr(import_module(module), attribute, None)
+            if found is None:
+                raise InputError(f"solver '{name}': no '{attribute}' in module '{module}'")
         else:
             points = {point.name: point for point in entry_points(group=_GROUP)}
             if name not in points:

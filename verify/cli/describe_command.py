@@ -1,0 +1,81 @@
+"""``verify describe``: a case in words."""
+
+import argparse
+import json
+import textwrap
+from typing import Any
+
+from verify.scene import Scene, load_scene, scene_hash
+
+__all__ = ["description", "execute"]
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Print what a case asks."""
+    scene = load_scene(arguments.case)
+    if arguments.json:
+        print(json.dumps(scene.model_dump(mode="json", by_alias=True), indent=2))
+    else:
+        print(description(scene))
+    return 0
+
+
+def description(scene: Scene) -> str:
+    """Return the case in words: requirement, body, cuts, supports, loads, what is judged."""
+    parts: list[tuple[str, list[str]]] = [
+        ("tags", [", ".join(scene.tags)] if scene.tags else []),
+        ("body", [_keys(scene.geometry)]),
+        ("material", [_keys(scene.material)]),
+        ("mesh", [_mesh(scene)]),
+        ("cuts", [f"{cut.name}: {_keys(cut, 'name', 'opens_at')}" for cut in scene.cuts]),
+        ("supports", [_keys(support) for support in scene.supports]),
+        ("loads", [_keys(load) for load in scene.loads]),
+        ("analysis", [_keys(scene.analysis, "damping")]),
+        ("measured", [_keys(quantity) for quantity in scene.quantities]),
+        ("judged by", [_judge(scene)]),
+        ("accepted if", [_keys(check) for check in scene.acceptance] or ["no acceptance"]),
+        ("hash", [scene_hash(scene)]),
+    ]
+    lines = [scene.name, scene.title, "", textwrap.fill(scene.requirement, 92), ""]
+    for name, entries in parts:
+        for i, entry in enumerate(entries):
+            lines.append(
+                textwrap.fill(
+                    entry,
+                    92,
+                    initial_indent=f"{name if i == 0 else '':<12}",
+                    subsequent_indent=" " * 14,
+                )
+            )
+    return "\n".join(lines)
+
+
+def _keys(part: Any, *without: str) -> str:
+    said = part.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=set(without))
+    head = said.pop("kind", said.pop("check", ""))
+    body = ", ".join(f"{key} {_value(value)}" for key, value in said.items() if value != {})
+    return f"{head}{': ' if head and body else ''}{body}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list):
+        shown = value if len(value) <= 8 else [*value[:3], "…", value[-1]]
+        return f"({', '.join(_value(entry) for entry in shown)})"
+    return str(value)
+
+
+def _mesh(scene: Scene) -> str:
+    if scene.mesh.pattern == "given":
+        return "as given, 1 level"
+    levels = [_value(list(level)) for level in scene.mesh.cells or []]
+    levels += [f"h = {size:g} m" for size in scene.mesh.sizes or []]
+    return f"{scene.mesh.pattern}, {scene.mesh.count} levels: {', '.join(levels)}"
+
+
+def _judge(scene: Scene) -> str:
+    if scene.judged_by_exact and scene.exact is not None:
+        return f"exact solution '{scene.exact.solution}'"
+    levels = scene.reference
+    return f"conforming reference, P{levels.degree}, {levels.levels} levels, with its uncertainty"

@@ -1,0 +1,39 @@
+"""Entry point: parse, run the command, turn errors into one line and an exit code."""
+
+import errno
+import os
+import sys
+from collections.abc import Sequence
+
+from verify.cli.parser import build_parser
+from verify.errors import InputError, UnsupportedSceneError
+
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line `argv` (default: that of the process) and return its exit code."""
+    arguments = build_parser().parse_args(argv)
+    try:
+        code: int = arguments.command(arguments)
+        sys.stdout.flush()
+    except (InputError, UnsupportedSceneError) as error:
+        return _fail(str(error), 2)
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130)
+    except BrokenPipeError:  # `verify list | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO):
+            raise
+        where = f" ({error.filename})" if error.filename else ""
+        return _fail(
+            f"{error.strerror}{where}; what is finished stays, the same command resumes it", 3
+        )
+    return code
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"verify: error: {' '.join(message.split())}", file=sys.stderr)
+    return code

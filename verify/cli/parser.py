@@ -1,0 +1,192 @@
+"""The command line: sub-commands, options, and help that teaches by example."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import NoReturn
+
+from verify import __version__
+
+__all__ = ["build_parser"]
+
+_EXIT_CODES = """\
+exit codes:
+  0  every verdict is PASS (or UNDECIDED, without --strict)
+  1  a verdict is FAIL; goes before 3, because a FAIL stands whatever the missing solves say
+  2  bad input or usage; nothing was run, nothing was written
+  3  a solve failed, timed out, ran out of memory, or could not be stored
+  4  nothing ran: no case matches, or every solver refused
+  5  with --strict: something is UNDECIDED, refused, or without any verdict
+  128+n  stopped by signal n (130: Ctrl-C); what is finished stays"""
+
+_MAIN = f"""\
+examples:
+  verify list                                 the cases that come with the project
+  verify describe statics/f3_inclined         what a case asks, in words
+  verify run statics/f1_patch --out out       solve, compare, judge, report
+  verify run -k demo --out out -j 2           all cases that mention 'demo', 2 at a time
+  verify check my_case.toml                   validate an own case file without running
+  verify run my_case.toml --out mine          run it
+  verify report out                           render the report again
+
+{_EXIT_CODES}"""
+
+_RUN = f"""\
+examples:
+  verify run statics/f1_patch --out out
+  verify run my_case.toml --out mine --solver xfem --timeout 60
+  verify run -k "demo and not tissue" --out out -j 2
+  verify run "statics/*" --quick --out out --strict --json > verdicts.json
+
+A run that was stopped is resumed by the same command: finished solves are taken over if their
+scene, their solver's parameters and the code are the same. Each solve runs in a process of its
+own, on one thread. With -j above 1 the timings are marked as contended.
+
+{_EXIT_CODES}"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        print(f"{self.prog}: error: {message} (see {self.prog} --help)", file=sys.stderr)
+        sys.exit(2)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Build the parser; its result has the function ``command`` that takes the result."""
+    parser = _Parser(
+        prog="verify",
+        description="Verify cutting simulations: solve scenes, compare, judge, report.",
+        epilog=_MAIN,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"verify {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=_Parser)
+
+    def add(name: str, text: str, epilog: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(
+            name,
+            help=text,
+            description=f"{text[0].upper()}{text[1:]}.",
+            epilog=epilog,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.set_defaults(command=_late(name))
+        return command
+
+    _add_reading_commands(add)
+    _add_run(add("run", "solve, compare and judge cases, and render the report", _RUN))
+    return parser
+
+
+def _add_reading_commands(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+    command = add(
+        "list",
+        "list the cases, or the exact solutions",
+        "examples:\n  verify list\n  verify list -k quick\n  verify list --exact\n"
+        "  verify list --json",
+    )
+    command.add_argument("--exact", action="store_true", help="list exact solutions instead")
+    command.add_argument("-k", metavar="EXPR", dest="expression", help="only matching cases")
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+    command = add(
+        "describe",
+        "say in words what a case asks",
+        "examples:\n  verify describe statics/f1_patch\n  verify describe my_case.toml",
+    )
+    command.add_argument("case", metavar="CASE", help="name of a case, or a case file")
+    command.add_argument("--json", action="store_true", help="print the case with all defaults")
+
+    command = add(
+        "check",
+        "validate case files without running them",
+        "examples:\n  verify check my_case.toml\n  verify check cases/*/*.toml",
+    )
+    command.add_argument("files", metavar="FILE", nargs="+", help="case file")
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+    add(
+        "schema",
+        "print the JSON Schema of a case file, for editors",
+        "examples:\n  verify schema > case.schema.json",
+    )
+
+    command = add(
+        "report",
+        "render the report of a run again, without computing anything",
+        "examples:\n  verify report out",
+    )
+    command.add_argument("directory", metavar="DIR", type=Path, help="directory of a run")
+
+
+def _add_run(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "cases", metavar="CASE", nargs="*", help="name, pattern or file of a case (default: all)"
+    )
+    command.add_argument(
+        "-k", metavar="EXPR", dest="expression", help="words with and, or, not, parentheses, "
+        "looked for in name, title and tags"
+    )  # fmt: skip
+    command.add_argument(
+        "--out", metavar="DIR", type=Path, default=Path("verify-results"),
+        help="run directory (default: verify-results)",
+    )  # fmt: skip
+    weight = command.add_mutually_exclusive_group()
+    weight.add_argument("--quick", action="store_true", help="only cases tagged quick")
+    weight.add_argument("--heavy", action="store_true", help="also cases tagged heavy")
+    command.add_argument(
+        "-j", metavar="N", dest="jobs", type=_count, default=1,
+        help="processes at the same time (default: 1)",
+    )  # fmt: skip
+    command.add_argument(
+        "--timeout", metavar="S", type=_positive, default=600.0,
+        help="wall seconds after which a solve is killed (default: 600)",
+    )  # fmt: skip
+    command.add_argument(
+        "--memory", metavar="GB", type=_positive,
+        help="resident memory above which a solve is killed "
+        "(default: 80 %% of the machine's, shared by the processes)",
+    )  # fmt: skip
+    command.add_argument(
+        "--solver", metavar="NAME", action="append", dest="solvers", default=[],
+        help="solver to compare, or module:Class; repeat for several "
+        "(default: those that the case names)",
+    )  # fmt: skip
+    command.add_argument(
+        "--repetitions", metavar="N", type=_count, default=3,
+        help="timed repetitions of each solve (default: 3)",
+    )  # fmt: skip
+    command.add_argument(
+        "--strict", action="store_true", help="undecided verdicts and refusals: exit code 5"
+    )
+    command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+
+
+def _late(name: str) -> Callable[[argparse.Namespace], int]:
+    """Import the module of a command only when it runs."""
+
+    def command(arguments: argparse.Namespace) -> int:
+        code: int = import_module(f"verify.cli.{name}_command").execute(arguments)
+        return code
+
+    return command
+
+
+def _count(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, got '{text}'")
+    return int(text)
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a positive number, got '{text}'")
+    return value

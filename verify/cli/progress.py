@@ -1,0 +1,114 @@
+"""How a run goes: bars on a terminal, plain lines elsewhere."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import monotonic
+from typing import Any, Protocol, TextIO
+
+from verify.result import CaseResult, SolveRecord, Status
+from verify.runner import Progress
+
+__all__ = ["ClosableProgress", "progress_on"]
+
+
+class ClosableProgress(Progress, Protocol):
+    """A progress display that can leave the screen."""
+
+    def close(self) -> None:
+        """Stop drawing."""
+        ...
+
+
+@contextmanager
+def progress_on(stream: TextIO) -> Iterator[ClosableProgress]:
+    """Give bars if `stream` is a terminal, else lines."""
+    display: ClosableProgress = _Bars(stream) if stream.isatty() else _Lines(stream)
+    try:
+        yield display
+    finally:
+        display.close()
+
+
+def _solve_text(label: str, record: SolveRecord, reused: bool) -> str:
+    if reused:
+        return f"{label}: taken over"
+    took = f" in {record.wall:.1f} s" if record.wall is not None else ""
+    if record.status is Status.SOLVED:
+        return f"{label}: solved, {record.unknowns} unknowns{took}"
+    return f"{label}: {record.status}{took}: {record.reason}"
+
+
+class _Lines:
+    """One line per finished solve and case."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream, self.done, self.total = stream, 0, 0
+
+    def planned(self, solves: int, cases: int) -> None:
+        self.total = solves
+        self._say(f"{solves} solves of {cases} case{'s' if cases != 1 else ''}")
+
+    def started(self, label: str) -> None:
+        """Say nothing: a line per event that ended is enough in a log."""
+
+    def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
+        self.done += 1
+        self._say(f"[{self.done}/{self.total}] {_solve_text(label, record, reused)}")
+
+    def judged(self, result: CaseResult) -> None:
+        self._say(f"{result.case}: {result.verdict if result.verdicts else 'not judged'}")
+
+    def close(self) -> None:
+        """Nothing is drawn that would have to go."""
+
+    def _say(self, text: str) -> None:
+        print(text, file=self.stream, flush=True)
+
+
+class _Bars:
+    """A bar over the solves, with what runs now, above it what went wrong."""
+
+    def __init__(self, stream: TextIO) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as RichProgress
+
+        columns = (
+            BarColumn(bar_width=30),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.description}", markup=False),
+        )
+        self.bars = RichProgress(*columns, console=Console(file=stream), transient=True)
+        self.task: Any = None
+        self.running: dict[str, float] = {}
+
+    def planned(self, solves: int, cases: int) -> None:
+        self.task = self.bars.add_task("", total=solves + cases)
+        self.bars.start()
+
+    def started(self, label: str) -> None:
+        self.running[label] = monotonic()
+        self._describe()
+
+    def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
+        self.running.pop(label, None)
+        if record.status is not Status.SOLVED:
+            self._say(_solve_text(label, record, reused))
+        self._describe(1)
+
+    def judged(self, result: CaseResult) -> None:
+        self.running.pop(f"{result.case} · comparison", None)
+        self._say(f"{result.case}: {result.verdict if result.verdicts else 'not judged'}")
+        self._describe(1)
+
+    def close(self) -> None:
+        self.bars.stop()
+
+    def _say(self, text: str) -> None:
+        self.bars.console.print(text, markup=False, highlight=False)
+
+    def _describe(self, advance: int = 0) -> None:
+        oldest = min(self.running, key=lambda label: self.running[label], default="")
+        more = f" (+{len(self.running) - 1})" if len(self.running) > 1 else ""
+        self.bars.update(self.task, description=f"{oldest}{more}", advance=advance)

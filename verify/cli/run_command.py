@@ -1,0 +1,72 @@
+"""``verify run``."""
+
+import argparse
+import json
+import shlex
+import sys
+from dataclasses import asdict
+
+from verify.cli.progress import progress_on
+from verify.cli.verdict_text import verdict_lines
+from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
+from verify.runner.checking import check_solver_name
+from verify.runner.ending import NOTHING_RAN
+
+__all__ = ["execute"]
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Select, run, render, and say what came out."""
+    names = [name for entry in arguments.solvers for name in entry.split(",") if name]
+    for name in names:
+        check_solver_name(name, "--solver")
+    weight = "quick" if arguments.quick else "heavy" if arguments.heavy else "normal"
+    scenes = select_cases(arguments.cases, arguments.expression, weight)
+    if not scenes:
+        print("verify: no case matches; `verify list` shows them all", file=sys.stderr)
+        return NOTHING_RAN
+    options = Options(
+        solvers=tuple(dict.fromkeys(names)),
+        repetitions=arguments.repetitions,
+        jobs=arguments.jobs,
+        timeout=arguments.timeout,
+        memory=arguments.memory * 1e9 if arguments.memory else None,
+    )
+    with progress_on(sys.stderr) as progress:
+        try:
+            summary = run_cases(
+                scenes, arguments.out, options, progress, shlex.join(["verify", *sys.argv[1:]])
+            )
+        except RunStoppedError as stop:
+            progress.close()
+            print(
+                f"verify: {stop}; the same command resumes it, "
+                f"`verify report {shlex.quote(str(arguments.out))}` renders what is finished",
+                file=sys.stderr,
+            )
+            return 128 + stop.signum
+    from verify.report import render
+
+    report = render(arguments.out)
+    code = exit_code(summary.results, arguments.strict)
+    if arguments.json:
+        cases = [
+            {
+                "case": result.case,
+                "verdict": result.verdict,
+                "verdicts": [asdict(record) for record in result.verdicts],
+                "solves": [
+                    {"solver": s.solver, "level": s.level, "status": s.status, "reason": s.reason}
+                    for s in result.solves
+                ],
+            }
+            for result in summary.results
+        ]
+        print(json.dumps({"exit": code, "report": str(report), "cases": cases}, indent=2))
+        return code
+    for line in verdict_lines(summary.results):
+        print(line)
+    if summary.reused:
+        print(f"{summary.reused} finished solves were taken over from before")
+    print(f"report: {report}")
+    return code

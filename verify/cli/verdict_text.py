@@ -1,0 +1,29 @@
+"""Verdicts as lines of text."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from verify.result import CaseResult, Status, Verdict, VerdictRecord
+
+__all__ = ["verdict_lines"]
+
+
+def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
+    """Yield a line per case, one per check that is not a PASS, one per solve that ended badly."""
+    width = max((len(result.case) for result in results), default=0)
+    for result in results:
+        counts = Counter(record.verdict for record in result.verdicts)
+        said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict])
+        verdict = result.verdict if result.verdicts else "NOT JUDGED"
+        yield f"{result.case:<{width}}  {verdict:<10} {said}"
+        for record in result.verdicts:
+            if record.verdict is not Verdict.PASS:
+                yield f"    {record.verdict}: {_check(record)}: {record.reason}"
+        for solve in result.solves:
+            if solve.status is not Status.SOLVED:
+                yield f"    {solve.solver}, level {solve.level}: {solve.status}: {solve.reason}"
+
+
+def _check(record: VerdictRecord) -> str:
+    observed = "not observed" if record.observed is None else f"{record.observed:.6g}"
+    return f"{record.check} of {record.metric} ({record.solver}): {observed}, wanted {record.limit}"

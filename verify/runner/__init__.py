@@ -1,0 +1,21 @@
+"""Runs cases: every solve in a process of its own, with limits; failures are records.
+
+The runner knows solvers by their names only and judges nothing: the comparison of a finished
+case (`verify.study`) runs in a process of its own too.
+"""
+
+from verify.runner.ending import exit_code
+from verify.runner.interruption import RunStoppedError
+from verify.runner.options import Options
+from verify.runner.run import Progress, RunSummary, run_cases
+from verify.runner.selection import select_cases
+
+__all__ = [
+    "Options",
+    "Progress",
+    "RunStoppedError",
+    "RunSummary",
+    "exit_code",
+    "run_cases",
+    "select_cases",
+]

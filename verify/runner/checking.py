@@ -1,0 +1,32 @@
+"""Checks of a case that take more than the case file: its exact solution, mesh, solvers."""
+
+from verify.errors import InputError
+from verify.scene import MeshFile, Scene, read_mesh
+from verify.scene.nearest import nearest
+from verify.solvers import solver_names
+
+__all__ = ["check_scene", "check_solver_name"]
+
+
+def check_scene(scene: Scene) -> None:
+    """Raise `InputError` if something that `scene` names is not there or is bad."""
+    where = str(scene.file or scene.name)
+    if isinstance(scene.geometry, MeshFile):
+        read_mesh(scene)
+    if scene.exact is not None:
+        from reference.exact import exact_solution
+
+        try:
+            exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+        except InputError as error:
+            raise InputError(f"exact: {error}", where) from None
+    for i, check in enumerate(scene.acceptance):
+        for name in (check.solver, *([check.to] if check.check == "ratio" else [])):
+            check_solver_name(name, f"{where}: acceptance[{i}]")
+
+
+def check_solver_name(name: str, where: str) -> None:
+    """Raise `InputError` if there is no solver of that name (``module:Class`` is not looked up)."""
+    known = solver_names()
+    if ":" not in name and name not in known:
+        raise InputError(f"no solver '{name}'{nearest(name, known)}", where)

@@ -1,0 +1,34 @@
+"""What every process that the runner starts does first and last."""
+
+import ctypes
+import os
+import signal
+import sys
+from pathlib import Path
+
+from verify.runner.child import PARENT_VARIABLE
+
+__all__ = ["die_with_parent", "peak_memory"]
+
+_PR_SET_PDEATHSIG = 1
+
+
+def die_with_parent() -> None:
+    """Have the kernel kill this process when the runner dies, however it dies."""
+    parent = os.environ.get(PARENT_VARIABLE)
+    if parent is None or not sys.platform.startswith("linux"):
+        return
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != int(parent):  # it died before we asked
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def peak_memory() -> float:
+    """Largest resident memory of this process so far, bytes.
+
+    From ``VmHWM``; ``getrusage`` would count what the parent held when it started us.
+    """
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return float(line.split()[1]) * 1024.0
+    return float("nan")

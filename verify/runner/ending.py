@@ -1,0 +1,52 @@
+"""The exit code of a run.
+
+A failed verdict (1) goes before a failed solve (3): a FAIL is only given when the whole interval
+of what is known violates the limit, so it stands whatever the missing solves would have said,
+and a script that repeats a run on code 3 must not take a wrong answer for a bad day of the
+machine.
+"""
+
+from collections.abc import Sequence
+
+from verify.result import CaseResult, Status, Verdict
+
+__all__ = [
+    "ALL_PASS",
+    "BAD_INPUT",
+    "NOTHING_RAN",
+    "ONLY_WARNINGS",
+    "SOLVER_FAILED",
+    "VERDICT_FAILED",
+    "exit_code",
+]
+
+ALL_PASS = 0
+VERDICT_FAILED = 1
+BAD_INPUT = 2
+SOLVER_FAILED = 3
+NOTHING_RAN = 4
+ONLY_WARNINGS = 5
+
+_BROKEN = (Status.FAILED, Status.TIMEOUT, Status.MEMORY)
+
+
+def exit_code(results: Sequence[CaseResult], strict: bool = False) -> int:
+    """Return the exit code of a run that ended with `results`.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+    strict : bool
+        Whether an undecided verdict, a refusal, or a case without any verdict counts.
+    """
+    verdicts = [record.verdict for result in results for record in result.verdicts]
+    statuses = [solve.status for result in results for solve in result.solves]
+    if Verdict.FAIL in verdicts:
+        return VERDICT_FAILED
+    if Verdict.ERROR in verdicts or any(status in _BROKEN for status in statuses):
+        return SOLVER_FAILED
+    if Status.SOLVED not in statuses:
+        return NOTHING_RAN
+    doubtful = Verdict.UNDECIDED in verdicts or Status.REFUSED in statuses
+    doubtful |= any(not result.verdicts for result in results)
+    return ONLY_WARNINGS if strict and doubtful else ALL_PASS

@@ -1,0 +1,65 @@
+"""Fingerprints that decide whether a stored solve or verdict is still that of today's code."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import verify
+from verify.provenance import versions
+from verify.scene import MeshFile, Scene, mesh_path
+
+__all__ = ["code_of_comparison", "code_of_solvers", "digest_of", "file_digest", "physics_digest"]
+
+_PACKAGE = Path(verify.__file__).resolve().parent
+# what can change a solution
+_SOLVING = ("errors.py", "scene", "solution.py", "solvers", "xfem", "methods", "runner/solve.py")
+# what can change a verdict, given the solutions
+_COMPARING = ("result.py", "compare", "study", "verdict.py", "runner/assess.py")
+
+
+def digest_of(content: Any) -> str:
+    """Return a short hash of plain values."""
+    text = json.dumps(content, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+def file_digest(path: Path) -> str:
+    """Return the hash of a file's bytes.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()[:24]
+
+
+def physics_digest(scene: Scene) -> str:
+    """Return the hash of what a solver sees: the scene without its words and its acceptance."""
+    words = {"title", "requirement", "tags", "acceptance"}
+    content: list[Any] = [scene.model_dump(mode="json", by_alias=True, exclude=words)]
+    if isinstance(scene.geometry, MeshFile):
+        content.append(file_digest(mesh_path(scene)))
+    return digest_of(content)
+
+
+def code_of_solvers() -> str:
+    """Return the hash of the sources and of the versions that a solution depends on."""
+    return digest_of([versions(), _sources(_SOLVING, _PACKAGE.parent / "reference")])
+
+
+def code_of_comparison() -> str:
+    """Return the hash of the sources that a verdict depends on, given the solutions."""
+    return digest_of([versions(), _sources(_COMPARING, _PACKAGE.parent / "reference" / "exact")])
+
+
+def _sources(parts: Iterable[str], *folders: Path) -> list[tuple[str, str]]:
+    files: set[Path] = set()
+    for place in (*(_PACKAGE / part for part in parts), *folders):
+        files |= {place} if place.is_file() else set(place.rglob("*.py"))
+    return [
+        (path.relative_to(_PACKAGE.parent).as_posix(), file_digest(path)) for path in sorted(files)
+    ]

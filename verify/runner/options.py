@@ -1,0 +1,49 @@
+"""What a run was asked for, apart from the cases."""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+__all__ = ["Options"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a run.
+
+    Parameters
+    ----------
+    solvers : tuple of str
+        The solvers compared; empty: those that the case's acceptance names, with ``xfem`` and
+        ``conforming``. The conforming reference of a case without exact solution runs in any
+        case.
+    repetitions : int
+        Timed repetitions of each solve, after the first call, which compiles.
+    parameters : dict of str to dict
+        Parameters by solver.
+    jobs : int
+        Processes at the same time.
+    timeout : float
+        Wall seconds after which a solve is killed.
+    memory : float or None
+        Bytes of resident memory above which a solve is killed; default: 80 % of the machine's,
+        shared by `jobs`.
+    """
+
+    solvers: tuple[str, ...] = ()
+    repetitions: int = 3
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    jobs: int = 1
+    timeout: float = 600.0
+    memory: float | None = None
+
+    def of_result(self) -> dict[str, Any]:
+        """Return those that change what is computed; a resumed run must have the same."""
+        return {
+            "solvers": list(self.solvers),
+            "repetitions": self.repetitions,
+            "parameters": self.parameters,
+        }
+
+    def record(self) -> dict[str, Any]:
+        """Return all of them as plain values."""
+        return {**asdict(self), "solvers": list(self.solvers)}

@@ -1,0 +1,133 @@
+"""From cases to solves: which solvers, which levels, what they refuse."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import sleep
+from typing import Any
+
+from verify.errors import InputError
+from verify.result import SolveRecord, Status
+from verify.runner.child import POLL_SECONDS, Child
+from verify.runner.directory import RunDirectory
+from verify.runner.fingerprint import code_of_solvers, digest_of, physics_digest
+from verify.runner.interruption import StopRequest
+from verify.runner.job import Job
+from verify.runner.log import telling_line
+from verify.runner.options import Options
+from verify.runner.storage import read_json, write_json
+from verify.scene import Scene, scene_content
+
+__all__ = ["CasePlan", "Survey", "plan_case", "solvers_of", "survey_solvers"]
+
+REFERENCE = "reference"
+_SURVEY_SECONDS = 300.0
+
+Survey = dict[str, dict[str, Any]]
+
+
+@dataclass
+class CasePlan:
+    """The solves of one case, and the records of those that are known not to run."""
+
+    scene: Scene
+    solvers: list[str]
+    jobs: list[Job] = field(default_factory=list)
+    refused: list[tuple[Job, SolveRecord]] = field(default_factory=list)
+
+
+def solvers_of(scene: Scene, options: Options) -> list[str]:
+    """Return the names of the solvers that a run of `scene` takes, the reference last."""
+    named = [check.solver for check in scene.acceptance]
+    named += [check.to for check in scene.acceptance if check.check == "ratio"]
+    names = list(dict.fromkeys(options.solvers or ("xfem", "conforming", *named)))
+    if not scene.judged_by_exact and REFERENCE not in names:
+        names.append(REFERENCE)
+    return names
+
+
+def survey_solvers(scenes: Sequence[Scene], options: Options, stop: StopRequest) -> Survey:
+    """Ask each solver, in a process of its own, what it refuses and how many levels it has.
+
+    Raises
+    ------
+    InputError
+        If a scene names something bad (a mesh file), or `options` name a solver that does not
+        work here. A solver that only the cases want may be missing: its solves fail, with
+        that reason.
+    RunStoppedError
+        If a signal came.
+    """
+    asked: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        for name in solvers_of(scene, options):
+            asked.setdefault(name, []).append(scene)
+    answers: Survey = {}
+    with tempfile.TemporaryDirectory(prefix="verify-") as folder:
+        waiting = list(asked)
+        running: dict[str, Child] = {}
+        try:
+            while waiting or running:
+                stop.check()
+                while waiting and len(running) < options.jobs:
+                    name = waiting.pop(0)
+                    running[name] = _ask(
+                        name, asked[name], Path(folder, str(len(asked) - len(waiting)))
+                    )
+                for name, child in list(running.items()):
+                    if child.poll() is not None:
+                        answers[name] = _answer(running.pop(name))
+                sleep(POLL_SECONDS)
+        finally:
+            for child in running.values():
+                child.kill()
+    for name, answer in answers.items():
+        if answer["error"] and name in options.solvers:
+            raise InputError(answer["error"], "--solver")
+        for scene in asked[name]:
+            bad = answer.get("cases", {}).get(scene.name, {}).get("bad_input")
+            if bad:
+                raise InputError(
+                    bad, "" if str(scene.file) in bad else str(scene.file or scene.name)
+                )
+    return answers
+
+
+def plan_case(scene: Scene, options: Options, survey: Survey, directory: RunDirectory) -> CasePlan:
+    """Lay out the solves of `scene`, coarse to fine."""
+    plan = CasePlan(scene, solvers_of(scene, options))
+    physics, code = physics_digest(scene), code_of_solvers()
+    for name in plan.solvers:
+        answer = survey[name]
+        parameters = options.parameters.get(name, {})
+
+        def job(level: int, name: str = name, parameters: dict[str, Any] = parameters) -> Job:
+            what = [physics, name, level, options.repetitions, parameters]
+            key = digest_of([*what, code, survey[name].get("source", "")])
+            folder = directory.solve_folder(scene.name, name, level)
+            return Job(scene.name, name, level, options.repetitions, key, folder, parameters)
+
+        if answer["error"]:
+            plan.refused.append((job(0), job(0).blank(Status.FAILED, answer["error"])))
+        elif refusal := answer["cases"][scene.name]["refusal"]:
+            plan.refused.append((job(0), job(0).blank(Status.REFUSED, refusal)))
+        else:
+            plan.jobs += [job(level) for level in range(answer["cases"][scene.name]["levels"])]
+    return plan
+
+
+def _ask(name: str, scenes: Sequence[Scene], folder: Path) -> Child:
+    folder.mkdir()
+    question = folder / "question.json"
+    write_json({"solver": name, "scenes": [scene_content(scene) for scene in scenes]}, question)
+    return Child(
+        "verify.runner.survey", question, folder / "log.txt", _SURVEY_SECONDS, float("inf")
+    )
+
+
+def _answer(child: Child) -> dict[str, Any]:
+    answer = child.log.parent / "answer.json"
+    if answer.exists():
+        return read_json(answer)
+    return {"error": f"could not be loaded: {telling_line(child.log)}"}

@@ -1,0 +1,299 @@
+"""The run: solves in parallel processes, then the comparison of each finished case."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from time import sleep
+from typing import Any, Protocol
+
+from verify.errors import InputError
+from verify.provenance import provenance
+from verify.result import CaseResult, SolveRecord, Status, read_result
+from verify.runner.checking import check_scene
+from verify.runner.child import POLL_SECONDS, Child, Ending
+from verify.runner.directory import RunDirectory, claimed, write_run
+from verify.runner.fingerprint import code_of_comparison, digest_of
+from verify.runner.interruption import StopRequest, listening
+from verify.runner.job import Job, store_record, stored_record
+from verify.runner.log import telling_line
+from verify.runner.options import Options
+from verify.runner.plan import CasePlan, plan_case, survey_solvers
+from verify.runner.storage import read_json, write_json
+from verify.runner.unjudged import unjudged_result
+from verify.scene import Scene, scene_content
+
+__all__ = ["Progress", "RunSummary", "run_cases"]
+
+
+class Progress(Protocol):
+    """Who is told how the run goes."""
+
+    def planned(self, solves: int, cases: int) -> None:
+        """Say how much there is to do."""
+        ...
+
+    def started(self, label: str) -> None:
+        """Say that a solve or a comparison begins."""
+        ...
+
+    def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
+        """Say that a solve ended."""
+        ...
+
+    def judged(self, result: CaseResult) -> None:
+        """Say that a case is compared and judged."""
+        ...
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """What a finished run left: results by case, and how many solves were taken over."""
+
+    directory: Path
+    results: list[CaseResult]
+    reused: int
+
+
+def run_cases(
+    scenes: Sequence[Scene], out: Path, options: Options, progress: Progress, command: str = ""
+) -> RunSummary:
+    """Solve, compare and judge `scenes` into the directory `out`; resume what is there.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+    out : Path
+        A directory that does not exist, is empty, or holds an unfinished or finished run of
+        the same cases and options.
+    options : Options
+    progress : Progress
+    command : str
+        The command line, for the record.
+
+    Raises
+    ------
+    InputError
+        If a case or `out` is bad; then nothing was written.
+    RunStoppedError
+        If SIGINT, SIGTERM or SIGHUP came; what is finished stays and is taken over next time.
+    OSError
+        If the directory cannot be written (disk full).
+    """
+    for scene in scenes:
+        check_scene(scene)
+    identity = {
+        "cases": [scene.name for scene in scenes],
+        "options_of_result": options.of_result(),
+    }
+    with listening() as stop:
+        survey = survey_solvers(scenes, options, stop)
+        with claimed(out, identity) as directory:
+            record = {
+                **identity,
+                "command": command,
+                "started": _now(),
+                "finished": None,
+                "options": options.record(),
+                "provenance": provenance(),
+            }
+            write_run(directory, record)
+            plans = [plan_case(scene, options, survey, directory) for scene in scenes]
+            work = _Work(plans, directory, options, record["provenance"], progress)
+            results = work.until_done(stop)
+            write_run(directory, {**record, "finished": _now()})
+    return RunSummary(out, results, work.reused)
+
+
+class _Work:
+    """The state of a run: what waits, what runs, what is done."""
+
+    def __init__(
+        self,
+        plans: list[CasePlan],
+        directory: RunDirectory,
+        options: Options,
+        origin: dict[str, Any],
+        progress: Progress,
+    ) -> None:
+        self.directory, self.options, self.origin = directory, options, origin
+        self.progress, self.reused = progress, 0
+        self.plans = {plan.scene.name: plan for plan in plans}
+        self.waiting: list[Job] = [job for plan in plans for job in plan.jobs]
+        self.open = {name: len(plan.jobs) for name, plan in self.plans.items()}
+        self.to_judge = [name for name, count in self.open.items() if not count]
+        self.running: dict[Child, Job | str] = {}  # a job, or the case that is compared
+        self.results: dict[str, CaseResult] = {}
+        self.memory = options.memory or 0.8 * origin["memory"] / options.jobs
+
+    def until_done(self, stop: StopRequest) -> list[CaseResult]:
+        """Run everything; kill what runs if that is interrupted or fails."""
+        self.progress.planned(
+            sum(len(plan.jobs) + len(plan.refused) for plan in self.plans.values()),
+            len(self.plans),
+        )
+        try:
+            for plan in self.plans.values():
+                self._prepare(plan)
+            while self.waiting or self.to_judge or self.running:
+                stop.check()
+                while len(self.running) < self.options.jobs and (self.waiting or self.to_judge):
+                    self._start()
+                for child, what in list(self.running.items()):
+                    ending = child.poll()
+                    if ending is not None:
+                        del self.running[child]
+                        self._ended(child, what, ending)
+                sleep(POLL_SECONDS)
+        finally:
+            for child in self.running:
+                child.kill()
+        return [self.results[name] for name in self.plans]
+
+    def _prepare(self, plan: CasePlan) -> None:
+        folder = self.directory.case_folder(plan.scene.name)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_json(scene_content(plan.scene), folder / "scene.json")
+        for job, record in plan.refused:
+            job.folder.mkdir(exist_ok=True)
+            store_record(job, record)
+            self.progress.solved(job.label, record, reused=False)
+
+    def _start(self) -> None:
+        if self.to_judge:
+            self._judge(self.to_judge.pop(0))
+            return
+        job = self.waiting.pop(0)
+        if (record := stored_record(job)) is not None:
+            self.reused += 1
+            self._solve_done(job, record, reused=True)
+            return
+        job.folder.mkdir(exist_ok=True)
+        for leftover in job.folder.iterdir():
+            leftover.unlink()
+        write_json(
+            {
+                "scene": scene_content(self.plans[job.case].scene),
+                "solver": job.solver,
+                "level": job.level,
+                "repetitions": job.repetitions,
+                "parameters": job.parameters,
+            },
+            job.folder / "job.json",
+        )
+        child = Child(
+            "verify.runner.solve",
+            job.folder / "job.json",
+            job.folder / "log.txt",
+            self.options.timeout,
+            self.memory,
+        )
+        self.running[child] = job
+        self.progress.started(job.label)
+
+    def _ended(self, child: Child, what: Job | str, ending: Ending) -> None:
+        if isinstance(what, str):
+            self._judged(what, child, ending)
+            return
+        record = self._record(what, child, ending)
+        store_record(what, record)
+        self._solve_done(what, record, reused=False)
+
+    def _record(self, job: Job, child: Child, ending: Ending) -> SolveRecord:
+        outcome: dict[str, Any] = {}
+        if not ending.killed_for and (job.folder / "outcome.json").exists():
+            outcome = read_json(job.folder / "outcome.json")
+        if outcome:
+            status, reason = Status(outcome.pop("status")), outcome.pop("reason")
+        else:
+            status, reason = self._death(child, ending)
+        peak = max(ending.peak, outcome.pop("peak_memory", None) or 0.0)
+        record = replace(job.blank(status, reason), wall=ending.wall, peak_memory=peak, **outcome)
+        if note := self._contention():
+            record.notes["timing"] = note
+        return record
+
+    def _death(self, child: Child, ending: Ending) -> tuple[Status, str]:
+        """Explain an end without an outcome."""
+        if ending.killed_for == "timeout":
+            return Status.TIMEOUT, f"killed after {self.options.timeout:g} s"
+        if ending.killed_for == "memory":
+            return Status.MEMORY, f"killed above {self.memory / 2**30:.3g} GiB"
+        said = telling_line(child.log)
+        if ending.returncode == -9:
+            return Status.MEMORY, "killed by the system, which was probably out of memory"
+        how = (
+            f"signal {-ending.returncode}" if ending.returncode < 0 else f"code {ending.returncode}"
+        )
+        return Status.FAILED, f"{said} ({how})"
+
+    def _contention(self) -> str:
+        if self.options.jobs > 1:
+            return f"contended: up to {self.options.jobs} processes at the same time"
+        if self.origin["load"] > self.origin["cores"]:
+            return f"contended: load {self.origin['load']} on {self.origin['cores']} cores"
+        return ""
+
+    def _solve_done(self, job: Job, record: SolveRecord, reused: bool) -> None:
+        self.progress.solved(job.label, record, reused)
+        self.open[job.case] -= 1
+        if not self.open[job.case]:
+            self.to_judge.append(job.case)
+
+    def _judge(self, case: str) -> None:
+        plan, folder = self.plans[case], self.directory.case_folder(case)
+        jobs = [*plan.jobs, *(job for job, _ in plan.refused)]
+        records = [digest_of(read_json(job.folder / "record.json")) for job in jobs]
+        key = digest_of([records, scene_content(plan.scene), code_of_comparison()])
+        question = {
+            "key": key,
+            "solvers": plan.solvers,
+            "folders": [os.path.relpath(job.folder, self.directory.root) for job in jobs],
+            "root": str(self.directory.root.resolve()),
+            "provenance": self.origin,
+        }
+        if (result := _stored_result(folder, key)) is not None:
+            self._case_done(result)
+            return
+        (folder / "judged.json").unlink(missing_ok=True)
+        write_json(question, folder / "judge.json")
+        child = Child(
+            "verify.runner.assess",
+            folder / "judge.json",
+            folder / "judge-log.txt",
+            max(self.options.timeout, 60.0),
+            self.memory,
+        )
+        self.running[child] = case
+        self.progress.started(f"{case} · comparison")
+
+    def _judged(self, case: str, child: Child, ending: Ending) -> None:
+        folder, plan = self.directory.case_folder(case), self.plans[case]
+        key = read_json(folder / "judge.json")["key"]
+        if (result := _stored_result(folder, key)) is None:
+            _, why = self._death(child, ending)
+            jobs = [*plan.jobs, *(job for job, _ in plan.refused)]
+            result = unjudged_result(
+                plan.scene, [job.folder for job in jobs], f"comparison failed: {why}", self.origin
+            )
+            write_json(asdict(result), folder / "result.json")
+        self._case_done(result)
+
+    def _case_done(self, result: CaseResult) -> None:
+        self.results[result.case] = result
+        self.progress.judged(result)
+
+
+def _stored_result(folder: Path, key: str) -> CaseResult | None:
+    """Return the result that a comparison with this `key` left."""
+    try:
+        if read_json(folder / "judged.json").get("key") == key:
+            return read_result(folder / "result.json")
+    except InputError:
+        pass
+    return None
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

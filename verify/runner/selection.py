@@ -1,0 +1,140 @@
+"""Which cases a run takes: by name, by file, by pattern, by ``-k`` expression, by weight."""
+
+import re
+from collections.abc import Callable, Sequence
+from fnmatch import fnmatchcase
+
+from verify.errors import InputError
+from verify.scene import Scene, list_cases, load_scene
+
+__all__ = ["parse_expression", "select_cases"]
+
+Predicate = Callable[[Scene], bool]
+_TOKEN = re.compile(r"\(|\)|[^\s()]+")
+
+
+def select_cases(
+    names: Sequence[str] = (), expression: str | None = None, weight: str = "normal"
+) -> list[Scene]:
+    """Load the cases that a command line asks for.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of cases, patterns (``statics/*``) or paths of case files; none: all cases.
+    expression : str, optional
+        Words with and, or, not and parentheses; a word is looked for in name, title and tags.
+    weight : {"quick", "normal", "heavy"}
+        ``quick``: only cases tagged quick; ``normal``: all but those tagged heavy;
+        ``heavy``: all. A case that is named runs whatever its weight.
+
+    Returns
+    -------
+    list of Scene
+        Empty if nothing matches.
+
+    Raises
+    ------
+    InputError
+        If a name, a file or the expression is bad, or two cases have the same name.
+    """
+    wanted = parse_expression(expression) if expression is not None else None
+    chosen: dict[str, Scene] = {}
+    for source, is_named in _sources(names).items():
+        scene = load_scene(source)
+        heavy_enough = is_named or _of_weight(scene, weight)
+        if not heavy_enough or (wanted is not None and not wanted(scene)):
+            continue
+        twin = chosen.setdefault(scene.name, scene)
+        if twin.file != scene.file:
+            raise InputError(
+                f"another case is called '{scene.name}' too ({twin.file}); rename one",
+                str(scene.file),
+            )
+    return list(chosen.values())
+
+
+def parse_expression(text: str) -> Predicate:
+    """Turn ``"demo and not (tissue or griffith)"`` into a predicate of scenes.
+
+    Raises
+    ------
+    InputError
+        If the text is not such an expression.
+    """
+    tokens = _TOKEN.findall(text)
+    predicate, rest = _either(tokens, text)
+    if rest:
+        raise _bad(text, f"unexpected '{rest[0]}'")
+    return predicate
+
+
+def _either(tokens: list[str], text: str) -> tuple[Predicate, list[str]]:
+    first, rest = _both(tokens, text)
+    while rest and rest[0].lower() == "or":
+        second, rest = _both(rest[1:], text)
+        first = _any(first, second)
+    return first, rest
+
+
+def _both(tokens: list[str], text: str) -> tuple[Predicate, list[str]]:
+    first, rest = _term(tokens, text)
+    while rest and rest[0].lower() == "and":
+        second, rest = _term(rest[1:], text)
+        first = _all(first, second)
+    return first, rest
+
+
+def _term(tokens: list[str], text: str) -> tuple[Predicate, list[str]]:
+    if not tokens:
+        raise _bad(text, "a word is missing at its end")
+    word, rest = tokens[0], tokens[1:]
+    if word.lower() == "not":
+        inner, rest = _term(rest, text)
+        return (lambda scene: not inner(scene)), rest
+    if word == "(":
+        inner, rest = _either(rest, text)
+        if not rest or rest[0] != ")":
+            raise _bad(text, "a ')' is missing")
+        return inner, rest[1:]
+    if word == ")" or word.lower() in ("and", "or"):
+        raise _bad(text, f"a word is missing before '{word}'")
+    return (lambda scene: _mentions(scene, word)), rest
+
+
+def _any(first: Predicate, second: Predicate) -> Predicate:
+    return lambda scene: first(scene) or second(scene)
+
+
+def _all(first: Predicate, second: Predicate) -> Predicate:
+    return lambda scene: first(scene) and second(scene)
+
+
+def _mentions(scene: Scene, word: str) -> bool:
+    return any(word.lower() in text.lower() for text in (scene.name, scene.title, *scene.tags))
+
+
+def _bad(text: str, why: str) -> InputError:
+    return InputError(f"-k '{text}': {why}; expected e.g. -k 'demo and not (tissue or f3)'")
+
+
+def _sources(names: Sequence[str]) -> dict[str, bool]:
+    """Case names and files, and whether each was named itself (not matched by a pattern)."""
+    known = list_cases()
+    sources: dict[str, bool] = {}
+    for name in names:
+        if any(mark in name for mark in "*?[") and not name.endswith(".toml"):
+            found = [case for case in known if fnmatchcase(case, name)]
+            if not found:
+                raise InputError(f"no case matches '{name}'; `verify list` shows them all")
+            for case in found:
+                sources.setdefault(case, False)
+        else:
+            sources[name] = True
+    return sources if names else dict.fromkeys(known, False)
+
+
+def _of_weight(scene: Scene, weight: str) -> bool:
+    if weight == "quick":
+        return "quick" in scene.tags
+    return weight == "heavy" or "heavy" not in scene.tags

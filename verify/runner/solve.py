@@ -1,0 +1,79 @@
+"""One solve in a process of its own: ``python -m verify.runner.solve JOB.json``.
+
+Writes ``solution.json``/``.vtu`` and, last, ``outcome.json``; a process that dies without an
+outcome has failed, and its log says how.
+"""
+
+import errno
+import os
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.result import Status
+from verify.runner.childhood import die_with_parent, peak_memory
+from verify.runner.storage import read_json, write_json
+
+__all__ = ["main", "solve_job"]
+
+
+def main(job_file: Path) -> None:
+    """Solve what `job_file` says and write down how it went."""
+    die_with_parent()
+    outcome = solve_job(read_json(job_file), job_file.parent)
+    write_json({**outcome, "peak_memory": peak_memory()}, job_file.parent / "outcome.json")
+
+
+def solve_job(job: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Solve and store; every way to fail is an outcome with its reason."""
+    try:
+        return _solved(job, folder)
+    except UnsupportedSceneError as refusal:
+        return {"status": Status.REFUSED, "reason": str(refusal)}
+    except InputError as error:
+        return {"status": Status.FAILED, "reason": str(error)}
+    except MemoryError:
+        traceback.print_exc()
+        return {"status": Status.MEMORY, "reason": "the solver could not allocate memory"}
+    except OSError as error:
+        traceback.print_exc()
+        reason = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else str(error)
+        return {"status": Status.FAILED, "reason": reason}
+    except (Exception, SystemExit) as error:
+        traceback.print_exc()
+        line = str(error).strip().splitlines()
+        reason = f"{type(error).__name__}{': ' + line[0] if line else ''}"
+        return {"status": Status.FAILED, "reason": reason}
+
+
+def _solved(job: dict[str, Any], folder: Path) -> dict[str, Any]:
+    from verify.scene import restore_scene
+    from verify.solution import write_solution
+    from verify.solvers import find_solver
+
+    if ":" in job["solver"]:  # a class of the user's own, found from where the run was started
+        sys.path.append(os.getcwd())
+    scene = restore_scene(job["scene"])
+    solver = find_solver(job["solver"])
+    if refusal := solver.refuses(scene):
+        raise UnsupportedSceneError(refusal)
+    solution = solver.solve(
+        scene, job["level"], repetitions=job["repetitions"], **job["parameters"]
+    )
+    write_solution(solution, folder / "solution")
+    return {
+        "status": Status.SOLVED,
+        "reason": "",
+        "size": solution.size,
+        "unknowns": solution.unknowns,
+        "timings": solution.timings,
+        "iterations": solution.iterations,
+        "regularisations": [vars(entry) for entry in solution.regularisations],
+        "notes": solution.notes,
+    }
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
