@@ -1,0 +1,69 @@
+"""A tree of bounding boxes over the cells of a mesh.
+
+A uniform grid of bins fails on meshes that are graded to a crack tip: an eighth of all cells
+can fall into one bin. Boxes over runs of cells in Morton order adapt to the grading and are
+built without recursion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CellTree", "build_cell_tree"]
+
+LEAF = 4  # cells per leaf
+
+
+@dataclass(frozen=True)
+class CellTree:
+    """A complete binary tree in heap order: node i has children 2i and 2i + 1, the root is 1.
+
+    Parameters
+    ----------
+    lower, upper : (2p, d) float array
+        Bounding boxes; an empty node has lower = +inf, upper = -inf.
+    cells : (4p,) int array
+        Cells in Morton order; leaf j is node p + j and holds cells[4j:4j + 4]; -1 fills up.
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    cells: NDArray[np.int64]
+
+
+def build_cell_tree(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> CellTree:
+    """Build the tree from the bounding boxes (m, d) of the cells; NaN marks cells to leave out."""
+    kept = np.flatnonzero(np.isfinite(lower).all(axis=1))
+    order = kept[np.argsort(_morton(0.5 * (lower[kept] + upper[kept])), kind="stable")]
+    leaves = 1
+    while leaves * LEAF < len(order):
+        leaves *= 2
+    cells = np.full(leaves * LEAF, -1, dtype=np.int64)
+    cells[: len(order)] = order
+    d = lower.shape[1]
+    lo, up = np.full((2 * leaves, d), np.inf), np.full((2 * leaves, d), -np.inf)
+    held = cells.reshape(leaves, LEAF)
+    full = held >= 0
+    lo[leaves:] = np.where(full[..., None], lower[held], np.inf).min(axis=1)
+    up[leaves:] = np.where(full[..., None], upper[held], -np.inf).max(axis=1)
+    first = leaves // 2
+    while first >= 1:
+        children = slice(2 * first, 4 * first)
+        lo[first : 2 * first] = lo[children].reshape(first, 2, d).min(axis=1)
+        up[first : 2 * first] = up[children].reshape(first, 2, d).max(axis=1)
+        first //= 2
+    return CellTree(lo, up, cells)
+
+
+def _morton(centres: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Interleave the bits of the coordinates, so that near cells get near numbers."""
+    d = centres.shape[1]
+    bits = 31 if d == 2 else 20
+    extent = np.maximum(np.ptp(centres, axis=0), 1e-300)
+    whole = ((centres - centres.min(axis=0)) / extent * (2**bits - 1)).astype(np.int64)
+    code = np.zeros(len(centres), dtype=np.int64)
+    for bit in range(bits):
+        for axis in range(d):
+            code |= ((whole[:, axis] >> bit) & 1) << (d * bit + axis)
+    return code

@@ -1,0 +1,124 @@
+"""The field of a `Solution`: displacement and its gradient at any point, on the wanted side.
+
+Sides are decided by geometry alone. On a cut a point has two values; the caller says which by
+`near`, a point in the wanted direction. A solution whose realised cut deviates from the cut
+as asked (an arc in facets, a snapped cut) is asked through `verify.compare.realised`.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.compare.cell_tree import build_cell_tree
+from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
+from verify.compare.simplices import simplices, straight_or_raise
+from verify.solution import Solution
+
+__all__ = ["ROUND_OFF", "Field", "SolutionField"]
+
+Array = NDArray[np.float64]
+
+# Relative to the body's size: mesh generators and files move points by up to this much.
+ROUND_OFF = 1e-10
+
+
+class Field(Protocol):
+    """A displacement field that can be compared: of a solution, or exact."""
+
+    def displacement(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement (n, d) in m at `points` (n, d)."""
+        ...
+
+    def gradient(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement gradient (n, d, d), ``[:, i, j]`` = ∂u_i/∂x_j, at `points` (n, d)."""
+        ...
+
+
+class SolutionField:
+    """Evaluate a solution at points.
+
+    Parameters
+    ----------
+    solution : Solution
+        Linear, or quadratic with straight edges.
+    step : int
+        Output time that is evaluated; default the last.
+
+    Attributes
+    ----------
+    degenerate_cells : int
+        Cells of no volume, which were left out.
+
+    Raises
+    ------
+    InputError
+        If quadratic cells have curved edges.
+    """
+
+    def __init__(self, solution: Solution, step: int = -1) -> None:
+        self.solution = solution
+        self._nodal = np.ascontiguousarray(solution.displacement[step])
+        self._cells = np.ascontiguousarray(solution.cells)
+        if solution.order == 2:
+            straight_or_raise(solution.points, self._cells)
+        shape = simplices(solution.points, self._cells)
+        self._shape = shape
+        self.degenerate_cells = int(shape.degenerate.sum())
+        lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
+        lower[shape.degenerate] = np.nan
+        self._tree = build_cell_tree(lower, upper)
+        self._centres = shape.corners.mean(axis=1)
+        self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
+        if solution.order == 1:
+            values = self._nodal[self._cells]
+            self._first = np.ascontiguousarray(values[:, 0])
+            self._origin = np.ascontiguousarray(shape.corners[:, 0])
+            self._slope = np.einsum(
+                "mkc,mka->mca", values[:, 1:] - values[:, :1], shape.gradients[:, 1:]
+            )
+
+    def cells_at(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
+        """Find the cell (n,) that holds each of `points` (n, d).
+
+        Where a point belongs to several cells within round-off, that one is taken whose
+        centroid lies in the direction of `near` (n, d); without `near`, the one that it lies
+        deepest in. A point outside of all cells is given to the nearest.
+        """
+        points = np.ascontiguousarray(points, dtype=float)
+        directions = np.zeros((0, points.shape[1])) if near is None else near - points
+        found: NDArray[np.int64] = find_cells(
+            points,
+            np.ascontiguousarray(directions),
+            self._tree.lower,
+            self._tree.upper,
+            self._tree.cells,
+            self._shape.corners,
+            self._shape.normals,
+            self._centres,
+            ROUND_OFF * self.scale,
+        )
+        return found
+
+    def in_cells(self, points: Array, cells: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Displacement (n, d) and gradient (n, d, d) of the polynomial of each given cell."""
+        points = np.ascontiguousarray(points, dtype=float)
+        if self.solution.order == 1:
+            u = evaluate_linear(points, cells, self._origin, self._first, self._slope)
+            return u, self._slope[cells]
+        u, gradient = evaluate_quadratic(
+            points, cells, self._cells, self._nodal, self._shape.corners, self._shape.gradients
+        )
+        return u, gradient
+
+    def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
+        """Displacement (n, d) and gradient (n, d, d) at `points` (n, d)."""
+        return self.in_cells(points, self.cells_at(points, near))
+
+    def displacement(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement (n, d) in m at `points` (n, d)."""
+        return self.evaluate(points, near)[0]
+
+    def gradient(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement gradient (n, d, d) at `points` (n, d)."""
+        return self.evaluate(points, near)[1]

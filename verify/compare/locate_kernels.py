@@ -1,0 +1,233 @@
+"""Kernels: find the cell that holds a point, and evaluate a P1 or P2 field in it."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["evaluate_linear", "evaluate_quadratic", "find_cells"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@njit(cache=True)
+def _depth(x, normals, corners):  # type: ignore[no-untyped-def]
+    """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
+    d = x.shape[0]
+    depth = np.inf
+    for facet in range(d + 1):
+        on_it = (facet + 1) % (d + 1)
+        distance = 0.0
+        for a in range(d):
+            distance += normals[facet, a] * (x[a] - corners[on_it, a])
+        depth = min(depth, distance)
+    return depth
+
+
+@njit(cache=True)
+def _segment_distance2(x, a, b):  # type: ignore[no-untyped-def]
+    """Squared distance of `x` to the segment ab, in any dimension."""
+    along, length2 = 0.0, 0.0
+    for c in range(x.shape[0]):
+        along += (x[c] - a[c]) * (b[c] - a[c])
+        length2 += (b[c] - a[c]) ** 2
+    t = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
+    distance2 = 0.0
+    for c in range(x.shape[0]):
+        distance2 += (x[c] - a[c] - t * (b[c] - a[c])) ** 2
+    return distance2
+
+
+@njit(cache=True)
+def _outside_distance2(x, normals, corners):  # type: ignore[no-untyped-def]
+    """Squared distance to a simplex of a point outside of it."""
+    d = x.shape[0]
+    best = np.inf
+    for i in range(d + 1):
+        for j in range(i):
+            best = min(best, _segment_distance2(x, corners[i], corners[j]))
+    if d == 2:
+        return best
+    for facet in range(4):  # the foot inside a face beats its edges
+        on_it = (facet + 1) % 4
+        height = 0.0
+        for a in range(3):
+            height += normals[facet, a] * (x[a] - corners[on_it, a])
+        if height >= 0.0:
+            continue
+        foot = x - height * normals[facet]
+        inside = True
+        for other in range(4):
+            if other == facet:
+                continue
+            p, q = corners[(facet + 1) % 4], corners[(facet + 1) % 4]
+            for k in range(4):
+                if k not in (facet, other):
+                    p, q = q, corners[k]
+            edge_normal = np.cross(q - p, normals[facet])
+            side = np.dot(edge_normal, foot - p)
+            if side * np.dot(edge_normal, corners[other] - p) < 0.0:
+                inside = False
+        if inside:
+            best = min(best, height * height)
+    return best
+
+
+@njit(cache=True)
+def _containing(x, direction, sided, lower, upper, cells, corners, normals, centres, tolerance):  # type: ignore[no-untyped-def]
+    """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
+    d = x.shape[0]
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    stack = np.empty(64, dtype=np.int64)
+    stack[0], top = 1, 1
+    best, best_depth, best_side = -1, -np.inf, False
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        inside = True
+        for a in range(d):
+            if x[a] < lower[node, a] - tolerance or x[a] > upper[node, a] + tolerance:
+                inside = False
+        if not inside:
+            continue
+        if node < leaves:
+            stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+            top += 2
+            continue
+        first = (node - leaves) * leaf_size
+        for k in range(first, first + leaf_size):
+            cell = cells[k]
+            if cell < 0:
+                break
+            depth = _depth(x, normals[cell], corners[cell])
+            if depth < -tolerance:
+                continue
+            if depth > tolerance:
+                return cell
+            on_side = not sided
+            if sided:
+                towards = 0.0
+                for a in range(d):
+                    towards += direction[a] * (centres[cell, a] - x[a])
+                on_side = towards > 0.0
+            if (on_side and not best_side) or (on_side == best_side and depth > best_depth):
+                best, best_depth, best_side = cell, depth, on_side
+    return best
+
+
+@njit(cache=True)
+def _nearest(x, lower, upper, cells, corners, normals):  # type: ignore[no-untyped-def]
+    """Find the cell nearest to `x`, by branch and bound."""
+    d = x.shape[0]
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    stack = np.empty(64, dtype=np.int64)
+    stack[0], top = 1, 1
+    best, best2 = -1, np.inf
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if _box_distance2(x, lower[node], upper[node]) >= best2:
+            continue
+        if node < leaves:
+            left, right = 2 * node, 2 * node + 1
+            left2 = _box_distance2(x, lower[left], upper[left])
+            if left2 < _box_distance2(x, lower[right], upper[right]):
+                left, right = right, left
+            stack[top], stack[top + 1] = left, right  # the nearer child is taken first
+            top += 2
+            continue
+        first = (node - leaves) * leaf_size
+        for k in range(first, first + leaf_size):
+            cell = cells[k]
+            if cell < 0:
+                break
+            if _depth(x, normals[cell], corners[cell]) >= 0.0:
+                return cell
+            distance2 = _outside_distance2(x, normals[cell], corners[cell])
+            if distance2 < best2:
+                best, best2 = cell, distance2
+    return best
+
+
+@njit(cache=True)
+def _box_distance2(x, lower, upper):  # type: ignore[no-untyped-def]
+    distance2 = 0.0
+    for a in range(x.shape[0]):
+        gap = max(lower[a] - x[a], x[a] - upper[a])
+        if gap > 0.0:
+            distance2 += gap * gap
+    return distance2
+
+
+@njit(cache=True)
+def find_cells(  # type: ignore[no-untyped-def]
+    points, directions, lower, upper, cells, corners, normals, centres, tolerance
+):
+    """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
+
+    `directions` is (n, d), or (0, d) where no side is wanted.
+    """
+    n = points.shape[0]
+    found = np.empty(n, dtype=np.int64)
+    sided = directions.shape[0] == n
+    nowhere = np.zeros(points.shape[1])
+    for i in range(n):
+        direction = directions[i] if sided else nowhere
+        cell = _containing(
+            points[i], direction, sided, lower, upper, cells, corners, normals, centres, tolerance
+        )
+        if cell < 0:
+            cell = _nearest(points[i], lower, upper, cells, corners, normals)
+        found[i] = cell
+    return found
+
+
+@njit(cache=True)
+def evaluate_linear(points, found, origins, values, slopes):  # type: ignore[no-untyped-def]
+    """Return value (n, d) of u = u_0 + G (x - x_0) with the first corner's x_0, u_0 of each cell."""
+    n, d = points.shape
+    result = np.empty((n, d))
+    for i in range(n):
+        cell = found[i]
+        for c in range(d):
+            value = values[cell, c]
+            for a in range(d):
+                value += slopes[cell, c, a] * (points[i, a] - origins[cell, a])
+            result[i, c] = value
+    return result
+
+
+@njit(cache=True)
+def evaluate_quadratic(points, found, nodes, values, corners, gradients):  # type: ignore[no-untyped-def]
+    """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
+    n, d = points.shape
+    u, grad = np.zeros((n, d)), np.zeros((n, d, d))
+    weight = np.empty(d + 1)
+    for i in range(n):
+        cell = found[i]
+        g = gradients[cell]
+        for k in range(d + 1):
+            weight[k] = 0.0
+            for a in range(d):
+                weight[k] += g[k, a] * (points[i, a] - corners[cell, (k + 1) % (d + 1), a])
+        for k in range(d + 1):
+            node = nodes[cell, k]
+            shape, slope = weight[k] * (2.0 * weight[k] - 1.0), 4.0 * weight[k] - 1.0
+            for c in range(d):
+                u[i, c] += shape * values[node, c]
+                for a in range(d):
+                    grad[i, c, a] += slope * g[k, a] * values[node, c]
+        for edge in range(d * (d + 1) // 2):
+            # VTK: edges 01 12 20, and in 3D then 03 13 23
+            p = edge if edge < 3 else edge - 3
+            q = (edge + 1) % 3 if edge < 3 else 3
+            node = nodes[cell, d + 1 + edge]
+            shape = 4.0 * weight[p] * weight[q]
+            for c in range(d):
+                u[i, c] += shape * values[node, c]
+                for a in range(d):
+                    slope = 4.0 * (weight[p] * g[q, a] + weight[q] * g[p, a])
+                    grad[i, c, a] += slope * values[node, c]
+    return u, grad
