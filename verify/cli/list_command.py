@@ -29,7 +29,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def _cases(expression: str | None) -> list[dict[str, Any]]:
     wanted = parse_expression(expression) if expression is not None else None
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name, path in list_cases().items():
         try:
             scene = load_scene(path)

@@ -90,17 +90,18 @@ def run_cases(
     with listening() as stop:
         survey = survey_solvers(scenes, options, stop)
         with claimed(out, identity) as directory:
-            record = {
+            origin = provenance()
+            record: dict[str, Any] = {
                 **identity,
                 "command": command,
                 "started": _now(),
                 "finished": None,
                 "options": options.record(),
-                "provenance": provenance(),
+                "provenance": origin,
             }
             write_run(directory, record)
             plans = [plan_case(scene, options, survey, directory) for scene in scenes]
-            work = _Work(plans, directory, options, record["provenance"], progress)
+            work = _Work(plans, directory, options, origin, progress)
             results = work.until_done(stop)
             write_run(directory, {**record, "finished": _now()})
     return RunSummary(out, results, work.reused)
@@ -223,9 +224,8 @@ class _Work:
         said = telling_line(child.log)
         if ending.returncode == -9:
             return Status.MEMORY, "killed by the system, which was probably out of memory"
-        how = (
-            f"signal {-ending.returncode}" if ending.returncode < 0 else f"code {ending.returncode}"
-        )
+        code = ending.returncode
+        how = f"signal {-code}" if code < 0 else f"exit code {code}"
         return Status.FAILED, f"{said} ({how})"
 
     def _contention(self) -> str:

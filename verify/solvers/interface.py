@@ -31,7 +31,7 @@ class Solver(Protocol):
         ...
 
     def levels(self, scene: Scene) -> int:
-        """Number of mesh levels on which it can solve `scene`."""
+        """Return the number of mesh levels on which it can solve `scene`."""
         ...
 
     def solve(self, scene: Scene, level: int, repetitions: int = 1, **parameters: Any) -> Solution:
@@ -56,7 +56,7 @@ def solver_names() -> list[str]:
 
 
 def find_solver(name: str) -> Solver:
-    """The solver called `name`.
+    """Find the solver called `name`.
 
     Parameters
     ----------

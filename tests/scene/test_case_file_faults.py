@@ -1,0 +1,149 @@
+"""A fault in a case file is said in one line: the file, the key, what is valid."""
+
+from pathlib import Path
+
+import pytest
+
+from verify.errors import InputError
+from verify.scene import load_scene
+
+WHOLE = """
+schema = 1
+title = "A strip"
+requirement = "It shall hang."
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [1.0, 2.0]
+[mesh]
+cells = [[4, 8], [8, 16]]
+[material]
+young = 1e4
+poisson = 0.3
+density = 1000.0
+plane = "strain"
+[[supports]]
+where = "top"
+displacement = [0.0, 0.0]
+[[loads]]
+kind = "gravity"
+acceleration = [0.0, -9.8]
+[[cuts]]
+kind = "polyline"
+points = [[-0.1, 1.0], [0.5, 1.0]]
+expected = "edge"
+[[quantities]]
+kind = "displacement"
+name = "tip"
+point = [0.5, 0.0]
+component = "y"
+[[quantities]]
+kind = "opening"
+name = "mouth"
+at = 0.2
+[[acceptance]]
+check = "error"
+metric = "tip"
+at_most = 0.1
+"""
+
+FAULTS = {
+    "unknown key": ("young = ", "yuong = ", "material.yuong: unknown key; did you mean 'young'?"),
+    "unknown table": ("[mesh]", "[mash]", "mash: unknown key; did you mean 'mesh'?"),
+    "missing value": ("poisson = 0.3\n", "", "material.poisson: missing"),
+    "number too large": ("poisson = 0.3", "poisson = 0.5", "expected a number < 0.5, got 0.5"),
+    "number too small": ("poisson = 0.3", "poisson = -1.0", "expected a number > -1, got -1.0"),
+    "not a number": ("young = 1e4", "young = nan", "material.young: expected a finite number"),
+    "text for a number": ("young = 1e4", 'young = "1e4"', "expected a finite number, got '1e4'"),
+    "truth for a number": ("young = 1e4", "young = true", "expected a finite number, got True"),
+    "half a cell": ("[8, 16]", "[8, 16.5]", "mesh.cells[1][1]: expected a whole number"),
+    "levels backwards": ("[8, 16]", "[2, 16]", "mesh: cells must go from coarse to fine"),
+    "one level twice": ("[8, 16]", "[4, 8]", "mesh: cells must go from coarse to fine"),
+    "no level": ("[[4, 8], [8, 16]]", "[]", "mesh.cells: expected at least 1 entries"),
+    "cells in 3D": ("[4, 8],", "[4, 8, 8],", "has 3 numbers; expected 2"),
+    "cells and sizes": ("[mesh]", "[mesh]\nsizes = [0.1]", "a mesh has either sizes or cells"),
+    "unknown kind": ('"polyline"', '"polylin"', "cuts[0].kind: no 'polylin'; did you mean"),
+    "no kind": ('kind = "polyline"\n', "", "cuts[0].kind: missing; expected one of arc, polygon"),
+    "a single table": ("[[supports]]", "[supports]", "supports: expected a list of tables ([[…]]"),
+    "point in 3D": ("[0.5, 1.0]]", "[0.5, 1.0, 0.0]]", "cuts[0].points[1]: expected at most 2"),
+    "one point": ("[-0.1, 1.0], ", "", "cuts[0].points: expected at least 2 entries"),
+    "cut outside": ("1.0], [0.5, 1.0]", "3.0], [0.5, 3.0]", "('cut'): lies outside the body"),
+    "cut on the boundary": ("[[-0.1, 1.0], [0.5, 1.0]]", "[[0, 0], [0, 2]]", "cuts nothing"),
+    "cut not as expected": ('"edge"', '"through"', "expected 'through' but it is 'edge'"),
+    "cut crosses itself": (
+        "[0.5, 1.0]]",
+        "[0.5, 1.0], [0.5, 0.5], [0.2, 1.5]]",
+        "cuts[0]: the polyline intersects itself (segments 0 and 2)",
+    ),
+    "cut folds back": ("[0.5, 1.0]]", "[0.5, 1.0], [0.2, 1.0]]", "folds back onto itself"),
+    "cut repeats a point": ("[0.5, 1.0]]", "[0.5, 1.0], [0.5, 1.0]]", "repeats point 1"),
+    "empty body": ("upper = [1.0, 2.0]", "upper = [0.0, 2.0]", "geometry: upper (0.0, 2.0) must"),
+    "no such part": ('"top"', '"topp"', "supports[0].where: no part 'topp'; did you mean 'top'?"),
+    "code for a region": ('"top"', '"__import__(1) > x"', "is not allowed; expected an inequality"),
+    "z in the plane": ('"top"', '"z > 1"', "'z' in 'z > 1' is not allowed"),
+    "values for components": ("displacement = [0.0, 0.0]", "displacement = [0.0]", "expected 2"),
+    "exact without solution": ("displacement = [0.0, 0.0]", 'displacement = "exact"', "an [exact]"),
+    "misspelt exact": ("displacement = [0.0, 0.0]", 'displacement = "exat"', "in brackets or 'exact'"),
+    "gravity without density": ("density = 1000.0\n", "", "gravity needs material.density"),
+    "3D gravity": ("[0.0, -9.8]", "[0.0, 0.0, -9.8]", "acceleration: 3 values; expected 2"),
+    "no plane": ('plane = "strain"\n', "", "material.plane: a 2D scene needs"),
+    "unknown metric": ('"tip"\nat_most', '"tap"\nat_most', "metric: no 'tap'; did you"),
+    "no limit": ("at_most = 0.1", "", "acceptance[0].at_most: missing"),
+    "point outside": ("point = [0.5, 0.0]", "point = [0.5, -0.1]", "which is not in the body"),
+    "point on the cut": ("point = [0.5, 0.0]", "point = [0.2, 1.0]", "lies on cut 'cut', where"),
+    "opening outside": ("at = 0.2", "at = 0.1", "(-0.04, 1), which is not in the body"),
+    "two-line title": ('"A strip"', '"A\\nstrip"', "title: expected one line of text"),
+    "wrong schema": ("schema = 1", "schema = 2", "schema: expected 1, got 2"),
+    "not TOML": ("[mesh]", "[mesh", "not valid TOML"),
+    "given without a file": ("cells = [[4, 8], [8, 16]]", 'pattern = "given"', "belong together"),
+}  # fmt: skip
+
+
+def load(folder: Path, text: str):
+    path = folder / "strip.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_scene(path)
+
+
+def test_the_whole_case_is_read(tmp_path):
+    assert load(tmp_path, WHOLE).name == "strip"
+
+
+def test_a_byte_order_mark_is_no_fault(tmp_path):
+    assert load(tmp_path, "\ufeff" + WHOLE).title == "A strip"
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_named_with_file_and_key_in_one_line(tmp_path, fault):
+    old, new, expected = FAULTS[fault]
+    assert WHOLE.count(old) == 1
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, WHOLE.replace(old, new))
+    message = str(caught.value)
+    assert expected in message
+    assert message.startswith(str(tmp_path / "strip.toml"))
+    assert "\n" not in message
+
+
+def test_more_faults_are_counted(tmp_path):
+    text = WHOLE.replace("poisson = 0.3", "poisson = 3").replace("at = 0.2", "at = 2.0")
+    with pytest.raises(InputError, match=r"\(and 1 more\)"):
+        load(tmp_path, text)
+
+
+@pytest.mark.parametrize("name", ["nowhere.toml", "statics/f1_pach"])
+def test_a_case_that_is_not_there_is_named(name):
+    with pytest.raises(InputError, match=r"no such file|did you mean 'statics/f1_patch'"):
+        load_scene(name)
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_scene(tmp_path / "a.toml")
+
+
+def test_a_directory_is_refused(tmp_path):
+    (tmp_path / "a.toml").mkdir()
+    with pytest.raises(InputError, match="cannot be read"):
+        load_scene(tmp_path / "a.toml")

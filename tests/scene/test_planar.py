@@ -1,0 +1,116 @@
+"""Plane predicates: where a cut lies in a body, checked against exact geometry."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from verify.scene.planar import (
+    distance_to_outline,
+    inner_parts,
+    inside_polygon,
+    overlap_length,
+    point_along,
+    polygon_defect,
+    polyline_defect,
+    polylines_meet,
+)
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+NOTCHED = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0],
+                    [1.0, 2.0], [0.0, 2.0]])  # fmt: skip
+
+
+def length(parts):
+    return sum(float(np.linalg.norm(b - a)) for a, b in parts)
+
+
+def test_a_cut_through_a_tiny_corner_is_inside():
+    # 1e-4 of the corner of a body of size 1, by a cut of length 2000
+    cut = np.array([[-1000.0, 1000.0 + 1e-4], [1000.0 + 1e-4, -1000.0]])
+    assert length(inner_parts(cut, SQUARE)) == pytest.approx(np.sqrt(2) * 1e-4, rel=1e-6)
+
+
+def test_a_cut_through_a_notch_has_two_inner_parts():
+    parts = inner_parts(np.array([[-1.0, 1.5], [4.0, 1.5]]), NOTCHED)
+    assert [np.round([a[0], b[0]], 12).tolist() for a, b in parts] == [[0, 1], [2, 3]]
+
+
+def test_a_cut_along_the_boundary_has_no_inner_part():
+    assert inner_parts(np.array([[-1.0, 0.0], [2.0, 0.0]]), SQUARE) == []
+    along_the_notch = inner_parts(np.array([[0.5, 1.0], [2.5, 1.0]]), NOTCHED)
+    assert length(along_the_notch) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_cut_through_a_corner_point_only_cuts_nothing():
+    assert inner_parts(np.array([[-1.0, 1.0], [1.0, -1.0]]), SQUARE) == []
+
+
+@given(
+    st.tuples(*[st.floats(-2, 3) for _ in range(4)]).filter(
+        lambda v: np.hypot(v[2] - v[0], v[3] - v[1]) > 1e-3
+    )
+)
+def test_the_inner_length_equals_that_of_clipping_against_half_planes(values):
+    a, b = np.array(values[:2]), np.array(values[2:])
+    low, high = 0.0, 1.0  # Liang–Barsky
+    for c in range(2):
+        for sign, bound in ((1, 1.0), (-1, 0.0)):
+            p, q = sign * (b[c] - a[c]), sign * (bound - a[c])
+            if p > 0:
+                high = min(high, q / p)
+            elif p < 0:
+                low = max(low, q / p)
+            elif q < 0:
+                high = -1.0
+    expected = max(high - low, 0.0) * np.linalg.norm(b - a)
+    on_boundary = distance_to_outline(0.5 * (a + b)[None], SQUARE)[0] < 1e-8
+    if not on_boundary:
+        # parts that hug the boundary within 1e-9 do not count
+        assert length(inner_parts(np.array([a, b]), SQUARE)) == pytest.approx(expected, abs=1e-7)
+
+
+def test_winding_decides_inside_for_both_orientations():
+    points = np.array([[0.5, 0.5], [1.5, 1.5], [2.5, 1.5], [-0.1, 0.5]])
+    assert inside_polygon(points, NOTCHED).tolist() == [True, False, True, False]
+    assert inside_polygon(points, NOTCHED[::-1]).tolist() == [True, False, True, False]
+
+
+def test_polygons_that_are_not_simple_are_named():
+    assert polygon_defect(NOTCHED) is None
+    assert "intersects itself" in polygon_defect(SQUARE[[0, 2, 1, 3]])
+    assert "repeats point" in polygon_defect(SQUARE[[0, 0, 1, 2]])
+    assert "folds back" in polygon_defect(
+        np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.0], [0.5, 1.0]])
+    )
+    # where it closes, a fold always touches a second segment
+    closing_fold = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0], [3.0, 0.0]])
+    assert "intersects itself" in polygon_defect(closing_fold)
+
+
+def test_a_closed_polyline_is_simple_and_a_touching_one_is_not():
+    ring = np.vstack([SQUARE, SQUARE[:1]])
+    assert polyline_defect(ring) is None
+    lasso = np.vstack([ring[:-1], [[0.5, 0.0]]])  # its end touches its first segment
+    assert "intersects itself" in polyline_defect(lasso)
+
+
+def test_polylines_meet_where_they_cross_or_touch():
+    level = np.array([[0.0, 0.0], [1.0, 0.0]])
+    assert polylines_meet(level, np.array([[0.5, -1.0], [0.5, 1.0]]))
+    assert polylines_meet(level, np.array([[0.5, 0.0], [0.5, 1.0]]))
+    assert not polylines_meet(level, np.array([[0.5, 1e-6], [0.5, 1.0]]))
+    assert not polylines_meet(level, np.array([[0.0, 1e-6], [1.0, 1e-6]]))
+
+
+def test_overlap_is_the_shared_length_and_a_crossing_has_none():
+    level = np.array([[0.0, 0.0], [1.0, 0.0]])
+    assert overlap_length(level, np.array([[0.75, 0.0], [2.0, 0.0]])) == pytest.approx(0.25)
+    assert overlap_length(level, np.array([[2.0, 0.0], [-1.0, 0.0]])) == pytest.approx(1.0)
+    assert overlap_length(level, np.array([[0.5, -1.0], [0.5, 1.0]])) == 0.0
+    assert overlap_length(level, np.array([[1.0, 0.0], [2.0, 0.0]])) == 0.0
+
+
+def test_a_fraction_of_the_length_is_found_across_kinks():
+    kinked = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]])
+    np.testing.assert_allclose(point_along(kinked, 0.5), [1.0, 1.0], atol=1e-15)

@@ -1,0 +1,137 @@
+"""Case files as files: hashes, schema, mesh files, and the way to another process."""
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+from test_case_file_faults import WHOLE, load
+
+from verify.errors import InputError
+from verify.scene import (
+    Scene,
+    list_cases,
+    load_scene,
+    parse_region,
+    read_mesh,
+    restore_scene,
+    scene_content,
+    scene_hash,
+    scene_schema,
+)
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+TRIANGLES = [[0, 1, 2], [0, 3, 2]]  # the second is turned the wrong way
+
+
+def test_every_case_of_the_project_is_valid():
+    cases = list_cases()
+    assert cases
+    for name, path in cases.items():
+        assert load_scene(path).name == name
+
+
+def test_the_hash_is_that_of_the_physics(tmp_path):
+    scene = load(tmp_path, WHOLE)
+    (tmp_path / "elsewhere").mkdir()
+    same = load(tmp_path / "elsewhere", WHOLE.replace("A strip", "Another title"))
+    other = load(tmp_path, WHOLE.replace("young = 1e4", "young = 1.1e4"))
+    assert scene_hash(scene) == scene_hash(same) != scene_hash(other)
+
+
+def test_a_scene_survives_the_way_to_another_process(tmp_path):
+    scene = load(tmp_path, WHOLE)
+    restored = restore_scene(json.loads(json.dumps(scene_content(scene))))
+    assert restored == scene
+    assert (restored.name, restored.file) == (scene.name, scene.file)
+
+
+def test_the_schema_knows_every_key_and_forbids_others():
+    schema = scene_schema()
+    assert set(schema["properties"]) == {
+        field.alias or name for name, field in Scene.model_fields.items()
+    }
+    assert schema["additionalProperties"] is False
+    assert all(part.get("additionalProperties") is False for part in schema["$defs"].values())
+
+
+def test_two_cuts_on_each_other_are_refused(tmp_path):
+    second = '[[cuts]]\nkind = "polyline"\nname = "twin"\npoints = [[0.2, 1.0], [0.9, 1.0]]\n'
+    with pytest.raises(InputError, match=r"'cut' and 'twin' lie on each other over 0\.3 m"):
+        load(tmp_path, WHOLE + second)
+
+
+def test_crossing_cuts_are_accepted(tmp_path):
+    second = '[[cuts]]\nkind = "polyline"\nname = "other"\npoints = [[0.3, 0.5], [0.3, 1.5]]\n'
+    assert len(load(tmp_path, WHOLE + second).cuts) == 2
+
+
+def test_a_region_is_an_inequality_and_nothing_else():
+    points = np.array([[0.2, 0.0], [0.6, 0.3], [0.9, 0.9]])
+    region = parse_region("0.1 < x <= 0.6 and not hypot(x, y) < 0.3 or y > 2*pi/8", 2)
+    assert region(points).tolist() == [False, True, True]
+    assert parse_region("sqrt(x - 0.5) >= 0", 2)(points).tolist() == [False, True, True]
+    for text in ("x", "x == 1", "x.real > 0", "x < 1 if y else 2", "x < 1e999", "open('f') < x",
+                 "x < " + "9" * 500, "(" * 500 + "x<1" + ")" * 500, "not " * 3000 + "x<1",
+                 "x<1\0"):  # fmt: skip
+        with pytest.raises(InputError):
+            parse_region(text, 2)
+
+
+def given_mesh(folder, points=SQUARE, cells=(("triangle", TRIANGLES),), name="body.vtk"):
+    meshio.Mesh(points, [(kind, np.array(c)) for kind, c in cells]).write(folder / name)
+    text = WHOLE.replace(
+        'kind = "rectangle"\nlower = [0.0, 0.0]\nupper = [1.0, 2.0]',
+        f'kind = "file"\nfile = "{name}"',
+    ).replace("cells = [[4, 8], [8, 16]]", 'pattern = "given"')
+    return load(folder, text.replace('"top"', '"y > 0.9"'))
+
+
+def test_a_mesh_file_gives_simplices_of_positive_orientation(tmp_path):
+    lonely = np.vstack([SQUARE, [[5.0, 5.0]]])
+    points, cells = read_mesh(given_mesh(tmp_path, lonely))
+    assert points.shape == (4, 2)  # the node that no cell uses is gone
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    np.testing.assert_allclose(np.linalg.det(edges), [1.0, 1.0], rtol=1e-15)
+
+
+def test_lines_beside_the_triangles_are_no_fault(tmp_path):
+    scene = given_mesh(tmp_path, cells=(("triangle", TRIANGLES), ("line", [[0, 1]])))
+    assert len(read_mesh(scene)[1]) == 2
+
+
+@pytest.mark.parametrize(
+    "options, expected",
+    [
+        ({"cells": (("quad", [[0, 1, 2, 3]]),)}, "not simplicial: has quad; expected triangles"),
+        ({"cells": (("line", [[0, 1]]),)}, "not simplicial: has line"),
+        ({"cells": (("triangle", TRIANGLES), ("quad", [[0, 1, 2, 3]]))}, "not simplicial: has quad"),
+        ({"points": np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0.1], [0, 1, 0]])}, "not plane"),
+        ({"points": SQUARE * [[1.0, 0.0]]}, "2 cells without volume"),
+        ({"points": np.array([[0.0, 0], [1, 0], [1, np.nan], [0, 1]])}, "not finite"),
+    ],
+    ids=["quadrangles", "only lines", "mixed", "not plane", "flat", "nan"],
+)  # fmt: skip
+def test_a_bad_mesh_file_is_said_in_one_line(tmp_path, options, expected):
+    with pytest.raises(InputError, match=expected) as caught:
+        read_mesh(given_mesh(tmp_path, **options))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_no_mesh_is_refused_without_noise(tmp_path, capfd):
+    scene = given_mesh(tmp_path)
+    capfd.readouterr()
+    for content in (b"", b"not a mesh\n", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET NONE\n"):
+        (tmp_path / "body.vtk").write_bytes(content)
+        with pytest.raises(InputError, match="not a mesh that meshio can read"):
+            read_mesh(scene)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_mesh_file_that_is_not_there_is_named_when_the_case_is_read(tmp_path):
+    scene = given_mesh(tmp_path)
+    (tmp_path / "body.vtk").unlink()
+    with pytest.raises(InputError, match=r"geometry\.file: no mesh file"):
+        load_scene(scene.file)
+    with pytest.raises(InputError, match=r"geometry\.file: no mesh file"):
+        read_mesh(scene)
