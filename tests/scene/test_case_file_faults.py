@@ -83,7 +83,7 @@ FAULTS = {
     "z in the plane": ('"top"', '"z > 1"', "'z' in 'z > 1' is not allowed"),
     "values for components": ("displacement = [0.0, 0.0]", "displacement = [0.0]", "expected 2"),
     "exact without solution": ("displacement = [0.0, 0.0]", 'displacement = "exact"', "an [exact]"),
-    "misspelt exact": ("displacement = [0.0, 0.0]", 'displacement = "exat"', "in brackets or 'exact'"),
+    "misspelt exact": ("displacement = [0.0, 0.0]", 'displacement = "exat"', "or 'exact'"),
     "gravity without density": ("density = 1000.0\n", "", "gravity needs material.density"),
     "3D gravity": ("[0.0, -9.8]", "[0.0, 0.0, -9.8]", "acceleration: 3 values; expected 2"),
     "no plane": ('plane = "strain"\n', "", "material.plane: a 2D scene needs"),
