@@ -1,0 +1,49 @@
+"""A measure together with the error of its quadrature.
+
+Finite element fields have kinks along edges that the neutral quadrature does not know. Its
+error is estimated by two coarser rules in other directions: it is taken to be as large as the
+largest difference among them, although the finest rule is the one that counts.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from verify.compare.body import Body
+from verify.compare.cut_line import CutRule, cut_rule
+from verify.compare.error_norm import ErrorNorm
+from verify.compare.slabs import Rule, area_rule
+
+__all__ = ["MeasuredNorm", "Rules", "cut_rules", "integrate_norm", "rules"]
+
+R = TypeVar("R", Rule, CutRule)
+
+# spacing over the wanted one, and direction: golden angle, and two unrelated to it
+_FAMILY = ((1.0, 0.5535), (1.31, 0.3217), (1.73, 0.8929))
+Rules = Sequence[R]
+
+
+@dataclass(frozen=True)
+class MeasuredNorm:
+    """An error norm by the finest rule, and the integration error of its relative value."""
+
+    norm: ErrorNorm
+    integration_error: float
+
+
+def rules(body: Body, size: float) -> list[Rule]:
+    """Area rules for fields on elements of size `size` m, the finest first."""
+    return [area_rule(body, factor * size / 3, angle) for factor, angle in _FAMILY]
+
+
+def cut_rules(body: Body, size: float) -> list[CutRule]:
+    """Rules along the cuts for fields on elements of size `size` m, the finest first."""
+    return [cut_rule(body, factor * size / 8) for factor, _ in _FAMILY]
+
+
+def integrate_norm(measure: Callable[[R], ErrorNorm], family: Rules[R]) -> MeasuredNorm:
+    """Apply `measure` with each rule of a family."""
+    norms = [measure(rule) for rule in family]
+    values = [norm.relative for norm in norms]
+    spread = max(abs(value - values[0]) for value in values) if values[0] < float("inf") else 0.0
+    return MeasuredNorm(norms[0], spread)
