@@ -80,12 +80,16 @@ def _pieces(
         for path in _lattice_paths((first, 0), (rows - 1, columns - 1)):
             corner = [(above[i], above[i]) for i in range(first + 1)]
             start = (0, above[first], below[0])
-            found.append((1, corner + _points(path, above, below), _steps(path, above, below, start)))
+            found.append(
+                (1, corner + _points(path, above, below), _steps(path, above, below, start))
+            )
     for first in range(columns):
         for path in _lattice_paths((0, first), (rows - 1, columns - 1)):
             corner = [(below[j], below[j]) for j in range(first + 1)]
             start = (1, above[0], below[first])
-            found.append((-1, corner + _points(path, above, below), _steps(path, above, below, start)))
+            found.append(
+                (-1, corner + _points(path, above, below), _steps(path, above, below, start))
+            )
     return found
 
 

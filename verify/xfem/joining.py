@@ -74,9 +74,7 @@ def _cells_around(mesh: SimplexMesh, nodes: _Ints) -> _Ints:
     return np.flatnonzero(mark[mesh.cells].any(axis=1))
 
 
-def _interior_faces(
-    mesh: SimplexMesh, patch: _Ints, place: _Ints
-) -> tuple[_Ints, _Ints, _Ints]:
+def _interior_faces(mesh: SimplexMesh, patch: _Ints, place: _Ints) -> tuple[_Ints, _Ints, _Ints]:
     """Faces between two cells of the patch: both cells (places) and the nodes (f, d), sorted."""
     across = np.where(mesh.neighbours[patch] >= 0, place[mesh.neighbours[patch]], -1)
     cell, opposite = np.nonzero(across > np.arange(len(patch))[:, None])

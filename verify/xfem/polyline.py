@@ -43,9 +43,7 @@ class Polyline:
         corners = np.asarray(vertices, dtype=float)
         fewest = 3 if closed else 2
         if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < fewest:
-            raise XfemError(
-                f"polyline of shape {corners.shape}; expected (k, 2) with k ≥ {fewest}"
-            )
+            raise XfemError(f"polyline of shape {corners.shape}; expected (k, 2) with k ≥ {fewest}")
         if not np.isfinite(corners).all():
             raise XfemError("polyline with a vertex that is not finite")
         object.__setattr__(self, "vertices", corners)
@@ -127,9 +125,7 @@ class Polyline:
             raise XfemError(f"segments {pair[0]} and {pair[1]} of the polyline intersect")
 
 
-def _first_intersection(
-    starts: _Floats, segments: _Floats, closed: bool
-) -> tuple[int, int] | None:
+def _first_intersection(starts: _Floats, segments: _Floats, closed: bool) -> tuple[int, int] | None:
     """The first pair of segments, not neighbours, that have a point in common."""
     count = len(starts)
     ends = starts + segments

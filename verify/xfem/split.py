@@ -136,7 +136,9 @@ def _split_by(
 ) -> Partition:
     points = partition.points
     plus = points.values[partition.sub_points, index] >= 0.0
-    mixed = plus.any(axis=1) & ~plus.all(axis=1) & (partition.label[partition.sub_piece, index] == 0)
+    mixed = (
+        plus.any(axis=1) & ~plus.all(axis=1) & (partition.label[partition.sub_piece, index] == 0)
+    )
     rows = np.flatnonzero(mixed)
     if len(rows) == 0:
         return partition
@@ -145,7 +147,13 @@ def _split_by(
     zero = points.find(index, ids[row, a], ids[row, b])
     piece = partition.sub_piece[rows][row]
     active = _crossed_through(
-        cut, points.positions, zero, piece, sizes[partition.parent[piece]], len(partition.parent), tip
+        cut,
+        points.positions,
+        zero,
+        piece,
+        sizes[partition.parent[piece]],
+        len(partition.parent),
+        tip,
     )
     if not active.any():
         return partition
@@ -199,7 +207,9 @@ def _divide(
     )
     new = _clip(partition, index, clipped)
     source, side = new["source"], new["side"]
-    piece = np.where(side > 0, above[partition.sub_piece[source]], below[partition.sub_piece[source]])
+    piece = np.where(
+        side > 0, above[partition.sub_piece[source]], below[partition.sub_piece[source]]
+    )
     return replace(
         partition,
         parent=parent,

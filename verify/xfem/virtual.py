@@ -18,6 +18,7 @@ from verify.xfem.cuts import Cut
 from verify.xfem.joining import PatchSlots, join_slots
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import Partition, TipRule, split_cells
+from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["SubCells", "VirtualMesh", "cut_mesh"]
 
@@ -39,12 +40,15 @@ class SubCells:
         Barycentric coordinates of the vertices (second axis) in the parent cell.
     fraction : (k,) float array
         Share in the volume of the parent cell, positive.
+    zero_points : ZeroPoints
+        Positions of all numbered points, and the edges on which the new ones lie.
     """
 
     piece: _Ints
     points: _Ints
     barycentric: _Floats
     fraction: _Floats
+    zero_points: ZeroPoints
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class VirtualMesh:
     node_parent : (N,) int array
         Node of the uncut mesh. The first n unknown nodes are the nodes of the mesh, each with the
         material in which it lies; further ones are virtual.
+    level_sets : (n, cuts) float array
+        Nodal level set of each cut as used: snapped to zero within round-off, in metres.
     node_side : (N, cuts) int8 array
         Side of each cut on which the material of the unknown lies (+1 or −1).
     sub_cells : SubCells
@@ -82,6 +88,7 @@ class VirtualMesh:
     fraction: _Floats
     label: NDArray[np.int8]
     node_parent: _Ints
+    level_sets: _Floats
     node_side: NDArray[np.int8]
     sub_cells: SubCells
     snapped: int
@@ -101,6 +108,13 @@ class VirtualMesh:
     def split(self) -> NDArray[np.bool_]:
         """(p,) whether a piece is part of a split cell."""
         return (self.label != 0).any(axis=1)
+
+    @cached_property
+    def piece_side(self) -> NDArray[np.int8]:
+        """(p, cuts) side of each cut on which a piece lies, whether split by it or not."""
+        mean = self.level_sets[self.mesh.cells[self.parent]].sum(axis=1)
+        geometric = np.where(mean >= 0.0, 1, -1).astype(np.int8)
+        return np.where(self.label != 0, self.label, geometric)
 
     @cached_property
     def volumes(self) -> _Floats:
@@ -137,6 +151,22 @@ class VirtualMesh:
         order = np.lexsort([self.volumes[piece], flat])
         last = np.flatnonzero(np.diff(flat[order], append=-1))
         return self.piece_centroids[piece[order[last]]]
+
+    @cached_property
+    def solid_simplices(self) -> tuple[_Ints, _Floats, _Floats]:
+        """The material as simplices: piece (q,), barycentric corners (q, d + 1, d + 1), share.
+
+        Whole cells and the sub-simplices of split ones; what integrals over the body run over.
+        """
+        whole = np.flatnonzero(~self.split)
+        corners = self.cells.shape[1]
+        sub = self.sub_cells
+        eye = np.broadcast_to(np.eye(corners), (len(whole), corners, corners))
+        return (
+            np.concatenate([whole, sub.piece]),
+            np.concatenate([eye, sub.barycentric]),
+            np.concatenate([np.ones(len(whole)), sub.fraction]),
+        )
 
     @cached_property
     def bodies(self) -> _Ints:
@@ -246,6 +276,7 @@ def _virtual_mesh(
         points=partition.sub_points[thick],
         barycentric=partition.sub_barycentric[thick],
         fraction=partition.sub_fraction[thick],
+        zero_points=partition.points,
     )
     node_side = _node_sides(partition, cells[order], label[order], node_parent)
     return VirtualMesh(
@@ -255,6 +286,7 @@ def _virtual_mesh(
         fraction=share[order],
         label=label[order],
         node_parent=node_parent,
+        level_sets=partition.points.values[: len(mesh.points)],
         node_side=node_side,
         sub_cells=sub_cells,
         snapped=partition.snapped,

@@ -30,11 +30,17 @@ class ZeroPoints:
     ----------
     positions, values
         The same, with the zero points appended.
+    ends : (k, 2) int array
+        Ends (plus, minus) of the edge of each zero point.
+    cut : (k,) int array
+        Cut of each zero point.
     """
 
     def __init__(self, positions: _Floats, values: _Floats, snap: float) -> None:
         self.positions = positions
         self.values = values
+        self.ends = np.zeros((0, 2), dtype=np.int64)
+        self.cut = np.zeros(0, dtype=np.int64)
         self._snap = snap
         cuts = values.shape[1]
         self._keys = [np.zeros(0, dtype=np.int64) for _ in range(cuts)]
@@ -75,6 +81,8 @@ class ZeroPoints:
         self.positions = np.concatenate(
             [self.positions, s * self.positions[p] + r * self.positions[m]]
         )
+        self.ends = np.concatenate([self.ends, np.stack([p, m], axis=1)])
+        self.cut = np.concatenate([self.cut, np.full(len(p), cut)])
         all_keys = np.concatenate([self._keys[cut], keys])
         order = np.argsort(all_keys)
         self._keys[cut] = all_keys[order]

@@ -1,0 +1,96 @@
+"""Other bases of the same space: shifted and plain Heaviside enrichment, for one cut per cell.
+
+Unknowns q stack u of all mesh nodes over a of the enriched ones. With H = ±1 above and below the
+cut, the shifted basis (2.48) is u = Σ N_i u_i + Σ N_j ½(H − H_j) a_j and the plain one is
+u = Σ N_i u_i + Σ N_j H a_j. Both are linear changes of the side-wise unknowns, p = T q.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, identity, kron
+
+from verify.xfem.errors import XfemError
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Basis", "from_sidewise", "sidewise_from", "transformation", "transformed_matrix"]
+
+Basis = Literal["shifted", "heaviside"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+def transformation(virtual: VirtualMesh, basis: Basis) -> csr_array:
+    """T of p = T q, for each component of the displacement (N, n + enriched).
+
+    Raises
+    ------
+    XfemError
+        If the basis is unknown, or a node has more than two unknowns or two that no single cut
+        separates: there the side-wise basis is the only one.
+    """
+    own, other, sign = _pairs(virtual)
+    nodes, count = len(virtual.mesh.points), len(own)
+    extra = nodes + np.arange(count)
+    plain = np.ones(nodes)
+    everywhere = np.arange(nodes)
+    if basis == "shifted":
+        # p_own = u_j; the other side differs by a, counted from below to above
+        rows = np.concatenate([everywhere, other, other])
+        columns = np.concatenate([everywhere, own, extra])
+        values = np.concatenate([plain, np.ones(count), -sign])
+    elif basis == "heaviside":
+        rows = np.concatenate([everywhere, own, other, other])
+        columns = np.concatenate([everywhere, extra, own, extra])
+        values = np.concatenate([plain, sign, np.ones(count), -sign])
+    else:
+        raise XfemError(f"basis '{basis}'; expected shifted or heaviside")
+    return csr_array((values, (rows, columns)), shape=(virtual.node_count, nodes + count))
+
+
+def sidewise_from(virtual: VirtualMesh, basis: Basis, unknowns: _Floats) -> _Floats:
+    """Side-wise displacement (N, d) from the unknowns (n + enriched, d) of another basis."""
+    return np.asarray(transformation(virtual, basis) @ unknowns)
+
+
+def from_sidewise(virtual: VirtualMesh, basis: Basis, displacement: _Floats) -> _Floats:
+    """Unknowns (n + enriched, d) of another basis from the side-wise displacement (N, d)."""
+    own, other, sign = _pairs(virtual)
+    nodes = len(virtual.mesh.points)
+    jump = sign[:, None] * (displacement[own] - displacement[other])
+    if basis == "shifted":
+        return np.concatenate([displacement[:nodes], jump])
+    if basis == "heaviside":
+        mean = displacement[:nodes].copy()
+        mean[own] = 0.5 * (displacement[own] + displacement[other])
+        return np.concatenate([mean, 0.5 * jump])
+    raise XfemError(f"basis '{basis}'; expected shifted or heaviside")
+
+
+def transformed_matrix(virtual: VirtualMesh, basis: Basis, matrix: csr_array) -> csr_array:
+    """Tᵀ K T for a matrix (N·d, N·d) with d components per node."""
+    dim = matrix.shape[0] // virtual.node_count
+    full = kron(transformation(virtual, basis), identity(dim), format="csr")
+    return csr_array(full.T @ matrix @ full)
+
+
+def _pairs(virtual: VirtualMesh) -> tuple[_Ints, _Ints, _Floats]:
+    """Enriched nodes: the unknown on the node's own side, the other, and H of the node."""
+    counts = np.bincount(virtual.node_parent)
+    if (counts > 2).any():
+        raise XfemError(
+            f"node {int(np.argmax(counts > 2))} has {counts.max()} unknowns; the shifted and "
+            "Heaviside bases need one cut per element, use the side-wise one"
+        )
+    own = virtual.enriched_nodes
+    place = np.full(len(counts), -1)
+    place[virtual.node_parent[len(counts) :]] = np.arange(len(counts), virtual.node_count)
+    other = place[own]
+    apart = virtual.node_side[own] != virtual.node_side[other]
+    if not (apart.sum(axis=1) == 1).all():
+        at = own[int(np.argmax(apart.sum(axis=1) != 1))]
+        raise XfemError(f"no single cut separates the two unknowns of node {at}")
+    cut = apart.argmax(axis=1)
+    return own, other, virtual.node_side[own, cut].astype(float)

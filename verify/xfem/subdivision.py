@@ -1,0 +1,167 @@
+"""The cut body as a conforming mesh: what others can read without knowing of enrichment.
+
+Whole cells, and the sub-simplices of split ones; nodes are doubled where the displacement jumps,
+and only there. Cells beside the end of a cut are bisected at the points where the cut meets their
+edges, so that no hanging node is left. The piecewise linear field on this mesh is the XFEM
+field itself, not an interpolation of it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from verify.xfem.virtual import VirtualMesh
+from verify.xfem.zero_points import ZeroPoints
+
+__all__ = ["Subdivision", "subdivide"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Subdivision:
+    """A conforming mesh of the cut body and the map of displacements onto it.
+
+    Attributes
+    ----------
+    points : (k, d) float array
+        Material positions, doubled on the cut, in metres.
+    cells : (c, d + 1) int array
+        Simplices, positively oriented.
+    cell_piece : (c,) int array
+        Piece (virtual cell) that holds each.
+    cell_parent : (c,) int array
+        Cell of the uncut mesh that holds each.
+    interpolation : (k, N) sparse array
+        Displacement at the points = interpolation @ displacement of the unknown nodes.
+    cut_facets : (f, d, d) float array
+        The cut as realised: segments or triangles by their corners (second axis), in metres.
+    """
+
+    points: _Floats
+    cells: _Ints
+    cell_piece: _Ints
+    cell_parent: _Ints
+    interpolation: csr_array
+    cut_facets: _Floats
+
+
+def subdivide(virtual: VirtualMesh) -> Subdivision:
+    """The conforming sub-division of a cut mesh."""
+    mesh = virtual.mesh
+    piece, barycentric, _ = virtual.solid_simplices
+    whole = len(piece) - len(virtual.sub_cells.piece)
+    ids = np.concatenate([mesh.cells[virtual.parent[piece[:whole]]], virtual.sub_cells.points])
+    piece, ids, barycentric = _bisect_hanging(virtual, piece, ids, barycentric)
+    keys, columns, weights = _node_keys(virtual, piece, ids, barycentric)
+    # unknown nodes first, in their order; then the points of the cut
+    unique, first, cells = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    cells = cells.reshape(ids.shape)
+    corner = barycentric.reshape(-1, barycentric.shape[2])[first]
+    parent = virtual.parent[np.repeat(piece, ids.shape[1])[first]]
+    count, corners = corner.shape
+    interpolation = csr_array(
+        (
+            weights[first].ravel(),
+            columns[first].ravel(),
+            np.arange(0, count * corners + 1, corners),
+        ),
+        shape=(count, virtual.node_count),
+    )
+    interpolation.eliminate_zeros()
+    points = virtual.sub_cells.zero_points.positions[ids.ravel()[first]]
+    assert len(unique) == len(points) == len(parent)
+    return Subdivision(
+        points=points,
+        cells=_oriented(points, cells),
+        cell_piece=piece,
+        cell_parent=virtual.parent[piece],
+        interpolation=interpolation,
+        cut_facets=_cut_facets(points, cells, ids),
+    )
+
+
+def _node_keys(
+    virtual: VirtualMesh, piece: _Ints, ids: _Ints, barycentric: _Floats
+) -> tuple[_Ints, _Ints, _Floats]:
+    """What tells nodes apart: the point, and the unknowns from which it moves."""
+    corners = ids.shape[1]
+    unknowns = np.broadcast_to(virtual.cells[piece][:, None, :], barycentric.shape)
+    columns = unknowns.reshape(-1, corners)
+    weights = barycentric.reshape(-1, corners)
+    support = np.sort(np.where(weights != 0.0, columns, -1), axis=1)
+    # a mesh node moves with one unknown: let that be the whole key, so that nodes come first
+    is_node = (ids.ravel() < len(virtual.mesh.points))[:, None]
+    point = np.where(is_node, -1, ids.reshape(-1, 1))
+    order = np.where(is_node, np.flip(support, axis=1), support)
+    return np.concatenate([point, order], axis=1), columns, weights
+
+
+def _bisect_hanging(
+    virtual: VirtualMesh, piece: _Ints, ids: _Ints, barycentric: _Floats
+) -> tuple[_Ints, _Ints, _Floats]:
+    """Bisect simplices on whose edges a neighbour has a point that they do not have."""
+    zero = virtual.sub_cells.zero_points
+    nodes = len(virtual.mesh.points)
+    used = np.unique(virtual.sub_cells.points)
+    used = used[used >= nodes] - nodes
+    for point in _bisection_order(zero, used):
+        plus, minus = zero.ends[point]
+        has = (ids == plus).any(axis=1) & (ids == minus).any(axis=1)
+        rows = np.flatnonzero(has)
+        if len(rows) == 0:
+            continue
+        at = barycentric[rows, (ids[rows] == plus).argmax(axis=1)]
+        to = barycentric[rows, (ids[rows] == minus).argmax(axis=1)]
+        r, s = zero.shares(int(zero.cut[point]), np.array([plus]), np.array([minus]))
+        middle = s * at + r * to
+        halves = []
+        for end in (plus, minus):
+            new_ids, new_corners = ids[rows].copy(), barycentric[rows].copy()
+            local = (ids[rows] == end).argmax(axis=1)
+            new_ids[np.arange(len(rows)), local] = nodes + point
+            new_corners[np.arange(len(rows)), local] = middle
+            halves.append((piece[rows], new_ids, new_corners))
+        piece = np.concatenate([piece[~has], halves[0][0], halves[1][0]])
+        ids = np.concatenate([ids[~has], halves[0][1], halves[1][1]])
+        barycentric = np.concatenate([barycentric[~has], halves[0][2], halves[1][2]])
+    return piece, ids, barycentric
+
+
+def _bisection_order(zero: ZeroPoints, used: _Ints) -> _Ints:
+    """Cut by cut, last ends first: on faces this gives the diagonals of the staircase."""
+    ends = zero.ends[used]
+    return used[np.lexsort([-ends[:, 1], -ends[:, 0], zero.cut[used]])]
+
+
+def _oriented(points: _Floats, cells: _Ints) -> _Ints:
+    """Positive orientation, where points and simplices have the same dimension."""
+    if points.shape[1] != cells.shape[1] - 1:
+        return cells
+    corners = points[cells]
+    flipped = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0.0
+    turned = cells.copy()
+    turned[flipped, 0], turned[flipped, 1] = cells[flipped, 1], cells[flipped, 0]
+    return turned
+
+
+def _cut_facets(points: _Floats, cells: _Ints, ids: _Ints) -> _Floats:
+    """Facets where two cells meet in space but do not share their nodes."""
+    corners = ids.shape[1]
+    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
+    doubled = np.bincount(ids[:, 0], minlength=ids.max() + 1) * 0
+    pairs = np.unique(np.stack([ids.ravel(), cells.ravel()], axis=1), axis=0)
+    np.add.at(doubled, pairs[:, 0], 1)
+    rows = np.flatnonzero((doubled[ids] > 1).any(axis=1))
+    facets, nodes = ids[rows][:, keep].reshape(-1, corners - 1), cells[rows][:, keep]
+    order = np.argsort(facets, axis=1)
+    facets = np.take_along_axis(facets, order, axis=1)
+    nodes = np.take_along_axis(nodes.reshape(-1, corners - 1), order, axis=1)
+    sequence = np.lexsort(facets.T[::-1])
+    facets, nodes = facets[sequence], nodes[sequence]
+    met = (facets[1:] == facets[:-1]).all(axis=1)
+    torn = met & (nodes[1:] != nodes[:-1]).any(axis=1)
+    return points[nodes[1:][torn]]

@@ -1,0 +1,137 @@
+"""Prescribed displacements on unknown nodes, each on its own side of the cuts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Supports", "UnsupportedBodyError", "check_bodies"]
+
+_Floats = NDArray[np.float64]
+
+# points (k, d) and sides (k, cuts) to displacements (k, d)
+PrescribedField = Callable[[_Floats, NDArray[np.int8]], _Floats]
+
+
+class UnsupportedBodyError(XfemError):
+    """A free piece of the cut body can move rigidly, so that statics has no solution."""
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Fixed components of the unknown nodes.
+
+    Attributes
+    ----------
+    fixed : (N, d) bool array
+    values : (N, d) float array
+        Prescribed displacement in metres; zero where not fixed.
+    """
+
+    fixed: NDArray[np.bool_]
+    values: _Floats
+
+    @staticmethod
+    def none(virtual: VirtualMesh) -> "Supports":
+        """No support at all."""
+        shape = virtual.node_points.shape
+        return Supports(np.zeros(shape, dtype=bool), np.zeros(shape))
+
+    def prescribe(
+        self,
+        virtual: VirtualMesh,
+        nodes: ArrayLike,
+        values: ArrayLike | PrescribedField = 0.0,
+        components: tuple[int, ...] | None = None,
+    ) -> "Supports":
+        """The same with further prescribed displacements.
+
+        Parameters
+        ----------
+        virtual : VirtualMesh
+        nodes : (k,) array_like of int, or (n,) of bool
+            Nodes of the *uncut* mesh; every unknown node there is prescribed.
+        values : float, (d,) array_like, or callable
+            A function is called with the positions (k, d) and the sides (k, cuts) of the unknown
+            nodes, so that a field that jumps across a cut is evaluated on the right side.
+        components : tuple of int, optional
+            Components to fix; all by default.
+
+        Raises
+        ------
+        XfemError
+            If nodes or components do not exist, or values have a wrong shape or are not finite.
+        """
+        count, dim = len(virtual.mesh.points), self.fixed.shape[1]
+        chosen = np.asarray(nodes)
+        if chosen.dtype == bool and chosen.shape != (count,):
+            raise XfemError(f"node mask of shape {chosen.shape}; expected ({count},)")
+        if chosen.dtype != bool:
+            chosen = chosen.astype(np.int64)
+            if chosen.size and (chosen.min() < 0 or chosen.max() >= count):
+                raise XfemError(f"supported node outside 0..{count - 1}")
+        mark = np.zeros(count, dtype=bool)
+        mark[chosen] = True
+        at = np.flatnonzero(mark[virtual.node_parent])
+        axes = range(dim) if components is None else components
+        if any(axis not in range(dim) for axis in axes):
+            raise XfemError(f"components {components}; expected some of 0..{dim - 1}")
+        field = (
+            values(virtual.node_points[at], virtual.node_side[at]) if callable(values) else values
+        )
+        try:
+            given = np.broadcast_to(np.asarray(field, dtype=float), (len(at), dim))
+        except ValueError:
+            raise XfemError(
+                f"prescribed values of shape {np.shape(field)}; expected ({len(at)}, {dim})"
+            ) from None
+        if not np.isfinite(given).all():
+            raise XfemError("a prescribed displacement is not finite")
+        fixed, prescribed = self.fixed.copy(), self.values.copy()
+        for axis in axes:
+            fixed[at, axis] = True
+            prescribed[at, axis] = given[:, axis]
+        return Supports(fixed, prescribed)
+
+
+def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
+    """Check that no free piece can move rigidly.
+
+    Raises
+    ------
+    UnsupportedBodyError
+        Naming the first such piece by its size and position.
+    """
+    points, dim = virtual.node_points, supports.fixed.shape[1]
+    scale = virtual.mesh.extent
+    for body in range(virtual.bodies.max() + 1):
+        nodes = np.flatnonzero(virtual.bodies == body)
+        modes = _rigid_modes((points[nodes] - points[nodes].mean(axis=0)) / scale)
+        held = modes[supports.fixed[nodes]]
+        size = np.linalg.norm(modes.reshape(-1, modes.shape[-1]), axis=0)
+        gram = (held / size).T @ (held / size)
+        if len(held) == 0 or np.linalg.eigvalsh(gram)[0] < 1e-14:
+            pieces = virtual.bodies[virtual.cells[:, 0]] == body
+            volume = virtual.volumes[pieces].sum()
+            centre = virtual.volumes[pieces] @ virtual.piece_centroids[pieces] / volume
+            unit = "m²" if dim == 2 else "m³"
+            raise UnsupportedBodyError(
+                f"a piece of {volume:.3g} {unit} around {np.round(centre, 6).tolist()} is not held: "
+                "it can move as a rigid body; support it, or do not cut it off"
+            )
+
+
+def _rigid_modes(points: _Floats) -> _Floats:
+    """(k, d, modes) translations and infinitesimal rotations at points (k, d)."""
+    dim = points.shape[1]
+    modes = [np.broadcast_to(np.eye(dim)[axis], points.shape) for axis in range(dim)]
+    for first in range(dim):
+        for second in range(first + 1, dim):
+            turn = np.zeros_like(points)
+            turn[:, first], turn[:, second] = -points[:, second], points[:, first]
+            modes.append(turn)
+    return np.stack(modes, axis=-1)
