@@ -116,7 +116,7 @@ def _inner_parts(name: str, cuts: dict[str, list[Piece]], outline: Array) -> lis
 
 
 def _special(ends: list[Array], parts: list[CutPart], size: float) -> list[Array]:
-    """Ends of parts that are more than a smooth point within one cut: kinks, junctions, mouths."""
+    """Find the ends of parts that are not smooth points within one cut."""
     tangents = [
         sign * part.piece.tangent(np.array([t]))[0]
         for part in parts

@@ -37,7 +37,7 @@ class Segment:
         return (1 - t) * self.start + t * self.end
 
     def tangent(self, t: Array) -> Array:
-        """Unit tangents (n, 2)."""
+        """Return unit tangents (n, 2)."""
         direction = (self.end - self.start) / self.length
         return np.tile(direction, (len(t), 1))
 
@@ -72,7 +72,7 @@ class Arc:
         return self.centre + self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
     def tangent(self, t: Array) -> Array:
-        """Unit tangents (n, 2)."""
+        """Return unit tangents (n, 2)."""
         angle = self.start_angle + self.sweep * np.asarray(t, dtype=float)
         return np.column_stack([-np.sin(angle), np.cos(angle)])
 
@@ -130,7 +130,7 @@ def _segment_segment(one: Segment, other: Segment) -> Array:
         t = (w[0] * u[1] - w[1] * u[0]) / det
         if -_END <= s <= 1 + _END and -_END <= t <= 1 + _END:
             found.append(s)
-    return np.clip(found, 0.0, 1.0)
+    return np.clip(np.array(found), 0.0, 1.0)
 
 
 def _foot(one: Segment, point: Array) -> float | None:
@@ -146,10 +146,11 @@ def _segment_arc(one: Segment, other: Arc) -> Array:
     root = b * b - a * c
     if root < -_END * a * other.radius**2:
         return np.zeros(0)
-    t = np.array([-b - np.sqrt(max(root, 0.0)), -b + np.sqrt(max(root, 0.0))]) / a
+    half = float(np.sqrt(max(float(root), 0.0)))
+    t = np.array([-b - half, -b + half]) / a
     t = t[(t >= -_END) & (t <= 1 + _END)]
     kept = [s for s in t if len(_on_arc(other, one.point(np.array([s]))))]
-    return np.clip(kept, 0.0, 1.0)
+    return np.clip(np.array(kept), 0.0, 1.0)
 
 
 def _arc_arc(one: Arc, other: Arc) -> Array:

@@ -7,20 +7,16 @@ largest difference among them, although the finest rule is the one that counts.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 from verify.compare.body import Body
 from verify.compare.cut_line import CutRule, cut_rule
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.slabs import Rule, area_rule
 
-__all__ = ["MeasuredNorm", "Rules", "cut_rules", "integrate_norm", "rules"]
-
-R = TypeVar("R", Rule, CutRule)
+__all__ = ["MeasuredNorm", "cut_rules", "integrate_norm", "rules"]
 
 # spacing over the wanted one, and direction: golden angle, and two unrelated to it
 _FAMILY = ((1.0, 0.5535), (1.31, 0.3217), (1.73, 0.8929))
-Rules = Sequence[R]
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,9 @@ def cut_rules(body: Body, size: float) -> list[CutRule]:
     return [cut_rule(body, factor * size / 8) for factor, _ in _FAMILY]
 
 
-def integrate_norm(measure: Callable[[R], ErrorNorm], family: Rules[R]) -> MeasuredNorm:
+def integrate_norm[R: (Rule, CutRule)](
+    measure: Callable[[R], ErrorNorm], family: Sequence[R]
+) -> MeasuredNorm:
     """Apply `measure` with each rule of a family."""
     norms = [measure(rule) for rule in family]
     values = [norm.relative for norm in norms]

@@ -11,7 +11,7 @@ Ints = NDArray[np.int64]
 
 
 @njit(cache=True)
-def _depth(x, normals, corners):  # type: ignore[no-untyped-def]
+def _depth(x, normals, corners):
     """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
     d = x.shape[0]
     depth = np.inf
@@ -25,7 +25,7 @@ def _depth(x, normals, corners):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _segment_distance2(x, a, b):  # type: ignore[no-untyped-def]
+def _segment_distance2(x, a, b):
     """Squared distance of `x` to the segment ab, in any dimension."""
     along, length2 = 0.0, 0.0
     for c in range(x.shape[0]):
@@ -39,7 +39,7 @@ def _segment_distance2(x, a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _outside_distance2(x, normals, corners):  # type: ignore[no-untyped-def]
+def _outside_distance2(x, normals, corners):
     """Squared distance to a simplex of a point outside of it."""
     d = x.shape[0]
     best = np.inf
@@ -74,7 +74,7 @@ def _outside_distance2(x, normals, corners):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _containing(x, direction, sided, lower, upper, cells, corners, normals, centres, tolerance):  # type: ignore[no-untyped-def]
+def _containing(x, direction, sided, lower, upper, cells, corners, normals, centres, tolerance):
     """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
     d = x.shape[0]
     leaves = lower.shape[0] // 2
@@ -117,9 +117,8 @@ def _containing(x, direction, sided, lower, upper, cells, corners, normals, cent
 
 
 @njit(cache=True)
-def _nearest(x, lower, upper, cells, corners, normals):  # type: ignore[no-untyped-def]
+def _nearest(x, lower, upper, cells, corners, normals):
     """Find the cell nearest to `x`, by branch and bound."""
-    d = x.shape[0]
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
     stack = np.empty(64, dtype=np.int64)
@@ -152,7 +151,7 @@ def _nearest(x, lower, upper, cells, corners, normals):  # type: ignore[no-untyp
 
 
 @njit(cache=True)
-def _box_distance2(x, lower, upper):  # type: ignore[no-untyped-def]
+def _box_distance2(x, lower, upper):
     distance2 = 0.0
     for a in range(x.shape[0]):
         gap = max(lower[a] - x[a], x[a] - upper[a])
@@ -162,9 +161,7 @@ def _box_distance2(x, lower, upper):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def find_cells(  # type: ignore[no-untyped-def]
-    points, directions, lower, upper, cells, corners, normals, centres, tolerance
-):
+def find_cells(points, directions, lower, upper, cells, corners, normals, centres, tolerance):
     """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
 
     `directions` is (n, d), or (0, d) where no side is wanted.
@@ -185,8 +182,8 @@ def find_cells(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def evaluate_linear(points, found, origins, values, slopes):  # type: ignore[no-untyped-def]
-    """Return value (n, d) of u = u_0 + G (x - x_0) with the first corner's x_0, u_0 of each cell."""
+def evaluate_linear(points, found, origins, values, slopes):
+    """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
     n, d = points.shape
     result = np.empty((n, d))
     for i in range(n):
@@ -200,7 +197,7 @@ def evaluate_linear(points, found, origins, values, slopes):  # type: ignore[no-
 
 
 @njit(cache=True)
-def evaluate_quadratic(points, found, nodes, values, corners, gradients):  # type: ignore[no-untyped-def]
+def evaluate_quadratic(points, found, nodes, values, corners, gradients):
     """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
     n, d = points.shape
     u, grad = np.zeros((n, d)), np.zeros((n, d, d))

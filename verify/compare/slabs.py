@@ -10,6 +10,7 @@ do not fall in step with the lines of a structured mesh.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,7 @@ def area_rule(
     has_arcs = any(isinstance(piece, Arc) for piece, _ in pieces)
     cells = [
         cell
-        for low, high in zip(ys[:-1], ys[1:], strict=True)
+        for low, high in pairwise(ys)
         for cell in _slab(curves, low, high, xs, order, max(order, 6) if has_arcs else order)
     ]
     points = np.vstack([p for p, _ in cells]) @ turn
@@ -104,7 +105,7 @@ def graded_breaks(breaks: Array, singular: Array, spacing: float, smallest: floa
     """
     base = np.unique(breaks)
     cells = []
-    for a, b in zip(base[:-1], base[1:], strict=True):
+    for a, b in pairwise(base):
         n = int(np.ceil((b - a) / spacing))
         edges = np.linspace(a, b, n + 1)
         cells.append(np.column_stack([edges[:-1], edges[1:]]))
@@ -150,7 +151,7 @@ def _monotone(piece: Piece, outline: bool) -> list[_Monotone]:
         first += 1
     angles.append(stop)
     found = []
-    for a, b in zip(angles[:-1], angles[1:], strict=True):
+    for a, b in pairwise(angles):
         ys = sorted(piece.centre[1] + piece.radius * np.sin([a, b]))
         bulge = 1.0 if np.cos(0.5 * (a + b)) > 0 else -1.0
         if ys[1] > ys[0]:
@@ -169,7 +170,7 @@ def _slab(
     v, wv = _gauss(along)
     ys, wy = low + (high - low) * v, (high - low) * wv
     found, inside = [], False
-    for left, right in zip(here[:-1], here[1:], strict=True):
+    for left, right in pairwise(here):
         inside ^= left.outline
         if not inside:
             continue
