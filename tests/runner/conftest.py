@@ -1,0 +1,72 @@
+"""A case, and the command line in a process of its own with the fake solvers at hand."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+
+CASE = """
+title = "A stretched square"
+requirement = "It shall be stretched."
+tags = ["stretched"]
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+[mesh]
+cells = [[2, 2], [4, 4]]
+[material]
+young = 1.0
+poisson = 0.0
+plane = "strain"
+[[supports]]
+where = "boundary"
+displacement = "exact"
+[exact]
+solution = "linear"
+parameters = { gradient = [[0.1, 0.0], [0.0, 0.0]] }
+"""
+
+
+@dataclass
+class CommandLine:
+    """Runs ``verify`` in a folder."""
+
+    folder: Path
+    environment: dict[str, str]
+
+    def start(self, *arguments, **environment):
+        return subprocess.Popen(
+            [sys.executable, "-m", "verify", *map(str, arguments)],
+            cwd=self.folder,
+            env={**self.environment, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def __call__(self, *arguments, **environment):
+        process = self.start(*arguments, **environment)
+        out, err = process.communicate(timeout=120)
+        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+    def records(self, out="out"):
+        """Records of all solves, by (solver, level)."""
+        files = (self.folder / out).glob("cases/*/*/record.json")
+        records = [json.loads(file.read_text())["record"] for file in files]
+        return {(r["solver"].removeprefix("fake_solvers:"), r["level"]): r for r in records}
+
+
+@pytest.fixture
+def verify(tmp_path):
+    (tmp_path / "square.toml").write_text(CASE)
+    paths = [str(HERE), str(HERE.parent.parent), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    return CommandLine(tmp_path, environment)

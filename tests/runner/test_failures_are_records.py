@@ -1,0 +1,96 @@
+"""However a solve ends, it is a record with its reason, and the others go on."""
+
+import json
+import time
+
+import pytest
+
+ENDINGS = {
+    "Refusing": ("refused", "it only does beams"),
+    "RefusingLate": ("refused", "it found a knot"),
+    "Raising": ("failed", "ZeroDivisionError: the pivot is zero"),
+    "Crashing": ("failed", "Segmentation fault (signal 11)"),
+    "Leaving": ("failed", "[0]PETSC ERROR: zero pivot in row 7 (exit code 59)"),
+    "NotFinite": ("failed", "displacement has values that are not finite"),
+}
+
+
+def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(verify):
+    solvers = [f"--solver=fake_solvers:{name}" for name in ("Instant", *ENDINGS)]
+    done = verify("run", "square.toml", "--out", "out", "-j", "2", *solvers)
+    records = verify.records()
+    for name, (status, reason) in ENDINGS.items():
+        assert (records[name, 0]["status"], records[name, 0]["reason"]) == (status, reason)
+    assert records["Instant", 0]["status"] == records["Instant", 1]["status"] == "solved"
+    assert done.returncode == 3
+    # the log keeps what the solver said
+    log = verify.folder / "out/cases/square/fake_solvers_Raising-0/log.txt"
+    assert "Traceback" in log.read_text()
+    result = json.loads((verify.folder / "out/cases/square/result.json").read_text())
+    assert len(result["solves"]) == len(records)
+
+
+def test_a_solve_that_hangs_is_killed_with_its_children_after_the_timeout(verify):
+    mark = verify.folder / "mark"
+    start = time.monotonic()
+    verify("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "1.5", "--out", "out",
+           HANG_MARK=str(mark))  # fmt: skip
+    assert time.monotonic() - start < 60
+    record = verify.records()["Hanging", 0]
+    assert (record["status"], record["reason"]) == ("timeout", "killed after 1.5 s")
+    assert 1.5 <= record["wall"] < 10
+    assert not alive_in_group(int(mark.read_text()))
+
+
+def test_a_solve_that_eats_memory_is_killed_and_its_peak_recorded(verify):
+    verify("run", "square.toml", "--solver=fake_solvers:Hungry", "--memory", "0.4", "--out", "out")
+    record = verify.records()["Hungry", 0]
+    assert record["status"] == "memory"
+    assert record["reason"] == "killed above 0.373 GiB"
+    # it touches 16 MB per 5 ms and is looked at every 20 ms (with the machine's own delays)
+    assert 0.4e9 < record["peak_memory"] < 1.5e9
+
+
+def test_memory_time_threads_and_repetitions_are_recorded(verify):
+    verify("run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "4", "--out", "out")
+    record = verify.records()["Instant", 1]
+    assert record["timings"] == {"solve": [1e-3] * 4}
+    assert 0 < record["wall"] < 60
+    assert 20e6 < record["peak_memory"] < 1e9  # an interpreter with numpy
+    assert record["notes"]["threads"] == "1"
+
+
+def test_timings_of_solves_that_ran_side_by_side_are_marked(verify):
+    verify("run", "square.toml", "--solver=fake_solvers:Instant", "-j", "2", "--out", "out")
+    assert verify.records()["Instant", 0]["notes"]["timing"].startswith("contended")
+
+
+@pytest.mark.parametrize(
+    "solver, said",
+    [
+        ("fake_solvers:Brittle", "could not be loaded: RuntimeError: no licence"),
+        ("fake_solvers:Nobody", "no 'Nobody' in module 'fake_solvers'"),
+        ("no_such_module:Solver", "needs 'no_such_module', which is not installed"),
+        ("fake_solvers:BadInput", "body.msh: its mesh has a hole"),
+    ],
+)
+def test_a_solver_that_was_asked_for_and_does_not_work_is_bad_input(verify, solver, said):
+    done = verify("run", "square.toml", "--solver", solver, "--out", "out")
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (verify.folder / "out").exists()
+
+
+def alive_in_group(leader):
+    """Whether a process of the group still runs (zombies do not count)."""
+    from pathlib import Path
+
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[2]) == leader and fields[0] != "Z":
+            return True
+    return False

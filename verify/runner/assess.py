@@ -1,0 +1,117 @@
+"""The comparison of a finished case: ``python -m verify.runner.assess judge.json``.
+
+Reads the stored solves of a case, has `verify.study` compare and judge them, and writes
+``result.json``, the error field for the pictures and, last, ``judged.json`` with the key of what
+was compared.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from verify.compare.locate import Field, SolutionField
+from verify.errors import InputError
+from verify.result import CaseResult, SolveRecord, Status, Verdict, write_result
+from verify.runner.childhood import die_with_parent
+from verify.runner.error_field import write_error_field
+from verify.runner.job import load_record
+from verify.runner.storage import read_json, write_json
+from verify.runner.unjudged import unjudged_check
+from verify.scene import Scene, restore_scene
+from verify.solution import Solution, read_solution
+from verify.study.accuracy import assess_accuracy
+
+__all__ = ["main"]
+
+REFERENCE = "reference"
+
+
+def main(question_file: Path) -> None:
+    """Compare and judge what `question_file` says."""
+    die_with_parent()
+    question, folder = read_json(question_file), question_file.parent
+    root = Path(question["root"])
+    scene = restore_scene(read_json(folder / "scene.json"))
+    records, solutions = _stored(root, question["folders"])
+    exact = _exact(scene)
+    asked, left_out = _split_acceptance(scene, question["solvers"])
+    result: CaseResult = assess_accuracy(asked, records, solutions, exact)
+    result = replace(
+        result,
+        verdicts=[*result.verdicts, *left_out],
+        provenance=question["provenance"],
+        scene=scene.model_dump(mode="json", by_alias=True),
+    )
+    if picture := _error_picture(scene, solutions, exact, folder):
+        pictures = {**result.pictures, "error_field": str(picture.relative_to(root))}
+        result = replace(result, pictures=pictures)
+    write_result(result, folder / "result.json")
+    write_json({"key": question["key"]}, folder / "judged.json")
+
+
+def _stored(
+    root: Path, folders: Sequence[str]
+) -> tuple[list[SolveRecord], dict[str, dict[int, Solution]]]:
+    """Read records and solutions; a solution that cannot be read is a failed solve."""
+    records: list[SolveRecord] = []
+    solutions: dict[str, dict[int, Solution]] = {}
+    for name in folders:
+        record = load_record(root / name)
+        if record.status is Status.SOLVED:
+            try:
+                solution = read_solution(root / name / "solution")
+            except InputError as error:
+                record = replace(record, status=Status.FAILED, reason=str(error))
+            else:
+                record = replace(record, solution=f"{name}/solution")
+                solutions.setdefault(record.solver, {})[record.level] = solution
+        records.append(record)
+    return records, solutions
+
+
+def _exact(scene: Scene) -> Any:
+    if scene.exact is None:
+        return None
+    from reference.exact import exact_solution
+
+    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+
+
+def _split_acceptance(scene: Scene, solvers: Sequence[str]) -> tuple[Scene, list[Any]]:
+    """Take away the checks of solvers that this run was not asked for; they stay undecided."""
+    kept, left_out = [], []
+    for check in scene.acceptance:
+        names = [check.solver, *([check.to] if check.check == "ratio" else [])]
+        missing = [name for name in names if name not in solvers]
+        if missing:
+            reason = f"the run was not asked for solver '{missing[0]}'"
+            left_out.append(unjudged_check(check, Verdict.UNDECIDED, reason))
+        else:
+            kept.append(check)
+    asked = scene.model_copy(update={"acceptance": kept})
+    asked._name, asked._file = scene.name, scene.file
+    return asked, left_out
+
+
+def _error_picture(
+    scene: Scene, solutions: dict[str, dict[int, Solution]], exact: Any, folder: Path
+) -> Path | None:
+    """Write the error field of the finest XFEM solution, if there is one and a reference."""
+    own = solutions.get("xfem", {})
+    references = solutions.get(REFERENCE, {})
+    truth: Field | None = None
+    if scene.judged_by_exact:
+        truth = exact
+    elif references:
+        truth = SolutionField(references[max(references)])
+    if not own or truth is None:
+        return None
+    path = folder / "error_field.vtu"
+    write_error_field(own[max(own)], truth, path)
+    return path
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

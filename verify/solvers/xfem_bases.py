@@ -1,0 +1,80 @@
+"""Statics in the shifted or the plain Heaviside basis, for comparison with the side-wise one.
+
+The same space, so the same displacements up to round-off; what differs is the conditioning. The
+transformed system is solved by SciPy's SuperLU, because the plain basis is too badly conditioned
+for a factorisation without pivoting.
+"""
+
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import splu
+
+from verify.xfem.bases import (
+    Basis,
+    from_sidewise,
+    sidewise_from,
+    transformation,
+    transformed_matrix,
+)
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.elasticity import Material
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.supports import Supports, check_bodies
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["solve_in_basis"]
+
+
+def solve_in_basis(
+    virtual: VirtualMesh,
+    material: Material,
+    supports: Supports,
+    load: NDArray[np.float64],
+    basis: Basis,
+) -> tuple[NDArray[np.float64], dict[str, float]]:
+    """Solve K u = f in another basis.
+
+    Returns
+    -------
+    displacement : (N, d) array
+        At the unknown nodes of the side-wise basis, m.
+    timings : dict of str to float
+        Wall seconds of ``assembly``, ``factorisation`` and ``solve``.
+
+    Raises
+    ------
+    XfemError
+        If a node has more than two unknowns, or a free piece can move rigidly.
+    """
+    check_bodies(virtual, supports)
+    clock = [perf_counter()]
+    pattern = block_pattern(virtual.cells, virtual.node_count)
+    blocks = LinearStiffness(virtual, material).assemble(pattern)
+    matrix = transformed_matrix(virtual, basis, csr_array(pattern.matrix(blocks)))
+    known = from_sidewise(virtual, basis, supports.values).ravel()
+    held = _held(virtual, supports)
+    transposed = transformation(virtual, basis).T
+    force = (transposed @ load).ravel() - matrix @ np.where(held, known, 0.0)
+    free = np.flatnonzero(~held)
+    inner = matrix[free][:, free].tocsc()
+    clock.append(perf_counter())
+    factors = splu(inner)
+    clock.append(perf_counter())
+    unknowns = np.where(held, known, 0.0)
+    unknowns[free] = factors.solve(force[free])
+    clock.append(perf_counter())
+    displacement = sidewise_from(virtual, basis, unknowns.reshape(-1, load.shape[1]))
+    phases = ("assembly", "factorisation", "solve")
+    return displacement, dict(zip(phases, np.diff(clock).tolist(), strict=True))
+
+
+def _held(virtual: VirtualMesh, supports: Supports) -> NDArray[np.bool_]:
+    """Which unknowns (u of all nodes, then a of the enriched) are prescribed.
+
+    A support holds every unknown node of a mesh node, hence u and a alike.
+    """
+    nodes = supports.fixed[: len(virtual.mesh.points)]
+    return np.concatenate([nodes, nodes[virtual.enriched_nodes]]).ravel()
