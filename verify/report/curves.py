@@ -1,0 +1,149 @@
+"""The curves of a case: error against mesh size, unknowns and time, as the result holds them."""
+
+import json
+import math
+from dataclasses import dataclass
+from statistics import median
+
+from verify.report.notation import solver_title
+from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
+
+__all__ = ["Curve", "Duration", "Point", "duration", "error_curves", "is_error", "metric_names"]
+
+MESHING = "meshing"
+
+
+@dataclass(frozen=True)
+class Duration:
+    """Wall seconds of a solve over its repetitions.
+
+    `median`, `low` and `high` leave meshing out; `meshing` is its median.
+    """
+
+    median: float
+    low: float
+    high: float
+    repetitions: int
+    meshing: float
+    phases: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One solve in a figure; `value` ± `uncertainty` is a relative error or deviation."""
+
+    level: int
+    size: float | None
+    unknowns: int | None
+    value: float
+    uncertainty: float
+    duration: Duration | None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One solver in a figure.
+
+    Parameters
+    ----------
+    label, solver : str
+    stretches : list of list of Point
+        Points of successive levels; a level that failed ends a stretch.
+    ends : list of (int, str)
+        Level that failed, and how.
+    rate : Rate or None
+    """
+
+    label: str
+    solver: str
+    stretches: list[list[Point]]
+    ends: list[tuple[int, str]]
+    rate: Rate | None
+
+    @property
+    def points(self) -> list[Point]:
+        """All points, coarse to fine."""
+        return [point for stretch in self.stretches for point in stretch]
+
+
+def metric_names(result: CaseResult) -> list[str]:
+    """Return the names of the metrics that some solve has, in order of appearance."""
+    return list(dict.fromkeys(m.name for solve in result.solves for m in solve.metrics))
+
+
+def is_error(result: CaseResult, metric: str) -> bool:
+    """Whether `metric` is a relative error, rather than a quantity with a reference value."""
+    found = (solve.metric(metric) for solve in result.solves)
+    return all(m.unit == "1" and m.reference is None for m in found if m is not None)
+
+
+def error_curves(result: CaseResult, metric: str) -> list[Curve]:
+    """Return one curve per solver (and set of parameters) that was measured by `metric`.
+
+    A quantity is drawn by its relative deviation from the reference value stored with it.
+    """
+    groups: dict[tuple[str, str], list[SolveRecord]] = {}
+    for solve in result.solves:
+        groups.setdefault((solve.solver, json.dumps(solve.parameters, sort_keys=True)), []).append(solve)
+    rates = {rate.solver: rate for rate in result.rates if rate.metric == metric}
+    curves = []
+    for (solver, parameters), solves in groups.items():
+        alone = sum(key[0] == solver for key in groups) == 1
+        label = solver_title(solver) if alone else f"{solver_title(solver)} {parameters}"
+        curve = _curve(label, solver, solves, metric, rates.get(solver))
+        if curve.points:
+            curves.append(curve)
+    return curves
+
+
+def duration(solve: SolveRecord) -> Duration | None:
+    """Return the time of a solve, or None if it was not measured.
+
+    Phases have one entry per repetition; where a phase has fewer, medians and extremes are
+    added phase by phase (the spread is then an upper bound).
+    """
+    timed = {name: values for name, values in solve.timings.items() if values and name != MESHING}
+    if not timed:
+        return None
+    counts = {len(values) for values in timed.values()}
+    if len(counts) == 1:
+        totals = [sum(repetition) for repetition in zip(*timed.values(), strict=True)]
+        middle, low, high = median(totals), min(totals), max(totals)
+    else:
+        middle, low, high = (
+            sum(pick(values) for values in timed.values()) for pick in (median, min, max)
+        )
+    meshing = solve.timings.get(MESHING) or [0.0]
+    return Duration(middle, low, high, min(counts), median(meshing), tuple(timed))
+
+
+def _curve(
+    label: str, solver: str, solves: list[SolveRecord], metric: str, rate: Rate | None
+) -> Curve:
+    stretches: list[list[Point]] = [[]]
+    ends = []
+    for solve in sorted(solves, key=lambda solve: solve.level):
+        measured = solve.metric(metric)
+        if solve.status is not Status.SOLVED:
+            ends.append((solve.level, str(solve.status)))
+            stretches.append([])
+        elif measured is not None and _can_be_drawn(measured):
+            stretches[-1].append(_point(solve, measured))
+        else:
+            stretches.append([])
+    return Curve(label, solver, [stretch for stretch in stretches if stretch], ends, rate)
+
+
+def _can_be_drawn(measured: Metric) -> bool:
+    """Whether it is an error, or a quantity that has a reference value to differ from."""
+    known = measured.unit == "1" if measured.reference is None else math.isfinite(measured.reference)
+    return known and math.isfinite(measured.value) and math.isfinite(measured.uncertainty)
+
+
+def _point(solve: SolveRecord, measured: Metric) -> Point:
+    value, uncertainty = measured.value, measured.uncertainty
+    if measured.reference is not None:
+        scale = abs(measured.reference) or 1.0
+        value, uncertainty = abs(value - measured.reference) / scale, uncertainty / scale
+    size = solve.size if solve.size and math.isfinite(solve.size) and solve.size > 0 else None
+    return Point(solve.level, size, solve.unknowns or None, value, uncertainty, duration(solve))

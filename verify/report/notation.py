@@ -1,0 +1,102 @@
+"""How numbers, metrics and solvers are written in the report."""
+
+import math
+from typing import Any
+
+from verify.report.markup import Markup, joined, tag
+
+__all__ = [
+    "bytes_text",
+    "error_title",
+    "metric_title",
+    "number",
+    "number_text",
+    "seconds_text",
+    "solver_title",
+    "with_interval",
+]
+
+_METRICS = {
+    "displacement_l2": "relative L² error of the displacement",
+    "energy_norm": "relative energy-norm error",
+    "jump_l2": "relative L² error of the jump across the cut",
+    "strain_energy": "strain energy",
+}
+_SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference"}
+_MISSING = "–"
+
+
+def metric_title(name: str) -> str:
+    """Return the metric's name in words."""
+    return _METRICS.get(name, name.replace("_", " "))
+
+
+def error_title(name: str, is_error: bool) -> str:
+    """Return what is drawn for a metric: itself if it is an error, else its deviation."""
+    return metric_title(name) if is_error else f"relative deviation of {metric_title(name)}"
+
+
+def solver_title(name: str) -> str:
+    """Return the solver's name as it is written in figures."""
+    return _SOLVERS.get(name, name)
+
+
+def _decimal(value: float, digits: int) -> tuple[str, int | None]:
+    """Split `value` into its written mantissa and, if it needs one, a power of ten."""
+    if value == 0:
+        return "0", None
+    exponent = math.floor(math.log10(abs(value)))
+    if -3 <= exponent < 5:
+        text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
+        return text.replace("-", "−"), None
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    return mantissa.replace("-", "−"), int(power)
+
+
+def number(value: Any, digits: int = 4) -> Markup:
+    """Return `value` with `digits` significant digits, as ``1.234×10⁻³`` where that helps."""
+    if value is None or isinstance(value, str | bool):
+        return joined(_MISSING if value is None else str(value))
+    if isinstance(value, int):
+        return joined(f"{value:,}".replace(",", "\N{THIN SPACE}"))
+    if not math.isfinite(value):
+        return joined("not finite")
+    mantissa, power = _decimal(value, digits)
+    if power is None:
+        return joined(mantissa)
+    return joined(mantissa, "×10", tag("sup", str(power).replace("-", "−")))
+
+
+def number_text(value: float | None, digits: int = 3) -> str:
+    """Return `value` as plain text for places without markup (alternative texts, tips)."""
+    return _MISSING if value is None else f"{value:.{digits}g}"
+
+
+def with_interval(value: float | None, low: float | None, high: float | None) -> Markup:
+    """Return an observed value and the interval in which the true one lies."""
+    if value is None:
+        return joined(_MISSING)
+    if low is None or high is None or low == high:
+        return number(value)
+    digits = 4
+    while digits < 10 and _decimal(low, digits) == _decimal(high, digits):
+        digits += 1
+    interval = tag(
+        "span", "[", number(low, digits), ", ", number(high, digits), "]", class_="interval"
+    )
+    return joined(number(value, digits), " ", interval)
+
+
+def seconds_text(value: float | None) -> str:
+    """Return a duration in the unit that suits it."""
+    if value is None:
+        return _MISSING
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value * 1e6:.3g} µs"
+
+
+def bytes_text(value: float | None) -> str:
+    """Return an amount of memory."""
+    return _MISSING if value is None else f"{value / 2**20:,.0f} MiB".replace(",", "\N{THIN SPACE}")

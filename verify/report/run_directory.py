@@ -1,0 +1,145 @@
+"""Reads a run directory, whole or left behind by a killed run.
+
+What is missing or damaged becomes a sentence of the report, never an omission.
+"""
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from verify.errors import InputError
+from verify.result import CaseResult, SolveRecord, read_result
+
+__all__ = ["CaseEntry", "Run", "load_run"]
+
+_RESULT = TypeAdapter(CaseResult)
+_SOLVE = TypeAdapter(SolveRecord)
+
+
+@dataclass(frozen=True)
+class CaseEntry:
+    """One case of a run.
+
+    Parameters
+    ----------
+    name : str
+    folder : Path
+    result : CaseResult or None
+        None if it is missing or damaged.
+    defect : str
+        Why there is no result; empty if there is one.
+    unjudged : list of SolveRecord
+        Solves that finished before the run was killed, if there is no result.
+    """
+
+    name: str
+    folder: Path
+    result: CaseResult | None
+    defect: str = ""
+    unjudged: list[SolveRecord] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run directory in memory: ``run.json``, the cases, and what is wrong with them."""
+
+    root: Path
+    record: dict[str, Any]
+    entries: list[CaseEntry]
+    defects: list[str]
+
+    @property
+    def results(self) -> list[CaseResult]:
+        """The results that could be read."""
+        return [entry.result for entry in self.entries if entry.result is not None]
+
+
+def load_run(directory: Path) -> Run:
+    """Read the run in `directory`.
+
+    Raises
+    ------
+    InputError
+        If there is no such directory, or neither a readable ``run.json`` nor a case in it.
+    """
+    if not directory.is_dir():
+        raise InputError("no such directory; expected the directory of a run", str(directory))
+    record, defects = _run_record(directory / "run.json")
+    folder = directory / "cases"
+    folders = sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+    if not record and not folders:
+        raise InputError(f"holds no run ({defects[0]})", str(directory))
+    found = {entry.folder.name: entry for entry in map(_entry, folders)}
+    entries = []
+    for name in record.get("cases", []):
+        path = folder / _folder_name(name)
+        entry = found.pop(path.name, None)
+        if entry is None:
+            defect = "not started: the run was stopped before it, or its folder was removed"
+            entry = CaseEntry(name, path, None, defect)
+        entries.append(entry if entry.result else CaseEntry(name, *_rest(entry)))
+    entries += found.values()
+    if record and not record.get("finished"):
+        defects.append("the run has not finished: it was stopped, or is still going on")
+    return Run(directory, record, entries, defects)
+
+
+def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return the content of ``run.json`` in a form that can be relied on, and its defects."""
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}, ["run.json is missing"]
+    except (json.JSONDecodeError, UnicodeDecodeError, OSError) as error:
+        return {}, [f"run.json cannot be read ({error})"]
+    if not isinstance(record, dict) or record.get("schema") != 1:
+        return {}, ["run.json is not of schema version 1"]
+    names = record.get("cases")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return {**record, "cases": []}, ["run.json has no list of case names"]
+    return record, []
+
+
+def _entry(folder: Path) -> CaseEntry:
+    name = folder.name.replace("__", "/")
+    try:
+        result = read_result(folder / "result.json")
+        result = _RESULT.validate_python(asdict(result))
+    except InputError as error:
+        defect = str(error.what)
+        if not (folder / "result.json").exists():
+            defect = "not judged: the run was stopped before its comparison"
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        defect = f"result.json is not readable ({where}: {first['msg']})"
+    except OSError as error:
+        defect = f"result.json cannot be read ({error.strerror})"
+    else:
+        return CaseEntry(result.case, folder, result)
+    return CaseEntry(name, folder, None, defect, _finished_solves(folder))
+
+
+def _finished_solves(folder: Path) -> list[SolveRecord]:
+    """Read the records of single solves; damaged ones are as good as unfinished."""
+    records = []
+    for path in sorted(folder.glob("*/record.json")):
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            records.append(_SOLVE.validate_python(content["record"]))
+        except (OSError, ValueError, KeyError, TypeError):  # ValidationError is a ValueError
+            continue
+    return sorted(records, key=lambda record: (record.solver, record.level))
+
+
+def _folder_name(case: str) -> str:
+    """Return the folder of a case below ``cases/``, as the runner names it."""
+    name = case.replace("/", "__")
+    return f"_{name}" if name.startswith(".") else name
+
+
+def _rest(entry: CaseEntry) -> tuple[Path, None, str, list[SolveRecord]]:
+    return entry.folder, None, entry.defect, entry.unjudged
