@@ -1,0 +1,1 @@
+"""Studies: what several solutions together say (rates, extrapolation, accuracy)."""

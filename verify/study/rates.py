@@ -1,0 +1,63 @@
+"""Observed orders of convergence, with reasons where an order means nothing."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import log
+
+from verify.result import Rate
+
+__all__ = ["observed_rate"]
+
+# Relative errors below this are round-off of a direct solver on 1e5 unknowns.
+ROUND_OFF = 1e-11
+
+
+def observed_rate(
+    solver: str,
+    metric: str,
+    sizes: Sequence[float],
+    errors: Sequence[float],
+    uncertainties: Sequence[float],
+) -> Rate:
+    """Fit the order of `errors` under refinement.
+
+    Parameters
+    ----------
+    solver, metric : str
+    sizes, errors, uncertainties : sequence of float
+        Element size (m), relative error and its half-width per level, coarse to fine.
+
+    Returns
+    -------
+    Rate
+        The slope between the two finest levels. Its uncertainty is the change from the pair
+        before, plus what the half-widths of the two errors allow.
+    """
+    levels = list(zip(sizes, errors, uncertainties, strict=True))
+    slopes = [
+        log(a[1] / b[1]) / log(a[0] / b[0]) if a[1] > 0 and b[1] > 0 else float("nan")
+        for a, b in pairwise(levels)
+    ]
+    shown = ", ".join(f"{slope:.2f}" for slope in slopes)
+    pairwise_slopes = [slope for slope in slopes if slope == slope]
+
+    def without(reason: str) -> Rate:
+        return Rate(solver, metric, None, 0.0, reason, pairwise_slopes)
+
+    if len(levels) < 3:
+        return without(f"too few levels: {len(levels)}; an order with its uncertainty needs 3")
+    if any(error <= ROUND_OFF for error in errors[-2:]):
+        return without(f"floor: errors {errors[-2]:.1e}, {errors[-1]:.1e} are at round-off")
+    for error, width in zip(errors[-2:], uncertainties[-2:], strict=True):
+        if width >= 0.5 * error:
+            return without(
+                f"floor: the uncertainty {width:.1e} of the comparison is not clearly below the "
+                f"error {error:.1e}"
+            )
+    if all(slope <= 0 for slope in slopes):
+        return without(f"diverging: slopes {shown}")
+    if min(slopes) < 0 < max(slopes):
+        return without(f"oscillating: slopes {shown}")
+    span = log(sizes[-2] / sizes[-1])
+    allowed = sum(w / e for e, w in zip(errors[-2:], uncertainties[-2:], strict=True)) / span
+    return Rate(solver, metric, slopes[-1], abs(slopes[-1] - slopes[-2]) + allowed, "", slopes)

@@ -1,0 +1,228 @@
+"""Verdicts: whether a case keeps what it promises, given what is known about the truth.
+
+Everything measured is an interval. PASS if all of it satisfies the limit, FAIL if none of it
+does, UNDECIDED otherwise: the reference is too imprecise to tell. ERROR if a solve that the
+check needs is missing.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from verify.result import Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
+from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
+
+__all__ = ["Interval", "error_interval", "judge"]
+
+Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
+
+# "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
+_SAME_SIZE = 0.1
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A measured number and the bounds of its true value."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def half_width(self) -> float:
+        """Largest distance of the bounds from the value."""
+        return max(self.value - self.low, self.high - self.value)
+
+
+class _NotMeasuredError(Exception):
+    """A solve or a metric that the check needs is not there."""
+
+
+def judge(
+    scene: Scene, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> list[VerdictRecord]:
+    """Judge every acceptance check of `scene` on what was measured.
+
+    Parameters
+    ----------
+    scene : Scene
+    records : sequence of SolveRecord
+        All solves of the case, with their metrics.
+    rates : sequence of Rate
+
+    Returns
+    -------
+    list of VerdictRecord
+        One per check, in the order of the scene.
+    """
+    judges: dict[type, Callable[..., VerdictRecord]] = {
+        RateCheck: _judge_rate,
+        BoundCheck: _judge_bound,
+        RatioCheck: _judge_ratio,
+        ValueCheck: _judge_value,
+    }
+    verdicts = []
+    for check in scene.acceptance:
+        try:
+            verdicts.append(judges[type(check)](check, records, rates))
+        except _NotMeasuredError as problem:
+            verdicts.append(_record(check, Verdict.ERROR, None, _limit(check), str(problem)))
+    return verdicts
+
+
+def error_interval(metric: Metric) -> Interval:
+    """Relative error that a metric stands for, with the bounds of its true value.
+
+    For an error metric that is its value; for a quantity its distance from the reference.
+    """
+    if metric.reference is None:
+        return _interval(metric.value, metric.uncertainty)
+    if metric.reference == 0.0:
+        raise _NotMeasuredError(f"the reference of {metric.name} is 0: it has no relative error")
+    scale = abs(metric.reference)
+    return _interval(abs(metric.value - metric.reference) / scale, metric.uncertainty / scale)
+
+
+def _interval(error: float, width: float) -> Interval:
+    return Interval(error, max(0.0, error - width), error + width)
+
+
+def _judge_bound(
+    check: BoundCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    error = error_interval(_metric(_levels(records, check.solver)[-1], check.metric))
+    return _decide(check, error, 0.0, check.at_most, "error on the finest level")
+
+
+def _judge_value(
+    check: ValueCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    value = _metric(_levels(records, check.solver)[-1], check.metric).value
+    allowed = check.relative_tolerance * abs(check.equals)
+    known = Interval(value, value, value)
+    off = abs(value - check.equals) / abs(check.equals) if check.equals else abs(value)
+    text = f"off by {off:.2e} (relative); stated by: {check.source}"
+    return _decide(check, known, check.equals - allowed, check.equals + allowed, text)
+
+
+def _judge_ratio(
+    check: RatioCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    ours, theirs = _levels(records, check.solver), _levels(records, check.to)
+    if [r.level for r in ours] != [r.level for r in theirs]:
+        raise _NotMeasuredError(f"{check.solver} and {check.to} were not solved on the same levels")
+    low, high = 0.0, check.at_most or 0.0
+    if check.within is not None:
+        low, high = 1 - check.within, 1 + check.within
+    found = []
+    for one, other in zip(ours, theirs, strict=True):
+        a = error_interval(_metric(one, check.metric))
+        b = error_interval(_metric(other, check.metric))
+        if one.size and other.size and abs(one.size / other.size - 1) > _SAME_SIZE:
+            text = f"level {one.level}: mesh sizes {one.size:.3g} and {other.size:.3g} m differ"
+            return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
+        if b.low <= 0.0:
+            text = (
+                f"level {one.level}: the uncertainty {b.half_width:.1e} is not below the error "
+                f"{b.value:.1e} of {check.to}"
+            )
+            return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
+        found.append((one.level, Interval(a.value / b.value, a.low / b.high, a.high / b.low)))
+    all_levels = ", ".join(f"{ratio.value:.4g}" for _, ratio in found)
+    decided = [
+        _decide(check, ratio, low, high, f"level {level} of ratios {all_levels}")
+        for level, ratio in found
+    ]
+    order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL]
+    centre = 0.5 * (low + high) if check.within is not None else 0.0
+    return max(decided, key=lambda v: (order.index(v.verdict), abs((v.observed or 0.0) - centre)))
+
+
+def _judge_rate(
+    check: RateCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
+) -> VerdictRecord:
+    _levels(records, check.solver)
+    rate = next((r for r in rates if (r.solver, r.metric) == (check.solver, check.metric)), None)
+    if rate is None:
+        raise _NotMeasuredError(f"no rate of {check.metric} for {check.solver}")
+    low, high = -float("inf"), float("inf")
+    if check.at_least is not None:
+        low = check.at_least
+    else:
+        assert check.equals is not None
+        assert check.within is not None
+        low, high = check.equals - check.within, check.equals + check.within
+    if rate.order is not None:
+        found = Interval(rate.order, rate.order - rate.uncertainty, rate.order + rate.uncertainty)
+        slopes = ", ".join(f"{slope:.3f}" for slope in rate.pairwise)
+        return _decide(check, found, low, high, f"slopes {slopes}")
+    if rate.reason.startswith("diverging") and max(rate.pairwise) < low:
+        worst = Interval(rate.pairwise[-1], min(rate.pairwise), max(rate.pairwise))
+        return _record(check, Verdict.FAIL, worst, _limit(check), rate.reason)
+    return _record(check, Verdict.UNDECIDED, None, _limit(check), rate.reason)
+
+
+def _decide(check: Check, found: Interval, low: float, high: float, text: str) -> VerdictRecord:
+    limit = _limit(check)
+    if not isfinite(found.value):
+        return _record(check, Verdict.FAIL, None, limit, f"{text}: not finite")
+    if low <= found.low and found.high <= high:
+        return _record(check, Verdict.PASS, found, limit, text)
+    if found.high < low or found.low > high:
+        return _record(check, Verdict.FAIL, found, limit, text)
+    reason = (
+        f"{text}: the uncertainty {found.half_width:.1e} is too large to tell {found.value:.4g} "
+        "from the limit"
+    )
+    if isinstance(check, BoundCheck) and found.half_width > 0.1 * found.value:
+        reason = (
+            f"{text}: reference uncertainty {found.half_width:.1e} is not clearly below the "
+            f"error {found.value:.1e} it judges"
+        )
+    return _record(check, Verdict.UNDECIDED, found, limit, reason)
+
+
+def _record(
+    check: Check, verdict: Verdict, found: Interval | None, limit: str, reason: str
+) -> VerdictRecord:
+    value, low, high = (None, None, None) if found is None else (found.value, found.low, found.high)
+    return VerdictRecord(
+        check.check, check.solver, check.metric, verdict, value, low, high, limit, reason
+    )
+
+
+def _limit(check: Check) -> str:
+    match check:
+        case RateCheck(at_least=float(least)):
+            return f"order ≥ {least:g}"
+        case RateCheck():
+            return f"order {check.equals:g} ± {check.within:g}"
+        case BoundCheck():
+            return f"relative error ≤ {check.at_most:g}"
+        case RatioCheck(at_most=float(most)):
+            return f"error ≤ {most:g} × that of {check.to}, on every level"
+        case RatioCheck():
+            return f"error within {check.within:.3g} of that of {check.to} (ratio), on every level"
+        case ValueCheck():
+            return f"{check.equals:.10g} ± {check.relative_tolerance:g} (relative)"
+
+
+def _levels(records: Sequence[SolveRecord], solver: str) -> list[SolveRecord]:
+    """All solves of a solver, coarse to fine; every one must have finished."""
+    own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
+    if not own:
+        raise _NotMeasuredError(f"'{solver}' was not run")
+    for record in own:
+        if record.status is not Status.SOLVED:
+            raise _NotMeasuredError(
+                f"{solver} level {record.level} {record.status}: {record.reason}"
+            )
+    return own
+
+
+def _metric(record: SolveRecord, name: str) -> Metric:
+    metric = record.metric(name)
+    if metric is None:
+        why = record.notes.get(name, "it was not measured")
+        raise _NotMeasuredError(f"{record.solver} level {record.level} has no {name}: {why}")
+    return metric
