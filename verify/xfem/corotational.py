@@ -1,0 +1,186 @@
+"""Corotational elasticity of a cut body: one polar rotation per piece (2.42, 2.66-70).
+
+The potential is W = μ‖U − I‖² + ½λ tr²(U − I) with F = R U: with polar rotations (and with no
+others) the corotational force is its gradient. Pieces turn on their own, so the parts of a cut
+cell need not agree on a rotation. A collapsed or inverted piece has a rotation of determinant +1;
+U then has a negative eigenvalue, which is what the potential pulls back.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.corotational_kernels import corotational_kernels
+from verify.xfem.elasticity import Material
+from verify.xfem.errors import XfemError
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["InternalForce", "Kinematics", "TangentKind"]
+
+_Floats = NDArray[np.float64]
+Kinematics = Literal["corotational", "linear"]
+TangentKind = Literal["frozen", "exact"]
+
+
+class InternalForce:
+    """Internal force, strain energy and stiffness of a cut body.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+        Triangles in the plane, tetrahedra, or triangles in space (membranes without bending
+        stiffness; their material is in plane stress times the thickness, its unit N/m).
+    material : Material
+    kinematics : {"corotational", "linear"}
+        Linear keeps every rotation at the identity.
+
+    Attributes
+    ----------
+    rotations : (p, d, d) float array
+        Rotation of each piece at the last `evaluate`.
+    left_out : int
+        Pieces whose rotation was not differentiable at the last exact `add_stiffness`, and
+        which therefore entered with a frozen one.
+
+    Raises
+    ------
+    XfemError
+        If the material fits neither () nor (m,), the kinematics is unknown, or a membrane is to
+        be linear (it would resist rotation across its plane).
+    """
+
+    def __init__(
+        self, virtual: VirtualMesh, material: Material, kinematics: Kinematics = "corotational"
+    ) -> None:
+        mesh = virtual.mesh
+        if kinematics not in ("corotational", "linear"):
+            raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
+        if mesh.dim < mesh.space and kinematics == "linear":
+            raise XfemError("linear kinematics of a membrane in space; expected corotational")
+        count = len(mesh.cells)
+        for name, values in (("λ", material.lam), ("μ", material.mu)):
+            if np.shape(values) not in ((), (count,)):
+                raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
+        self.virtual, self.kinematics = virtual, kinematics
+        self.lam = np.broadcast_to(material.lam, count).astype(float)
+        self.mu = np.broadcast_to(material.mu, count).astype(float)
+        self.left_out = 0
+        pieces, space = len(virtual.cells), mesh.space
+        self.rotations = np.tile(np.eye(space), (pieces, 1, 1))
+        self._quaternions = np.zeros((pieces, 4))
+        self._quaternions[:, 0] = 1.0
+        self._kernels = corotational_kernels(mesh.dim, space)
+        self._normals = _unit_normals(virtual)
+        self._shape = (virtual.node_count, space)
+
+    @property
+    def turning(self) -> bool:
+        """Whether pieces have rotations of their own."""
+        return self.kinematics == "corotational"
+
+    @property
+    def geometry(self) -> tuple[NDArray, ...]:
+        """(gradients, parent, volumes, normals, λ, μ): what every kernel reads."""
+        v = self.virtual
+        return v.mesh.gradients, v.parent, v.volumes, self._normals, self.lam, self.mu
+
+    def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
+        """Internal force (N, d) in newtons and strain energy in joules; updates the rotations.
+
+        Parameters
+        ----------
+        displacement : (N, d) float array
+            Of the unknown nodes, in metres.
+        out : (N, d) float array, optional
+            Overwritten with the force.
+
+        Raises
+        ------
+        XfemError
+            If the displacement has a wrong shape.
+        """
+        if displacement.shape != self._shape:
+            raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
+        force = np.empty(self._shape) if out is None else out
+        force[:] = 0.0
+        energy = self._kernels.internal_force(
+            self.virtual.cells, *self.geometry, self.turning, displacement,
+            self._quaternions, self.rotations, force,
+        )  # fmt: skip
+        return force, float(energy)
+
+    def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` K v (N, d), K with the rotations of the last `evaluate`, to `out`."""
+        self._kernels.frozen_product(
+            self.virtual.cells, *self.geometry, self.rotations, vector, scale, out
+        )
+
+    def add_stiffness(
+        self,
+        pattern: BlockPattern,
+        blocks: _Floats,
+        scale: float = 1.0,
+        kind: TangentKind = "frozen",
+        displacement: _Floats | None = None,
+    ) -> None:
+        """Add `scale` times the stiffness at the last `evaluate` to the nodal blocks.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Its first cells must be those of the body.
+        blocks : (B, d, d) float array
+        kind : {"frozen", "exact"}
+            Rotations held, or the second derivative of the potential.
+        displacement : (N, d) float array, optional
+            That of the last `evaluate`; needed for the exact stiffness.
+
+        Raises
+        ------
+        XfemError
+            If the kind is unknown or the exact stiffness is asked for without a displacement.
+        """
+        if kind not in ("frozen", "exact"):
+            raise XfemError(f"stiffness '{kind}'; expected frozen or exact")
+        targets = pattern.targets[: len(self.virtual.cells)]
+        self._kernels.add_frozen_stiffness(
+            targets, *self.geometry, self.rotations, scale, blocks
+        )
+        if kind == "frozen" or not self.turning:
+            return
+        if displacement is None:
+            raise XfemError("exact stiffness without the displacement at which it is wanted")
+        self.left_out = self._kernels.add_spin_stiffness(
+            self.virtual.cells, targets, *self.geometry, self.rotations, displacement, scale, blocks
+        )
+
+    def stiffness(
+        self, pattern: BlockPattern, displacement: _Floats, kind: TangentKind = "exact"
+    ) -> _Floats:
+        """(B, d, d) nodal blocks of the stiffness at a displacement, in N/m."""
+        self.evaluate(displacement)
+        space = self._shape[1]
+        blocks = np.zeros((len(pattern.columns), space, space))
+        self.add_stiffness(pattern, blocks, 1.0, kind, displacement)
+        return blocks
+
+    def inverted(self, displacement: _Floats) -> NDArray[np.int64]:
+        """Pieces whose deformation gradient has a negative determinant (solids only)."""
+        v = self.virtual
+        if v.mesh.dim < v.mesh.space:
+            raise XfemError("inversion of a membrane in space is not defined")
+        F = np.eye(v.mesh.dim) + np.einsum(
+            "pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent]
+        )
+        return np.flatnonzero(np.linalg.det(F) < 0.0)
+
+
+def _unit_normals(virtual: VirtualMesh) -> _Floats:
+    mesh = virtual.mesh
+    if mesh.dim == mesh.space:
+        return np.zeros((1, 3))
+    edges = mesh.edge_vectors
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)

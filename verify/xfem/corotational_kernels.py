@@ -1,0 +1,315 @@
+"""Compiled loops of corotational elasticity over the pieces of a cut body.
+
+With b_i the material gradient of shape function i, w the volume of a piece, R its rotation and
+g_i = R b_i, the force f_i = w R (2μE + λ tr(E) I) b_i, E = Rᵀ F − I, is the gradient of
+w (μ‖E‖² + ½λ tr² E). The stiffness with frozen rotations is that of linear elasticity in the g_i,
+and the exact one adds [g_i]ₓᵀ H [g_j]ₓ, H = μI + (λ tr E − 2μ)(tr(V) I − V)⁻¹, V = R Uᵀ Rᵀ.
+
+A membrane is the same with F and I restricted to its tangent plane. The loops are compiled once
+for each pair of dimensions, so that the innermost ones have a constant length.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+from numba import njit
+
+from verify.xfem.polar_kernels import nearest_rotation
+
+__all__ = ["corotational_kernels"]
+
+_SINGULAR = 1e-8  # of the trace of the stretch: a spin without stiffness of its own
+
+
+@njit(cache=True)
+def _spin_row(g, out):  # type: ignore[no-untyped-def]
+    """Write the matrix of u ↦ g × u: (1, 2) in the plane, (3, 3) in space."""
+    if len(g) == 2:
+        out[0, 0], out[0, 1] = -g[1], g[0]
+    else:
+        out[:] = 0.0
+        out[0, 1], out[0, 2], out[1, 2] = -g[2], g[1], -g[0]
+        out[1, 0], out[2, 0], out[2, 1] = g[2], -g[1], g[0]
+
+
+@njit(cache=True)
+def _spin_stiffness(V, lam_trace, mu, dim, H):  # type: ignore[no-untyped-def]
+    """Write H (1, 1) or (3, 3); without the inverse, and False, where that does not exist."""
+    trace = 0.0
+    for k in range(V.shape[0]):
+        trace += V[k, k]
+    factor = lam_trace - 2.0 * mu
+    if V.shape[0] == 2:
+        regular = trace > 0.0
+        H[0, 0] = mu + factor / trace if regular else 0.0
+        return regular
+    a, b, c = trace - V[0, 0], trace - V[1, 1], trace - V[2, 2]
+    d = -0.5 * (V[0, 1] + V[1, 0])
+    e = -0.5 * (V[0, 2] + V[2, 0])
+    f = -0.5 * (V[1, 2] + V[2, 1])
+    determinant = a * (b * c - f * f) - d * (d * c - e * f) + e * (d * f - b * e)
+    if not determinant > _SINGULAR * abs(trace) ** 3:
+        H[:] = 0.0
+        return False
+    scale = factor / determinant
+    H[0, 0] = mu + scale * (b * c - f * f)
+    H[1, 1] = mu + scale * (a * c - e * e)
+    H[2, 2] = mu + scale * (a * b - d * d)
+    H[0, 1] = H[1, 0] = scale * (e * f - d * c)
+    H[0, 2] = H[2, 0] = scale * (d * f - b * e)
+    H[1, 2] = H[2, 1] = scale * (d * e - a * f)
+    return True
+
+
+@cache
+def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
+    """Loops for simplices of dimension `dim` in `space`.
+
+    Returns
+    -------
+    SimpleNamespace
+        ``internal_force``, ``frozen_product``, ``add_frozen_stiffness``, ``add_spin_stiffness``.
+    """
+    corners = dim + 1
+    membrane = dim < space
+    spins = 1 if space == 2 else 3
+
+    @njit(cache=True)
+    def internal_force(  # type: ignore[no-untyped-def]
+        cells, gradients, parent, volumes, normals, lam, mu, turning, displacement,
+        quaternions, rotations, force,
+    ):  # fmt: skip
+        """Add the internal force to `force`, update the rotations; return the strain energy.
+
+        Parameters
+        ----------
+        cells : (p, c) int array
+        gradients : (m, c, d) float array
+        parent, volumes : (p,) arrays
+        normals : (m, 3) float array
+            Unit normals of membranes; not read otherwise.
+        lam, mu : (m,) float array
+        turning : bool
+            False: rotations stay the identity (linear elasticity).
+        displacement : (N, d) float array
+        quaternions : (p, 4) float array
+            Warm start, updated.
+        rotations : (p, d, d) float array
+            Overwritten.
+        force : (N, d) float array
+        """
+        F = np.empty((space, space))
+        E = np.empty((space, space))
+        energy = 0.0
+        for piece in range(len(cells)):
+            cell = parent[piece]
+            R = rotations[piece]
+            for k in range(space):
+                for l in range(space):
+                    F[k, l] = 1.0 if k == l else 0.0
+                    if membrane:
+                        F[k, l] -= normals[cell, k] * normals[cell, l]
+                    E[k, l] = -F[k, l]
+            for i in range(corners):
+                node = cells[piece, i]
+                for k in range(space):
+                    for l in range(space):
+                        F[k, l] += displacement[node, k] * gradients[cell, i, l]
+            if turning:
+                nearest_rotation(F, quaternions[piece], R)
+            for k in range(space):
+                for l in range(space):
+                    for m in range(space):
+                        E[k, l] += R[m, k] * F[m, l]
+            trace = 0.0
+            for k in range(space):
+                trace += E[k, k]
+                for l in range(k + 1, space):
+                    E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])
+            square = 0.0
+            for k in range(space):
+                for l in range(space):
+                    square += E[k, l] * E[k, l]
+            w, la, m2 = volumes[piece], lam[cell], 2.0 * mu[cell]
+            energy += 0.5 * w * (m2 * square + la * trace * trace)
+            # stress w R (2μE + λ tr E I), over F
+            for k in range(space):
+                for l in range(space):
+                    total = la * trace * R[k, l]
+                    for m in range(space):
+                        total += m2 * R[k, m] * E[m, l]
+                    F[k, l] = w * total
+            for i in range(corners):
+                node = cells[piece, i]
+                for k in range(space):
+                    total = 0.0
+                    for l in range(space):
+                        total += F[k, l] * gradients[cell, i, l]
+                    force[node, k] += total
+        return energy
+
+    @njit(cache=True)
+    def frozen_product(  # type: ignore[no-untyped-def]
+        cells, gradients, parent, volumes, normals, lam, mu, rotations, vector, scale, product
+    ):
+        """Add `scale` times the stiffness with frozen rotations times `vector` to `product`."""
+        D = np.empty((space, space))
+        E = np.empty((space, space))
+        normal = np.empty(space)
+        for piece in range(len(cells)):
+            cell = parent[piece]
+            R = rotations[piece]
+            for k in range(space):
+                for l in range(space):
+                    D[k, l] = 0.0
+            for i in range(corners):
+                node = cells[piece, i]
+                for k in range(space):
+                    for l in range(space):
+                        D[k, l] += vector[node, k] * gradients[cell, i, l]
+            for k in range(space):
+                for l in range(space):
+                    E[k, l] = 0.0
+                    for m in range(space):
+                        E[k, l] += R[m, k] * D[m, l]
+            if membrane:  # nothing resists across the plane
+                for l in range(space):
+                    normal[l] = 0.0
+                    for m in range(space):
+                        normal[l] += normals[cell, m] * E[m, l]
+                for k in range(space):
+                    for l in range(space):
+                        E[k, l] -= normals[cell, k] * normal[l]
+            w = scale * volumes[piece]
+            trace = 0.0
+            for k in range(space):
+                trace += E[k, k]
+                for l in range(k + 1, space):
+                    E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])
+            wl, wm = w * lam[cell] * trace, 2.0 * w * mu[cell]
+            for k in range(space):
+                for l in range(space):
+                    total = wl * R[k, l]
+                    for m in range(space):
+                        total += wm * R[k, m] * E[m, l]
+                    D[k, l] = total
+            for i in range(corners):
+                node = cells[piece, i]
+                for k in range(space):
+                    total = 0.0
+                    for l in range(space):
+                        total += D[k, l] * gradients[cell, i, l]
+                    product[node, k] += total
+
+    @njit(cache=True)
+    def add_frozen_stiffness(  # type: ignore[no-untyped-def]
+        targets, gradients, parent, volumes, normals, lam, mu, rotations, scale, blocks
+    ):
+        """Add `scale` times the stiffness with frozen rotations to the nodal blocks."""
+        g = np.empty((corners, space))
+        T = np.empty((space, space))
+        for piece in range(len(targets)):
+            cell = parent[piece]
+            R = rotations[piece]
+            wl = scale * volumes[piece] * lam[cell]
+            wm = scale * volumes[piece] * mu[cell]
+            for i in range(corners):
+                for k in range(space):
+                    total = 0.0
+                    for l in range(space):
+                        total += R[k, l] * gradients[cell, i, l]
+                    g[i, k] = total
+            for k in range(space):
+                for l in range(space):
+                    T[k, l] = wm if k == l else 0.0
+            if membrane:
+                n = R @ normals[cell]
+                for k in range(space):
+                    for l in range(space):
+                        T[k, l] -= wm * n[k] * n[l]
+            for i in range(corners):
+                for j in range(i, corners):
+                    dot = 0.0
+                    for k in range(space):
+                        dot += g[i, k] * g[j, k]
+                    upper = targets[piece, i, j]
+                    lower = targets[piece, j, i]
+                    for k in range(space):
+                        for l in range(space):
+                            value = wl * g[i, k] * g[j, l] + wm * g[j, k] * g[i, l]
+                            value += dot * T[k, l]
+                            blocks[upper, k, l] += value
+                            if i != j:
+                                blocks[lower, l, k] += value
+
+    @njit(cache=True)
+    def add_spin_stiffness(  # type: ignore[no-untyped-def]
+        cells, targets, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
+        scale, blocks,
+    ):  # fmt: skip
+        """Add what the exact stiffness has beyond the frozen one; return the pieces left out.
+
+        A piece is left out where its rotation is not differentiable (tr(V) I − V singular).
+        """
+        F = np.empty((space, space))
+        V = np.empty((space, space))
+        g = np.empty((corners, space))
+        H = np.empty((spins, spins))
+        X = np.empty((corners, spins, space))
+        Y = np.empty((corners, spins, space))
+        left_out = 0
+        for piece in range(len(cells)):
+            cell = parent[piece]
+            R = rotations[piece]
+            for k in range(space):
+                for l in range(space):
+                    F[k, l] = 1.0 if k == l else 0.0
+                    if membrane:
+                        F[k, l] -= normals[cell, k] * normals[cell, l]
+            for i in range(corners):
+                for k in range(space):
+                    g[i, k] = 0.0
+                    for l in range(space):
+                        g[i, k] += R[k, l] * gradients[cell, i, l]
+                        F[k, l] += displacement[cells[piece, i], k] * gradients[cell, i, l]
+                _spin_row(g[i], X[i])
+            trace = -float(dim)
+            for k in range(space):
+                for l in range(space):
+                    V[k, l] = 0.0
+                    for m in range(space):
+                        V[k, l] += F[k, m] * R[l, m]
+                trace += V[k, k]
+            if not _spin_stiffness(V, lam[cell] * trace, mu[cell], dim, H):
+                left_out += 1
+                continue
+            w = scale * volumes[piece]
+            for j in range(corners):
+                for a in range(spins):
+                    for l in range(space):
+                        Y[j, a, l] = 0.0
+                        for b in range(spins):
+                            Y[j, a, l] += w * H[a, b] * X[j, b, l]
+            n = R @ normals[cell] if membrane else F[0]
+            for i in range(corners):
+                for j in range(corners):
+                    at = targets[piece, i, j]
+                    dot = 0.0
+                    if membrane:
+                        for k in range(space):
+                            dot += w * mu[cell] * g[i, k] * g[j, k]
+                    for k in range(space):
+                        for l in range(space):
+                            total = dot * n[k] * n[l] if membrane else 0.0
+                            for a in range(spins):
+                                total += X[i, a, k] * Y[j, a, l]
+                            blocks[at, k, l] += total
+        return left_out
+
+    return SimpleNamespace(
+        internal_force=internal_force,
+        frozen_product=frozen_product,
+        add_frozen_stiffness=add_frozen_stiffness,
+        add_spin_stiffness=add_spin_stiffness,
+    )

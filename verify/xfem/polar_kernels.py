@@ -1,0 +1,163 @@
+"""Rotation nearest to a deformation gradient: argmax over SO(d) of tr(Rᵀ F).
+
+The maximum t = tr(Rᵀ F) is the trace of the stretch; R has determinant +1 whatever the sign of
+det F, so a collapsed or inverted piece has a rotation too. In the plane R is closed form. In space
+tr(R(q)ᵀ F) is a quadratic form in the unit quaternion q; such a form has no local maximum on the
+sphere besides the global one, so Newton's method on SO(3) may start anywhere: where its Hessian
+tr(S) I − S is positive definite it has found the rotation, and where it is not, the eigenvector
+of the form (a Jacobi iteration, which cannot fail) is taken instead.
+"""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["nearest_rotation", "rotation_matrix"]
+
+_NEWTON_STEPS = 12
+_PIVOT = 1e-4  # of the norm of F: a Hessian nearer to singular goes to the eigenvector
+_SMALL_TURN = 1e-16  # square of the last turn: Newton squares it once more, to round-off
+_JACOBI_SWEEPS = 12
+
+
+@njit(cache=True)
+def rotation_matrix(q, R):  # type: ignore[no-untyped-def]
+    """Write the matrix of the unit quaternion (w, x, y, z) to R (3, 3)."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    R[0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    R[0, 1] = 2.0 * (x * y - w * z)
+    R[0, 2] = 2.0 * (x * z + w * y)
+    R[1, 0] = 2.0 * (x * y + w * z)
+    R[1, 1] = 1.0 - 2.0 * (x * x + z * z)
+    R[1, 2] = 2.0 * (y * z - w * x)
+    R[2, 0] = 2.0 * (x * z - w * y)
+    R[2, 1] = 2.0 * (y * z + w * x)
+    R[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@njit(cache=True)
+def nearest_rotation(F, q, R):  # type: ignore[no-untyped-def]
+    """Write the rotation nearest to F (d, d) to R; a warm start changes its cost only.
+
+    Parameters
+    ----------
+    F : (d, d) float array
+        Deformation gradient, d = 2 or 3; any, also singular or inverted.
+    q : (4,) float array
+        Quaternion from which to start; in space replaced by that of the result.
+    R : (d, d) float array
+        Overwritten.
+    """
+    if F.shape[0] == 2:
+        along, across = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
+        length = np.hypot(along, across)
+        cosine, sine = 1.0, 0.0
+        if length > 0.0:
+            cosine, sine = along / length, across / length
+        R[0, 0] = cosine
+        R[0, 1] = -sine
+        R[1, 0] = sine
+        R[1, 1] = cosine
+        return
+    if not _newton(F, q):
+        _largest_eigenvector(F, q)
+    rotation_matrix(q, R)
+
+
+@njit(cache=True)
+def _newton(F, q):  # type: ignore[no-untyped-def]
+    """Newton's method on SO(3), on scalars throughout; whether it has converged."""
+    f00, f01, f02 = F[0, 0], F[0, 1], F[0, 2]
+    f10, f11, f12 = F[1, 0], F[1, 1], F[1, 2]
+    f20, f21, f22 = F[2, 0], F[2, 1], F[2, 2]
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    norm = np.sqrt(
+        f00 * f00 + f01 * f01 + f02 * f02 + f10 * f10 + f11 * f11 + f12 * f12
+        + f20 * f20 + f21 * f21 + f22 * f22
+    )  # fmt: skip
+    least = _PIVOT * norm
+    for _ in range(_NEWTON_STEPS):
+        r00, r01, r02 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+        r10, r11, r12 = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+        r20, r21, r22 = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+        a00 = r00 * f00 + r10 * f10 + r20 * f20
+        a01 = r00 * f01 + r10 * f11 + r20 * f21
+        a02 = r00 * f02 + r10 * f12 + r20 * f22
+        a10 = r01 * f00 + r11 * f10 + r21 * f20
+        a11 = r01 * f01 + r11 * f11 + r21 * f21
+        a12 = r01 * f02 + r11 * f12 + r21 * f22
+        a20 = r02 * f00 + r12 * f10 + r22 * f20
+        a21 = r02 * f01 + r12 * f11 + r22 * f21
+        a22 = r02 * f02 + r12 * f12 + r22 * f22
+        # Hessian tr(S) I − S and its factorisation L D Lᵀ
+        d0 = a11 + a22
+        if not d0 > least:
+            return False
+        h01, h02, h12 = -0.5 * (a01 + a10), -0.5 * (a02 + a20), -0.5 * (a12 + a21)
+        l10, l20 = h01 / d0, h02 / d0
+        d1 = a00 + a22 - l10 * h01
+        if not d1 > least:
+            return False
+        e21 = h12 - l20 * h01
+        l21 = e21 / d1
+        d2 = a00 + a11 - l20 * h02 - l21 * e21
+        if not d2 > least:
+            return False
+        # turn that makes Rᵀ F symmetric to first order
+        t0 = a21 - a12
+        t1 = a02 - a20 - l10 * t0
+        t2 = (a10 - a01 - l20 * t0 - l21 * t1) / d2
+        t1 = t1 / d1 - l21 * t2
+        t0 = t0 / d0 - l10 * t1 - l20 * t2
+        turn = t0 * t0 + t1 * t1 + t2 * t2
+        t0, t1, t2 = 0.5 * t0, 0.5 * t1, 0.5 * t2
+        nw = w - x * t0 - y * t1 - z * t2
+        nx = x + w * t0 + y * t2 - z * t1
+        ny = y + w * t1 + z * t0 - x * t2
+        nz = z + w * t2 + x * t1 - y * t0
+        scale = 1.0 / np.sqrt(nw * nw + nx * nx + ny * ny + nz * nz)
+        w, x, y, z = nw * scale, nx * scale, ny * scale, nz * scale
+        if turn <= _SMALL_TURN:
+            q[0], q[1], q[2], q[3] = w, x, y, z
+            return True
+    return False
+
+
+@njit(cache=True)
+def _largest_eigenvector(F, q):  # type: ignore[no-untyped-def]
+    """Unit eigenvector of the largest eigenvalue of the form q ↦ tr(R(q)ᵀ F), by Jacobi."""
+    form = np.empty((4, 4))
+    form[0, 0] = F[0, 0] + F[1, 1] + F[2, 2]
+    form[1, 1] = F[0, 0] - F[1, 1] - F[2, 2]
+    form[2, 2] = F[1, 1] - F[0, 0] - F[2, 2]
+    form[3, 3] = F[2, 2] - F[0, 0] - F[1, 1]
+    form[0, 1] = form[1, 0] = F[2, 1] - F[1, 2]
+    form[0, 2] = form[2, 0] = F[0, 2] - F[2, 0]
+    form[0, 3] = form[3, 0] = F[1, 0] - F[0, 1]
+    form[1, 2] = form[2, 1] = F[0, 1] + F[1, 0]
+    form[1, 3] = form[3, 1] = F[0, 2] + F[2, 0]
+    form[2, 3] = form[3, 2] = F[1, 2] + F[2, 1]
+    vectors = np.eye(4)
+    for _ in range(_JACOBI_SWEEPS):
+        for i in range(3):
+            for j in range(i + 1, 4):
+                off = form[i, j]
+                if off == 0.0:
+                    continue
+                angle = 0.5 * np.arctan2(2.0 * off, form[j, j] - form[i, i])
+                c, s = np.cos(angle), np.sin(angle)
+                for k in range(4):
+                    p, r = form[k, i], form[k, j]
+                    form[k, i], form[k, j] = c * p - s * r, s * p + c * r
+                for k in range(4):
+                    p, r = form[i, k], form[j, k]
+                    form[i, k], form[j, k] = c * p - s * r, s * p + c * r
+                for k in range(4):
+                    p, r = vectors[k, i], vectors[k, j]
+                    vectors[k, i], vectors[k, j] = c * p - s * r, s * p + c * r
+    best = 0
+    for i in range(1, 4):
+        if form[i, i] > form[best, best]:
+            best = i
+    norm = np.sqrt((vectors[:, best] ** 2).sum())
+    for k in range(4):
+        q[k] = vectors[k, best] / norm
