@@ -11,7 +11,7 @@ __all__ = ["add_stiffness", "constrain", "linear_force"]
 
 
 @njit(cache=True)
-def add_stiffness(targets, gradients, parent, volumes, lam, mu, blocks):  # type: ignore[no-untyped-def]
+def add_stiffness(targets, gradients, parent, volumes, lam, mu, blocks):
     """Add the stiffness of all pieces to `blocks` (B, d, d).
 
     Parameters
@@ -52,7 +52,7 @@ def add_stiffness(targets, gradients, parent, volumes, lam, mu, blocks):  # type
 
 
 @njit(cache=True)
-def linear_force(cells, gradients, parent, volumes, lam, mu, displacement, force):  # type: ignore[no-untyped-def]
+def linear_force(cells, gradients, parent, volumes, lam, mu, displacement, force):
     """Add the internal force K u (N, d) of the displacement (N, d) to `force`; return ½ uᵀKu."""
     count, corners = cells.shape
     dim = gradients.shape[2]
@@ -91,7 +91,7 @@ def linear_force(cells, gradients, parent, volumes, lam, mu, displacement, force
 
 
 @njit(cache=True)
-def constrain(starts, columns, fixed, blocks):  # type: ignore[no-untyped-def]
+def constrain(starts, columns, fixed, blocks):
     """Decouple the fixed components: zero their rows and columns but for the diagonal.
 
     Parameters

@@ -43,7 +43,7 @@ class BlockPattern:
         return np.flatnonzero(rows == self.columns).astype(np.int32)
 
     def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
-        """The matrix of the given blocks (B, d, d), without a copy."""
+        """Return the matrix of the given blocks (B, d, d), without a copy."""
         size = self.node_count * blocks.shape[1]
         return bsr_array((blocks, self.columns, self.starts), shape=(size, size))
 
@@ -62,7 +62,7 @@ def block_pattern(cells: NDArray[np.int64], node_count: int) -> BlockPattern:
 
 
 @njit(cache=True)
-def _pattern(cells, node_count):  # type: ignore[no-untyped-def]
+def _pattern(cells, node_count):
     count, corners = cells.shape
     first = np.zeros(node_count + 1, dtype=np.int64)
     for cell in range(count):

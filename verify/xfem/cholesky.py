@@ -26,15 +26,16 @@ class SingularStiffnessError(XfemError):
 
     Attributes
     ----------
-    node : int
-        Unknown node at which the factorisation stopped.
+    node : int or None
+        Unknown node at which the factorisation stopped, where it is known.
     """
 
-    def __init__(self, node: int) -> None:
+    def __init__(self, node: int | None) -> None:
         self.node = node
+        where = "" if node is None else f" (at unknown node {node})"
         super().__init__(
-            f"the stiffness is not positive definite (at unknown node {node}): a free piece "
-            "without support, or a wrong sign"
+            f"the stiffness is not positive definite{where}: a free piece without support, "
+            "or a wrong sign"
         )
 
 
@@ -55,7 +56,8 @@ class Cholesky:
         fronts = analyse_fronts(pattern.starts, pattern.columns, order, bounds)
         self._order, self._bounds, self._block = order, bounds, block
         self._row_start, self._rows, self._relative = fronts[0], fronts[1], fronts[2]
-        self._parent, self._entries = fronts[3], fronts[4:]
+        self._parent, self._entry_start = fronts[3], fronts[4]
+        self._entry_block, self._entry_row = fronts[5], fronts[6]
         width = np.diff(bounds) * block
         below = np.diff(self._row_start) * block
         self._offset = np.concatenate([[0], np.cumsum(width * (width + below))])
@@ -84,7 +86,9 @@ class Cholesky:
             self._row_start,
             self._relative,
             self._parent,
-            *self._entries,
+            self._entry_start,
+            self._entry_block,
+            self._entry_row,
             self._offset,
             self._factor,
             self._stack,

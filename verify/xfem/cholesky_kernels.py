@@ -16,7 +16,7 @@ _TINY = 1e-14
 
 
 @njit(cache=True)
-def analyse_fronts(starts, columns, order, bounds):  # type: ignore[no-untyped-def]
+def analyse_fronts(starts, columns, order, bounds):
     """Rows, tree and assembly lists of the fronts, from the sparsity and the order.
 
     Returns
@@ -116,7 +116,7 @@ def analyse_fronts(starts, columns, order, bounds):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
-def _subtract(panel, low, high, j, first, second, begin):  # type: ignore[no-untyped-def]
+def _subtract(panel, low, high, j, first, second, begin):
     """Subtract columns `low` to `high` times their rows j and j + 1 from two columns.
 
     Column entries are counted from row `begin` of the panel on: first[0] is row j + begin of
@@ -144,7 +144,7 @@ def _subtract(panel, low, high, j, first, second, begin):  # type: ignore[no-unt
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
-def _subtract_one(panel, low, high, j, first, begin):  # type: ignore[no-untyped-def]
+def _subtract_one(panel, low, high, j, first, begin):
     length = len(first)
     for k in range(low, high):
         a = panel[k]
@@ -155,7 +155,7 @@ def _subtract_one(panel, low, high, j, first, begin):  # type: ignore[no-untyped
 
 
 @njit(cache=True)
-def _eliminate(panel, diagonal):  # type: ignore[no-untyped-def]
+def _eliminate(panel, diagonal):
     """Factorise the columns of a panel (w, height) in place; the failing column or -1."""
     width, height = panel.shape
     j = 0
@@ -186,7 +186,7 @@ def _eliminate(panel, diagonal):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _complement(panel, update):  # type: ignore[no-untyped-def]
+def _complement(panel, update):
     """Subtract L Lᵀ of the rows below the supernode from its update matrix (lower part)."""
     width, height = panel.shape
     below = height - width
@@ -200,7 +200,7 @@ def _complement(panel, update):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _extend_add(waiting, place, count, panel, update):  # type: ignore[no-untyped-def]
+def _extend_add(waiting, place, count, panel, update):
     """Add the update matrix of a child, whose row i is row place[i] of this front."""
     width = panel.shape[0]
     for j in range(count):
@@ -217,7 +217,7 @@ def _extend_add(waiting, place, count, panel, update):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def factorise_fronts(  # type: ignore[no-untyped-def]
+def factorise_fronts(
     blocks,
     bounds,
     row_start,
@@ -283,7 +283,7 @@ def factorise_fronts(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
-def solve_fronts(bounds, row_start, rows, offset, factor, block, x):  # type: ignore[no-untyped-def]
+def solve_fronts(bounds, row_start, rows, offset, factor, block, x):
     """Solve L Lᵀ x = b in place; x (N·block,) is in the order of elimination."""
     fronts = len(bounds) - 1
     gathered = np.empty(max(1, np.max(np.diff(row_start))) * block)

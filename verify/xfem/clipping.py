@@ -11,7 +11,7 @@ sub-simplices of neighbours match on shared faces.
 
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class Staircase:
 
 @cache
 def staircase(corners: int) -> Staircase:
-    """The staircase of a simplex with that many corners."""
+    """Make the staircase of a simplex with that many corners."""
     start, plus, minus, factors, side = [0], [], [], [], []
     for pattern in range(2**corners):
         above = [k for k in range(corners) if pattern >> k & 1]
@@ -114,8 +114,8 @@ def _points(path: _Path, above: list[int], below: list[int]) -> _Path:
 def _steps(
     path: _Path, above: list[int], below: list[int], start: tuple[int, int, int]
 ) -> list[tuple[int, int, int]]:
-    """The coefficient with which each vertex of the path brings in its new corner."""
+    """Coefficient with which each vertex of the path brings in its new corner."""
     steps = [start]
-    for (i, _), (k, l) in zip(path[:-1], path[1:], strict=True):
+    for (i, _), (k, l) in pairwise(path):
         steps.append((1 if k > i else 0, above[k], below[l]))
     return steps

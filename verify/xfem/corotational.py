@@ -145,9 +145,7 @@ class InternalForce:
         if kind not in ("frozen", "exact"):
             raise XfemError(f"stiffness '{kind}'; expected frozen or exact")
         targets = pattern.targets[: len(self.virtual.cells)]
-        self._kernels.add_frozen_stiffness(
-            targets, *self.geometry, self.rotations, scale, blocks
-        )
+        self._kernels.add_frozen_stiffness(targets, *self.geometry, self.rotations, scale, blocks)
         if kind == "frozen" or not self.turning:
             return
         if displacement is None:

@@ -94,11 +94,11 @@ class ImplicitCut:
     extent: Callable[[_Floats], _Floats] | None = None
 
     def level_set(self, points: _Floats) -> _Floats:
-        """The given function."""
+        """Evaluate the given function."""
         return np.asarray(self.function(points), dtype=float)
 
     def depth(self, points: _Floats) -> _Floats:
-        """The given extent."""
+        """Evaluate the given extent."""
         if self.extent is None:
             return np.full(len(points), np.inf)
         return np.asarray(self.extent(points), dtype=float)

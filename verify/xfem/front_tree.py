@@ -47,8 +47,8 @@ def stack_depth(parent: _Ints, below: _Ints) -> int:
 
 
 @njit(cache=True)
-def _merge(width, parent, below):  # type: ignore[no-untyped-def]
-    """The front into which each front goes in the end (itself if it stays)."""
+def _merge(width, parent, below):
+    """Front into which each front goes in the end (itself if it stays)."""
     count = len(parent)
     group = np.arange(count)
     columns = width.copy()
@@ -71,7 +71,7 @@ def _merge(width, parent, below):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _postorder(width, parent, group):  # type: ignore[no-untyped-def]
+def _postorder(width, parent, group):
     """First place of each front's columns, and the ends of the merged fronts (from 0)."""
     count = len(parent)
     head = np.full(count + 1, -1, dtype=np.int64)  # children of merged fronts; last: roots
@@ -112,7 +112,7 @@ def _postorder(width, parent, group):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _stack_depth(parent, below):  # type: ignore[no-untyped-def]
+def _stack_depth(parent, below):
     freed = np.zeros(len(parent), dtype=np.int64)
     waiting = 0
     deepest = 0

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from verify.xfem.clipping import staircase
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import Partition, clip_pattern
-from verify.xfem.clipping import staircase
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["PatchSlots", "join_slots"]

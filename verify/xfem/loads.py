@@ -129,6 +129,8 @@ def _integrate(
     degree: int,
 ) -> None:
     """Add ∫ N_i f over simplices given by barycentric corners (q, k, d + 1) to the load."""
+    if len(piece) == 0:
+        return
     rule, weights = simplex_rule(corners.shape[1] - 1, degree)
     nodes = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
     sides = virtual.piece_side[piece]

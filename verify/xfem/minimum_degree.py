@@ -35,7 +35,7 @@ def minimum_degree(starts: NDArray[np.int32], columns: NDArray[np.int32]) -> tup
 
 
 @njit(cache=True)
-def _unlink(node, degree, head, after, before):  # type: ignore[no-untyped-def]
+def _unlink(node, degree, head, after, before):
     if before[node] >= 0:
         after[before[node]] = after[node]
     else:
@@ -45,7 +45,7 @@ def _unlink(node, degree, head, after, before):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _link(node, degree, head, after, before):  # type: ignore[no-untyped-def]
+def _link(node, degree, head, after, before):
     first = head[degree[node]]
     after[node] = first
     before[node] = -1
@@ -55,7 +55,7 @@ def _link(node, degree, head, after, before):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather(pivot, start, elements, variables, sees, begin, size, members, alive, mark):  # type: ignore[no-untyped-def]
+def _gather(pivot, start, elements, variables, sees, begin, size, members, alive, mark):
     """Nodes of the new element: what the pivot sees, directly or through its elements."""
     room = variables[pivot]
     for k in range(elements[pivot]):
@@ -82,7 +82,7 @@ def _gather(pivot, start, elements, variables, sees, begin, size, members, alive
 
 
 @njit(cache=True)
-def _eliminate_all(starts, columns):  # type: ignore[no-untyped-def]
+def _eliminate_all(starts, columns):
     count = len(starts) - 1
     start = starts[:-1].astype(np.int64)
     sees = columns.astype(np.int64)  # of each node: its elements, then its nodes
@@ -160,7 +160,7 @@ def _eliminate_all(starts, columns):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _shorten(node, pivot, start, elements, variables, sees, alive, outside, gone, mark):  # type: ignore[no-untyped-def]
+def _shorten(node, pivot, start, elements, variables, sees, alive, outside, gone, mark):
     """Replace what the new element covers by the element; bound the degree of the rest."""
     at = start[node]
     bound = 0

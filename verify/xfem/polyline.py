@@ -113,7 +113,8 @@ class Polyline:
         return segment, share[row, segment], offsets[row, segment]
 
     def _check_segments(self) -> None:
-        if not (self._lengths > 0.0).all():
+        shortest = 1e-14 * np.abs(self.vertices).max()
+        if not (self._lengths > shortest).all():
             raise XfemError(f"segment {int(self._lengths.argmin())} of the polyline has no length")
         t = self._segments / self._lengths[:, None]
         following = np.roll(t, -1, axis=0) if self.closed else t[1:]
@@ -126,7 +127,7 @@ class Polyline:
 
 
 def _first_intersection(starts: _Floats, segments: _Floats, closed: bool) -> tuple[int, int] | None:
-    """The first pair of segments, not neighbours, that have a point in common."""
+    """First pair of segments, not neighbours, that have a point in common."""
     count = len(starts)
     ends = starts + segments
     for i in range(count - 2):

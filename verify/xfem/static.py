@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from verify.xfem.assembly_kernels import constrain
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cholesky import Cholesky
+from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.stiffness import LinearStiffness
@@ -47,7 +49,11 @@ class StaticSolution:
 
 
 def solve_static(
-    virtual: VirtualMesh, material: Material, supports: Supports, load: _Floats | None = None
+    virtual: VirtualMesh,
+    material: Material,
+    supports: Supports,
+    load: _Floats | None = None,
+    solver: Literal["direct", "iterative"] = "direct",
 ) -> StaticSolution:
     """Solve K u = f.
 
@@ -58,6 +64,9 @@ def solve_static(
     supports : Supports
     load : (N, d) float array, optional
         Nodal forces in newtons.
+    solver : {"direct", "iterative"}
+        Sparse Cholesky factorisation, or conjugate gradients with nodal-block Jacobi: in 3D the
+        faster one from some 10⁴ unknowns on.
 
     Raises
     ------
@@ -78,16 +87,19 @@ def solve_static(
     stiffness = LinearStiffness(virtual, material)
     clock = [perf_counter()]
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    solver = Cholesky(pattern, shape[1])
+    if solver not in ("direct", "iterative"):
+        raise XfemError(f"solver '{solver}'; expected direct or iterative")
+    method = ConjugateGradients if solver == "iterative" else Cholesky
+    inverse = method(pattern, shape[1])
     clock.append(perf_counter())
     blocks = stiffness.assemble(pattern)
     internal, _ = stiffness.force(supports.values)
     constrain(pattern.starts, pattern.columns, supports.fixed, blocks)
     right = np.where(supports.fixed, 0.0, force - internal)
     clock.append(perf_counter())
-    solver.factorize(blocks)
+    inverse.factorize(blocks)
     clock.append(perf_counter())
-    displacement = supports.values + solver.solve(right)
+    displacement = supports.values + inverse.solve(right)
     clock.append(perf_counter())
     internal, energy = stiffness.force(displacement)
     unbalanced = internal - force

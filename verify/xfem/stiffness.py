@@ -61,7 +61,7 @@ class LinearStiffness:
         return blocks
 
     def force(self, displacement: _Floats) -> tuple[_Floats, float]:
-        """Internal force (N, d) in newtons and strain energy in joules of a displacement (N, d)."""
+        """Apply to a displacement (N, d): internal force (N, d) and strain energy, in N and J."""
         v = self.virtual
         force = np.zeros_like(displacement)
         energy = linear_force(

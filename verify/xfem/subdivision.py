@@ -50,7 +50,7 @@ class Subdivision:
 
 
 def subdivide(virtual: VirtualMesh) -> Subdivision:
-    """The conforming sub-division of a cut mesh."""
+    """Make the conforming sub-division of a cut mesh."""
     mesh = virtual.mesh
     piece, barycentric, _ = virtual.solid_simplices
     whole = len(piece) - len(virtual.sub_cells.piece)
@@ -87,7 +87,7 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
 def _node_keys(
     virtual: VirtualMesh, piece: _Ints, ids: _Ints, barycentric: _Floats
 ) -> tuple[_Ints, _Ints, _Floats]:
-    """What tells nodes apart: the point, and the unknowns from which it moves."""
+    """Keys that tell nodes apart: the point, and the unknowns from which it moves."""
     corners = ids.shape[1]
     unknowns = np.broadcast_to(virtual.cells[piece][:, None, :], barycentric.shape)
     columns = unknowns.reshape(-1, corners)

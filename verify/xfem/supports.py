@@ -48,7 +48,7 @@ class Supports:
         values: ArrayLike | PrescribedField = 0.0,
         components: tuple[int, ...] | None = None,
     ) -> "Supports":
-        """The same with further prescribed displacements.
+        """Add prescribed displacements.
 
         Parameters
         ----------
@@ -80,6 +80,8 @@ class Supports:
         axes = range(dim) if components is None else components
         if any(axis not in range(dim) for axis in axes):
             raise XfemError(f"components {components}; expected some of 0..{dim - 1}")
+        if len(at) == 0:
+            return self
         field = (
             values(virtual.node_points[at], virtual.node_side[at]) if callable(values) else values
         )
@@ -120,8 +122,8 @@ def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
             centre = virtual.volumes[pieces] @ virtual.piece_centroids[pieces] / volume
             unit = "m²" if dim == 2 else "m³"
             raise UnsupportedBodyError(
-                f"a piece of {volume:.3g} {unit} around {np.round(centre, 6).tolist()} is not held: "
-                "it can move as a rigid body; support it, or do not cut it off"
+                f"a piece of {volume:.3g} {unit} around {np.round(centre, 6).tolist()} is not "
+                "held: it can move as a rigid body; support it, or do not cut it off"
             )
 
 

@@ -56,8 +56,9 @@ class ZeroPoints:
 
         Where φ is exactly zero at the plus end, the zero point is that end.
         """
-        keys = (plus << 32) | minus
-        wanted, back = np.unique(keys, return_inverse=True)
+        keys: _Ints = (plus << 32) | minus
+        wanted: _Ints = np.unique(keys)
+        back: _Ints = np.searchsorted(wanted, keys)
         known = self._keys[cut]
         at = np.searchsorted(known, wanted)
         old = np.zeros(len(wanted), dtype=bool)

@@ -1,0 +1,136 @@
+"""One space, three bases: equal displacements; and the thesis' blocks as an independent check."""
+
+import numpy as np
+import pytest
+import xfem_exact_fields as exact
+from scipy.sparse import csr_array
+from xfem_bodies import boundary_nodes, sparse_stiffness
+
+from verify.xfem.bases import (
+    from_sidewise,
+    sidewise_from,
+    transformation,
+    transformed_matrix,
+)
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import XfemError
+from verify.xfem.polyline import Polyline
+from verify.xfem.static import solve_static
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.thesis_blocks import shifted_stiffness
+from verify.xfem.virtual import cut_mesh
+
+CASES = {
+    "through": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.0], [2.0, 1.0]])),
+    "edge crack": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.52], [0.5, 0.52]])),
+    "along edges": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.5], [2.0, 0.5]])),
+    "through nodes": (rectangle_mesh((6, 6)), Polyline([[-0.5, 0.0], [1.5, 1.0]])),
+    "cube": (box_mesh((2, 3, 2)), Plane([0.5, 0.5, 0.5], [-1.0, -2.0, 3.0])),
+}
+
+
+def blocks_by_the_thesis(virtual, sign_of_kaa=1.0):
+    """(u, a) stiffness from nodal signs and fractions only."""
+    mesh = virtual.mesh
+    split = np.zeros(len(mesh.cells), dtype=bool)
+    split[virtual.parent[virtual.split]] = True
+    plus = virtual.label[:, 0] > 0
+    above = np.bincount(virtual.parent[plus], virtual.fraction[plus], minlength=len(mesh.cells))
+    state = "plane strain" if mesh.dim == 2 else "solid"
+    return shifted_stiffness(
+        mesh,
+        isotropic(1.0, 0.3, state),
+        np.where(virtual.level_sets[:, 0] >= 0.0, 1, -1),
+        above,
+        virtual.enriched_nodes,
+        split,
+        sign_of_kaa,
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_transformed_stiffness_equals_the_thesis_blocks_with_the_corrected_sign(name):
+    mesh, cut = CASES[name]
+    virtual = cut_mesh(mesh, [cut])
+    through_t = transformed_matrix(virtual, "shifted", sparse_stiffness(virtual)).toarray()
+    assert np.abs(through_t - blocks_by_the_thesis(virtual)).max() < 1e-14
+
+
+def test_the_sign_printed_in_2_64_makes_the_stiffness_indefinite():
+    """Negative control: the wrong sign of K^aa must not pass unnoticed."""
+    virtual = cut_mesh(*[(CASES["through"][0]), [CASES["through"][1]]])
+    right = np.linalg.eigvalsh(blocks_by_the_thesis(virtual))
+    wrong = np.linalg.eigvalsh(blocks_by_the_thesis(virtual, sign_of_kaa=-1.0))
+    assert right[0] > -1e-14
+    assert wrong[0] < -0.1 * wrong[-1]
+
+
+def test_the_sign_printed_in_2_64_gives_a_wrong_energy():
+    mesh, cut = CASES["through"]
+    virtual = cut_mesh(mesh, [cut])
+    p = exact.f1(virtual.node_points, virtual.node_side)
+    q = from_sidewise(virtual, "shifted", p).ravel()
+    assert 0.5 * q @ blocks_by_the_thesis(virtual) @ q == pytest.approx(exact.ENERGY_F1, rel=1e-9)
+    wrong = 0.5 * q @ blocks_by_the_thesis(virtual, sign_of_kaa=-1.0) @ q
+    assert abs(wrong / exact.ENERGY_F1 - 1.0) > 0.1
+
+
+@pytest.mark.parametrize("basis", ["shifted", "heaviside"])
+@pytest.mark.parametrize("name", CASES)
+def test_conversions_between_bases_are_inverse_to_each_other(name, basis):
+    mesh, cut = CASES[name]
+    virtual = cut_mesh(mesh, [cut])
+    p = np.random.default_rng(0).normal(size=virtual.node_points.shape)
+    q = from_sidewise(virtual, basis, p)
+    assert np.abs(sidewise_from(virtual, basis, q) - p).max() < 1e-15
+    assert np.linalg.cond(transformation(virtual, basis).toarray()) < 3.0
+
+
+@pytest.mark.parametrize("basis", ["shifted", "heaviside"])
+def test_all_bases_give_the_same_displacement_to_round_off(basis):
+    """The system solved in its own unknowns, Dirichlet values included, by a dense solver."""
+    mesh, cut = CASES["through"]
+    virtual = cut_mesh(mesh, [cut])
+    nodes = boundary_nodes(mesh)
+    supports = Supports.none(virtual).prescribe(virtual, nodes, exact.f3)
+    sidewise = solve_static(virtual, isotropic(1.0, 0.3, "plane strain"), supports).displacement
+    K = transformed_matrix(virtual, basis, csr_array(sparse_stiffness(virtual))).toarray()
+    given = from_sidewise(virtual, basis, supports.values)
+    # an enriched node with a prescribed value has both u and a prescribed
+    on_boundary = np.isin(
+        np.concatenate([np.arange(len(mesh.points)), virtual.enriched_nodes]), nodes
+    )
+    fixed = np.repeat(on_boundary, 2)
+    q = given.ravel().copy()
+    q[~fixed] = np.linalg.solve(K[np.ix_(~fixed, ~fixed)], -K[np.ix_(~fixed, fixed)] @ q[fixed])
+    got = sidewise_from(virtual, basis, q.reshape(-1, 2))
+    assert np.abs(got - sidewise).max() < 1e-13
+
+
+def test_a_is_the_displacement_above_minus_below():
+    """Both bases: the jump is a (shifted) or 2a (plain), whatever the side of the node."""
+    mesh, cut = CASES["through"]
+    virtual = cut_mesh(mesh, [cut])
+    p = np.where(virtual.node_side > 0, [0.3, 0.7], [0.1, 0.2]) * np.ones((virtual.node_count, 2))
+    count = len(mesh.points)
+    assert from_sidewise(virtual, "shifted", p)[count:] == pytest.approx(
+        np.tile([0.2, 0.5], (len(virtual.enriched_nodes), 1))
+    )
+    assert from_sidewise(virtual, "heaviside", p)[count:] == pytest.approx(
+        np.tile([0.1, 0.25], (len(virtual.enriched_nodes), 1))
+    )
+
+
+def test_two_crossing_cuts_have_no_shifted_basis():
+    mesh = rectangle_mesh((6, 6))
+    cuts = [Polyline([[-1.0, 0.52], [2.0, 0.52]]), Polyline([[0.52, -1.0], [0.52, 2.0]])]
+    with pytest.raises(XfemError, match="need one cut per element"):
+        transformation(cut_mesh(mesh, cuts), "shifted")
+
+
+def test_an_unknown_basis_is_refused():
+    virtual = cut_mesh(CASES["through"][0], [CASES["through"][1]])
+    with pytest.raises(XfemError, match="expected shifted or heaviside"):
+        transformation(virtual, "ramp")

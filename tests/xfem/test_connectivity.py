@@ -1,0 +1,142 @@
+"""Pieces are joined by contact, not by sign vectors: bodies, zero-energy modes, tips."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from xfem_bodies import zero_modes
+
+from verify.xfem.cuts import Plane, PolygonPatch
+from verify.xfem.polyline import Polyline
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.virtual import cut_mesh
+
+SQUARE = rectangle_mesh((4, 4))
+CUBE = box_mesh((2, 2, 2))
+
+
+def line(x0, y0, x1, y1):
+    return Polyline([[x0, y0], [x1, y1]])
+
+
+def patch(*corners):
+    return PolygonPatch(corners)
+
+
+STEM = line(-1.0, 0.52, 2.0, 0.52)
+PLANAR = {
+    "none": ([], 1),
+    "one": ([STEM], 2),
+    "two parallel in one row of elements": ([STEM, line(-1.0, 0.6, 2.0, 0.6)], 3),
+    "two parallel, opposite directions": ([STEM, line(2.0, 0.6, -1.0, 0.6)], 3),
+    "crossing inside an element": ([STEM, line(0.47, -1.0, 0.47, 2.0)], 4),
+    "crossing in a node": ([line(-1.0, 0.5, 2.0, 0.5), line(0.5, -1.0, 0.5, 2.0)], 4),
+    "crossing obliquely in a node": ([line(0.0, 0.0, 1.0, 1.0), line(0.1, 0.7, 0.9, 0.3)], 2),
+    "branch after its stem": ([STEM, line(0.47, 0.52, 0.47, 2.0)], 3),
+    "branch before its stem": ([line(0.47, 0.52, 0.47, 2.0), STEM], 3),
+    "branch from a node": ([line(-1.0, 0.5, 2.0, 0.5), line(0.5, 0.5, 0.6, 2.0)], 3),
+    "crossing, then a branch": (
+        [STEM, line(0.47, -1.0, 0.47, 2.0), line(0.47, 0.8, -1.0, 0.9)],
+        5,
+    ),
+    "three through one point": (
+        [line(-1.0, 0.53, 2.0, 0.53), line(0.53, -1.0, 0.53, 2.0), line(-1.0, -1.0, 2.0, 2.0)],
+        6,
+    ),
+    "the same cut twice": ([STEM, STEM], 2),
+    "the same cut in both directions": ([STEM, line(2.0, 0.52, -1.0, 0.52)], 2),
+    "a hole": ([Polyline([[0.3, 0.3], [0.7, 0.35], [0.6, 0.72]], closed=True)], 2),
+    "edge crack": ([line(-1.0, 0.52, 0.5, 0.52)], 1),
+    "inner crack": ([line(0.25, 0.52, 0.75, 0.52)], 1),
+    "kink": ([Polyline([[-1.0, 0.4], [0.5, 0.55], [2.0, 0.3]])], 2),
+}
+
+
+@pytest.mark.parametrize("name", PLANAR)
+def test_every_free_piece_of_a_plate_has_exactly_three_zero_energy_modes(name):
+    cuts, pieces = PLANAR[name]
+    virtual = cut_mesh(SQUARE, cuts)
+    assert virtual.bodies.max() + 1 == pieces
+    modes, next_value = zero_modes(virtual)
+    assert modes == 3 * pieces
+    assert next_value > 1e-6  # nothing between a zero mode and an elastic one
+
+
+CENTRE = [0.5, 0.5, 0.5]
+SPATIAL = {
+    "one oblique": ([Plane(CENTRE, [-1.0, -2.0, 3.0])], 2),
+    "two crossing": ([Plane(CENTRE, [1.0, 0.2, 0.3]), Plane([0.4, 0.5, 0.6], [0.1, 1.0, 0.3])], 4),
+    "three through nodes": ([Plane(CENTRE, n) for n in np.eye(3)], 8),
+    "two crossing and a branch": (
+        [
+            Plane([0.47, 0.5, 0.5], [1.0, 0.0, 0.0]),
+            Plane([0.5, 0.53, 0.5], [0.0, 1.0, 0.0]),
+            patch([0.47, -1.0, 0.4], [0.47, 0.53, 0.4], [-1.0, 0.53, 0.4], [-1.0, -1.0, 0.4]),
+        ],
+        5,
+    ),
+    "half-way": ([patch([-1, -1, 0.52], [0.5, -1, 0.52], [0.5, 2, 0.52], [-1, 2, 0.52])], 1),
+    "along faces": ([Plane(CENTRE, [0.0, 0.0, 1.0])], 2),
+    "along diagonals": ([Plane([0.0, 0.0, 0.0], [1.0, -1.0, 0.0])], 2),
+}
+
+
+@pytest.mark.parametrize("name", SPATIAL)
+def test_every_free_piece_of_a_block_has_exactly_six_zero_energy_modes(name):
+    cuts, pieces = SPATIAL[name]
+    virtual = cut_mesh(CUBE, cuts)
+    assert virtual.bodies.max() + 1 == pieces
+    modes, next_value = zero_modes(virtual)
+    assert modes == 6 * pieces
+    assert next_value > 1e-6
+
+
+def test_the_order_of_the_cuts_does_not_matter():
+    cuts = PLANAR["crossing, then a branch"][0]
+    counts = set()
+    for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0], [2, 0, 1]):
+        virtual = cut_mesh(SQUARE, [cuts[k] for k in order])
+        counts.add((virtual.node_count, len(virtual.cells), int(virtual.bodies.max())))
+    assert len(counts) == 1
+
+
+@given(st.floats(0.05, 0.95), st.floats(0.05, 0.95), st.floats(-2.0, 2.0))
+@settings(max_examples=60, deadline=None)
+def test_turning_a_cut_round_changes_nothing_but_the_name_of_its_sides(x, y, slope):
+    start, end = [x - 3.0, y - 3.0 * slope], [x + 3.0, y + 3.0 * slope]
+    one, other = (cut_mesh(SQUARE, [Polyline(p)]) for p in ([start, end], [end, start]))
+    assert one.bodies.max() == other.bodies.max()
+    assert one.volumes.sum() == pytest.approx(other.volumes.sum(), rel=1e-14)
+    assert np.allclose(np.sort(one.fraction), np.sort(other.fraction), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "tip, length", [("inside", 0.25), ("through", 0.5), ("nearest", 0.5)], ids=lambda x: str(x)
+)
+def test_a_tip_inside_an_element_moves_to_an_edge_by_the_chosen_rule(tip, length):
+    from verify.xfem.subdivision import subdivide
+
+    mesh = rectangle_mesh((4, 4))
+    # the row of triangles is crossed at x = 0, 0.02.., 0.25, ...; the tip is in the third square
+    virtual = cut_mesh(mesh, [line(-1.0, 0.52, 0.40, 0.52)], tip)
+    facets = subdivide(virtual).cut_facets
+    realised = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum()
+    crossings = np.array([0.25, 0.27, 0.5])  # vertical edge, diagonal, vertical edge
+    want = {"inside": crossings[1], "through": crossings[2], "nearest": crossings[2]}[tip]
+    assert realised == pytest.approx(want, abs=1e-12)
+    assert virtual.bodies.max() == 0
+
+
+def test_nodes_of_the_edge_that_holds_the_tip_are_not_enriched():
+    virtual = cut_mesh(rectangle_mesh((4, 4)), [line(-1.0, 0.52, 0.5, 0.52)])
+    points = virtual.mesh.points[virtual.enriched_nodes]
+    assert (points[:, 0] < 0.5).all()
+    assert len(points) == 4  # two columns of nodes above and below: x = 0 and 0.25
+
+
+def test_a_strip_of_cut_triangles_enriches_two_nodes_more_than_it_has_triangles():
+    """Table 4.3 of the thesis: n cut triangles enrich n + 2 nodes."""
+    virtual = cut_mesh(rectangle_mesh((16, 5)), [line(-1.0, 0.5, 2.0, 0.5)])
+    cut_cells = len(np.unique(virtual.parent[virtual.split]))
+    assert cut_cells == 32
+    assert len(virtual.enriched_nodes) == cut_cells + 2

@@ -1,0 +1,151 @@
+"""The sparse Cholesky factorisation and conjugate gradients against scipy, and their refusals."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sparse
+from scipy.sparse.linalg import spsolve
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.conjugate_gradients import ConjugateGradients, NotConvergedError
+from verify.xfem.minimum_degree import minimum_degree
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+
+
+def random_system(cells, nodes, block, seed=0):
+    """A symmetric positive definite matrix on the pattern of these cells."""
+    rng = np.random.default_rng(seed)
+    pattern = block_pattern(cells, nodes)
+    blocks = np.zeros((len(pattern.columns), block, block))
+    corners = cells.shape[1]
+    for cell in range(len(cells)):
+        half = rng.normal(size=(corners * block, corners * block))
+        element = (half @ half.T).reshape(corners, block, corners, block)
+        for a in range(corners):
+            for b in range(corners):
+                blocks[pattern.targets[cell, a, b]] += element[a, :, b]
+    blocks[pattern.diagonal] += 0.1 * np.eye(block)
+    return pattern, blocks, rng.normal(size=(nodes, block))
+
+
+def random_cells(rng, nodes):
+    cells = np.array([rng.choice(nodes, 3, replace=False) for _ in range(2 * nodes)])
+    return np.concatenate([cells, np.stack([np.arange(nodes)] * 3, 1)])  # every node used
+
+
+MESHES = {
+    "plate": rectangle_mesh((9, 7)),
+    "long plate": rectangle_mesh((40, 2)),
+    "block": box_mesh((3, 4, 3)),
+}
+
+
+@pytest.mark.parametrize("block", [1, 2, 3])
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("method", [Cholesky, ConjugateGradients])
+def test_solutions_equal_those_of_superlu(method, name, block):
+    mesh = MESHES[name]
+    pattern, blocks, load = random_system(mesh.cells, len(mesh.points), block)
+    solver = method(pattern, block)
+    solver.factorize(blocks)
+    want = spsolve(sparse.csc_matrix(pattern.matrix(blocks)), load.ravel()).reshape(load.shape)
+    tolerance = 1e-11 if method is Cholesky else 1e-7
+    assert np.abs(solver.solve(load) - want).max() < tolerance * np.abs(want).max()
+
+
+def test_a_kept_analysis_serves_other_values():
+    mesh = MESHES["block"]
+    pattern, _, load = random_system(mesh.cells, len(mesh.points), 3)
+    solver = Cholesky(pattern, 3)
+    for seed in range(3):
+        _, blocks, _ = random_system(mesh.cells, len(mesh.points), 3, seed)
+        solver.factorize(blocks)
+        residual = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
+        assert np.abs(residual).max() < 1e-11
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_irregular_and_disconnected_graphs_are_factorised(seed):
+    rng = np.random.default_rng(seed)
+    nodes = int(rng.integers(1, 60))
+    cells = random_cells(rng, nodes) if nodes > 3 else np.zeros((1, 1), int) + np.arange(nodes)
+    if seed % 2 == 0:  # two parts that do not touch
+        cells = np.concatenate([cells, cells + nodes])
+        nodes *= 2
+    pattern, blocks, load = random_system(cells, nodes, 2, seed)
+    solver = Cholesky(pattern, 2)
+    solver.factorize(blocks)
+    residual = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
+    assert np.abs(residual).max() < 1e-10 * np.abs(blocks).max()
+
+
+def dense_fill(pattern, order):
+    """Nodal entries of the factor, by elimination on a dense pattern."""
+    full = pattern.matrix(np.ones((len(pattern.columns), 1, 1))).toarray() > 0
+    full = full[np.ix_(order, order)]
+    for k in range(len(order)):
+        below = np.flatnonzero(full[k + 1 :, k]) + k + 1
+        full[np.ix_(below, below)] = True
+    return int(np.tril(full).sum())
+
+
+def test_minimum_degree_gives_about_the_fill_of_superlu_s():
+    mesh = rectangle_mesh((20, 20))
+    pattern = block_pattern(mesh.cells, len(mesh.points))
+    order, bounds = minimum_degree(pattern.starts, pattern.columns)
+    assert np.array_equal(np.sort(order), np.arange(len(mesh.points)))
+    assert (np.diff(bounds) > 0).all()
+    assert bounds[-1] == len(order)
+    matrix = sparse.csc_matrix(pattern.matrix(np.ones((len(pattern.columns), 1, 1))))
+    matrix.setdiag(50.0)
+    lu = sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    # both are heuristics with ties; the natural order would give 441·21 ≈ 9000 entries
+    assert dense_fill(pattern, order) <= 1.15 * lu.L.nnz
+
+
+def test_a_badly_scaled_matrix_loses_no_digits():
+    """D A D with D over 24 decades: Cholesky's error does not depend on diagonal scaling."""
+    mesh = MESHES["plate"]
+    pattern, blocks, _ = random_system(mesh.cells, len(mesh.points), 2)
+    rng = np.random.default_rng(1)
+    scale = 10.0 ** rng.uniform(-12, 12, (len(mesh.points), 2))
+    rows = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
+    scaled = scale[rows][:, :, None] * blocks * scale[pattern.columns][:, None, :]
+    x = rng.normal(size=scale.shape)
+    load = (pattern.matrix(blocks) @ x.ravel()).reshape(scale.shape)
+    solver = Cholesky(pattern, 2)
+    solver.factorize(scaled)
+    got = solver.solve(load * scale) * scale
+    assert np.abs(got - x).max() < 1e-10
+
+
+def test_an_indefinite_matrix_is_refused_by_the_node_where_it_shows():
+    mesh = MESHES["plate"]
+    pattern, blocks, _ = random_system(mesh.cells, len(mesh.points), 2)
+    blocks[pattern.diagonal[17]] *= -1.0
+    for solver in (Cholesky(pattern, 2), ConjugateGradients(pattern, 2)):
+        with pytest.raises(SingularStiffnessError, match="not positive definite"):
+            solver.factorize(blocks)
+    blocks[pattern.diagonal[17]] = np.nan
+    with pytest.raises(SingularStiffnessError):
+        Cholesky(pattern, 2).factorize(blocks)
+
+
+def test_conjugate_gradients_say_so_when_they_do_not_converge():
+    mesh = MESHES["plate"]
+    pattern, blocks, load = random_system(mesh.cells, len(mesh.points), 2)
+    solver = ConjugateGradients(pattern, 2, limit=3)
+    solver.factorize(blocks)
+    with pytest.raises(NotConvergedError, match="after 3 iterations"):
+        solver.solve(load)
+
+
+def test_a_warm_start_at_the_solution_needs_no_iteration():
+    mesh = MESHES["plate"]
+    pattern, blocks, load = random_system(mesh.cells, len(mesh.points), 2)
+    solver = ConjugateGradients(pattern, 2, tolerance=1e-8)
+    solver.factorize(blocks)
+    direct = Cholesky(pattern, 2)
+    direct.factorize(blocks)
+    solver.solve(load, direct.solve(load))
+    assert solver.iterations == 0

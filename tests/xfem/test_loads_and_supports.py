@@ -1,0 +1,177 @@
+"""Loads add up, whatever the cut; supports and inputs that make no sense are refused."""
+
+import numpy as np
+import pytest
+from xfem_bodies import boundary_nodes
+
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import XfemError
+from verify.xfem.loads import body_force, traction
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.polyline import Polyline
+from verify.xfem.quadrature import simplex_rule
+from verify.xfem.static import solve_static
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports, UnsupportedBodyError
+from verify.xfem.virtual import cut_mesh
+
+LINE = Polyline([[-1.0, 0.1], [2.0, 1.1]])
+PLATE = cut_mesh(rectangle_mesh((5, 5)), [LINE])
+BLOCK = cut_mesh(box_mesh((3, 3, 3)), [Plane([0.5, 0.5, 0.5], [-1.0, -2.0, 3.0])])
+STRAIN = isotropic(1.0, 0.3, "plane strain")
+
+
+@pytest.mark.parametrize("virtual", [PLATE, BLOCK], ids=["plate", "block"])
+def test_gravity_on_each_body_is_its_weight_at_its_centre_of_mass(virtual):
+    """Force and moment are exact on every piece, so that a freed body falls without turning."""
+    dim = virtual.mesh.dim
+    load = body_force(virtual, np.arange(1.0, dim + 1))
+    per_piece = virtual.bodies[virtual.cells[:, 0]]
+    for body in range(2):
+        weight = virtual.volumes[per_piece == body]
+        centre = weight @ virtual.piece_centroids[per_piece == body] / weight.sum()
+        here = virtual.bodies == body
+        assert load[here].sum(axis=0) == pytest.approx(weight.sum() * np.arange(1.0, dim + 1))
+        # Σ f_k x_k with a constant density is density·V·(centre of mass)
+        moment = load[here].T @ virtual.node_points[here]
+        want = weight.sum() * np.outer(np.arange(1.0, dim + 1), centre)
+        assert moment == pytest.approx(want, rel=1e-13)
+
+
+@pytest.mark.parametrize("virtual", [PLATE, BLOCK], ids=["plate", "block"])
+def test_a_constant_density_given_as_a_function_is_integrated_exactly(virtual):
+    force = np.arange(1.0, virtual.mesh.dim + 1)
+    as_function = body_force(virtual, lambda x, side: np.broadcast_to(force, x.shape), degree=1)
+    assert as_function == pytest.approx(body_force(virtual, force), abs=1e-15)
+
+
+def test_a_density_that_jumps_across_the_cut_acts_on_the_right_side():
+    load = body_force(PLATE, lambda x, side: np.where(side > 0, [0.0, 1.0], 0.0))
+    above = PLATE.volumes[PLATE.piece_side[:, 0] > 0].sum()
+    assert load[:, 1].sum() == pytest.approx(above)
+    assert (load[PLATE.node_side[:, 0] < 0] == 0.0).all()
+
+
+@pytest.mark.parametrize("virtual", [PLATE, BLOCK], ids=["plate", "block"])
+def test_a_uniform_pressure_on_the_whole_surface_balances_on_the_whole_and_opens_the_cut(virtual):
+    """∮ n dA = 0 over the body; over one half it is minus the area vector of the cut."""
+    mesh = virtual.mesh
+    facets = mesh.boundary_facets
+
+    def outward(x, side):
+        nearest = np.abs(np.stack([x, x - 1.0], axis=-1)).reshape(len(x), -1).argmin(axis=1)
+        normal = np.zeros_like(x)
+        normal[np.arange(len(x)), nearest // 2] = np.where(nearest % 2 == 1, 1.0, -1.0)
+        return normal
+
+    load = traction(virtual, facets, outward)
+    assert np.abs(load.sum(axis=0)).max() < 1e-14
+    upper = load[virtual.node_side[:, 0] > 0].sum(axis=0)
+    if mesh.dim == 2:
+        assert upper == pytest.approx([-1 / 3, 1.0], abs=1e-14)
+    else:
+        assert upper == pytest.approx(np.array([-1.0, -2.0, 3.0]) / 3.0, abs=1e-14)
+
+
+def test_a_pulled_plate_with_a_cut_along_the_pull_has_the_uniaxial_solution():
+    virtual = cut_mesh(rectangle_mesh((6, 6)), [Polyline([[-1.0, 0.52], [2.0, 0.52]])])
+    mesh = virtual.mesh
+    x = mesh.points
+    facets = mesh.boundary_facets
+    local = np.arange(3) != facets[:, 1:]
+    ends = mesh.points[mesh.cells[facets[:, 0]][local].reshape(-1, 2)]
+    right = facets[(ends[:, :, 0] > 1.0 - 1e-9).all(axis=1)]
+    supports = Supports.none(virtual).prescribe(virtual, x[:, 0] < 1e-9, components=(0,))
+    corners = (x[:, 0] < 1e-9) & ((x[:, 1] < 1e-9) | (x[:, 1] > 1.0 - 1e-9))
+    supports = supports.prescribe(virtual, corners, components=(1,))
+    load = traction(virtual, right, [1.0, 0.0])
+    for state, modulus in (("plane stress", 1.0), ("plane strain", 1.0 / 0.91)):
+        solution = solve_static(virtual, isotropic(1.0, 0.3, state), supports, load)
+        assert solution.displacement[:, 0] == pytest.approx(virtual.node_points[:, 0] / modulus)
+        assert solution.strain_energy == pytest.approx(0.5 / modulus, rel=1e-12)
+        assert solution.reaction.sum(axis=0) == pytest.approx([-1.0, 0.0], abs=1e-13)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("degree", [1, 2, 4, 7])
+def test_quadrature_is_exact_up_to_its_degree(dim, degree):
+    """∫ Π λ_i^{a_i} = d! Π a_i! / (Σ a_i + d)! times the volume."""
+    from itertools import product
+    from math import factorial, prod
+
+    points, weights = simplex_rule(dim, degree)
+    for powers in product(range(degree + 1), repeat=dim + 1):
+        if sum(powers) <= degree:
+            want = factorial(dim) * prod(map(factorial, powers)) / factorial(sum(powers) + dim)
+            assert weights @ (points ** np.array(powers)).prod(axis=1) == pytest.approx(want)
+
+
+def test_a_piece_that_nothing_holds_is_named():
+    held = Supports.none(PLATE).prescribe(PLATE, PLATE.mesh.points[:, 1] < 1e-9)
+    with pytest.raises(UnsupportedBodyError, match=r"a piece of 0\.4 m² around .* is not held"):
+        solve_static(PLATE, STRAIN, held)
+
+
+def test_a_body_held_in_one_node_can_still_turn_and_is_refused():
+    virtual = cut_mesh(rectangle_mesh((3, 3)), [])
+    one = Supports.none(virtual).prescribe(virtual, [0])
+    with pytest.raises(UnsupportedBodyError, match="rigid body"):
+        solve_static(virtual, STRAIN, one)
+    two = one.prescribe(virtual, [3], components=(1,))
+    assert solve_static(virtual, STRAIN, two, body_force(virtual, [0, -1])).residual < 1e-12
+
+
+def square(**changes):
+    given = {"points": [[0, 0], [1, 0], [1, 1], [0, 1]], "cells": [[0, 1, 2], [0, 2, 3]]} | changes
+    return SimplexMesh(given["points"], given["cells"])
+
+
+@pytest.mark.parametrize(
+    "make, message",
+    [
+        (lambda: square(points=[0.0, 1.0]), "points of shape"),
+        (lambda: square(points=[[0, 0], [1, 0], [1, np.inf], [0, 1]]), "point 2 is not finite"),
+        (lambda: square(cells=[[0, 1], [1, 2]]), "expected .* triangles"),
+        (lambda: square(cells=[[0, 1, 2, 3]]), "expected .* triangles"),
+        (lambda: square(cells=np.zeros((0, 3), int)), "without cells"),
+        (lambda: square(cells=[[0, 1, 2.5]]), "expected integers"),
+        (lambda: square(cells=[[0, 1, 2], [0, 2, 4]]), "outside 0..3"),
+        (lambda: square(cells=[[0, 1, 2]]), "point 3 belongs to no cell"),
+        (lambda: square(points=[[0, 0], [1, 0], [2, 0], [0, 1]]), "cell 0 .* degenerate"),
+        (
+            lambda: square(cells=[[0, 1, 2], [0, 2, 3], [0, 2, 1]]).neighbours,
+            r"facet \[0, 2\] is shared|facet \[0, 1\] is shared|shared by more",
+        ),
+        (lambda: rectangle_mesh((0, 3)), "positive integers"),
+        (lambda: rectangle_mesh((2, 3), (0, 0), (0, 1)), "lower < upper"),
+        (lambda: rectangle_mesh((2, 3), diagonal="both"), "expected right, left"),
+        (lambda: isotropic(-1.0, 0.3, "solid"), "Young's modulus"),
+        (lambda: isotropic(1.0, 0.5, "plane strain"), "Poisson's ratio 0.5"),
+        (lambda: isotropic(1.0, 0.3, "membrane"), "expected plane strain"),
+        (lambda: Supports.none(PLATE).prescribe(PLATE, [99]), "outside 0..35"),
+        (lambda: Supports.none(PLATE).prescribe(PLATE, [True]), "node mask"),
+        (lambda: Supports.none(PLATE).prescribe(PLATE, [0], [1, 2, 3]), "prescribed values"),
+        (lambda: Supports.none(PLATE).prescribe(PLATE, [0], np.nan), "not finite"),
+        (lambda: Supports.none(PLATE).prescribe(PLATE, [0], components=(2,)), "some of 0..1"),
+        (lambda: body_force(PLATE, [1.0, 2.0, 3.0]), "2 finite components"),
+        (lambda: body_force(PLATE, lambda x, side: x[:, 0]), "load density of shape"),
+        (lambda: traction(PLATE, [[0, 3]], [1.0, 0.0]), "not a pair"),
+        (
+            lambda: solve_static(PLATE, STRAIN, Supports.none(BLOCK)),
+            "load .* and supports",
+        ),
+        (
+            lambda: solve_static(
+                PLATE,
+                isotropic([1.0, 2.0], 0.3, "plane strain"),
+                Supports.none(PLATE).prescribe(PLATE, boundary_nodes(PLATE.mesh)),
+            ),
+            r"λ of shape \(2,\)",
+        ),
+    ],
+)
+def test_input_that_makes_no_sense_is_refused_in_one_sentence(make, message):
+    with pytest.raises(XfemError, match=message) as error:
+        make()
+    assert "\n" not in str(error.value)

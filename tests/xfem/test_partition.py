@@ -1,0 +1,234 @@
+"""Pieces of cut cells: exact volumes, no lost piece, no crash, however degenerate the cut."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from verify.xfem.clipping import staircase
+from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.polyline import Polyline
+from verify.xfem.split import split_cells
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
+from verify.xfem.virtual import cut_mesh
+
+TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
+TETRAHEDRON = SimplexMesh(np.concatenate([np.zeros((1, 3)), np.eye(3)]), [[0, 1, 2, 3]])
+MESHES = {2: rectangle_mesh((3, 3)), 3: box_mesh((2, 2, 2))}
+
+# a level-set value: ordinary, a sliver, exactly zero, below round-off, or huge
+VALUE = st.one_of(
+    st.floats(-1.0, 1.0),
+    st.sampled_from([0.0, 1e-12, -1e-12, 1e-9, -1e-6, 1e-15, -1e-15, 1e-17, 1e3, -1e3]),
+)
+
+
+def nodal_cut(mesh, values):
+    """A cut given by its nodal values, whatever they are: more degenerate than any geometry.
+
+    It has no end, and its interpolated zero set counts as being on it.
+    """
+    nodal = np.resize(values, len(mesh.points))
+    return ImplicitCut(lambda x: nodal if np.array_equal(x, mesh.points) else np.zeros(len(x)))
+
+
+def check_pieces(mesh, cuts):
+    partition = split_cells(mesh, cuts)
+    total = np.bincount(partition.parent, partition.fraction, minlength=len(mesh.cells))
+    split = np.unique(partition.parent)
+    assert (partition.sub_fraction >= 0.0).all()
+    # sums of at most some ten products of a few factors each
+    assert np.abs(total[split] - 1.0).max(initial=0.0) <= 1e-14
+    virtual = cut_mesh(mesh, cuts)
+    assert virtual.volumes.sum() == pytest.approx(mesh.measures.sum(), rel=1e-14)
+    assert (virtual.fraction > 0.0).all()
+    # no unknown without material, no material without unknowns
+    assert np.array_equal(np.unique(virtual.cells), np.arange(virtual.node_count))
+    assert np.array_equal(virtual.node_parent[virtual.cells], mesh.cells[virtual.parent])
+    return virtual
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@given(st.data())
+@settings(max_examples=150, deadline=None)
+def test_any_nodal_values_give_pieces_that_fill_their_cells(dim, data):
+    mesh = MESHES[dim]
+    cuts = [
+        nodal_cut(mesh, data.draw(st.lists(VALUE, min_size=5, max_size=27)))
+        for _ in range(data.draw(st.integers(1, 3)))
+    ]
+    check_pieces(mesh, cuts)
+
+
+@given(*[st.floats(-0.2, 1.2) for _ in range(4)])
+@example(0.0, 0.0, 1.0, 1.0)
+@example(1 / 3, 0.0, 1 / 3, 1.0)
+@example(0.0, 1 / 3, 1 / 3, 0.0)
+@settings(max_examples=150, deadline=None)
+def test_any_segment_through_a_plate_gives_pieces_that_fill_their_cells(x0, y0, x1, y1):
+    if np.hypot(x1 - x0, y1 - y0) > 1e-12:  # shorter ones are refused
+        check_pieces(MESHES[2], [Polyline([[x0, y0], [x1, y1]])])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_ten_thousand_random_and_degenerate_cuts_lose_no_volume_and_no_piece(dim):
+    """One mesh of 5000 separate simplices, each with its own nodal values."""
+    rng = np.random.default_rng(dim)
+    one = TRIANGLE if dim == 2 else TETRAHEDRON
+    count, corners = 5000, dim + 1
+    offsets = np.zeros((count, dim))
+    offsets[:, 0] = 2.0 * np.arange(count)
+    mesh = SimplexMesh(
+        (one.points + offsets[:, None]).reshape(-1, dim),
+        np.arange(count * corners).reshape(count, corners),
+    )
+    values = rng.choice([-1.0, 1.0], (count, corners)) * 10.0 ** rng.uniform(-14, 2, (count, 1))
+    values = values * 10.0 ** rng.choice([0.0, 0.0, -6.0, -12.0], (count, corners))
+    values[rng.random((count, corners)) < 0.1] = 0.0
+    virtual = check_pieces(mesh, [nodal_cut(mesh, values.ravel())])
+    # a cell splits into two unless all its nodes are on one side, zero being the plus side
+    used = virtual.level_sets.reshape(count, corners)
+    above, below = (used > 0.0).any(axis=1), (used < 0.0).any(axis=1)
+    pieces = np.bincount(virtual.parent, minlength=count)
+    assert np.array_equal(pieces, np.where(above & below, 2, 1))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6, 1e-9, 1e-12])
+def test_a_cut_off_corner_keeps_all_digits_of_its_volume(dim, size):
+    """φ = size − Σx cuts off the corner at the origin: a fraction of size^dim."""
+    mesh = TRIANGLE if dim == 2 else TETRAHEDRON
+    virtual = cut_mesh(mesh, [Plane([0.5 * size] * 2 + [0.0] * (dim - 2), -np.ones(dim))])
+    if size == 1.0:
+        assert virtual.fraction.tolist() == [1.0]
+    else:
+        # φ itself carries a round-off of some 1e-17 from subtracting coordinates of size 1e-12
+        assert virtual.fraction.min() == pytest.approx(size**dim, rel=1e-15 / size + 1e-14)
+
+
+def test_volume_shares_of_a_two_two_split_match_the_product_formula():
+    """r_bc r_bd + r_ac s_bc r_bd + r_ac r_ad s_bd for the plus side of corners a, b."""
+    a, b, c, d = 0.3, 0.8, -0.5, -0.1
+    partition = split_cells(TETRAHEDRON, [nodal_cut(TETRAHEDRON, [a, b, c, d])])
+
+    def r(p, q):
+        return p / (p - q)
+
+    def s(p, q):
+        return -q / (p - q)
+
+    want = r(b, c) * r(b, d) + r(a, c) * s(b, c) * r(b, d) + r(a, c) * r(a, d) * s(b, d)
+    plus = partition.fraction[partition.label[:, 0] > 0]
+    assert plus == pytest.approx([want], rel=1e-15)
+
+
+@pytest.mark.parametrize("corners", [2, 3, 4])
+def test_staircases_fill_the_simplex_with_the_determinants_that_they_claim(corners):
+    rng = np.random.default_rng(0)
+    stairs = staircase(corners)
+    for pattern in range(1, 2**corners - 1):
+        plus = np.array([pattern >> k & 1 for k in range(corners)], dtype=bool)
+        phi = np.where(plus, 1.0, -1.0) * rng.uniform(0.1, 1.0, corners)
+        total = 0.0
+        for entry in range(stairs.start[pattern], stairs.start[pattern + 1]):
+            rows = []
+            for p, m in zip(stairs.plus[entry], stairs.minus[entry], strict=True):
+                share = 0.0 if p == m else phi[p] / (phi[p] - phi[m])
+                rows.append((1 - share) * np.eye(corners)[p] + share * np.eye(corners)[m])
+            determinant = abs(np.linalg.det(rows))
+            claimed = 1.0
+            for kind, p, m in stairs.factors[entry]:
+                if p != m:
+                    claimed *= (phi[p] if kind == 0 else -phi[m]) / (phi[p] - phi[m])
+            assert claimed == pytest.approx(determinant, rel=1e-12)
+            assert np.sign(np.mean(rows, axis=0) @ phi) == stairs.side[entry]
+            total += claimed
+        assert total == pytest.approx(1.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_subdivision_is_watertight_and_fills_the_body(dim, seed):
+    """Every facet has two cells, or lies on the body's surface or on the cut, twice."""
+    rng = np.random.default_rng(seed)
+    mesh = MESHES[dim]
+    cuts = [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim)) for _ in range(2)]
+    body = subdivide(cut_mesh(mesh, cuts))
+    corners = body.points[body.cells]
+    edges = corners[:, 1:] - corners[:, :1]
+    volumes = np.linalg.det(edges) / (2 if dim == 2 else 6)
+    assert (volumes > 0.0).all()
+    assert volumes.sum() == pytest.approx(1.0, rel=1e-13)
+    keep = np.array([[j for j in range(dim + 1) if j != k] for k in range(dim + 1)])
+    facets, count = np.unique(
+        np.sort(body.cells[:, keep].reshape(-1, dim), axis=1), axis=0, return_counts=True
+    )
+    assert count.max() == 2
+    free = body.points[facets[count == 1]]
+    on_box = ((np.abs(free) < 1e-12).all(axis=1) | (np.abs(free - 1.0) < 1e-12).all(axis=1)).any(1)
+    assert (~on_box).sum() == 2 * len(body.cut_facets)
+    # Gauss: the outward normals of a closed surface add up to zero, body by body
+    area = _areas(free).sum()
+    assert area == pytest.approx((4 if dim == 2 else 6) + 2 * _areas(body.cut_facets).sum())
+
+
+def _areas(facets):
+    if facets.shape[1] == 2:
+        return np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1)
+    return np.linalg.norm(np.cross(*(facets[:, k] - facets[:, 0] for k in (1, 2))), axis=1) / 2
+
+
+def test_the_subdivision_beside_a_tip_has_no_hanging_node():
+    mesh = box_mesh((2, 2, 2))
+    half = Plane([0.5, 0.5, 0.52], [0.1, 0.0, 1.0])
+    cut = ImplicitCut(half.level_set, lambda x: 0.5 - x[:, 0])
+    body = subdivide(cut_mesh(mesh, [cut]))
+    keep = np.array([[j for j in range(4) if j != k] for k in range(4)])
+    facets, count = np.unique(
+        np.sort(body.cells[:, keep].reshape(-1, 3), axis=1), axis=0, return_counts=True
+    )
+    free = body.points[facets[count == 1]]
+    on_box = ((np.abs(free) < 1e-12).all(axis=1) | (np.abs(free - 1.0) < 1e-12).all(axis=1)).any(1)
+    assert (~on_box).sum() == 2 * len(body.cut_facets)
+    # the realised cut is the plane's part over x < 0.5
+    assert _areas(body.cut_facets).sum() == pytest.approx(0.5 * np.hypot(1.0, 0.1), rel=1e-12)
+
+
+def test_a_thin_layer_between_two_cuts_keeps_its_volume():
+    gap = 1e-9
+    cuts = [Plane([0.5, 0.52], [0.0, 1.0]), Plane([0.5, 0.52 + gap], [0.0, 1.0])]
+    virtual = check_pieces(rectangle_mesh((4, 4)), cuts)
+    layer = virtual.bodies[virtual.cells[:, 0]]
+    volumes = np.bincount(layer, virtual.volumes)
+    assert len(volumes) == 3
+    # positions carry round-off of 1e-16, the gap a relative 1e-7 of it
+    assert volumes.min() == pytest.approx(gap, rel=1e-6)
+
+
+def test_a_cut_that_misses_the_body_changes_nothing():
+    mesh = rectangle_mesh((4, 4))
+    virtual = cut_mesh(mesh, [Plane([0.0, 2.0], [0.0, 1.0]), Polyline([[-2.0, 0.5], [-1.0, 0.5]])])
+    assert np.array_equal(virtual.cells, mesh.cells)
+    assert virtual.node_count == len(mesh.points)
+    assert len(subdivide(virtual).cut_facets) == 0
+
+
+def test_what_was_snapped_and_dropped_is_counted():
+    mesh = rectangle_mesh((4, 4))
+    virtual = cut_mesh(mesh, [Plane([0.0, 0.5 + 1e-17], [1e-17, 1.0])])
+    assert virtual.snapped + (virtual.level_sets == 0.0).sum() >= 5
+    # the plus side of every cell below the line has no volume: eight cells touch it from below
+    assert virtual.dropped == 8
+
+
+def test_a_level_set_that_is_not_finite_is_refused():
+    with pytest.raises(XfemError, match="cut 0: level set"):
+        cut_mesh(MESHES[2], [ImplicitCut(lambda x: np.full(len(x), np.nan))])
+
+
+def test_an_unknown_tip_rule_is_refused():
+    with pytest.raises(XfemError, match="expected inside, through or nearest"):
+        cut_mesh(MESHES[2], [], tip="midway")

@@ -1,0 +1,122 @@
+"""Exact solutions with a traction-free inclined cut: patch tests and observed orders."""
+
+import numpy as np
+import pytest
+import xfem_exact_fields as exact
+from xfem_bodies import boundary_nodes, relative_l2_error
+
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.polyline import Polyline
+from verify.xfem.static import solve_static
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+LINE = Polyline([[-1.0, 0.0], [2.0, 1.0]])
+PLANE = Plane([0.5, 0.5, 0.5], exact.NORMAL)
+
+
+def solve(mesh, cut, field, solver="direct"):
+    virtual = cut_mesh(mesh, [cut])
+    supports = Supports.none(virtual).prescribe(virtual, boundary_nodes(mesh), field)
+    state = "plane strain" if mesh.dim == 2 else "solid"
+    material = isotropic(exact.YOUNG, exact.POISSON, state)
+    return virtual, solve_static(virtual, material, supports, solver=solver)
+
+
+@pytest.mark.parametrize("diagonal", ["right", "left", "alternating", "crossed"])
+@pytest.mark.parametrize("n", [5, 8])
+def test_a_cut_plate_passes_the_patch_test_to_round_off(n, diagonal):
+    virtual, solution = solve(rectangle_mesh((n, n), diagonal=diagonal), LINE, exact.f1)
+    assert solution.strain_energy == pytest.approx(exact.ENERGY_F1, rel=1e-9)
+    want = exact.f1(virtual.node_points, virtual.node_side)
+    # round-off of a solve with a few hundred unknowns, displacements of order 0.1
+    assert np.abs(solution.displacement - want).max() < 1e-14
+
+
+def test_the_side_of_an_unknown_is_that_of_its_material():
+    virtual = cut_mesh(rectangle_mesh((8, 8)), [LINE])
+    geometric = np.sign(LINE.level_set(virtual.node_piece_points))
+    assert np.array_equal(virtual.node_side[:, 0], geometric)
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_a_cut_cube_passes_the_patch_test_to_round_off(solver):
+    virtual, solution = solve(box_mesh((4, 4, 4)), PLANE, exact.f1_3d, solver)
+    assert solution.strain_energy == pytest.approx(exact.ENERGY_F1_3D, rel=1e-9)
+    want = exact.f1_3d(virtual.node_points, virtual.node_side)
+    tolerance = 1e-14 if solver == "direct" else 1e-9  # CG stops at a relative residual of 1e-10
+    assert np.abs(solution.displacement - want).max() < tolerance
+
+
+def test_swapped_sides_of_the_prescribed_values_are_seen_in_the_displacement():
+    """Negative control. The energy alone is blind to it: both halves are congruent."""
+    virtual, solution = solve(rectangle_mesh((8, 8)), LINE, lambda x, side: exact.f1(x, -side))
+    assert relative_l2_error(virtual, solution.displacement, exact.f1) > 1.0
+
+
+def test_energy_and_displacement_of_f3_converge_at_first_and_second_order():
+    errors, energies = [], []
+    for n in (16, 32, 64):
+        virtual, solution = solve(rectangle_mesh((n, n)), LINE, exact.f3)
+        errors.append(relative_l2_error(virtual, solution.displacement, exact.f3))
+        energies.append(solution.strain_energy)
+    # independent values: another minimal P1 XFEM on the same meshes, to the digits stated
+    assert energies == pytest.approx([2.80440, 2.78535, 2.78055], abs=5.1e-6)
+    assert errors == pytest.approx([1.153e-2, 2.937e-3, 7.366e-4], rel=5e-4)
+    excess = np.array(energies) - exact.ENERGY_F3
+    assert np.log2(errors[1] / errors[2]) > 1.95
+    # with exact values on the boundary the energy converges like the square of its norm
+    assert np.log2(excess[1] / excess[2]) / 2 > 0.98
+
+
+def test_the_solution_does_not_depend_on_the_numbering_of_nodes_and_cells():
+    mesh = rectangle_mesh((8, 8))
+    _, solution = solve(mesh, LINE, exact.f3)
+    rng = np.random.default_rng(3)
+    order = rng.permutation(len(mesh.points))
+    place = np.argsort(order)
+    cells = place[mesh.cells][rng.permutation(len(mesh.cells))]
+    shuffled = type(mesh)(mesh.points[order], rng.permuted(cells, axis=1))
+    _, other = solve(shuffled, LINE, exact.f3)
+    assert other.strain_energy == pytest.approx(solution.strain_energy, rel=1e-13)
+    # the real unknown of each node keeps the node's number on both meshes
+    assert np.allclose(other.displacement[place], solution.displacement[: len(place)], atol=1e-13)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.2, 3.0])
+def test_a_turned_problem_has_the_turned_solution(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s], [s, c]])
+    mesh = rectangle_mesh((6, 6))
+    virtual, solution = solve(mesh, LINE, exact.f3)
+    turned_mesh = type(mesh)(mesh.points @ turn.T, mesh.cells)
+    turned_cut = Polyline(LINE.vertices @ turn.T)
+    turned_virtual, turned = solve(
+        turned_mesh, turned_cut, lambda x, side: exact.f3(x @ turn, side) @ turn.T
+    )
+    assert np.array_equal(turned_virtual.cells, virtual.cells)
+    assert np.allclose(turned.displacement, solution.displacement @ turn.T, atol=1e-13)
+
+
+@pytest.mark.parametrize("degrees, energy", [(30.0, 162.233085), (90.0, 9038.461538)])
+def test_linear_kinematics_charge_energy_for_a_rigid_rotation_of_one_half(degrees, energy):
+    """Rigid separation costs nothing; a rotation costs 2(λ+μ)(1−cos θ)² per area."""
+    mesh = rectangle_mesh((8, 8))
+    virtual = cut_mesh(mesh, [Polyline([[-1.0, 0.03], [2.0, 1.03]])])
+    angle = np.radians(degrees)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    everywhere = np.arange(len(mesh.points))
+    material = isotropic(1e4, 0.3, "plane strain")
+
+    def turned(x, side):
+        return np.where(side > 0, (x - 0.5) @ (turn - np.eye(2)).T, 0.0)
+
+    def moved(x, side):
+        return np.where(side > 0, [0.3, 0.7], 0.0) * np.ones_like(x)
+
+    for field, want, tolerance in ((turned, energy, 1e-6), (moved, 0.0, 1e-9 * 1e4)):
+        supports = Supports.none(virtual).prescribe(virtual, everywhere, field)
+        solution = solve_static(virtual, material, supports)
+        assert solution.strain_energy == pytest.approx(want, abs=tolerance)

@@ -1,0 +1,53 @@
+"""Small things that several tests need: boundary nodes, dense stiffness, integrals."""
+
+import numpy as np
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.elasticity import isotropic
+from verify.xfem.quadrature import simplex_rule
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.subdivision import subdivide
+
+
+def boundary_nodes(mesh):
+    facets = mesh.boundary_facets
+    local = np.arange(mesh.dim + 1) != facets[:, 1:]
+    return np.unique(mesh.cells[facets[:, 0]][local])
+
+
+def sparse_stiffness(virtual, young=1.0, poisson=0.3):
+    state = "plane strain" if virtual.mesh.dim == 2 else "solid"
+    pattern = block_pattern(virtual.cells, virtual.node_count)
+    blocks = LinearStiffness(virtual, isotropic(young, poisson, state)).assemble(pattern)
+    return pattern.matrix(blocks).tocsr()
+
+
+def scaled_dense_stiffness(virtual):
+    """D^-1/2 K D^-1/2, so that slivers do not hide in round-off."""
+    K = sparse_stiffness(virtual).toarray()
+    scale = 1.0 / np.sqrt(np.diag(K))
+    return scale[:, None] * K * scale
+
+
+def zero_modes(virtual):
+    """Number of eigenvalues of the scaled stiffness that are zero, and the gap to the next."""
+    values = np.linalg.eigvalsh(scaled_dense_stiffness(virtual))
+    zero = int((np.abs(values) < 1e-11).sum())
+    return zero, values[zero]
+
+
+def relative_l2_error(virtual, displacement, exact, degree=6):
+    """‖u − exact‖/‖exact‖ over the body, integrated on the pieces."""
+    body = subdivide(virtual)
+    values = (body.interpolation @ displacement)[body.cells]
+    corners = body.points[body.cells]
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / (2 if virtual.mesh.dim == 2 else 6)
+    sides = virtual.piece_side[body.cell_piece]
+    error = size = 0.0
+    for point, weight in zip(*simplex_rule(virtual.mesh.dim, degree), strict=True):
+        at = np.einsum("k,ckd->cd", point, corners)
+        want = exact(at, sides)
+        got = np.einsum("k,ckd->cd", point, values)
+        error += weight * volumes @ ((got - want) ** 2).sum(axis=1)
+        size += weight * volumes @ (want**2).sum(axis=1)
+    return np.sqrt(error / size)

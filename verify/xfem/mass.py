@@ -1,0 +1,179 @@
+"""Mass of a cut body, as a scalar matrix on unknown nodes (the same for every component).
+
+Side-wise lumping gives each unknown node its share ρ V_piece/n of the pieces around it. It is
+diagonal, conserves the mass of every piece exactly, and bounds the explicit step by that of the
+uncut elements, however small the pieces. The consistent mass integrates shape functions exactly.
+The lumpings that the thesis compares live in the shifted basis: see `verify.xfem.mass_shifted`.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+from verify.xfem.block_pattern import BlockPattern, block_pattern
+from verify.xfem.errors import XfemError
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Mass", "cell_densities", "consistent_mass", "second_moments", "side_wise_mass"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A symmetric positive definite mass matrix.
+
+    Attributes
+    ----------
+    matrix : (N, N) csr_array
+        In kilograms (per metre of thickness in 2D).
+    root : (N, N) csr_array or None
+        C with M⁻¹ = C Cᵀ where it is known in closed form.
+    weights : (N,) float array
+        Physical mass that belongs to each unknown: what gravity pulls at. For the lumpings of
+        the thesis it differs from the row sums of the matrix, which is their defect.
+    """
+
+    matrix: csr_array
+    root: csr_array | None
+    weights: _Floats
+
+    @cached_property
+    def diagonal(self) -> _Floats | None:
+        """(N,) the diagonal if the matrix is one, else None."""
+        entries = self.matrix.tocoo()
+        if (entries.row != entries.col).any():
+            return None
+        return np.asarray(self.matrix.diagonal())
+
+    @cached_property
+    def entries(self) -> tuple[_Ints, _Ints, _Floats]:
+        """(rows, columns, values) of the non-zeros."""
+        entries = self.matrix.tocoo()
+        return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
+
+    def apply(self, vectors: _Floats) -> _Floats:
+        """M times (N, d) vectors."""
+        if self.diagonal is not None:
+            return self.diagonal[:, None] * vectors
+        return self.matrix @ vectors
+
+    def solve(self, forces: _Floats) -> _Floats:
+        """M⁻¹ times (N, d) forces."""
+        if self.diagonal is not None:
+            return forces / self.diagonal[:, None]
+        if self.root is not None:
+            return self.root @ (self.root.T @ forces)
+        return self._factor.solve(forces)
+
+    @cached_property
+    def _factor(self):  # type: ignore[no-untyped-def]
+        return splu(csc_array(self.matrix))
+
+    def weight(self, gravity: ArrayLike) -> _Floats:
+        """(N, d) dead weight of the unknowns in a field of gravity (d,), in newtons."""
+        return self.weights[:, None] * np.asarray(gravity, dtype=float)
+
+    def pattern(self, virtual: VirtualMesh) -> BlockPattern:
+        """Sparsity of stiffness and mass together; its first cells are those of the body.
+
+        The lumpings of the thesis couple the unknowns of one node, which no cell does.
+        """
+        rows, columns, _ = self.entries
+        corners = virtual.cells.shape[1]
+        same_parent = virtual.node_parent[rows] == virtual.node_parent[columns]
+        extra = same_parent & (rows < columns)
+        pairs = np.stack([rows[extra], columns[extra]], axis=1)
+        couplings = pairs[:, [0] + [1] * (corners - 1)]
+        return block_pattern(np.concatenate([virtual.cells, couplings]), virtual.node_count)
+
+    def places(self, pattern: BlockPattern) -> _Ints:
+        """Block of each of the `entries` in a pattern.
+
+        Raises
+        ------
+        XfemError
+            If the pattern lacks one.
+        """
+        rows, columns, _ = self.entries
+        of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
+        keys = of_row * pattern.node_count + pattern.columns
+        wanted = rows * pattern.node_count + columns
+        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        if (keys[at] != wanted).any():
+            raise XfemError("the pattern lacks couplings of this mass; expected Mass.pattern(...)")
+        return at
+
+
+def cell_densities(virtual: VirtualMesh, density: ArrayLike) -> _Floats:
+    """(m,) density of the uncut cells.
+
+    Raises
+    ------
+    XfemError
+        If it is not positive and finite, or neither one value nor one per cell.
+    """
+    count = len(virtual.mesh.cells)
+    values = np.asarray(density, dtype=float)
+    if values.shape not in ((), (count,)):
+        raise XfemError(f"density of shape {values.shape}; expected () or ({count},)")
+    if not (np.isfinite(values).all() and (values > 0.0).all()):
+        raise XfemError(f"density {values.min():g}; expected positive and finite")
+    return np.broadcast_to(values, count)
+
+
+def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
+    """Side-wise lumped mass: diag(ρ V_piece/n) in side-wise unknowns.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    density : float or (m,) array_like
+        In kg/m³; for membranes times the thickness.
+    """
+    corners = virtual.cells.shape[1]
+    share = virtual.volumes * cell_densities(virtual, density)[virtual.parent] / corners
+    weights = np.bincount(
+        virtual.cells.ravel(), np.repeat(share, corners), minlength=virtual.node_count
+    )
+    return Mass(
+        matrix=csr_array(diags_array(weights)),
+        root=csr_array(diags_array(1.0 / np.sqrt(weights))),
+        weights=weights,
+    )
+
+
+def second_moments(virtual: VirtualMesh) -> _Floats:
+    """(p, d + 1, d + 1) exact integrals of N_i N_j over each piece, in m^d."""
+    corners = virtual.cells.shape[1]
+    whole = (np.ones((corners, corners)) + np.eye(corners)) / (corners * (corners + 1))
+    moments = virtual.volumes[:, None, None] * whole
+    moments[virtual.split] = 0.0
+    sub = virtual.sub_cells
+    vertex_sum = sub.barycentric.sum(axis=1)
+    products = np.einsum("kvi,kvj->kij", sub.barycentric, sub.barycentric)
+    products += vertex_sum[:, :, None] * vertex_sum[:, None, :]
+    volume = sub.fraction * virtual.mesh.measures[virtual.parent[sub.piece]]
+    products *= (volume / (corners * (corners + 1)))[:, None, None]
+    np.add.at(moments, sub.piece, products)
+    return moments
+
+
+def consistent_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
+    """Consistent mass (2.72–75) in side-wise unknowns: ∫ρ N_i N_j over each piece.
+
+    Its explicit step vanishes with the smallest piece.
+    """
+    moments = second_moments(virtual)
+    moments *= cell_densities(virtual, density)[virtual.parent][:, None, None]
+    rows = np.broadcast_to(virtual.cells[:, :, None], moments.shape)
+    columns = np.broadcast_to(virtual.cells[:, None, :], moments.shape)
+    count = virtual.node_count
+    entries = (moments.ravel(), (rows.ravel(), columns.ravel()))
+    matrix = csr_array(coo_array(entries, shape=(count, count)))
+    return Mass(matrix=matrix, root=None, weights=np.asarray(matrix.sum(axis=1)).ravel())
