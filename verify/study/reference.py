@@ -84,7 +84,7 @@ def size_of(solution: Solution) -> float:
 
 
 def exact_reference(scene: Scene, exact: ExactField, body: Body, law: Hooke) -> Reference:
-    """Make the reference from an exact solution; its quantities are integrated or evaluated here."""
+    """Make the reference from an exact solution; its quantities are integrated here."""
     assert scene.exact is not None
     quantities = {q.name: _exact_quantity(q, exact, body, law) for q in scene.quantities}
     source = f"exact: {scene.exact.solution}"

@@ -1,0 +1,100 @@
+import numpy as np
+import pytest
+from cut_meshes import cube, grid, layered, quadratic, solution
+
+from verify.compare.locate import SolutionField
+from verify.errors import InputError
+
+RNG = np.random.default_rng(1)
+
+
+def second_degree(points):
+    d = points.shape[1]
+    a = np.arange(1, d * d * d + 1).reshape(d, d, d) / 7
+    b = np.arange(d * d).reshape(d, d) - 1.5
+    u = np.einsum("cij,ni,nj->nc", a, points, points) + points @ b.T + 0.3
+    gradient = np.einsum("cij,nj->nci", a + np.swapaxes(a, 1, 2), points) + b
+    return u, gradient
+
+
+@pytest.mark.parametrize("mesh", [grid(7, 5), cube()], ids=["2D", "3D"])
+def test_a_quadratic_field_on_quadratic_cells_is_reproduced_everywhere(mesh):
+    points, cells = quadratic(*mesh)
+    field = SolutionField(solution(points, cells, second_degree(points)[0], order=2))
+    x = RNG.random((500, points.shape[1]))
+    u, gradient = field.evaluate(x)
+    exact, exact_gradient = second_degree(x)
+    assert np.abs(u - exact).max() < 1e-13
+    assert np.abs(gradient - exact_gradient).max() < 1e-12
+
+
+@pytest.mark.parametrize("mesh", [grid(7, 5), cube()], ids=["2D", "3D"])
+def test_the_cell_found_is_the_one_that_brute_force_finds(mesh):
+    points, cells = mesh
+    field = SolutionField(solution(points, cells, np.zeros_like(points)))
+    x = RNG.random((300, points.shape[1]))
+    corners = points[cells]
+    edges = corners[:, 1:] - corners[:, :1]
+    weights = np.einsum("nmi,mij->nmj", x[:, None] - corners[None, :, 0], np.linalg.inv(edges))
+    smallest = np.minimum(weights.min(axis=2), 1 - weights.sum(axis=2))
+    assert np.array_equal(field.cells_at(x), smallest.argmax(axis=1))
+
+
+@pytest.mark.parametrize("mesh", [grid(3, 4), cube()], ids=["2D", "3D"])
+def test_a_point_outside_goes_to_the_nearest_cell(mesh):
+    points, cells = mesh
+    d = points.shape[1]
+    field = SolutionField(solution(points, cells, np.zeros_like(points)))
+    x = 3 * RNG.random((200, d)) - 1
+    x = x[((x < 0) | (x > 1)).any(axis=1)]
+    corners = points[cells[field.cells_at(x)]]
+    # the foot on the square is the nearest point, and the cell found must contain it
+    foot = np.clip(x, 0, 1)
+    edges = corners[:, 1:] - corners[:, :1]
+    weights = np.einsum("ni,nij->nj", foot - corners[:, 0], np.linalg.inv(edges))
+    assert weights.min() > -1e-12
+    assert weights.sum(axis=1).max() < 1 + 1e-12
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-9])
+def test_on_a_cut_near_decides_the_side_also_at_slivers(gap):
+    # three layers: below y = .5, a sliver, and above; each moved by its own number
+    lines = [lambda x: np.full_like(x, 0.5), lambda x: np.full_like(x, 0.5 + gap)]
+    points, cells, layer = layered(9, lines)
+    field = SolutionField(solution(points, cells, layer[:, None] * np.ones(2)))
+    x = np.column_stack([RNG.random(400), np.full(400, 0.5)])
+    up = np.array([0.0, 1e-4])
+    assert (field.displacement(x, x + up) == 1).all()
+    assert (field.displacement(x, x - up) == 0).all()
+    inside = x + np.array([0.0, 0.3 * gap])
+    assert (field.displacement(inside) == 1).all()
+    top = x + np.array([0.0, gap])
+    assert (field.displacement(top, top + up) == 2).all()
+
+
+@pytest.mark.parametrize("thin", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("apex", [0.0, 0.4], ids=["needle", "cap"])
+def test_gradients_in_sliver_cells_lose_no_more_than_round_off_over_height(thin, apex):
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [apex, thin]])
+    slope = np.array([[0.1, 0.2], [0.3, -0.4]])
+    field = SolutionField(solution(points, np.array([[0, 1, 2]]), points @ slope.T + 1))
+    x = points.mean(axis=0)[None]
+    u, gradient = field.evaluate(x)
+    assert np.abs(gradient - slope).max() < 4 * np.finfo(float).eps / thin
+    assert np.abs(u - x @ slope.T - 1).max() < 1e-15
+
+
+def test_cells_without_area_are_left_out_and_counted():
+    points, cells = grid(2, 2)
+    flat = np.array([[0, 4, 8]])
+    field = SolutionField(solution(points, np.vstack([flat, cells]), points))
+    assert field.degenerate_cells == 1
+    x = RNG.random((50, 2))
+    assert np.abs(field.displacement(x) - x).max() < 1e-15
+
+
+def test_a_curved_quadratic_edge_is_refused_by_name():
+    points, cells = quadratic(*grid(1, 1))
+    points[-1] += 1e-3
+    with pytest.raises(InputError, match="curved edge"):
+        SolutionField(solution(points, cells, np.zeros_like(points), order=2))

@@ -1,0 +1,154 @@
+import numpy as np
+import pytest
+from cut_meshes import STRAIGHT, cube, grid, layered, quadratic, scene, solution
+
+from verify.compare.body import body_of
+from verify.compare.cut_line import cut_rule
+from verify.compare.displacement_error import displacement_error
+from verify.compare.energy_error import energy_error
+from verify.compare.hooke import hooke
+from verify.compare.jump_error import jump_error
+from verify.compare.locate import SolutionField
+from verify.compare.opening import opening
+from verify.compare.slabs import area_rule
+from verify.compare.strain_energy import strain_energy
+from verify.scene import Material
+
+LAW = hooke(Material(young=1.0, poisson=0.3, plane="strain"))
+
+
+def line(x):
+    return 0.5 + (x - 0.5) / 3
+
+
+class Swapped:
+    """The same field with the sides of the cut y = line(x) exchanged."""
+
+    def __init__(self, field):
+        self._field = field
+
+    def displacement(self, points, near=None):
+        foot = np.column_stack([points[:, 0], line(points[:, 0])])
+        across = np.abs(points[:, 1] - foot[:, 1]) < 1e-9
+        near = np.where(across[:, None], 2 * points - near, near)
+        return self._field.displacement(points, near)
+
+
+def halves(n, above, below, lines=(line,)):
+    points, cells, layer = layered(n, lines)
+    moved = [points @ np.array(slope).T + np.array(shift) for slope, shift in (below, above)]
+    return SolutionField(solution(points, cells, np.where(layer[:, None] > 0, moved[1], moved[0])))
+
+
+ZERO = ([[0, 0], [0, 0]], [0, 0])
+STRETCH = ([[0.1, 0.2], [-0.3, 0.05]], [0.01, 0.02])
+
+
+def test_fields_on_different_meshes_with_a_known_difference_give_it():
+    # both linear per side, so that every quadrature is exact: only round-off remains
+    body = body_of(scene([STRAIGHT]))
+    field, reference = halves(5, STRETCH, ZERO), halves(8, ([[0.1, 0], [0, 0.1]], [0, 0]), ZERO)
+    rule = area_rule(body, 0.05, order=3)
+    slope = np.array(STRETCH[0]) - 0.1 * np.eye(2)
+    x, w = rule.points, rule.weights * (rule.points[:, 1] > line(rule.points[:, 0]))
+    # moments of the upper trapezoid, in closed form
+    u = np.polynomial.Polynomial([1 / 3, 1 / 3])
+    area = 0.5
+    first = [(np.polynomial.Polynomial([0, 1]) * (1 - u)).integ()(1), 0.5 * (1 - u**2).integ()(1)]
+    p = np.polynomial.Polynomial([0, 1])
+    second = np.array(
+        [
+            [(p * p * (1 - u)).integ()(1), (p * 0.5 * (1 - u**2)).integ()(1)],
+            [(p * 0.5 * (1 - u**2)).integ()(1), ((1 - u**3) / 3).integ()(1)],
+        ]
+    )
+    shift = np.array(STRETCH[1])
+    square = np.sum(slope.T @ slope * second) + 2 * shift @ slope @ first + area * shift @ shift
+    assert w @ x[:, 0] == pytest.approx(first[0], rel=1e-13)
+    found = displacement_error(field, reference, rule)
+    assert found.absolute == pytest.approx(np.sqrt(square), rel=1e-8)
+    strain = 0.5 * (slope + slope.T)
+    density = LAW.lame * np.trace(strain) ** 2 + 2 * LAW.shear * np.sum(strain**2)
+    found = energy_error(field, reference, rule, LAW)
+    assert found.absolute == pytest.approx(np.sqrt(area * density), rel=1e-8)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-9])
+def test_a_jump_across_a_sliver_is_measured_on_its_own_cut(gap):
+    def upper(x):
+        return line(x) + gap
+
+    points, cells, layer = layered(6, [line, upper])
+    moved = np.array([[0.0, 0.0], [3.0, 4.0], [6.0, 0.0]])[layer]
+    field = SolutionField(solution(points, cells, moved))
+    other = {
+        "kind": "polyline",
+        "name": "b",
+        "points": [[-0.1, 0.3 + gap], [1.1, 0.7 + gap]],
+    }
+    body = body_of(scene([STRAIGHT, other]))
+    rule = cut_rule(body, 0.1)
+    still = SolutionField(solution(points, cells, np.zeros_like(points)))
+    # |(3,4)| = 5 on both cuts, each as long as √10/3
+    expected = 5 * np.sqrt(2 * np.sqrt(10) / 3)
+    assert jump_error(field, still, rule).absolute == pytest.approx(expected, rel=1e-8)
+    normal = np.array([-1, 3]) / np.sqrt(10)
+    assert opening(field, body, "cut", 0.5, "normal") == pytest.approx(normal @ [3, 4], rel=1e-12)
+    assert opening(field, body, "b", 0.3, "normal") == pytest.approx(normal @ [3, -4], rel=1e-12)
+    # the sliver moved by (3, 4) alone: its area carries the difference
+    area = area_rule(body, 0.1)
+    only = SolutionField(solution(points, cells, np.where(layer[:, None] == 1, moved, 0.0)))
+    # rel: the width of the sliver, a difference of numbers near .5, is known to 1e-16
+    expected = 5 * np.sqrt(gap)
+    tolerance = max(1e-8, 4e-16 / gap)
+    assert displacement_error(only, still, area).absolute == pytest.approx(expected, rel=tolerance)
+
+
+def test_swapped_sides_show_as_a_jump_error_of_two():
+    field = halves(6, ([[0, 0], [0, 0]], [0.0, 0.1]), ZERO)
+    rule = cut_rule(body_of(scene([STRAIGHT])), 0.1)
+    assert jump_error(field, field, rule).relative == 0.0
+    assert jump_error(Swapped(field), field, rule).relative == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_field_without_the_cut_has_a_jump_error_of_one():
+    field = halves(6, ([[0, 0], [0, 0]], [0.0, 0.1]), ZERO)
+    points, cells = grid(5, 5)
+    whole = SolutionField(solution(points, cells, np.zeros_like(points)))
+    rule = cut_rule(body_of(scene([STRAIGHT])), 0.1)
+    assert jump_error(whole, field, rule).relative == pytest.approx(1.0, rel=1e-12)
+
+
+def test_an_error_against_a_reference_of_zero_is_not_finite():
+    field, still = halves(4, STRETCH, ZERO), halves(4, ZERO, ZERO)
+    rule = area_rule(body_of(scene([STRAIGHT])), 0.2)
+    assert displacement_error(field, still, rule).relative == np.inf
+    assert displacement_error(still, still, rule).relative == 0.0
+
+
+def test_the_energy_of_a_quadratic_field_is_exact():
+    points, cells = quadratic(*grid(3, 2))
+    x, y = points.T
+    u = np.column_stack([x * x + 0.5 * x * y, x * y - y * y])
+    # ε_xx = 2x + y/2, ε_yy = x − 2y, 2ε_xy = x/2 + y: moments of the unit square
+    xx, xy, yy = 1 / 3, 1 / 4, 1 / 3
+    trace = 9 * xx - 9 * xy + 2.25 * yy
+    square = (4 * xx + 2 * xy + yy / 4) + (xx - 4 * xy + 4 * yy) + (xx / 4 + xy + yy) / 2
+    expected = 0.5 * LAW.lame * trace + LAW.shear * square
+    assert strain_energy(solution(points, cells, u, order=2), LAW) == pytest.approx(expected, 1e-13)
+
+
+def test_the_energy_of_a_uniform_strain_in_space_is_exact():
+    points, cells = quadratic(*cube())
+    slope = np.array([[0.1, 0.2, 0], [0, -0.1, 0.3], [0.05, 0, 0.2]])
+    strain = 0.5 * (slope + slope.T)
+    expected = 0.5 * LAW.lame * np.trace(strain) ** 2 + LAW.shear * np.sum(strain**2)
+    u = points @ slope.T
+    assert strain_energy(solution(points, cells, u, order=2), LAW) == pytest.approx(expected, 1e-13)
+
+
+def test_plane_stress_has_the_energy_of_free_thickness():
+    law = hooke(Material(young=2.0, poisson=0.3, plane="stress"))
+    # uniaxial stress: σ = Eε with a lateral strain of −νε
+    uniaxial = np.diag([1e-3, -0.3e-3])[None]
+    assert law.energy_density(uniaxial)[0] == pytest.approx(0.5 * 2.0 * 1e-6, rel=1e-13)
