@@ -1,0 +1,70 @@
+# `make` alone prints this help.                                              (GNU make, bash)
+#
+#   VERIFY_PYTHON=/path   the Python that .venv is built on (else one from 3.12 on is searched)
+#   DOLFINX=system        use the DOLFINx of that Python instead of the wheel
+#   JOBS=n                processes that tests and the demo run side by side (else all cores)
+
+SHELL := /bin/bash
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test heavy bench check clean lock
+
+BIN := $(or $(VERIFY_VENV),.venv)/bin
+JOBS ?= $(shell nproc)
+DEMO := build/demo
+
+# One thread per process: cores are filled by processes, and a timing is that of one thread.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+export NUMBA_NUM_THREADS ?= 1
+# Nothing here opens a window.
+export MPLBACKEND ?= Agg
+export PYVISTA_OFF_SCREEN ?= true
+
+PYTEST := $(BIN)/python -m pytest
+
+help: ## print this help
+	@sed -n 's/^#   /  /p' $(MAKEFILE_LIST)
+	@echo
+	@sed -nE 's/^([a-z]+):.*## (.*)/\1|\2/p' $(MAKEFILE_LIST) \
+	    | while IFS='|' read -r name what; do printf '  make %-6s %s\n' "$$name" "$$what"; done
+	@echo
+	@echo "  one thread per process: OMP_NUM_THREADS=$(OMP_NUM_THREADS) NUMBA_NUM_THREADS=$(NUMBA_NUM_THREADS); JOBS=$(JOBS)"
+
+setup: ## make .venv ready (every other target does it first)
+	@.ci/setup
+
+demo: setup ## solve the demo cases and write build/demo/report.html
+	@rm -rf $(DEMO)
+	@$(BIN)/verify run -k demo -j $(JOBS) --out $(DEMO); code=$$?; \
+	    if [ -f $(DEMO)/report.html ]; then echo "Report: $(CURDIR)/$(DEMO)/report.html"; fi; \
+	    exit $$code
+
+# Claims about time run first, alone; then the others, a file per process at a time. Exit code 5
+# of the first is "no such test here".
+test: setup ## run the tests, without the heavy studies
+	@$(PYTEST) -q -m "timing and not heavy" -p no:xdist; timed=$$?; \
+	    [ $$timed -eq 5 ] && timed=0; \
+	    $(PYTEST) -n $(JOBS) --dist loadfile -m "not timing and not heavy" || exit $$?; \
+	    exit $$timed
+
+heavy: setup ## run the heavy studies (minutes to hours)
+	@$(PYTEST) -m heavy --timeout 0
+
+bench: setup ## measure: benchmarks alone, medians with their spread
+	@$(PYTEST) tests/benchmarks -m "not heavy" -p no:xdist --benchmark-only \
+	    --benchmark-columns=median,iqr,rounds
+
+check: setup ## ruff, format, types, layers
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+lock: ## resolve the lock files again from pyproject.toml (needs uv; UPGRADE=1 takes new versions)
+	@.ci/lock $(if $(UPGRADE),--upgrade)
+
+clean: ## remove what was built, but not .venv
+	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .benchmarks
+	find verify reference tests -type d -name __pycache__ -prune -exec rm -rf {} +
