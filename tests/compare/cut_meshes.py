@@ -50,7 +50,7 @@ def layered(n: int, lines: Sequence[Map]) -> tuple[Array, NDArray[np.int64], NDA
     heights: list[Map] = [np.zeros_like, *lines, np.ones_like]
     points, cells, layer, first = [], [], [], 0
     for k, (low, high) in enumerate(pairwise(heights)):
-        p, c = grid(n, max(1, n // len(heights)))
+        p, c = grid(n, max(1, n // (len(heights) - 1)))
         x, t = p.T
         points.append(np.column_stack([x, (1 - t) * low(x) + t * high(x)]))
         cells.append(c + first)

@@ -10,6 +10,8 @@ __all__ = ["observed_rate"]
 
 # Relative errors below this are round-off of a direct solver on 1e5 unknowns.
 ROUND_OFF = 1e-11
+# The slope may still change by a little more than it last did.
+SAFETY = 1.25
 
 
 def observed_rate(
@@ -30,8 +32,8 @@ def observed_rate(
     Returns
     -------
     Rate
-        The slope between the two finest levels. Its uncertainty is the change from the pair
-        before, plus what the half-widths of the two errors allow.
+        The slope between the two finest levels. Its uncertainty is 1.25 × the change from
+        the pair before, plus what the half-widths of the two errors allow.
     """
     levels = list(zip(sizes, errors, uncertainties, strict=True))
     slopes = [
@@ -60,4 +62,5 @@ def observed_rate(
         return without(f"oscillating: slopes {shown}")
     span = log(sizes[-2] / sizes[-1])
     allowed = sum(w / e for e, w in zip(errors[-2:], uncertainties[-2:], strict=True)) / span
-    return Rate(solver, metric, slopes[-1], abs(slopes[-1] - slopes[-2]) + allowed, "", slopes)
+    spread = SAFETY * abs(slopes[-1] - slopes[-2]) + allowed
+    return Rate(solver, metric, slopes[-1], spread, "", slopes)

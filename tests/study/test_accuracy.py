@@ -1,0 +1,239 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cut_meshes import STRAIGHT, grid, layered, quadratic, scene, solution
+
+from verify.errors import InputError
+from verify.result import SolveRecord, Status, Verdict, read_result, write_result
+from verify.study.accuracy import assess_accuracy
+
+
+def line(x):
+    return 0.5 + (x - 0.5) / 3
+
+
+class Cubic:
+    """A smooth field on each side of the cut; `near` decides the side."""
+
+    singular_points = np.zeros((0, 2))
+
+    def __init__(self, swapped=False):
+        self._sign = -1 if swapped else 1
+
+    def _above(self, points, near):
+        near = points if near is None else near
+        return self._sign * (near[:, 1] - line(near[:, 0])) > 0
+
+    def displacement(self, points, near=None):
+        x, y = points.T
+        above = np.column_stack([x * x * y, 0.3 + y**3 - x])
+        below = np.column_stack([y * y, x * y * y])
+        return np.where(self._above(points, near)[:, None], above, below)
+
+    def gradient(self, points, near=None):
+        x, y = points.T
+        one = np.ones_like(x)
+        above = np.array([[2 * x * y, x * x], [-one, 3 * y * y]]).transpose(2, 0, 1)
+        below = np.array([[0 * x, 2 * y], [y * y, 2 * x * y]]).transpose(2, 0, 1)
+        return np.where(self._above(points, near)[:, None, None], above, below)
+
+
+def interpolant(n, order=1):
+    """The nodal interpolant on a conforming mesh, as a solver would return it."""
+    points, cells, layer = layered(n, [line])
+    if order == 2:
+        layer_of_cell = layer[cells[:, 0]]
+        points, cells = quadratic(points, cells)
+        layer = np.concatenate([layer, np.tile(layer_of_cell, 3)])
+    far = np.where(layer[:, None] == 1, [[0.5, 2.0]], [[0.5, -2.0]])
+    u = Cubic().displacement(points, far)
+    return solution(points, cells, u, order=order, size=1 / n, unknowns=2 * len(points))
+
+
+def case(checks, exact=True, **more):
+    content = {"exact": {"solution": "cubic"}} if exact else {}
+    return scene([STRAIGHT], acceptance=checks, **content, **more)
+
+
+def records(solver, levels):
+    return [SolveRecord("a test", solver, i, Status.SOLVED, size=1 / n) for i, n in levels.items()]
+
+
+def assess(checks, solvers, exact=None, **more):
+    """`solvers`: name -> {level: solution}."""
+    rows = [
+        r
+        for name, own in solvers.items()
+        for r in records(name, {i: round(1 / s.size) for i, s in own.items()})
+    ]
+    return assess_accuracy(case(checks, exact is not None, **more), rows, solvers, exact)
+
+
+LEVELS = {0: interpolant(8), 1: interpolant(16), 2: interpolant(32)}
+
+
+def test_interpolants_of_a_smooth_field_converge_with_orders_two_and_one(tmp_path):
+    checks = [
+        {"check": "rate", "metric": "displacement_l2", "at_least": 1.95},
+        {"check": "rate", "metric": "energy_norm", "at_least": 0.95},
+        {"check": "error", "metric": "jump_l2", "at_most": 1e-2},
+        {"check": "error", "metric": "opening", "at_most": 1e-2},
+        {"check": "ratio", "metric": "energy_norm", "within": 0.05},
+    ]
+    quantities = [
+        {"kind": "strain_energy"},
+        {"kind": "opening", "name": "opening", "at": 0.4},
+        {"kind": "displacement", "name": "corner", "point": [1.0, 1.0], "component": "y"},
+    ]
+    solvers = {"xfem": LEVELS, "conforming": LEVELS}
+    result = assess(checks, solvers, Cubic(), quantities=quantities)
+    assert [v.verdict for v in result.verdicts] == [Verdict.PASS] * 5
+    finest = result.solves[2]
+    assert finest.metric("corner").value == pytest.approx(0.3, abs=1e-14)
+    assert finest.metric("corner").reference == pytest.approx(0.3, abs=1e-14)
+    ratio = result.verdicts[-1]
+    assert ratio.observed == 1.0
+    # energies of interpolants exceed the exact one by the square of their error: h²
+    energy = [s.metric("strain_energy") for s in result.solves[:3]]
+    excess = [m.value / m.reference - 1 for m in energy]
+    assert excess[0] / excess[1] == pytest.approx(4, rel=0.1)
+    assert excess[1] / excess[2] == pytest.approx(4, rel=0.1)
+    write_result(result, tmp_path / "result.json")
+    assert read_result(tmp_path / "result.json").verdicts == result.verdicts
+
+
+def test_the_strain_energy_of_an_exact_field_is_integrated_to_round_off():
+    result = assess([], {"xfem": LEVELS}, Cubic())
+    metric = result.solves[0].metric("strain_energy")
+    # cubic fields: polynomials of degree 4, which both rules integrate exactly
+    assert metric.uncertainty < 1e-13
+    assert result.reference["metrics"]["strain_energy"]["values"] == [metric.reference]
+
+
+def test_a_comparison_with_the_sides_swapped_fails():
+    checks = [
+        {"check": "error", "metric": "jump_l2", "at_most": 0.05},
+        {"check": "error", "metric": "displacement_l2", "at_most": 0.05},
+    ]
+    result = assess(checks, {"xfem": LEVELS}, Cubic(swapped=True))
+    assert [v.verdict for v in result.verdicts] == [Verdict.FAIL] * 2
+    assert result.solves[-1].metric("jump_l2").value > 1.5
+
+
+BOUND = {"check": "error", "metric": "energy_norm", "at_most": 0.06}
+
+
+def reference(sizes, order=2):
+    return {i: interpolant(n, order) for i, n in enumerate(sizes)}
+
+
+def test_a_fine_reference_judges_as_the_exact_field_does():
+    true = assess([BOUND], {"xfem": LEVELS}, Cubic())
+    against = assess([BOUND], {"xfem": LEVELS, "reference": reference((12, 24, 48))})
+    assert against.verdicts[0].verdict is true.verdicts[0].verdict is Verdict.PASS
+    for name in ("displacement_l2", "energy_norm", "jump_l2"):
+        measured = against.solves[2].metric(name)
+        truth = true.solves[2].metric(name)
+        assert abs(measured.value - truth.value) <= measured.uncertainty + truth.uncertainty
+        assert measured.uncertainty < 0.1 * measured.value
+    assert against.reference["source"] == "conforming P2, 3 levels, GCI"
+
+
+def test_a_too_coarse_reference_leaves_the_verdict_undecided_with_the_reason():
+    result = assess([BOUND], {"xfem": LEVELS, "reference": reference((3, 6, 12), order=1)})
+    (found,) = result.verdicts
+    assert found.verdict is Verdict.UNDECIDED
+    assert "is not clearly below the error" in found.reason
+    truth = assess([BOUND], {"xfem": LEVELS}, Cubic()).verdicts[0].observed
+    assert found.low <= truth <= found.high
+
+
+def test_a_coarse_reference_makes_the_rate_a_floor_and_not_a_number():
+    result = assess([], {"xfem": LEVELS, "reference": reference((3, 6, 12), order=1)})
+    rate = next(r for r in result.rates if (r.solver, r.metric) == ("xfem", "displacement_l2"))
+    assert rate.order is None
+    assert rate.reason.startswith("floor")
+
+
+def test_a_reference_of_two_levels_judges_nothing_and_says_why():
+    result = assess([BOUND], {"xfem": LEVELS, "reference": reference((6, 12))})
+    assert result.verdicts[0].verdict is Verdict.ERROR
+    assert "2 solved levels" in result.verdicts[0].reason
+    assert result.solves[0].metric("strain_energy").reference is None
+
+
+def test_a_failed_solve_stays_a_record_and_is_an_error_not_a_pass():
+    rows = records("xfem", {0: 8, 1: 16, 2: 32})
+    rows[2] = replace(rows[2], status=Status.TIMEOUT, reason="stopped after 1 s")
+    solved = {"xfem": {0: LEVELS[0], 1: LEVELS[1]}}
+    result = assess_accuracy(case([BOUND]), rows, solved, Cubic())
+    assert result.verdicts[0].verdict is Verdict.ERROR
+    assert "stopped after 1 s" in result.verdicts[0].reason
+    assert len(result.solves) == 3
+    assert result.solves[2].metrics == []
+    assert result.solves[1].metrics
+
+
+def test_no_solve_at_all_is_still_a_result():
+    rows = [SolveRecord("a test", "xfem", 0, Status.FAILED, "no memory")]
+    result = assess_accuracy(case([BOUND], exact=False), rows, {}, None)
+    assert result.verdicts[0].verdict is Verdict.ERROR
+    assert result.reference["kind"] == "none"
+
+
+def test_a_relative_error_against_zero_is_left_out_with_a_note():
+    class Still(Cubic):
+        def displacement(self, points, near=None):
+            return np.zeros_like(points)
+
+        def gradient(self, points, near=None):
+            return np.zeros((len(points), 2, 2))
+
+    result = assess(
+        [{"check": "error", "metric": "jump_l2", "at_most": 0.1}], {"xfem": {0: LEVELS[0]}}, Still()
+    )
+    assert result.solves[0].metric("jump_l2") is None
+    assert "the reference is zero" in result.verdicts[0].reason
+
+
+def test_a_body_in_space_gets_notes_and_no_wrong_number():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    tetrahedron = solution(points, np.array([[0, 1, 2, 3]]), 0 * points, size=1.0)
+    asked = scene(
+        [],
+        geometry={"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]},
+        mesh={"cells": [[1, 1, 1]]},
+        material={"young": 1.0, "poisson": 0.3},
+        supports=[{"where": "left", "displacement": [0.0, 0.0, 0.0]}],
+        acceptance=[BOUND],
+    )
+    rows = [SolveRecord("a test", "xfem", 0, Status.SOLVED, size=1.0)]
+    result = assess_accuracy(asked, rows, {"xfem": {0: tetrahedron}}, None)
+    assert result.verdicts[0].verdict is Verdict.ERROR
+    assert "box" in result.verdicts[0].reason
+
+
+def test_an_exact_case_without_its_exact_solution_is_refused():
+    with pytest.raises(InputError, match="was not given"):
+        assess_accuracy(case([]), [], {}, None)
+
+
+def test_an_uncut_body_has_no_jump_metric():
+    points, cells = grid(6, 6)
+
+    class Linear:
+        singular_points = np.zeros((0, 2))
+
+        def displacement(self, points, near=None):
+            return 0.1 * points
+
+        def gradient(self, points, near=None):
+            return np.tile(0.1 * np.eye(2), (len(points), 1, 1))
+
+    one = solution(points, cells, 0.1 * points, size=1 / 6)
+    asked = scene([], exact={"solution": "linear"})
+    rows = [SolveRecord("a test", "xfem", 0, Status.SOLVED, size=1 / 6)]
+    result = assess_accuracy(asked, rows, {"xfem": {0: one}}, Linear())
+    assert result.solves[0].metric("jump_l2") is None
+    assert result.solves[0].metric("energy_norm").value < 1e-13

@@ -1,0 +1,51 @@
+import pytest
+
+from verify.study.rates import observed_rate
+
+H = [0.4, 0.2, 0.1, 0.05]
+
+
+def rate(errors, widths=(0.0,) * 4, sizes=H):
+    return observed_rate("xfem", "energy_norm", sizes, errors, widths[: len(errors)])
+
+
+def test_a_power_law_has_its_order_without_uncertainty():
+    found = rate([h**1.5 for h in H])
+    assert found.order == pytest.approx(1.5)
+    assert found.uncertainty == pytest.approx(0, abs=1e-12)
+    assert found.reason == ""
+
+
+def test_a_slope_that_still_changes_is_uncertain_by_its_change():
+    found = rate([h + h**2 for h in H])
+    assert found.uncertainty >= abs(found.pairwise[-1] - found.pairwise[-2])
+    assert abs(found.order - 1) <= found.uncertainty
+
+
+def test_the_uncertainty_of_the_errors_goes_into_the_order():
+    exact, blurred = [h**2 for h in H], rate([h**2 for h in H], [0.1 * h**2 for h in H])
+    assert blurred.uncertainty == pytest.approx(0.2 / 0.6931, rel=1e-3)
+    assert rate(exact).uncertainty < blurred.uncertainty
+
+
+@pytest.mark.parametrize(
+    "errors, widths, reason",
+    [
+        ([1e-3, 1e-6, 1e-12, 1e-13], (0.0,) * 4, "floor"),
+        ([1e-1, 1e-2, 4e-3, 3e-3], (2e-3,) * 4, "floor"),
+        ([0.1, 0.2, 0.3, 0.4], (0.0,) * 4, "diverging"),
+        ([0.1, 0.05, 0.07, 0.01], (0.0,) * 4, "oscillating"),
+    ],
+)
+def test_an_order_that_means_nothing_is_not_given_but_explained(errors, widths, reason):
+    found = rate(errors, widths)
+    assert found.order is None
+    assert found.reason.startswith(reason)
+
+
+def test_two_levels_are_too_few():
+    assert rate([0.1, 0.05], sizes=H[:2]).reason.startswith("too few levels: 2")
+
+
+def test_an_error_of_exactly_zero_is_round_off_not_a_crash():
+    assert rate([0.1, 0.0, 0.0, 0.0]).reason.startswith("floor")

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+
+from verify.errors import InputError
+from verify.study.richardson import extrapolate, field_uncertainty, observed_order
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("sizes", [(1, 0.5, 0.25), (1, 0.6, 0.4), (1, 0.5, 0.4)])
+def test_the_order_of_a_power_law_is_found_for_any_refinement_ratios(order, sizes):
+    h = np.array(sizes) ** order
+    assert observed_order(h[0] - h[1], h[1] - h[2], sizes) == pytest.approx(order, abs=1e-6)
+
+
+def test_a_clean_sequence_is_extrapolated_to_its_limit_and_brackets_it():
+    sizes = [0.4, 0.2, 0.1]
+    found = extrapolate([3 + h**2 for h in sizes], sizes, theoretical=2)
+    assert found.extrapolated == pytest.approx(3, abs=1e-12)
+    assert found.half_width == pytest.approx(1.25 * 0.01, rel=1e-6)
+    assert "1.25" in found.reason
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [3.1, 2.98, 3.01],  # oscillating
+        [3.00, 3.01, 3.03],  # diverging
+        [3.0, 3.1, 3.1 + 1e-9],  # too good to be true
+        [3 + h**0.5 for h in (0.4, 0.2, 0.1)],  # a singularity where order 2 was expected
+    ],
+)
+def test_a_sequence_without_a_sane_order_gets_the_safety_factor_three(values):
+    found = extrapolate(values, [0.4, 0.2, 0.1], theoretical=2)
+    assert "safety factor 3" in found.reason
+    # order 2 halving h leaves at most a third of the last difference; three times that
+    assert found.half_width >= (1 - 1e-12) * abs(values[-1] - values[-2])
+
+
+def test_a_singular_sequence_brackets_its_limit_although_order_two_was_expected():
+    sizes = [0.4, 0.2, 0.1]
+    found = extrapolate([3 + h**0.5 for h in sizes], sizes, theoretical=2)
+    assert abs(found.value - 3) <= found.half_width
+
+
+def test_levels_at_round_off_are_not_extrapolated():
+    found = extrapolate([1.0, 1.0 + 2e-16, 1.0 - 2e-16], [0.4, 0.2, 0.1], theoretical=2)
+    assert found.order is None
+    assert found.half_width < 1e-12
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0, 3.0])
+def test_the_uncertainty_of_a_field_bounds_its_error_whatever_its_order(order):
+    # u_h = u + h^p e with a fixed e: differences of levels are exact, so is the error
+    sizes = np.array([0.4, 0.2, 0.1])
+    error = sizes**order
+    found = field_uncertainty(list(error[:-1] - error[1:]), list(sizes), theoretical=2)
+    assert error[-1] <= found.half_width * (1 + 1e-9) <= 4 * error[-1]
+
+
+def test_equal_reference_fields_have_no_uncertainty():
+    assert field_uncertainty([0.0, 0.0], [0.4, 0.2, 0.1], 2).half_width == 0.0
+
+
+@pytest.mark.parametrize(
+    "values, sizes, message",
+    [
+        ([1.0, 2.0], [0.2, 0.1], "at least 3"),
+        ([1.0, 2.0, 3.0], [0.1, 0.2, 0.3], "must fall"),
+        ([1.0, float("nan"), 3.0], [0.3, 0.2, 0.1], "not finite"),
+    ],
+)
+def test_levels_that_cannot_be_judged_are_refused(values, sizes, message):
+    with pytest.raises(InputError, match=message):
+        extrapolate(values, sizes, 2)

@@ -1,0 +1,180 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parent / "compare"))
+from cut_meshes import STRAIGHT, scene
+
+from verify.result import Metric, Rate, SolveRecord, Status, Verdict
+from verify.verdict import judge
+
+
+def solve(level, value, width=0.0, solver="xfem", metric="energy_norm", reference=None, size=None):
+    return SolveRecord(
+        "a test",
+        solver,
+        level,
+        Status.SOLVED,
+        size=size or 0.1 / 2**level,
+        metrics=[Metric(metric, value, "1", reference, width)],
+    )
+
+
+def verdict(check, records, rates=()):
+    asked = scene([STRAIGHT], acceptance=[{"metric": "energy_norm", **check}])
+    (found,) = judge(asked, records, list(rates))
+    return found
+
+
+@pytest.mark.parametrize(
+    "value, width, expected",
+    [
+        (0.02, 0.0, Verdict.PASS),
+        (0.02, 0.029, Verdict.PASS),  # the whole interval satisfies the limit
+        (0.04, 0.02, Verdict.UNDECIDED),
+        (0.06, 0.02, Verdict.UNDECIDED),
+        (0.06, 0.001, Verdict.FAIL),
+    ],
+)
+def test_an_error_bound_is_judged_on_the_whole_interval(value, width, expected):
+    assert (
+        verdict({"check": "error", "at_most": 0.05}, [solve(0, value, width)]).verdict is expected
+    )
+
+
+def test_an_undecided_bound_names_the_uncertainty_and_the_error_it_judges():
+    found = verdict({"check": "error", "at_most": 6e-3}, [solve(0, 5e-3, 3e-3)])
+    assert "uncertainty 3.0e-03 is not clearly below the error 5.0e-03" in found.reason
+
+
+def test_the_finest_level_is_the_one_that_is_bounded():
+    records = [solve(1, 0.01), solve(0, 0.5)]
+    assert verdict({"check": "error", "at_most": 0.05}, records).observed == 0.01
+
+
+@pytest.mark.parametrize(
+    "value, width, expected",
+    [(1.01, 0.001, Verdict.PASS), (1.1, 0.001, Verdict.FAIL), (1.05, 0.01, Verdict.UNDECIDED)],
+)
+def test_a_quantity_is_bounded_by_its_relative_distance_from_the_reference(value, width, expected):
+    record = solve(0, value, width, metric="strain_energy", reference=1.0)
+    check = {"check": "error", "metric": "strain_energy", "at_most": 0.05}
+    assert verdict(check, [record]).verdict is expected
+
+
+def test_a_quantity_whose_reference_is_zero_has_no_relative_error():
+    record = solve(0, 1.0, metric="strain_energy", reference=0.0)
+    found = verdict({"check": "error", "metric": "strain_energy", "at_most": 0.05}, [record])
+    assert found.verdict is Verdict.ERROR
+    assert "0" in found.reason
+
+
+@pytest.mark.parametrize("value, expected", [(1 + 5e-10, Verdict.PASS), (1 + 2e-9, Verdict.FAIL)])
+def test_a_stated_value_is_met_to_its_relative_tolerance(value, expected):
+    check = {
+        "check": "value",
+        "metric": "strain_energy",
+        "equals": 1.0,
+        "relative_tolerance": 1e-9,
+        "source": "theory",
+    }
+    assert verdict(check, [solve(0, value, metric="strain_energy")]).verdict is expected
+
+
+@pytest.mark.parametrize(
+    "ours, width, expected",
+    [
+        ([0.101, 0.0505], 0.0, Verdict.PASS),
+        ([0.101, 0.06], 0.0, Verdict.FAIL),  # one level is enough
+        ([0.12, 0.0505], 0.0, Verdict.FAIL),
+        ([0.94, 0.47], 0.0, Verdict.FAIL),
+        ([0.101, 0.0505], 0.005, Verdict.UNDECIDED),
+    ],
+)
+def test_a_ratio_must_hold_on_every_level(ours, width, expected):
+    records = [solve(i, e, width) for i, e in enumerate(ours)]
+    records += [solve(i, e, width, "conforming") for i, e in enumerate([0.1, 0.05])]
+    assert verdict({"check": "ratio", "within": 0.05}, records).verdict is expected
+
+
+def test_a_much_smaller_error_satisfies_at_most_but_not_within():
+    records = [solve(0, 0.01), solve(0, 0.1, solver="conforming")]
+    assert verdict({"check": "ratio", "at_most": 1.05}, records).verdict is Verdict.PASS
+    assert verdict({"check": "ratio", "within": 0.05}, records).verdict is Verdict.FAIL
+
+
+def test_a_ratio_at_unequal_mesh_sizes_is_undecided():
+    records = [solve(0, 0.1), solve(0, 0.1, solver="conforming", size=0.07)]
+    found = verdict({"check": "ratio", "within": 0.05}, records)
+    assert found.verdict is Verdict.UNDECIDED
+    assert "sizes" in found.reason
+
+
+def test_a_ratio_to_an_error_below_its_uncertainty_is_undecided():
+    records = [solve(0, 0.1), solve(0, 1e-3, 2e-3, "conforming")]
+    assert verdict({"check": "ratio", "within": 0.05}, records).verdict is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    "order, width, limits, expected",
+    [
+        (1.98, 0.01, {"at_least": 1.95}, Verdict.PASS),
+        (1.96, 0.05, {"at_least": 1.95}, Verdict.UNDECIDED),
+        (1.50, 0.05, {"at_least": 1.95}, Verdict.FAIL),
+        (0.51, 0.01, {"equals": 0.5, "within": 0.05}, Verdict.PASS),
+        (0.60, 0.01, {"equals": 0.5, "within": 0.05}, Verdict.FAIL),
+        (0.54, 0.02, {"equals": 0.5, "within": 0.05}, Verdict.UNDECIDED),
+    ],
+)
+def test_a_rate_is_judged_on_its_interval(order, width, limits, expected):
+    rate = Rate("xfem", "energy_norm", order, width, "", [order, order])
+    found = verdict({"check": "rate", **limits}, [solve(0, 0.1), solve(1, 0.05)], [rate])
+    assert found.verdict is expected
+
+
+@pytest.mark.parametrize(
+    "reason, expected",
+    [
+        ("diverging: slopes -1", Verdict.FAIL),
+        ("oscillating: slopes -1, 1", Verdict.UNDECIDED),
+        ("floor: errors 1e-15", Verdict.UNDECIDED),
+    ],
+)
+def test_an_order_that_means_nothing_never_passes(reason, expected):
+    rate = Rate("xfem", "energy_norm", None, 0.0, reason, [-1.0, -1.1])
+    found = verdict({"check": "rate", "at_least": 1.0}, [solve(0, 0.1), solve(1, 0.2)], [rate])
+    assert found.verdict is expected
+    assert reason in found.reason
+
+
+@pytest.mark.parametrize("status", [Status.FAILED, Status.TIMEOUT, Status.REFUSED, Status.MEMORY])
+@pytest.mark.parametrize(
+    "check",
+    [
+        {"check": "error", "at_most": 1.0},
+        {"check": "rate", "at_least": 0.0},
+        {"check": "ratio", "within": 0.05},
+    ],
+    ids=lambda c: c["check"],
+)
+def test_a_solve_that_did_not_finish_is_an_error_with_its_reason(status, check):
+    records = [solve(0, 0.1), SolveRecord("a test", "xfem", 1, status, "out of luck")]
+    found = verdict(check, records)
+    assert found.verdict is Verdict.ERROR
+    assert "out of luck" in found.reason
+
+
+def test_a_solver_that_was_not_run_and_a_metric_that_was_not_measured_are_errors():
+    check = {"check": "error", "at_most": 1.0}
+    assert "not run" in verdict(check, []).reason
+    bare = SolveRecord("a test", "xfem", 0, Status.SOLVED, notes={"energy_norm": "no reference"})
+    found = verdict(check, [bare])
+    assert found.verdict is Verdict.ERROR
+    assert "no reference" in found.reason
+
+
+def test_a_value_that_is_not_a_number_fails():
+    found = verdict({"check": "error", "at_most": 1.0}, [solve(0, float("nan"))])
+    assert found.verdict is Verdict.FAIL
+    assert "not finite" in found.reason
