@@ -1,4 +1,5 @@
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,16 @@ def test_a_quantity_whose_reference_is_zero_has_no_relative_error():
     found = verdict({"check": "error", "metric": "strain_energy", "at_most": 0.05}, [record])
     assert found.verdict is Verdict.ERROR
     assert "0" in found.reason
+
+
+def test_a_quantity_without_a_reference_is_never_taken_for_an_error():
+    record = replace(
+        solve(0, 0.008, metric="strain_energy"), notes={"strain_energy": "reference level 2 failed"}
+    )
+    found = verdict({"check": "error", "metric": "strain_energy", "at_most": 0.05}, [record])
+    assert found.verdict is Verdict.ERROR
+    assert "no reference" in found.reason
+    assert "reference level 2 failed" in found.reason
 
 
 @pytest.mark.parametrize("value, expected", [(1 + 5e-10, Verdict.PASS), (1 + 2e-9, Verdict.FAIL)])

@@ -12,9 +12,12 @@ from math import isfinite
 from verify.result import Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 
-__all__ = ["Interval", "error_interval", "judge"]
+__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge"]
 
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
+
+# metrics that are relative errors themselves; all others are quantities with a reference
+ERROR_METRICS = ("displacement_l2", "energy_norm", "jump_l2")
 
 # "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
 _SAME_SIZE = 0.1
@@ -34,8 +37,8 @@ class Interval:
         return max(self.value - self.low, self.high - self.value)
 
 
-class _NotMeasuredError(Exception):
-    """A solve or a metric that the check needs is not there."""
+class NotMeasuredError(Exception):
+    """A solve, a metric or its reference that the check needs is not there."""
 
 
 def judge(
@@ -65,7 +68,7 @@ def judge(
     for check in scene.acceptance:
         try:
             verdicts.append(judges[type(check)](check, records, rates))
-        except _NotMeasuredError as problem:
+        except NotMeasuredError as problem:
             verdicts.append(_record(check, Verdict.ERROR, None, _limit(check), str(problem)))
     return verdicts
 
@@ -74,11 +77,18 @@ def error_interval(metric: Metric) -> Interval:
     """Relative error that a metric stands for, with the bounds of its true value.
 
     For an error metric that is its value; for a quantity its distance from the reference.
+
+    Raises
+    ------
+    NotMeasuredError
+        If the metric is a quantity without a reference, or with one that is 0.
     """
-    if metric.reference is None:
+    if metric.name in ERROR_METRICS:
         return _interval(metric.value, metric.uncertainty)
+    if metric.reference is None:  # never take the quantity itself for an error
+        raise NotMeasuredError(f"{metric.name} has no reference to be compared with")
     if metric.reference == 0.0:
-        raise _NotMeasuredError(f"the reference of {metric.name} is 0: it has no relative error")
+        raise NotMeasuredError(f"the reference of {metric.name} is 0: it has no relative error")
     scale = abs(metric.reference)
     return _interval(abs(metric.value - metric.reference) / scale, metric.uncertainty / scale)
 
@@ -90,7 +100,7 @@ def _interval(error: float, width: float) -> Interval:
 def _judge_bound(
     check: BoundCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
 ) -> VerdictRecord:
-    error = error_interval(_metric(_levels(records, check.solver)[-1], check.metric))
+    error = _error(_levels(records, check.solver)[-1], check.metric)
     return _decide(check, error, 0.0, check.at_most, "error on the finest level")
 
 
@@ -110,14 +120,14 @@ def _judge_ratio(
 ) -> VerdictRecord:
     ours, theirs = _levels(records, check.solver), _levels(records, check.to)
     if [r.level for r in ours] != [r.level for r in theirs]:
-        raise _NotMeasuredError(f"{check.solver} and {check.to} were not solved on the same levels")
+        raise NotMeasuredError(f"{check.solver} and {check.to} were not solved on the same levels")
     low, high = 0.0, check.at_most or 0.0
     if check.within is not None:
         low, high = 1 - check.within, 1 + check.within
     found = []
     for one, other in zip(ours, theirs, strict=True):
-        a = error_interval(_metric(one, check.metric))
-        b = error_interval(_metric(other, check.metric))
+        a = _error(one, check.metric)
+        b = _error(other, check.metric)
         if one.size and other.size and abs(one.size / other.size - 1) > _SAME_SIZE:
             text = f"level {one.level}: mesh sizes {one.size:.3g} and {other.size:.3g} m differ"
             return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
@@ -144,7 +154,7 @@ def _judge_rate(
     _levels(records, check.solver)
     rate = next((r for r in rates if (r.solver, r.metric) == (check.solver, check.metric)), None)
     if rate is None:
-        raise _NotMeasuredError(f"no rate of {check.metric} for {check.solver}")
+        raise NotMeasuredError(f"no rate of {check.metric} for {check.solver}")
     low, high = -float("inf"), float("inf")
     if check.at_least is not None:
         low = check.at_least
@@ -211,10 +221,10 @@ def _levels(records: Sequence[SolveRecord], solver: str) -> list[SolveRecord]:
     """All solves of a solver, coarse to fine; every one must have finished."""
     own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
     if not own:
-        raise _NotMeasuredError(f"'{solver}' was not run")
+        raise NotMeasuredError(f"'{solver}' was not run")
     for record in own:
         if record.status is not Status.SOLVED:
-            raise _NotMeasuredError(
+            raise NotMeasuredError(
                 f"{solver} level {record.level} {record.status}: {record.reason}"
             )
     return own
@@ -224,5 +234,14 @@ def _metric(record: SolveRecord, name: str) -> Metric:
     metric = record.metric(name)
     if metric is None:
         why = record.notes.get(name, "it was not measured")
-        raise _NotMeasuredError(f"{record.solver} level {record.level} has no {name}: {why}")
+        raise NotMeasuredError(f"{record.solver} level {record.level} has no {name}: {why}")
     return metric
+
+
+def _error(record: SolveRecord, name: str) -> Interval:
+    metric = _metric(record, name)
+    try:
+        return error_interval(metric)
+    except NotMeasuredError as problem:
+        why = f": {record.notes[name]}" if name in record.notes else ""
+        raise NotMeasuredError(f"{problem}{why}") from None

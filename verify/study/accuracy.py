@@ -156,7 +156,8 @@ def _measure(
         unit = unit_of(asked, scene.dimension)
         metrics.append(Metric(asked.name, one.quantity(asked), unit, known, width, source))
     if reference is None:
-        return _noted(replace(record, metrics=metrics), dict.fromkeys(ERRORS, missing))
+        names = [*ERRORS, *(q.name for q in scene.quantities)]
+        return _noted(replace(record, metrics=metrics), dict.fromkeys(names, missing))
     if record.solver == REFERENCE and not scene.judged_by_exact:
         return replace(record, metrics=metrics)  # it does not judge itself
     errors, notes = _errors(one, reference, ruler)
@@ -198,8 +199,7 @@ def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
                 for record in own
                 if record.size
                 and (metric := record.metric(name)) is not None
-                and (metric.reference is None) == (name in ERRORS)
-                and metric.reference != 0.0
+                and (name in ERRORS or metric.reference)
             ]
             if rows:
                 sizes, errors = zip(*rows, strict=True)
