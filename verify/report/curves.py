@@ -84,7 +84,9 @@ def error_curves(result: CaseResult, metric: str) -> list[Curve]:
     """
     groups: dict[tuple[str, str], list[SolveRecord]] = {}
     for solve in result.solves:
-        groups.setdefault((solve.solver, json.dumps(solve.parameters, sort_keys=True)), []).append(solve)
+        groups.setdefault((solve.solver, json.dumps(solve.parameters, sort_keys=True)), []).append(
+            solve
+        )
     rates = {rate.solver: rate for rate in result.rates if rate.metric == metric}
     curves = []
     for (solver, parameters), solves in groups.items():
@@ -136,7 +138,9 @@ def _curve(
 
 def _can_be_drawn(measured: Metric) -> bool:
     """Whether it is an error, or a quantity that has a reference value to differ from."""
-    known = measured.unit == "1" if measured.reference is None else math.isfinite(measured.reference)
+    known = (
+        measured.unit == "1" if measured.reference is None else math.isfinite(measured.reference)
+    )
     return known and math.isfinite(measured.value) and math.isfinite(measured.uncertainty)
 
 

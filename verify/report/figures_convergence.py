@@ -36,7 +36,11 @@ def error_range(curves: list[Curve], sloped: bool) -> tuple[float, float] | None
 def required_slope(result: CaseResult, metric: str) -> tuple[float, str] | None:
     """Return the order of convergence that the case demands of `metric`, and how it says so."""
     for check in result.scene.get("acceptance") or []:
-        if isinstance(check, dict) and check.get("check") == "rate" and check.get("metric") == metric:
+        if (
+            isinstance(check, dict)
+            and check.get("check") == "rate"
+            and check.get("metric") == metric
+        ):
             if isinstance(order := check.get("at_least"), int | float):
                 return float(order), f"≥ {order:g}"
             if isinstance(order := check.get("equals"), int | float):
@@ -80,7 +84,9 @@ def _order(rate: Rate | None) -> str:
         return ""
     if rate.reason or rate.order is None:
         return "no order: " + rate.reason.split(":")[0].split("(")[0].strip()[:12]
-    return f"order {rate.order:.2f}" + (f" ± {rate.uncertainty:.2f}" if rate.uncertainty >= 0.005 else "")
+    return f"order {rate.order:.2f}" + (
+        f" ± {rate.uncertainty:.2f}" if rate.uncertainty >= 0.005 else ""
+    )
 
 
 def _places_of_ends(curve: Curve, curves: list[Curve]) -> list[tuple[float, float]]:

@@ -11,8 +11,17 @@ from verify.report.notation import number_text
 __all__ = ["Style", "abandoned", "band", "curve_names", "drawn_curve", "slope_triangle", "style_of"]
 
 # Okabe and Ito's palette, darkened to stay legible as text; markers differ as well
-_FIRST = {"xfem": ("#c04a00", "disc"), "conforming": ("#0067a5", "square"), "reference": ("#4d4d4d", "diamond")}
-_OTHERS = [("#00785a", "triangle"), ("#a3487b", "cross"), ("#8a6a00", "disc"), ("#5b4db5", "square")]
+_FIRST = {
+    "xfem": ("#c04a00", "disc"),
+    "conforming": ("#0067a5", "square"),
+    "reference": ("#4d4d4d", "diamond"),
+}
+_OTHERS = [
+    ("#00785a", "triangle"),
+    ("#a3487b", "cross"),
+    ("#8a6a00", "disc"),
+    ("#5b4db5", "square"),
+]
 
 
 @dataclass(frozen=True)
@@ -107,7 +116,9 @@ def band(panel: Panel, floor: Sequence[tuple[float, float]]) -> Markup:
     )
 
 
-def slope_triangle(panel: Panel, low: float, high: float, y: float, slope: float, name: str) -> Markup:
+def slope_triangle(
+    panel: Panel, low: float, high: float, y: float, slope: float, name: str
+) -> Markup:
     """Return a triangle of `slope` over the abscissa from `low` to `high`, starting at `y`."""
     x0, x1 = panel.x.at(low), panel.x.at(high)
     y0, y1 = panel.y.at(y), panel.y.at(y * (high / low) ** slope)
@@ -126,8 +137,12 @@ def _error_bar(panel: Panel, point: Point, x: float, style: Style) -> Markup | N
     bottom = panel.y.at(low)
     if bottom - top < 3:  # hidden behind the marker; the tip and the table have it
         return None
-    feet = f"M{x - 3:.1f} {top:.1f}h6" + (f"M{x - 3:.1f} {bottom:.1f}h6" if low > panel.y.low else "")
-    return tag("path", d=f"{feet}M{x:.1f} {top:.1f}V{bottom:.1f}", class_="bar", stroke=style.colour)
+    feet = f"M{x - 3:.1f} {top:.1f}h6" + (
+        f"M{x - 3:.1f} {bottom:.1f}h6" if low > panel.y.low else ""
+    )
+    return tag(
+        "path", d=f"{feet}M{x:.1f} {top:.1f}V{bottom:.1f}", class_="bar", stroke=style.colour
+    )
 
 
 def _marker(x: float, y: float, style: Style, tip: str) -> Markup:
@@ -141,7 +156,12 @@ def _marker(x: float, y: float, style: Style, tip: str) -> Markup:
     filled = style.marker in ("disc", "triangle")
     fill = style.colour if filled else "#fff"
     return tag(
-        "path", tag("title", tip), d=shapes[style.marker], class_="marker", stroke=style.colour, fill=fill
+        "path",
+        tag("title", tip),
+        d=shapes[style.marker],
+        class_="marker",
+        stroke=style.colour,
+        fill=fill,
     )
 
 

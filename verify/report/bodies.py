@@ -1,0 +1,165 @@
+"""What is drawn of a stored field: triangles, outline and values, ready for any renderer."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+from verify.solution import Solution, read_solution
+
+__all__ = ["Body", "deformed_body", "error_body", "read_stored"]
+
+_FEATURE_ANGLE = 30.0  # degrees between facets beyond which a 3D edge is drawn
+
+
+@dataclass(frozen=True)
+class Body:
+    """A surface to draw.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        Where the nodes are drawn, m.
+    triangles : (m, 3) int array
+    edges : (e, 2) int array
+        Outline; the two faces of a cut are part of it, since nodes are doubled there.
+    values : (n,) or (m,) float array
+        What is coloured, per node or per triangle.
+    element_edges : (k, 2) int array
+        Edges of the elements, empty where they would be too dense to be seen.
+    """
+
+    points: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    values: NDArray[np.float64]
+    element_edges: NDArray[np.int64]
+
+
+def read_stored(root: Path, path: str) -> Solution:
+    """Read the solution stored under `path` in the run directory `root`.
+
+    Raises
+    ------
+    InputError
+        If it is not there, not readable, or not inside the run directory.
+    """
+    target = (root / path).resolve()
+    if not target.is_relative_to(root.resolve()):
+        raise InputError("lies outside the run directory", path)
+    # a record may name the file, its path without ending, or its folder
+    target = target / "solution" if target.is_dir() else target
+    if target.suffix not in (".json", ".vtu"):
+        target = target.with_name(target.name + ".json")
+    try:
+        return read_solution(target)
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", path) from None
+
+
+def deformed_body(solution: Solution, scale: float) -> Body:
+    """Return the body displaced by `scale` times its last displacement, coloured by |u|."""
+    displacement = solution.displacement[-1]
+    points = solution.points + scale * displacement
+    cells = _straight(solution.cells, solution.cell_type)
+    return _body(points, cells, np.linalg.norm(displacement, axis=1), solution.cells)
+
+
+def error_body(path: Path) -> Body:
+    """Return the undeformed body of a stored error field, coloured by the error.
+
+    Raises
+    ------
+    InputError
+        If the file is not a mesh of simplices with point or cell data ``error``.
+    """
+    import meshio
+
+    try:
+        mesh = meshio.read(path, file_format="vtu")
+    except (Exception, SystemExit) as error:  # meshio exits on unreadable files
+        said = f"cannot be read ({type(error).__name__}: {error})"
+        raise InputError(said, str(path)) from None
+    for kind in ("tetra10", "tetra", "triangle6", "triangle"):
+        if kind in mesh.cells_dict:
+            break
+    else:
+        raise InputError("no triangles or tetrahedra in it", str(path))
+    cells = np.asarray(mesh.cells_dict[kind], dtype=np.int64)
+    dimension = 3 if kind.startswith("tetra") else 2
+    points = np.asarray(mesh.points, dtype=float)[:, :dimension]
+    if "error" in mesh.point_data:
+        values = np.asarray(mesh.point_data["error"], dtype=float)
+        values = values if values.ndim == 1 else np.linalg.norm(values, axis=1)
+        if len(values) != len(points) or not np.isfinite(values).all():
+            raise InputError("its error has values that are not finite", str(path))
+        return _body(points, _straight(cells, kind), values, cells)
+    per_cell = mesh.cell_data_dict.get("error", {}).get(kind)
+    if per_cell is None or dimension == 3 or kind == "triangle6":
+        raise InputError("has no point data 'error'", str(path))
+    return _body(points, cells, np.asarray(per_cell, dtype=float).reshape(-1), cells)
+
+
+def _straight(cells: NDArray[np.int64], kind: str) -> NDArray[np.int64]:
+    """Return quadratic triangles as four straight ones, tetrahedra by their corners."""
+    if kind == "triangle6":
+        a, b, c, ab, bc, ca = cells.T
+        return np.concatenate(
+            [np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+    return cells[:, :4] if kind.startswith("tetra") else cells
+
+
+def _body(
+    points: NDArray[np.float64],
+    cells: NDArray[np.int64],
+    values: NDArray[np.float64],
+    elements: NDArray[np.int64],
+) -> Body:
+    flat = points.shape[1] == 2
+    drawn = np.column_stack([points, np.zeros(len(points))]) if flat else points
+    if flat:
+        triangles = cells
+        edges = _single(cells, ((0, 1), (1, 2), (2, 0)))
+        inner = _all_edges(elements[:, :3], ((0, 1), (1, 2), (2, 0)))
+    else:
+        triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))
+        edges = _creases(drawn, triangles)
+        inner = _all_edges(triangles, ((0, 1), (1, 2), (2, 0)))
+    return Body(drawn, triangles, edges, values, inner if len(inner) <= 4000 else inner[:0])
+
+
+def _single(cells: NDArray[np.int64], faces: tuple[tuple[int, ...], ...]) -> NDArray[np.int64]:
+    """Return the faces that belong to one cell only, as the cell orients them."""
+    found = np.concatenate([cells[:, list(face)] for face in faces])
+    _, first, count = np.unique(
+        np.sort(found, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    single: NDArray[np.int64] = found[np.sort(first[count == 1])]
+    return single
+
+
+def _all_edges(cells: NDArray[np.int64], pairs: tuple[tuple[int, int], ...]) -> NDArray[np.int64]:
+    found = np.concatenate([cells[:, list(pair)] for pair in pairs])
+    edges: NDArray[np.int64] = np.unique(np.sort(found, axis=1), axis=0)
+    return edges
+
+
+def _creases(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the edges of a surface where it ends or bends sharply."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    edges = np.concatenate([triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
+    owner = np.tile(np.arange(len(triangles)), 3)
+    unique, inverse, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    total = np.zeros((len(unique), 3))
+    np.add.at(total, inverse.reshape(-1), normals[owner])
+    # |n1 + n2| = 2 cos(angle/2) for the two facets of an inner edge
+    sharp = np.linalg.norm(total, axis=1) < 2 * np.cos(np.deg2rad(_FEATURE_ANGLE) / 2)
+    creases: NDArray[np.int64] = unique[(count != 2) | sharp]
+    return creases

@@ -1,0 +1,165 @@
+"""The report for programs: results as JSON, as CSV rows, and as JUnit test cases."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import asdict
+from statistics import median
+from typing import Any
+from xml.etree import ElementTree
+
+from verify.report.curves import duration
+from verify.report.markup import printable
+from verify.report.run_directory import CaseEntry, Run
+from verify.result import SolveRecord, Verdict, VerdictRecord
+
+__all__ = ["COLUMNS", "EXPORT_SCHEMA", "csv_rows", "json_document", "junit_document"]
+
+EXPORT_SCHEMA = 1
+COLUMNS = (
+    "case",
+    "solver",
+    "level",
+    "parameters",
+    "status",
+    "reason",
+    "size",
+    "unknowns",
+    "metric",
+    "value",
+    "unit",
+    "reference",
+    "uncertainty",
+    "source",
+    "seconds_median",
+    "seconds_min",
+    "seconds_max",
+    "meshing_median",
+    "repetitions",
+    "wall",
+    "peak_memory",
+)
+
+
+def json_document(run: Run) -> str:
+    """Return all results of a run as one JSON document of schema version `EXPORT_SCHEMA`.
+
+    Numbers that are not finite, for which JSON has no word, become null.
+    """
+    cases = [
+        {
+            "case": entry.name,
+            "defect": entry.defect,
+            "result": asdict(entry.result) if entry.result else None,
+            "unjudged": [asdict(solve) for solve in entry.unjudged],
+        }
+        for entry in run.entries
+    ]
+    document = {
+        "schema": EXPORT_SCHEMA,
+        "kind": "verification results",
+        "run": run.record,
+        "defects": run.defects,
+        "cases": cases,
+    }
+    return json.dumps(_finite(document), indent=1, allow_nan=False) + "\n"
+
+
+def csv_rows(run: Run) -> str:
+    """Return one row per case, solver, level and metric; one without metric for failed solves."""
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    for entry in run.entries:
+        for solve in entry.result.solves if entry.result else entry.unjudged:
+            writer.writerows(_rows(entry, solve))
+    return buffer.getvalue()
+
+
+def junit_document(run: Run) -> str:
+    """Return one test case per verdict, and one per case that has none."""
+    root = ElementTree.Element("testsuites", name="verification")
+    for entry in run.entries:
+        suite = ElementTree.SubElement(root, "testsuite", name=printable(entry.name))
+        if entry.result is None:
+            _testcase(suite, entry, "result", Verdict.ERROR, entry.defect)
+        elif not entry.result.verdicts:
+            _testcase(suite, entry, "result", Verdict.UNDECIDED, "the case states no check")
+        else:
+            for record in entry.result.verdicts:
+                _testcase(suite, entry, _test_name(record), record.verdict, record.reason)
+        _count(suite)
+        walls = [
+            solve.wall for solve in (entry.result.solves if entry.result else []) if solve.wall
+        ]
+        suite.set("time", f"{sum(walls):.3f}")
+    _count(root)
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, "unicode") + "\n"
+
+
+def _rows(entry: CaseEntry, solve: SolveRecord) -> Iterator[dict[str, Any]]:
+    time = duration(solve)
+    common = {
+        "case": printable(entry.name),
+        "solver": printable(solve.solver),
+        "level": solve.level,
+        "parameters": json.dumps(solve.parameters, sort_keys=True) if solve.parameters else "",
+        "status": str(solve.status),
+        "reason": printable(solve.reason),
+        "size": solve.size,
+        "unknowns": solve.unknowns,
+        "wall": solve.wall,
+        "peak_memory": solve.peak_memory,
+    }
+    if meshing := solve.timings.get("meshing"):
+        common["meshing_median"] = median(meshing)
+    if time:
+        common |= {
+            "seconds_median": time.median,
+            "seconds_min": time.low,
+            "seconds_max": time.high,
+            "repetitions": time.repetitions,
+        }
+    for metric in solve.metrics:
+        yield common | {
+            "metric": printable(metric.name),
+            "value": metric.value,
+            "unit": printable(metric.unit),
+            "reference": metric.reference,
+            "uncertainty": metric.uncertainty,
+            "source": printable(metric.source),
+        }
+    if not solve.metrics:
+        yield common
+
+
+def _test_name(record: VerdictRecord) -> str:
+    return f"{record.check} {record.metric} of {record.solver}: {record.limit}"
+
+
+def _testcase(
+    suite: ElementTree.Element, entry: CaseEntry, name: str, verdict: Verdict, reason: str
+) -> None:
+    classname = printable(entry.name).replace("/", ".")
+    case = ElementTree.SubElement(suite, "testcase", name=printable(name), classname=classname)
+    elements = {Verdict.FAIL: "failure", Verdict.ERROR: "error", Verdict.UNDECIDED: "skipped"}
+    if verdict in elements:
+        said = printable(reason) or "no reason given"
+        ElementTree.SubElement(case, elements[verdict], message=f"{verdict}: {said}")
+
+
+def _count(element: ElementTree.Element) -> None:
+    element.set("tests", str(len(element.findall(".//testcase"))))
+    for kind, name in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+        element.set(kind, str(len(element.findall(f".//{name}"))))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    return [_finite(entry) for entry in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,61 @@
+"""The page as a whole: one file, nothing fetched, no script."""
+
+from importlib.resources import files
+
+from verify.report.case_section import case_section
+from verify.report.markup import Markup, joined, tag
+from verify.report.origin import origin_section, reading_guide
+from verify.report.pictures import CasePictures
+from verify.report.run_directory import Run
+from verify.report.summary import summary, verdict_table
+
+__all__ = ["page"]
+
+
+def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
+    """Return the report as HTML.
+
+    Parameters
+    ----------
+    run : Run
+    pictures : list of CasePictures
+        One for each of the run's entries.
+    notes : list of str
+        What has to be said about the pictures of all cases.
+    """
+    style = Markup(files("verify.report").joinpath("style.css").read_text(encoding="utf-8"))
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", "Verification report"),
+        tag("style", style),
+    )
+    started = run.record.get("started")
+    when = f"Run of {started}" if started else "Run of unknown date"
+    links = (("#reading", "how to read this"), ("#provenance", "provenance"))
+    top = tag(
+        "header",
+        tag("h1", "Verification report"),
+        tag(
+            "p",
+            when,
+            [joined(" · ", tag("a", words, href=to)) for to, words in links],
+            class_="quiet",
+        ),
+        class_="top",
+    )
+    sections = [
+        case_section(index, entry, shown)
+        for index, (entry, shown) in enumerate(zip(run.entries, pictures, strict=True))
+    ]
+    body = tag(
+        "main",
+        summary(run),
+        [tag("p", "Note: " + note, class_="warning") for note in notes],
+        verdict_table(run),
+        sections,
+        reading_guide(),
+        origin_section(run),
+    )
+    return joined(Markup("<!DOCTYPE html>\n"), tag("html", head, tag("body", top, body), lang="en"))

@@ -1,0 +1,191 @@
+"""Pictures of a run: reference and XFEM with the cut open, and where the error is."""
+
+import base64
+import io
+import math
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from verify.errors import InputError
+from verify.report import draw_with_matplotlib
+from verify.report.bodies import Body, deformed_body, error_body, read_stored
+from verify.report.notation import number_text, solver_title
+from verify.report.run_directory import CaseEntry
+from verify.report.view import View, common_view
+from verify.result import CaseResult, SolveRecord, Status
+from verify.solution import Solution
+
+__all__ = ["CasePictures", "Picture", "case_pictures", "drawn"]
+
+DISPLACEMENT_COLOURS, ERROR_COLOURS = "cividis", "YlOrBr"
+_VTK = [sys.executable, "-m", "verify.report.draw_with_vtk"]
+_SECONDS = 60.0  # to start VTK
+_SECONDS_EACH = 20.0
+_OPENING_SHOWN = 0.08  # of the body's diagonal: what the largest displacement is scaled to
+
+
+@dataclass
+class Picture:
+    """One picture: what it shows, and its image once it is drawn."""
+
+    title: str
+    description: str
+    body: Body
+    view: View
+    image: bytes = b""  # WebP
+    by_vtk: bool = True
+
+    @property
+    def address(self) -> str:
+        """The image as a data address."""
+        return "data:image/webp;base64," + base64.b64encode(self.image).decode("ascii")
+
+
+@dataclass
+class CasePictures:
+    """The pictures of a case and what has to be said about them.
+
+    `deformed` share view, colours and `scale` (displacements are drawn that much enlarged).
+    """
+
+    deformed: list[Picture] = field(default_factory=list)
+    error: list[Picture] = field(default_factory=list)
+    scale: float = 1.0
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def all(self) -> list[Picture]:
+        """Every picture of the case."""
+        return [*self.deformed, *self.error]
+
+
+def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
+    """Prepare the pictures of a case from what is stored; what is missing becomes a note."""
+    pictures = CasePictures()
+    if entry.result is None:
+        return pictures
+    shown: list[tuple[SolveRecord, Solution]] = []
+    for solve in _shown_solves(entry.result):
+        try:
+            shown.append((solve, read_stored(root, solve.solution or "")))
+        except InputError as error:
+            where = f"{solver_title(solve.solver)}, level {solve.level}"
+            pictures.notes.append(f"No picture of {where}: the stored solution {error.what}.")
+    dimensions = {solution.dimension for _, solution in shown}
+    if len(dimensions) > 1:
+        pictures.notes.append("No pictures side by side: the solutions differ in dimension.")
+    elif shown:
+        _deformed(pictures, shown)
+    elif not pictures.notes:
+        pictures.notes.append("No pictures: no solution is stored.")
+    _error(pictures, root, entry)
+    return pictures
+
+
+def drawn(pictures: Sequence[Picture]) -> str:
+    """Draw every picture, by VTK in a process of its own, else by matplotlib.
+
+    Returns
+    -------
+    str
+        Why VTK did not draw some or all of them; empty if it did.
+    """
+    if not pictures:
+        return ""
+    with tempfile.TemporaryDirectory(prefix="verify-report-") as name:
+        folder = Path(name)
+        job = folder / "job.pickle"
+        files = [f"{i}.png" for i in range(len(pictures))]
+        asked = [(p.body, p.view, file) for p, file in zip(pictures, files, strict=True)]
+        job.write_bytes(pickle.dumps(asked))
+        reason = _by_vtk(job, _SECONDS + _SECONDS_EACH * len(pictures))
+        for picture, file in zip(pictures, files, strict=True):
+            try:
+                picture.image = _as_webp(folder / file)
+            except OSError:  # not there, or cut off when the process ended
+                picture.by_vtk = False
+                draw_with_matplotlib.draw(picture.body, picture.view, folder / file)
+                picture.image = _as_webp(folder / file)
+    return "" if all(picture.by_vtk for picture in pictures) else reason or "VTK drew nothing"
+
+
+def _by_vtk(job: Path, seconds: float) -> str:
+    try:
+        done = subprocess.run([*_VTK, str(job)], capture_output=True, text=True, timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return f"VTK took longer than {seconds:g} s"
+    except OSError as error:
+        return f"VTK could not be started ({error.strerror})"
+    if done.returncode < 0:
+        return f"VTK ended by signal {-done.returncode}, as it does without OpenGL"
+    last = done.stderr.strip().splitlines()[-1:]
+    return f"VTK failed ({last[0][:200] if last else 'no message'})" if done.returncode else ""
+
+
+def _as_webp(path: Path) -> bytes:
+    buffer = io.BytesIO()
+    with Image.open(path) as image:
+        image.convert("RGB").save(buffer, "WEBP", quality=84, method=4)
+    return buffer.getvalue()
+
+
+def _shown_solves(result: CaseResult) -> list[SolveRecord]:
+    """Return the finest stored solve of the reference (else the conforming) and of the rest."""
+    finest: dict[str, SolveRecord] = {}
+    for solve in sorted(result.solves, key=lambda solve: solve.level):
+        if solve.status is Status.SOLVED and solve.solution:
+            finest[solve.solver] = solve
+    if "reference" in finest:
+        finest.pop("conforming", None)
+    order = {"reference": 0, "conforming": 1, "xfem": 2}
+    return sorted(finest.values(), key=lambda solve: order.get(solve.solver, 3))[:4]
+
+
+def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> None:
+    everything = np.concatenate([solution.points for _, solution in shown])
+    diagonal = float(np.linalg.norm(np.ptp(everything, axis=0)))
+    largest = max(float(np.abs(solution.displacement[-1]).max()) for _, solution in shown)
+    pictures.scale = _round_scale(_OPENING_SHOWN * diagonal / largest) if largest > 0 else 1.0
+    bodies = [deformed_body(solution, pictures.scale) for _, solution in shown]
+    view = common_view(bodies, DISPLACEMENT_COLOURS)
+    for (solve, solution), body in zip(shown, bodies, strict=True):
+        title = f"{solver_title(solve.solver)}, level {solve.level}"
+        when = "" if len(solution.times) == 1 else f" at t = {solution.times[-1]:.4g} s"
+        description = (
+            f"Deformed body, {title}{when}; displacements drawn {pictures.scale:g} times, "
+            f"largest displacement {number_text(float(body.values.max()))} m."
+        )
+        pictures.deformed.append(Picture(title + when, description, body, view))
+
+
+def _round_scale(scale: float) -> float:
+    """Return 1 for bodies that move visibly by themselves, else 1, 2 or 5 times a power of ten."""
+    if 0.3 <= scale < 2:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(scale))
+    return next(m * power for m in (5, 2, 1) if scale >= m * power * (1 - 1e-12))
+
+
+def _error(pictures: CasePictures, root: Path, entry: CaseEntry) -> None:
+    named = entry.result.pictures.get("error_field") if entry.result else None
+    path = root / named if named else entry.folder / "error_field.vtu"
+    if not path.resolve().is_relative_to(root.resolve()) or not path.is_file():
+        pictures.notes.append("No picture of the error: no error field is stored for this case.")
+        return
+    try:
+        body = error_body(path)
+    except InputError as error:
+        pictures.notes.append(f"No picture of the error: the stored field {error.what}.")
+        return
+    largest = number_text(float(body.values.max()))
+    description = f"Error of the displacement on the undeformed body; largest {largest} m."
+    view = common_view([body], ERROR_COLOURS)
+    pictures.error.append(Picture("error of XFEM", description, body, view))

@@ -1,0 +1,137 @@
+"""The top of the report: what was found, in one paragraph and one table."""
+
+from collections import Counter
+
+from verify.report.markup import Markup, joined, tag
+from verify.report.notation import metric_title, solver_title, with_interval
+from verify.report.run_directory import CaseEntry, Run
+from verify.result import Status, Verdict, VerdictRecord
+
+__all__ = ["anchor", "badge", "check_text", "summary", "verdict_of", "verdict_table"]
+
+_SIGNS = {
+    Verdict.PASS: "✓",
+    Verdict.FAIL: "✕",
+    Verdict.UNDECIDED: "?",
+    Verdict.ERROR: "!",
+}
+_CHECKS = {
+    "rate": "order of the",
+    "error": "finest-mesh",
+    "ratio": "ratio to another solver, on every level, of the",
+    "value": "value of the",
+}
+_NAMED_IN_PARAGRAPH = 6
+
+
+def anchor(index: int) -> str:
+    """Return the identifier of the section of case number `index`."""
+    return f"case-{index + 1}"
+
+
+def badge(verdict: Verdict) -> Markup:
+    """Return a verdict as a sign, a word and a frame: the colour says nothing of its own."""
+    sign = tag("span", _SIGNS[verdict], aria_hidden="true")
+    return tag("span", sign, " ", str(verdict), class_=f"verdict {verdict.lower()}")
+
+
+def verdict_of(entry: CaseEntry) -> Verdict:
+    """Return the verdict of a case; one without a result could not be judged."""
+    return entry.result.verdict if entry.result else Verdict.ERROR
+
+
+def check_text(record: VerdictRecord) -> str:
+    """Return what a check looks at, in words."""
+    what = _CHECKS.get(record.check, record.check)
+    return f"{solver_title(record.solver)}: {what} {metric_title(record.metric)}"
+
+
+def summary(run: Run) -> Markup:
+    """Return the paragraph that says what came out, and what to distrust."""
+    judged = [(e, v) for e in run.entries if e.result for v in e.result.verdicts]
+    counts = Counter(v.verdict for _, v in judged)
+    cases, checks = len(run.entries), len(judged)
+    said: list[str | Markup] = [
+        f"{_count(cases, 'case')} with {_count(checks, 'check')}: "
+        f"{counts[Verdict.PASS]} passed, {counts[Verdict.FAIL]} failed, "
+        f"{counts[Verdict.UNDECIDED]} undecided, {counts[Verdict.ERROR]} not judged. "
+    ]
+    if failed := [f"{e.name} ({check_text(v)})" for e, v in judged if v.verdict is Verdict.FAIL]:
+        said.append(joined(tag("b", "Failed"), ": ", _listed(failed), ". "))
+    open_ = [(e, v) for e, v in judged if v.verdict is Verdict.UNDECIDED]
+    if undecided := [f"{e.name} ({check_text(v)}): {_clause(v.reason)}" for e, v in open_]:
+        said.append(joined(tag("b", "Undecided"), ": ", _listed(undecided), ". "))
+    errors = [f"{e.name}: {_clause(v.reason)}" for e, v in judged if v.verdict is Verdict.ERROR]
+    errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
+    if errors := list(dict.fromkeys(errors)):
+        said.append(joined(tag("b", "Not judged"), ": ", _listed(errors), ". "))
+    without = [e.name for e in run.entries if e.result and not e.result.verdicts]
+    if without:
+        said.append(f"No check is stated for {_listed(without)}: nothing was accepted there. ")
+    solves = [s for r in run.results for s in r.solves] + [
+        s for e in run.entries for s in e.unjudged
+    ]
+    ended = Counter(str(s.status) for s in solves if s.status is not Status.SOLVED)
+    if ended:
+        how = ", ".join(f"{count} {name}" for name, count in sorted(ended.items()))
+        said.append(f"Of {_count(len(solves), 'solve')}, {how}; each is listed under its case. ")
+    return joined(tag("p", said, class_="summary"), _warnings(run))
+
+
+def verdict_table(run: Run) -> Markup:
+    """Return all verdicts, a group of rows per case."""
+    groups = []
+    for index, entry in enumerate(run.entries):
+        title = entry.result.title if entry.result else entry.name
+        requirement = entry.result.requirement if entry.result else entry.defect
+        head = tag(
+            "th",
+            tag("a", title, href=f"#{anchor(index)}"),
+            tag("span", entry.name, class_="path"),
+            tag("p", requirement, class_="requirement"),
+            colspan=3,
+            scope="rowgroup",
+        )
+        verdict = tag("td", badge(verdict_of(entry)), class_="worst")
+        rows = [tag("tr", head, verdict, class_="case-row")]
+        rows += [_check_row(record) for record in entry.result.verdicts] if entry.result else []
+        groups.append(tag("tbody", rows))
+    titles = ["check", "observed [interval]", "limit", "verdict"]
+    head_row = tag("tr", [tag("th", title, scope="col") for title in titles])
+    whole = tag(
+        "table", tag("caption", "Verdicts"), tag("thead", head_row), groups, class_="verdicts"
+    )
+    return tag("div", whole, class_="scroll", tabindex="0", role="region", aria_label="Verdicts")
+
+
+def _check_row(record: VerdictRecord) -> Markup:
+    return tag(
+        "tr",
+        tag("td", check_text(record)),
+        tag("td", with_interval(record.observed, record.low, record.high), class_="number"),
+        tag("td", record.limit),
+        tag("td", badge(record.verdict), tag("div", record.reason, class_="reason")),
+    )
+
+
+def _warnings(run: Run) -> Markup:
+    said = [f"{defect[:1].upper()}{defect[1:]}." for defect in run.defects]
+    if (run.record.get("provenance") or {}).get("dirty"):
+        said.append(
+            "The code differed from its commit when this ran: it cannot be reproduced from it."
+        )
+    return joined(*(tag("p", "Note: " + sentence, class_="warning") for sentence in said))
+
+
+def _listed(parts: list[str]) -> str:
+    rest = len(parts) - _NAMED_IN_PARAGRAPH
+    shown = "; ".join(parts[:_NAMED_IN_PARAGRAPH])
+    return shown if rest <= 0 else f"{shown}; and {rest} more in the table"
+
+
+def _clause(sentence: str) -> str:
+    return sentence.rstrip(". ") or "no reason given"
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"

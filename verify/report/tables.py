@@ -1,0 +1,220 @@
+"""The tables of a case: orders, numbers, times, reference, regularisations, failures."""
+
+from collections.abc import Sequence
+from statistics import median
+from typing import Any
+
+from verify.report.curves import duration, metric_names
+from verify.report.markup import Markup, joined, tag
+from verify.report.notation import (
+    bytes_text,
+    metric_title,
+    number,
+    seconds_text,
+    solver_title,
+)
+from verify.result import CaseResult, Metric, SolveRecord, Status
+
+__all__ = [
+    "failures_table",
+    "numbers_table",
+    "orders_table",
+    "reference_record",
+    "regularisations_table",
+    "table",
+    "times_table",
+]
+
+
+def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], caption: str, **marks: str) -> Markup:
+    """Return a table that scrolls sideways where the page is too narrow for it."""
+    cells = [tag("tr", [tag("td", cell) for cell in row]) for row in rows]
+    whole = tag(
+        "table",
+        tag("caption", caption),
+        tag("thead", tag("tr", [tag("th", title, scope="col") for title in head])),
+        tag("tbody", cells),
+    )
+    class_ = f"scroll {marks.get('class_', '')}".strip()
+    return tag("div", whole, class_=class_, tabindex="0", role="region", aria_label=caption)
+
+
+def numbers_table(result: CaseResult) -> Markup | None:
+    """Return every measured number of every solve with its uncertainty."""
+    names = metric_names(result)
+    if not result.solves:
+        return None
+    head = ["solver", "level", "h (m)", "unknowns", *(metric_title(name) for name in names)]
+    rows = [
+        [
+            solver_title(solve.solver),
+            solve.level,
+            number(solve.size),
+            number(solve.unknowns),
+            *(_measured(solve, solve.metric(name)) for name in names),
+        ]
+        for solve in _ordered(result)
+    ]
+    return table(head, rows, "Numbers: value ± uncertainty, reference value below")
+
+
+def times_table(result: CaseResult) -> Markup | None:
+    """Return the wall time of every phase: median, and smallest to largest repetition."""
+    phases = list(dict.fromkeys(name for solve in result.solves for name in solve.timings))
+    if not phases:
+        return None
+    head = ["solver", "level", *phases, "total without meshing", "process", "memory", "iterations"]
+    rows = []
+    for solve in _ordered(result):
+        if not solve.timings:
+            continue
+        whole = duration(solve)
+        iterations = ", ".join(f"{name} {count}" for name, count in solve.iterations.items())
+        rows.append(
+            [
+                solver_title(solve.solver),
+                solve.level,
+                *(_spread(solve.timings.get(phase, [])) for phase in phases),
+                seconds_text(whole.median) if whole else "–",
+                seconds_text(solve.wall),
+                bytes_text(solve.peak_memory),
+                iterations or "–",
+            ]
+        )
+    caption = "Wall times: median (smallest to largest repetition)"
+    return table(head, rows, caption)
+
+
+def orders_table(result: CaseResult) -> Markup | None:
+    """Return the observed orders, or why there is none."""
+    if not result.rates:
+        return None
+    rows = [
+        [
+            solver_title(rate.solver),
+            metric_title(rate.metric),
+            joined(number(rate.order, 3), " ± ", number(rate.uncertainty, 2))
+            if rate.order is not None
+            else "–",
+            ", ".join(f"{slope:.2f}" for slope in rate.pairwise) or "–",
+            rate.reason or "–",
+        ]
+        for rate in result.rates
+    ]
+    head = ["solver", "error", "order", "between successive levels", "why it means nothing"]
+    return table(head, rows, "Observed orders of convergence")
+
+
+def regularisations_table(result: CaseResult) -> Markup | None:
+    """Return all that the solvers dropped, snapped, clamped, scaled or floored."""
+    rows = [
+        [
+            solver_title(solve.solver),
+            solve.level,
+            entry.get("kind", "–"),
+            number(entry.get("count")),
+            joined(number(entry.get("size")), " ", entry.get("unit", "")),
+        ]
+        for solve in _ordered(result)
+        for entry in solve.regularisations
+    ]
+    if not rows:
+        return None
+    head = ["solver", "level", "what was done", "how often", "largest contribution"]
+    return table(head, rows, "Regularisations")
+
+
+def failures_table(solves: Sequence[SolveRecord]) -> Markup | None:
+    """Return the solves that did not end well, with their reasons."""
+    rows = [
+        [
+            solver_title(solve.solver),
+            solve.level,
+            str(solve.status),
+            solve.reason or "no reason given",
+            seconds_text(solve.wall),
+        ]
+        for solve in solves
+        if solve.status is not Status.SOLVED
+    ]
+    if not rows:
+        return None
+    head = ["solver", "level", "ended", "reason", "after"]
+    return table(head, rows, "Solves that did not end well", class_="prose")
+
+
+def reference_record(reference: dict[str, Any]) -> Markup | None:
+    """Return what the case was judged against, whatever the record holds."""
+    if not reference:
+        return None
+    plain = {key: value for key, value in reference.items() if not isinstance(value, dict)}
+    nested = {key: value for key, value in reference.items() if isinstance(value, dict) and value}
+    parts: list[Markup] = []
+    if plain:
+        entries = [
+            (tag("dt", _words(key)), tag("dd", _value(value))) for key, value in plain.items()
+        ]
+        parts.append(tag("dl", [joined(*entry) for entry in entries], class_="record"))
+    for key, value in nested.items():
+        parts.append(_nested(key, value))
+    return joined(*parts)
+
+
+def _nested(key: str, record: dict[str, Any]) -> Markup:
+    """Return a table with one row per entry, if the entries are records; else name and value."""
+    caption = f"Reference: {_words(key)}"
+    if all(isinstance(entry, dict) for entry in record.values()):
+        columns = list(dict.fromkeys(name for entry in record.values() for name in entry))
+        rows = [
+            [metric_title(name), *(_value(entry.get(column)) for column in columns)]
+            for name, entry in record.items()
+        ]
+        return table(["", *(_words(column) for column in columns)], rows, caption)
+    rows = [[_words(name), _value(value)] for name, value in record.items()]
+    return table(["", "value"], rows, caption)
+
+
+def _value(value: Any) -> Markup:
+    if isinstance(value, list | tuple):
+        return joined(*_separated([_value(entry) for entry in value])) if value else joined("–")
+    if isinstance(value, dict):
+        said = [joined(_words(name), " ", _value(entry)) for name, entry in value.items()]
+        return joined(*_separated(said))
+    if isinstance(value, float):
+        return number(value, 7)
+    return number(value) if value is None or isinstance(value, int) else joined(str(value))
+
+
+def _separated(parts: list[Markup]) -> list[Any]:
+    return [piece for part in parts for piece in (", ", part)][1:]
+
+
+def _words(key: str) -> str:
+    return key.replace("_", " ")
+
+
+def _ordered(result: CaseResult) -> list[SolveRecord]:
+    """Return the solves with each solver's levels together, solvers as they first appear."""
+    solvers = list(dict.fromkeys(solve.solver for solve in result.solves))
+    return sorted(result.solves, key=lambda solve: (solvers.index(solve.solver), solve.level))
+
+
+def _measured(solve: SolveRecord, metric: Metric | None) -> Any:
+    if metric is None:
+        return "–" if solve.status is Status.SOLVED else str(solve.status)
+    value = number(metric.value, 5 if metric.reference is None else 8)
+    unit = "" if metric.unit == "1" else f" {metric.unit}"
+    plus = joined(" ± ", number(metric.uncertainty, 2)) if metric.uncertainty > 0 else None
+    below = None
+    if metric.reference is not None:
+        below = tag("div", "reference ", number(metric.reference, 8), unit, class_="quiet")
+    return joined(value, plus, unit, below)
+
+
+def _spread(values: Sequence[float]) -> str:
+    if not values:
+        return "–"
+    middle = median(values)
+    if len(values) == 1:
+        return f"{seconds_text(middle)} (once)"
+    return f"{seconds_text(middle)} ({seconds_text(min(values))} to {seconds_text(max(values))})"
