@@ -1,0 +1,114 @@
+"""A Python that the locked wheels are made for is found, whatever `python3` is."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+# Runs the code that it is given under the real Python, which now says that it is another one.
+PRETENDER = """#!/bin/bash
+exec {python} -c 'import sys
+sys.version_info = {version}
+code = sys.argv[2]
+sys.argv = ["-c", *sys.argv[3:]]
+exec(code)' "$@"
+"""
+REFUSING_SHIM = "#!/bin/sh\necho 'shim: python3.12: command not found' >&2\nexit 127\n"
+
+
+@pytest.fixture
+def programs(tmp_path):
+    """Return a function that puts a program at the front of PATH, and that PATH."""
+    directory = tmp_path / "bin"
+    directory.mkdir()
+
+    def put(name, text):
+        (directory / name).write_text(text)
+        (directory / name).chmod(0o755)
+        return directory / name
+
+    return put, f"{directory}:/usr/bin:/bin"
+
+
+def find_python(root, path, home, **changes):
+    return subprocess.run(
+        [root / ".ci/find-python"],
+        env={"PATH": path, "HOME": str(home)} | changes,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+def pretender(version):
+    return PRETENDER.format(python=sys.executable, version=version)
+
+
+def passing_on_to_this_python():
+    return f'#!/bin/sh\nexec {sys.executable} "$@"\n'
+
+
+def test_older_python3_and_refusing_shims_are_passed_over(root, tmp_path, programs):
+    put, path = programs
+    put("python3", pretender((3, 11, 7)))
+    put("python3.12", REFUSING_SHIM)
+    put("python3.13", REFUSING_SHIM)
+    put("python3.14", REFUSING_SHIM)
+    put("python", passing_on_to_this_python())
+    found = find_python(root, path, tmp_path)
+    assert found.returncode == 0, found.stderr
+    version = subprocess.check_output(
+        [found.stdout.strip(), "-c", "import sys; print(sys.version_info[:2] >= (3, 12))"]
+    )
+    assert version.strip() == b"True"
+
+
+@pytest.mark.parametrize(
+    "place",
+    [".pyenv/versions/3.12.9/bin/python3", ".local/share/uv/python/cpython-3.13.1-x/bin/python3"],
+)
+def test_python_of_a_version_manager_is_found_in_the_home(root, tmp_path, programs, place):
+    put, _ = programs
+    for name in ("python3", "python3.12", "python3.13", "python3.14", "python"):
+        put(name, REFUSING_SHIM)
+    # A PATH that holds the tools but no Python.
+    for tool in ("bash", "env", "timeout", "awk", "ls", "sh"):
+        (tmp_path / "bin" / tool).symlink_to(f"/usr/bin/{tool}")
+    (tmp_path / place).parent.mkdir(parents=True)
+    (tmp_path / place).write_text(passing_on_to_this_python())
+    (tmp_path / place).chmod(0o755)
+    found = find_python(root, str(tmp_path / "bin"), tmp_path)
+    assert found.returncode == 0, found.stderr
+    assert os.access(found.stdout.strip(), os.X_OK)
+
+
+@pytest.mark.parametrize(
+    ("version", "reason"), [((3, 11, 7), "is Python 3.11"), ((3, 15, 0), "is Python 3.15")]
+)
+def test_named_python_that_does_not_fit_is_refused_with_its_version(
+    root, tmp_path, programs, version, reason
+):
+    put, path = programs
+    python = put("mine", pretender(version))
+    refused = find_python(root, path, tmp_path, VERIFY_PYTHON=str(python))
+    assert refused.returncode == 2
+    assert reason in refused.stderr
+    assert "needed: CPython 3.12 to 3.14" in refused.stderr
+
+
+def test_named_python_is_taken_before_any_other(root, tmp_path, programs):
+    put, path = programs
+    put("python3", REFUSING_SHIM)
+    found = find_python(root, path, tmp_path, VERIFY_PYTHON=sys.executable)
+    assert found.returncode == 0
+    # The base of a virtual environment, so that an active one is no trap.
+    assert os.path.realpath(found.stdout.strip()) == os.path.realpath(sys._base_executable)
+
+
+def test_system_dolfinx_asks_for_a_python_that_has_it(root, tmp_path, programs):
+    put, path = programs
+    without = put("bare", f'#!/bin/sh\nexec {sys._base_executable} -I -S "$@"\n')
+    refused = find_python(root, path, tmp_path, VERIFY_PYTHON=str(without), DOLFINX="system")
+    assert refused.returncode == 2
+    assert "has no dolfinx" in refused.stderr

@@ -1,0 +1,96 @@
+"""What a machine lacks is asked of its loader and named with the apt line that brings it."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def requirements():
+    place = ROOT / ".ci/system_requirements.py"
+    specification = importlib.util.spec_from_file_location("system_requirements", place)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def loader_without(*absent):
+    def load(library):
+        if library in absent:
+            raise OSError(library)
+
+    return load
+
+
+@pytest.fixture
+def headers(tmp_path):
+    (tmp_path / "Python.h").touch()
+    return tmp_path
+
+
+@pytest.fixture
+def complete(headers):
+    return {"load": loader_without(), "which": lambda _: "/opt/cc", "include": headers,
+            "has_module": lambda _: True}  # fmt: skip
+
+
+def test_complete_machine_lacks_nothing(requirements, complete):
+    assert requirements.missing(**complete) == {}
+
+
+def test_every_library_is_asked_for_and_led_to_its_package(requirements, complete):
+    for library, (package, _) in requirements.LIBRARIES.items():
+        lacking = requirements.missing(**complete | {"load": loader_without(library)})
+        assert list(lacking) == [package]
+        assert library in lacking[package]
+
+
+def test_missing_libraries_lead_to_the_exact_apt_line(requirements, complete):
+    lacking = requirements.missing(
+        **complete | {"load": loader_without("libGLU.so.1", "libEGL.so.1")}
+    )
+    assert requirements.apt_line(lacking) == (
+        "apt-get install -y --no-install-recommends libegl1 libglu1-mesa"
+    )
+
+
+def test_missing_compiler_headers_and_ensurepip_are_named(requirements, complete, tmp_path):
+    lacking = requirements.missing(
+        **complete
+        | {
+            "which": lambda _: None,
+            "include": tmp_path / "nowhere",
+            "has_module": lambda name: name != "ensurepip",
+        }
+    )
+    version = f"python3.{sys.version_info.minor}"
+    assert {"gcc", f"{version}-dev", f"{version}-venv"} <= set(lacking)
+    assert "Python.h" in lacking[f"{version}-dev"]
+
+
+def test_headers_of_a_hand_made_python_are_not_promised_from_apt(requirements):
+    (sentence,) = requirements.missing_beyond_apt(
+        ("glibc", "2.36"), "/opt/python", ["python3.12-dev", "libegl1"]
+    )
+    assert "/opt/python" in sentence
+    assert "VERIFY_PYTHON" in sentence
+    assert requirements.missing_beyond_apt(("glibc", "2.36"), "/usr", ["python3.12-dev"]) == []
+
+
+@pytest.mark.parametrize(
+    ("libc", "fits"),
+    [(("glibc", "2.34"), True), (("glibc", "2.41"), True), (("glibc", "2.31"), False),
+     (("", ""), False), (("glibc", "3.0"), True)],
+)  # fmt: skip
+def test_dolfinx_wheel_needs_glibc_2_34(requirements, libc, fits):
+    assert (requirements.missing_beyond_apt(libc, "/usr") == []) is fits
+
+
+def test_the_guide_gives_the_same_apt_line(requirements):
+    packages = {package for package, _ in requirements.LIBRARIES.values()} | {"gcc", "libc6-dev"}
+    guide = (ROOT / "docs/install.md").read_text()
+    assert f"\n{requirements.apt_line(packages)}\n" in guide
