@@ -8,6 +8,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
+from verify.xfem.short_sort import sort_short
+
 __all__ = ["BlockPattern", "block_pattern"]
 
 _Ints = NDArray[np.int32]
@@ -92,7 +94,7 @@ def _pattern(cells, node_count):
                     mark[other] = node
                     columns[used] = other
                     used += 1
-        columns[begin:used] = np.sort(columns[begin:used])
+        sort_short(columns[begin:used])
         starts[node + 1] = used
         for k in range(begin, used):
             place[columns[k]] = k

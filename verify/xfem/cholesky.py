@@ -11,7 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.cholesky_kernels import analyse_fronts, factorise_fronts, solve_fronts
+from verify.xfem.cholesky_kernels import (
+    assembly_lists,
+    factorise_fronts,
+    front_rows,
+    solve_fronts,
+)
 from verify.xfem.errors import XfemError
 from verify.xfem.front_tree import merge_and_order, stack_depth
 from verify.xfem.minimum_degree import minimum_degree
@@ -50,14 +55,15 @@ class Cholesky:
     """
 
     def __init__(self, pattern: BlockPattern, block: int) -> None:
-        order, bounds = minimum_degree(pattern.starts, pattern.columns)
-        first = analyse_fronts(pattern.starts, pattern.columns, order, bounds)
-        order, bounds = merge_and_order(order, bounds, first[3], np.diff(first[0]))
-        fronts = analyse_fronts(pattern.starts, pattern.columns, order, bounds)
+        graph = (pattern.starts, pattern.columns)
+        order, bounds = minimum_degree(*graph)
+        row_start, _, parent = front_rows(*graph, order, bounds)
+        order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
+        row_start, rows, parent = front_rows(*graph, order, bounds)
+        lists = assembly_lists(*graph, order, bounds, row_start, rows, parent)
         self._order, self._bounds, self._block = order, bounds, block
-        self._row_start, self._rows, self._relative = fronts[0], fronts[1], fronts[2]
-        self._parent, self._entry_start = fronts[3], fronts[4]
-        self._entry_block, self._entry_row = fronts[5], fronts[6]
+        self._row_start, self._rows, self._parent = row_start, rows, parent
+        self._relative, self._entry_start, self._entry_block, self._entry_row = lists
         width = np.diff(bounds) * block
         below = np.diff(self._row_start) * block
         self._offset = np.concatenate([[0], np.cumsum(width * (width + below))])

@@ -9,15 +9,17 @@ waits on a stack until the parent front adds it.
 import numpy as np
 from numba import njit
 
-__all__ = ["analyse_fronts", "factorise_fronts", "solve_fronts"]
+from verify.xfem.short_sort import sort_short
+
+__all__ = ["assembly_lists", "factorise_fronts", "front_rows", "solve_fronts"]
 
 # a pivot below this share of the diagonal entry that it came from is round-off
 _TINY = 1e-14
 
 
 @njit(cache=True)
-def analyse_fronts(starts, columns, order, bounds):
-    """Rows, tree and assembly lists of the fronts, from the sparsity and the order.
+def front_rows(starts, columns, order, bounds):
+    """Rows of each front and the tree of fronts, from the sparsity and the order.
 
     Returns
     -------
@@ -25,14 +27,8 @@ def analyse_fronts(starts, columns, order, bounds):
         Rows of front s are entries row_start[s] to row_start[s + 1] of `rows`.
     rows : (R,) int array
         Places in the order, ascending, after the columns of the front.
-    relative : (R,) int array
-        Place of each row among the columns and rows of the parent front.
     parent : (S,) int array
         Parent front, -1 at a root.
-    entry_start : (N + 1,) int array
-        Matrix blocks of each column (in the order).
-    entry_block, entry_row : (E,) int array
-        Which block, transposed, adds to which local row of the column's front.
     """
     nodes = len(order)
     fronts = len(bounds) - 1
@@ -71,26 +67,46 @@ def analyse_fronts(starts, columns, order, bounds):
                     rows[used] = row
                     used += 1
             child = following[child]
-        rows[begin:used] = np.sort(rows[begin:used])
+        sort_short(rows[begin:used])
         row_start[s + 1] = used
         if used > begin:
             above = front_of[rows[begin]]
             parent[s] = above
             following[s] = head[above]
             head[above] = s
-    rows = rows[:used].copy()
+    return row_start, rows[:used].copy(), parent
 
-    relative = np.empty(used, dtype=np.int64)
+
+@njit(cache=True)
+def assembly_lists(starts, columns, order, bounds, row_start, rows, parent):
+    """Where matrix blocks and update matrices of children go in each front.
+
+    Returns
+    -------
+    relative : (R,) int array
+        Place of each row among the columns and rows of the parent front.
+    entry_start : (N + 1,) int array
+        Matrix blocks of each column (in the order).
+    entry_block, entry_row : (E,) int array
+        Which block, transposed, adds to which local row of the column's front.
+    """
+    nodes = len(order)
+    fronts = len(bounds) - 1
+    rank = np.empty(nodes, dtype=np.int64)
+    for k in range(nodes):
+        rank[order[k]] = k
+    relative = np.empty(len(rows), dtype=np.int64)
     entry_start = np.zeros(nodes + 1, dtype=np.int64)
-    entry_block = np.empty(len(columns), dtype=np.int64)
-    entry_row = np.empty(len(columns), dtype=np.int64)
+    entry_block = np.empty((len(columns) + nodes) // 2, dtype=np.int64)
+    entry_row = np.empty_like(entry_block)
     place = np.empty(nodes, dtype=np.int64)
     entries = 0
     for s in range(fronts):
+        width = bounds[s + 1] - bounds[s]
+        for at in range(row_start[s], row_start[s + 1]):
+            place[rows[at]] = width + at - row_start[s]
         for k in range(bounds[s], bounds[s + 1]):
             place[k] = k - bounds[s]
-        for at in range(row_start[s], row_start[s + 1]):
-            place[rows[at]] = bounds[s + 1] - bounds[s] + at - row_start[s]
         for k in range(bounds[s], bounds[s + 1]):
             for at in range(starts[order[k]], starts[order[k] + 1]):
                 row = rank[columns[at]]
@@ -99,20 +115,22 @@ def analyse_fronts(starts, columns, order, bounds):
                     entry_row[entries] = place[row]
                     entries += 1
             entry_start[k + 1] = entries
-        child = head[s]
-        while child >= 0:
-            for at in range(row_start[child], row_start[child + 1]):
-                relative[at] = place[rows[at]]
-            child = following[child]
-    return (
-        row_start,
-        rows,
-        relative,
-        parent,
-        entry_start,
-        entry_block[:entries],
-        entry_row[:entries],
-    )
+    # rows of a front are found among the columns or, in step, among the rows of its parent
+    for s in range(fronts):
+        above = parent[s]
+        if above < 0:
+            continue
+        at = row_start[above]
+        width = bounds[above + 1] - bounds[above]
+        for k in range(row_start[s], row_start[s + 1]):
+            row = rows[k]
+            if row < bounds[above + 1]:
+                relative[k] = row - bounds[above]
+            else:
+                while rows[at] < row:
+                    at += 1
+                relative[k] = width + at - row_start[above]
+    return relative, entry_start, entry_block, entry_row
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})

@@ -55,16 +55,14 @@ def _link(node, degree, head, after, before):
 
 
 @njit(cache=True)
-def _gather(pivot, start, elements, variables, sees, begin, size, members, alive, mark):
+def _gather(pivot, start, elements, variables, sees, begin, size, members, alive, mark, found):
     """Nodes of the new element: what the pivot sees, directly or through its elements."""
-    room = variables[pivot]
-    for k in range(elements[pivot]):
-        room += size[sees[start[pivot] + k]]
-    found = np.empty(room, dtype=np.int64)
     count = 0
     mark[pivot] = pivot
     for k in range(elements[pivot]):
         element = sees[start[pivot] + k]
+        if not alive[element]:
+            continue
         alive[element] = False
         for at in range(begin[element], begin[element] + size[element]):
             node = members[at]
@@ -78,7 +76,7 @@ def _gather(pivot, start, elements, variables, sees, begin, size, members, alive
             mark[node] = pivot
             found[count] = node
             count += 1
-    return found[:count]
+    return count
 
 
 @njit(cache=True)
@@ -108,6 +106,7 @@ def _eliminate_all(starts, columns):
     filled = 0
     outside = np.zeros(count, dtype=np.int64)
     seen_by = np.full(count, -1, dtype=np.int64)
+    space = np.empty(count, dtype=np.int64)
     order = np.empty(count, dtype=np.int64)
     bounds = np.zeros(count + 1, dtype=np.int64)
     done = 0
@@ -121,7 +120,10 @@ def _eliminate_all(starts, columns):
         gone[pivot] = True
         order[done] = pivot
         done += 1
-        found = _gather(pivot, start, elements, variables, sees, begin, size, members, alive, mark)
+        number = _gather(
+            pivot, start, elements, variables, sees, begin, size, members, alive, mark, space
+        )
+        found = space[:number]
         for node in found:
             for k in range(elements[node]):
                 element = sees[start[node] + k]
@@ -130,8 +132,8 @@ def _eliminate_all(starts, columns):
                         seen_by[element] = pivot
                         outside[element] = size[element]
                     outside[element] -= 1
-        if filled + len(found) > len(members):
-            grown = np.empty(2 * len(members) + len(found), dtype=np.int64)
+        if filled + number > len(members):
+            grown = np.empty(2 * len(members) + number, dtype=np.int64)
             grown[:filled] = members[:filled]
             members = grown
         begin[pivot] = filled
@@ -147,7 +149,7 @@ def _eliminate_all(starts, columns):
             else:
                 members[filled] = node
                 filled += 1
-                degree[node] = min(bound, degree[node]) + len(found) - 1
+                degree[node] = min(bound, degree[node]) + number - 1
         size[pivot] = filled - begin[pivot]
         for at in range(begin[pivot], filled):
             node = members[at]
@@ -162,31 +164,27 @@ def _eliminate_all(starts, columns):
 @njit(cache=True)
 def _shorten(node, pivot, start, elements, variables, sees, alive, outside, gone, mark):
     """Replace what the new element covers by the element; bound the degree of the rest."""
-    at = start[node]
+    begin = start[node]
+    write = begin
     bound = 0
-    kept = 0
-    count_elements = elements[node]
-    count_variables = variables[node]
-    # the new element needs one place at the front: something before it always falls away
-    rest = np.empty(count_elements + count_variables, dtype=np.int64)
-    for k in range(count_elements):
-        element = sees[at + k]
+    for at in range(begin, begin + elements[node]):
+        element = sees[at]
         if alive[element]:
             if outside[element] == 0:
                 alive[element] = False
             else:
                 bound += outside[element]
-                rest[kept] = element
-                kept += 1
-    number = kept
-    for k in range(count_elements, count_elements + count_variables):
-        other = sees[at + k]
+                sees[write] = element
+                write += 1
+    middle = write
+    for at in range(begin + elements[node], begin + elements[node] + variables[node]):
+        other = sees[at]
         if not gone[other] and mark[other] != pivot:
-            rest[kept] = other
-            kept += 1
-    sees[at] = pivot
-    for k in range(kept):
-        sees[at + 1 + k] = rest[k]
-    elements[node] = number + 1
-    variables[node] = kept - number
+            sees[write] = other
+            write += 1
+    # what led to the pivot has fallen away, so there is a place left for the new element
+    sees[write] = sees[middle]
+    sees[middle] = pivot
+    elements[node] = middle - begin + 1
+    variables[node] = write - middle
     return bound + variables[node]
