@@ -4,7 +4,7 @@ from cut_meshes import STRAIGHT, scene
 
 from verify.compare.body import body_of
 from verify.compare.cut_line import cut_rule, place_on_cut
-from verify.compare.slabs import area_rule, graded_breaks
+from verify.compare.slabs import area_rule, graded_breaks, slab_angles
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 
@@ -86,6 +86,26 @@ def test_gaps_never_exceed_their_distance_to_a_singular_point():
     away = np.minimum(np.abs(breaks[1:] - 0.4), np.abs(breaks[:-1] - 0.4))
     assert gap.max() <= 0.1 + 1e-15
     assert (gap <= np.maximum(away, 1e-5) * (1 + 1e-6)).all()
+
+
+def test_a_singular_point_off_a_break_by_round_off_is_refined_on_both_sides():
+    for off in (-2e-16, 0.0, 2e-16):
+        breaks = graded_breaks(np.array([0.0, 0.7, 1.0]), np.array([0.7 + off]), 0.1, 1e-5)
+        gap = np.diff(breaks)
+        at = int(np.argmin(np.abs(breaks - 0.7)))
+        assert 1e-6 < gap[at - 1] <= 1e-5
+        assert 1e-6 < gap[at] <= 1e-5
+
+
+@pytest.mark.parametrize("turn", np.linspace(0, np.pi, 13))
+def test_a_tip_in_any_direction_is_refined_on_all_sides(turn):
+    tip = 0.5 + 0.3 * np.array([np.cos(turn), np.sin(turn)])
+    body = body_of(scene([{"kind": "polyline", "points": [[0.5, 0.5], tip.tolist()]}]))
+    values = [
+        rule.weights @ (1 / np.linalg.norm(rule.points - tip, axis=1))
+        for rule in (area_rule(body, 0.2, angle, 6, 1e-8) for angle in slab_angles(body))
+    ]
+    assert np.ptp(values) < 2e-6 * values[0]
 
 
 def test_a_cut_is_trimmed_to_the_body_and_its_normal_points_left():

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from verify.compare.body import Body
 from verify.compare.cut_line import CutRule, cut_rule
 from verify.compare.error_norm import ErrorNorm
-from verify.compare.slabs import Rule, area_rule
+from verify.compare.slabs import Rule, area_rule, slab_angles
 
 __all__ = ["MeasuredNorm", "cut_rules", "integrate_norm", "rules"]
 
-# spacing over the wanted one, and direction: golden angle, and two unrelated to it
-_FAMILY = ((1.0, 0.5535), (1.31, 0.3217), (1.73, 0.8929))
+# spacings over the wanted one, without small common multiples
+_FAMILY = (1.0, 1.31, 1.73)
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,15 @@ class MeasuredNorm:
 
 def rules(body: Body, size: float) -> list[Rule]:
     """Area rules for fields on elements of size `size` m, the finest first."""
-    return [area_rule(body, factor * size / 3, angle) for factor, angle in _FAMILY]
+    return [
+        area_rule(body, factor * size / 3, angle)
+        for factor, angle in zip(_FAMILY, slab_angles(body), strict=True)
+    ]
 
 
 def cut_rules(body: Body, size: float) -> list[CutRule]:
     """Rules along the cuts for fields on elements of size `size` m, the finest first."""
-    return [cut_rule(body, factor * size / 8) for factor, _ in _FAMILY]
+    return [cut_rule(body, factor * size / 8) for factor in _FAMILY]
 
 
 def integrate_norm[R: (Rule, CutRule)](

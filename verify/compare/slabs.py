@@ -5,8 +5,8 @@ every crossing. Inside a slab no two curves cross, so that they are ordered from
 and the strips between them are trapezoids with (perhaps curved) sides. Nothing is clipped, no
 sliver is special: a strip of width 1e-12 is a trapezoid of width 1e-12.
 
-The slabs are turned by an angle whose tangent is the golden ratio or so, so that their points
-do not fall in step with the lines of a structured mesh.
+The slabs are turned away from the axes and diagonals, so that their points do not fall in step
+with the lines of a structured mesh, and away from the cuts, so that strips are not sheared.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from verify.compare.body import Body
 from verify.compare.curves import Arc, Piece, Segment, closed_pieces
 
-__all__ = ["Rule", "area_rule", "graded_breaks"]
+__all__ = ["Rule", "area_rule", "graded_breaks", "slab_angles"]
 
 Array = NDArray[np.float64]
 
@@ -85,9 +85,7 @@ def area_rule(
     ys = graded_breaks(ends, np.array([*singular[:, 1], *poles]), spacing, depth * spacing)
     corners = body.outline @ turn.T
     span = np.array([corners[:, 0].min(), corners[:, 0].max()])
-    xs = graded_breaks(
-        np.concatenate([span, singular[:, 0]]), singular[:, 0], spacing, depth * spacing
-    )
+    xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
     has_arcs = any(isinstance(piece, Arc) for piece, _ in pieces)
     cells = [
         cell
@@ -98,12 +96,39 @@ def area_rule(
     return Rule(points, np.concatenate([w for _, w in cells]))
 
 
+def slab_angles(body: Body) -> tuple[float, float, float]:
+    """Choose three slab directions, rad in [0, π), the best first.
+
+    Each is as far as possible from the cuts and from the lines of structured meshes, and at
+    least 10° from the two others.
+    """
+    straight = [part.piece for part in body.parts if isinstance(part.piece, Segment)]
+    edges = np.array([piece.end - piece.start for piece in straight]).reshape(-1, 2)
+    avoided = np.concatenate([np.arange(4) * np.pi / 4, np.arctan2(edges[:, 1], edges[:, 0])])
+    # 0.0123: no candidate has a simple tangent
+    candidates = np.arange(0.0123, np.pi, np.pi / 180)
+    apart = np.abs(np.sin(candidates[:, None] - avoided)).min(axis=1)
+    chosen: list[float] = []
+    for angle in candidates[np.argsort(-apart, kind="stable")]:
+        if all(abs(np.sin(angle - other)) > np.sin(np.deg2rad(10)) for other in chosen):
+            chosen.append(float(angle))
+    return chosen[0], chosen[1], chosen[2]
+
+
 def graded_breaks(breaks: Array, singular: Array, spacing: float, smallest: float) -> Array:
     """Sorted break points with gaps of at most `spacing`, halving towards `singular` points.
 
     A gap is at most as long as its distance to the nearest singular point, or `smallest`.
     """
-    base = np.unique(breaks)
+    # equal up to round-off is equal: a singular point must be a break to the last bit, or the
+    # gaps beside it are not refined; and a gap of one bit would hold a point on the tip itself
+    within = (singular >= breaks.min()) & (singular <= breaks.max())
+    base = np.unique(np.concatenate([breaks, singular[within]]))
+    same = 16 * np.finfo(float).eps * np.abs(base).max()
+    base = base[np.concatenate([[True], np.diff(base) > same])]
+    if len(singular):
+        nearest = base[np.abs(singular[:, None] - base).argmin(axis=1)]
+        singular = np.where(np.abs(singular - nearest) <= 4 * same, nearest, singular)
     cells = []
     for a, b in pairwise(base):
         n = int(np.ceil((b - a) / spacing))

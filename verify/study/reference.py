@@ -18,7 +18,7 @@ from verify.compare.jump_error import jump_error
 from verify.compare.locate import Field
 from verify.compare.opening import opening
 from verify.compare.point_displacement import point_displacement
-from verify.compare.slabs import Rule, area_rule
+from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError
 from verify.scene import Scene
@@ -110,7 +110,7 @@ def _exact_quantity(
     # spectral away from the tips; at a tip, halving cells down to 1e-8 of the others
     fine, check = (
         field_strain_energy(exact, area_rule(body, body.size / n, angle, 7, 1e-8), law)
-        for n, angle in ((14, 0.5535), (10, 0.3217))
+        for n, angle in zip((14, 10), slab_angles(body)[:2], strict=True)
     )
     return fine, abs(fine - check) + 1e-14 * abs(fine)
 
