@@ -87,7 +87,7 @@ class InternalForce:
         return v.mesh.gradients, v.parent, v.volumes, self._normals, self.lam, self.mu
 
     def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
-        """Internal force (N, d) in newtons and strain energy in joules; updates the rotations.
+        """Return internal force (N, d) in newtons and strain energy in joules; update rotations.
 
         Parameters
         ----------

@@ -23,7 +23,7 @@ _SINGULAR = 1e-8  # of the trace of the stretch: a spin without stiffness of its
 
 
 @njit(cache=True)
-def _spin_row(g, out):  # type: ignore[no-untyped-def]
+def _spin_row(g, out):
     """Write the matrix of u ↦ g × u: (1, 2) in the plane, (3, 3) in space."""
     if len(g) == 2:
         out[0, 0], out[0, 1] = -g[1], g[0]
@@ -34,7 +34,7 @@ def _spin_row(g, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _spin_stiffness(V, lam_trace, mu, dim, H):  # type: ignore[no-untyped-def]
+def _spin_stiffness(V, lam_trace, mu, dim, H):
     """Write H (1, 1) or (3, 3); without the inverse, and False, where that does not exist."""
     trace = 0.0
     for k in range(V.shape[0]):
@@ -76,7 +76,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
     spins = 1 if space == 2 else 3
 
     @njit(cache=True)
-    def internal_force(  # type: ignore[no-untyped-def]
+    def internal_force(
         cells, gradients, parent, volumes, normals, lam, mu, turning, displacement,
         quaternions, rotations, force,
     ):  # fmt: skip
@@ -150,7 +150,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         return energy
 
     @njit(cache=True)
-    def frozen_product(  # type: ignore[no-untyped-def]
+    def frozen_product(
         cells, gradients, parent, volumes, normals, lam, mu, rotations, vector, scale, product
     ):
         """Add `scale` times the stiffness with frozen rotations times `vector` to `product`."""
@@ -203,7 +203,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                     product[node, k] += total
 
     @njit(cache=True)
-    def add_frozen_stiffness(  # type: ignore[no-untyped-def]
+    def add_frozen_stiffness(
         targets, gradients, parent, volumes, normals, lam, mu, rotations, scale, blocks
     ):
         """Add `scale` times the stiffness with frozen rotations to the nodal blocks."""
@@ -244,7 +244,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                                 blocks[lower, l, k] += value
 
     @njit(cache=True)
-    def add_spin_stiffness(  # type: ignore[no-untyped-def]
+    def add_spin_stiffness(
         cells, targets, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
         scale, blocks,
     ):  # fmt: skip

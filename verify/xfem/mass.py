@@ -72,7 +72,7 @@ class Mass:
         return self._factor.solve(forces)
 
     @cached_property
-    def _factor(self):  # type: ignore[no-untyped-def]
+    def _factor(self):
         return splu(csc_array(self.matrix))
 
     def weight(self, gravity: ArrayLike) -> _Floats:

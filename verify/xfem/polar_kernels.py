@@ -20,7 +20,7 @@ _JACOBI_SWEEPS = 12
 
 
 @njit(cache=True)
-def rotation_matrix(q, R):  # type: ignore[no-untyped-def]
+def rotation_matrix(q, R):
     """Write the matrix of the unit quaternion (w, x, y, z) to R (3, 3)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     R[0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -35,7 +35,7 @@ def rotation_matrix(q, R):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def nearest_rotation(F, q, R):  # type: ignore[no-untyped-def]
+def nearest_rotation(F, q, R):
     """Write the rotation nearest to F (d, d) to R; a warm start changes its cost only.
 
     Parameters
@@ -64,7 +64,7 @@ def nearest_rotation(F, q, R):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _newton(F, q):  # type: ignore[no-untyped-def]
+def _newton(F, q):
     """Newton's method on SO(3), on scalars throughout; whether it has converged."""
     f00, f01, f02 = F[0, 0], F[0, 1], F[0, 2]
     f10, f11, f12 = F[1, 0], F[1, 1], F[1, 2]
@@ -123,8 +123,8 @@ def _newton(F, q):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _largest_eigenvector(F, q):  # type: ignore[no-untyped-def]
-    """Unit eigenvector of the largest eigenvalue of the form q ↦ tr(R(q)ᵀ F), by Jacobi."""
+def _largest_eigenvector(F, q):
+    """Write to q the unit eigenvector of the largest eigenvalue of the form tr(R(q)ᵀ F)."""
     form = np.empty((4, 4))
     form[0, 0] = F[0, 0] + F[1, 1] + F[2, 2]
     form[1, 1] = F[0, 0] - F[1, 1] - F[2, 2]

@@ -1,0 +1,178 @@
+"""Static equilibrium at large rotations: Newton's method with load steps."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.assembly_kernels import constrain
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.corotational import InternalForce
+from verify.xfem.errors import XfemError
+
+__all__ = ["NotInEquilibriumError", "StaticEquilibrium", "static_equilibrium"]
+
+_Floats = NDArray[np.float64]
+
+_HALVINGS = 12
+_ROUND_OFF = 256.0 * np.finfo(float).eps
+
+
+class NotInEquilibriumError(RuntimeError):
+    """Newton's method has not found the equilibrium of a load step."""
+
+
+class StaticEquilibrium(NamedTuple):
+    """A converged state.
+
+    Attributes
+    ----------
+    displacement : (N, d) float array
+        In metres.
+    energy : float
+        Strain energy in joules.
+    reactions : (N, d) float array
+        Forces of the supports in newtons; zero at free components.
+    iterations : tuple of int
+        Linear solves of each load step.
+    """
+
+    displacement: _Floats
+    energy: float
+    reactions: _Floats
+    iterations: tuple[int, ...]
+
+
+def static_equilibrium(
+    force: InternalForce,
+    fixed: NDArray[np.bool_],
+    prescribed: Callable[[float], _Floats] | None = None,
+    load: _Floats | None = None,
+    load_steps: int = 1,
+    tolerance: float = 1e-10,
+    iterations: int = 60,
+    start: _Floats | None = None,
+) -> StaticEquilibrium:
+    """Displacement with f_int(u) = load, u given on the fixed components.
+
+    Parameters
+    ----------
+    force : InternalForce
+    fixed : (N, d) bool array
+        Every piece must be held.
+    prescribed : callable, optional
+        Displacement (N, d) at a fraction s in (0, 1] of the path, read where fixed; zero without.
+    load : (N, d) float array, optional
+        Dead nodal forces at the end of the path; they grow in proportion to s.
+    load_steps : int
+        Equal parts of the path.
+    tolerance : float
+        Of the residual, over the largest of load, reactions and internal force.
+    iterations : int
+        Allowed per load step.
+    start : (N, d) float array, optional
+        First guess.
+
+    Raises
+    ------
+    NotInEquilibriumError
+        If a load step does not converge.
+    SingularStiffnessError
+        If something is not held.
+    XfemError
+        If a shape is wrong or the number of load steps is not positive.
+    """
+    virtual = force.virtual
+    shape = (virtual.node_count, virtual.mesh.space)
+    if fixed.shape != shape:
+        raise XfemError(f"supports of shape {fixed.shape}; expected {shape}")
+    if load is not None and load.shape != shape:
+        raise XfemError(f"load of shape {load.shape}; expected {shape}")
+    if load_steps < 1:
+        raise XfemError(f"{load_steps} load steps; expected at least one")
+    full_load = np.zeros(shape) if load is None else load
+    newton = _Newton(force, fixed, tolerance, iterations)
+    displacement = np.zeros(shape) if start is None else start.copy()
+    counts = []
+    for k in range(1, load_steps + 1):
+        share = k / load_steps
+        wanted = np.zeros(shape) if prescribed is None else prescribed(share)
+        if wanted.shape != shape:
+            raise XfemError(f"prescribed displacement of shape {wanted.shape}; expected {shape}")
+        change = np.where(fixed, wanted - displacement, 0.0)
+        displacement, count = newton.solve(displacement, change, share * full_load)
+        counts.append(count)
+    internal, energy = force.evaluate(displacement)
+    reactions = np.where(fixed, internal - full_load, 0.0)
+    return StaticEquilibrium(displacement, energy, reactions, tuple(counts))
+
+
+class _Newton:
+    def __init__(
+        self, force: InternalForce, fixed: NDArray[np.bool_], tolerance: float, iterations: int
+    ) -> None:
+        self._force, self._fixed = force, fixed
+        self._tolerance, self._iterations = tolerance, iterations
+        virtual = force.virtual
+        space = virtual.mesh.space
+        self._pattern = block_pattern(virtual.cells, virtual.node_count)
+        self._blocks = np.zeros((len(self._pattern.columns), space, space))
+        self._solver = Cholesky(self._pattern, space)
+
+    def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
+        """Equilibrium after a change of the fixed components, and the solves that it took."""
+        # the first solve spreads the prescribed change with the stiffness before it
+        residual, _ = self._residual(displacement, load)
+        correction = self._correct(displacement, residual, change)
+        displacement = displacement + correction
+        residual, scale = self._residual(displacement, load)
+        norm = float(np.linalg.norm(residual))
+        for count in range(1, self._iterations):
+            reach = np.abs(self._force.virtual.node_points + displacement).max()
+            floor = _ROUND_OFF * np.abs(self._blocks).max() * reach
+            if norm <= max(self._tolerance * scale, floor):
+                return displacement, count
+            correction = self._correct(displacement, residual, None)
+            for halving in range(_HALVINGS):
+                trial = displacement + 0.5**halving * correction
+                residual, scale = self._residual(trial, load)
+                if np.linalg.norm(residual) < norm:
+                    break
+            # a residual that must rise first is let rise: the energy may still fall
+            displacement, norm = trial, float(np.linalg.norm(residual))
+            if not np.isfinite(norm):
+                break
+        raise NotInEquilibriumError(
+            f"residual {norm:.3g} N against forces of {scale:.3g} N after {self._iterations} "
+            f"iterations; expected {self._tolerance:g} of them. More load steps may help"
+        )
+
+    def _residual(self, displacement: _Floats, load: _Floats) -> tuple[_Floats, float]:
+        internal, _ = self._force.evaluate(displacement)
+        scale = max(float(np.linalg.norm(internal)), float(np.linalg.norm(load)))
+        return np.where(self._fixed, 0.0, load - internal), scale
+
+    def _correct(self, displacement: _Floats, residual: _Floats, change: _Floats | None) -> _Floats:
+        try:
+            return self._solve(displacement, residual, change, exact=True)
+        except SingularStiffnessError:
+            return self._solve(displacement, residual, change, exact=False)
+
+    def _solve(
+        self, displacement: _Floats, residual: _Floats, change: _Floats | None, exact: bool
+    ) -> _Floats:
+        pattern, blocks = self._pattern, self._blocks
+        blocks[:] = 0.0
+        kind = "exact" if exact else "frozen"
+        self._force.evaluate(displacement)
+        self._force.add_stiffness(pattern, blocks, 1.0, kind, displacement)  # type: ignore[arg-type]
+        load = residual.copy()
+        if change is not None:
+            load -= (pattern.matrix(blocks) @ change.ravel()).reshape(change.shape)
+            load[self._fixed] = 0.0
+        constrain(pattern.starts, pattern.columns, self._fixed, blocks)
+        self._solver.factorize(blocks)
+        correction = self._solver.solve(load)
+        return correction if change is None else correction + change

@@ -1,0 +1,30 @@
+"""Motion of cut bodies: time integration, supports, loads, and the inheritance of a state."""
+
+from verify.xfem.dynamics.body import DynamicBody, MotionState, MovingSupports, RayleighDamping
+from verify.xfem.dynamics.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
+from verify.xfem.dynamics.implicit import EnergyMomentum, ImplicitEuler, Trapezoidal
+from verify.xfem.dynamics.inheritance import ancestors, inherit_state
+from verify.xfem.dynamics.integrator import Integrator, StepFailedError, StepForces
+from verify.xfem.dynamics.linear_solver import LinearSolver, SparseLU
+from verify.xfem.dynamics.real_time import RealTimeEuler
+
+__all__ = [
+    "CentralDifferences",
+    "DynamicBody",
+    "EnergyMomentum",
+    "ForwardEuler",
+    "ImplicitEuler",
+    "Integrator",
+    "LinearSolver",
+    "MotionState",
+    "MovingSupports",
+    "RayleighDamping",
+    "RealTimeEuler",
+    "SparseLU",
+    "StepFailedError",
+    "StepForces",
+    "SymplecticEuler",
+    "Trapezoidal",
+    "ancestors",
+    "inherit_state",
+]

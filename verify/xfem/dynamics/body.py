@@ -1,0 +1,186 @@
+"""What moves: elasticity, mass, damping, supports and loads of a cut body, and its state."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.corotational import InternalForce
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import Mass
+from verify.xfem.supports import Supports
+
+__all__ = ["DynamicBody", "MotionState", "MovingSupports", "RayleighDamping"]
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass
+class MotionState:
+    """State of motion; integrators change it in place.
+
+    Attributes
+    ----------
+    displacement, velocity : (N, d) float array
+        Of the unknown nodes, in m and m/s.
+    time : float
+        In seconds.
+    """
+
+    displacement: _Floats
+    velocity: _Floats
+    time: float = 0.0
+
+    def copy(self) -> "MotionState":
+        """Return an independent copy."""
+        return MotionState(self.displacement.copy(), self.velocity.copy(), self.time)
+
+
+@dataclass(frozen=True)
+class RayleighDamping:
+    """C = α M + β K, K with the rotations of the moment, so that turning is not damped by β.
+
+    Attributes
+    ----------
+    mass : float
+        α in 1/s.
+    stiffness : float
+        β in seconds.
+
+    Raises
+    ------
+    XfemError
+        If one is negative or not finite.
+    """
+
+    mass: float = 0.0
+    stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("α", self.mass), ("β", self.stiffness)):
+            if not (np.isfinite(value) and value >= 0.0):
+                raise XfemError(f"Rayleigh damping {name} = {value:g}; expected at least 0")
+
+
+@dataclass(frozen=True)
+class MovingSupports:
+    """Components with a prescribed motion.
+
+    Attributes
+    ----------
+    fixed : (N, d) bool array
+    motion : callable
+        Displacement and velocity, (N, d) each, at a time; read where fixed.
+    """
+
+    fixed: NDArray[np.bool_]
+    motion: Callable[[float], tuple[_Floats, _Floats]]
+
+    def at(self, time: float) -> tuple[_Floats, _Floats]:
+        """Prescribed displacement and velocity (N, d).
+
+        Raises
+        ------
+        XfemError
+            If one has a wrong shape.
+        """
+        displacement, velocity = self.motion(time)
+        for name, value in (("displacement", displacement), ("velocity", velocity)):
+            if np.shape(value) != self.fixed.shape:
+                raise XfemError(
+                    f"prescribed {name} of shape {np.shape(value)}; expected {self.fixed.shape}"
+                )
+        return displacement, velocity
+
+
+@dataclass
+class DynamicBody:
+    """M ü + C u̇ + f_int(u) = weight + load(t), with supports.
+
+    Parameters
+    ----------
+    force : InternalForce
+    mass : Mass
+    weight : (N, d) float array, optional
+        Dead load with the potential −weight·u, e.g. `Mass.weight(gravity)`, in newtons.
+    load : callable, optional
+        Further nodal forces (N, d) at a time.
+    supports : Supports or MovingSupports, optional
+        Without it the body is free.
+    damping : RayleighDamping
+
+    Raises
+    ------
+    XfemError
+        If a shape does not match the body.
+    """
+
+    force: InternalForce
+    mass: Mass
+    weight: _Floats | None = None
+    load: Callable[[float], _Floats] | None = None
+    supports: Supports | MovingSupports | None = None
+    damping: RayleighDamping = field(default_factory=RayleighDamping)
+
+    def __post_init__(self) -> None:
+        virtual = self.force.virtual
+        self.shape: tuple[int, int] = (virtual.node_count, virtual.mesh.space)
+        if self.mass.matrix.shape[0] != self.shape[0]:
+            raise XfemError(
+                f"mass of {self.mass.matrix.shape[0]} unknown nodes; the body has {self.shape[0]}"
+            )
+        if self.weight is None:
+            self.weight = np.zeros(self.shape)
+        if np.shape(self.weight) != self.shape:
+            raise XfemError(f"weight of shape {np.shape(self.weight)}; expected {self.shape}")
+        if self.supports is None:
+            self.supports = Supports.none(virtual)
+        if self.supports.fixed.shape != self.shape or self.supports.fixed.dtype != bool:
+            raise XfemError(
+                f"supports: {self.supports.fixed.dtype} array of shape "
+                f"{self.supports.fixed.shape}; expected bool and {self.shape}"
+            )
+        self.pattern = self.mass.pattern(virtual)
+        self.fixed = self.supports.fixed
+        self.moving = isinstance(self.supports, MovingSupports)
+
+    def rest(self) -> MotionState:
+        """Undeformed and at rest at time 0, apart from what the supports prescribe."""
+        state = MotionState(np.zeros(self.shape), np.zeros(self.shape))
+        displacement, velocity = self.prescribed(0.0)
+        state.displacement[self.fixed] = displacement[self.fixed]
+        state.velocity[self.fixed] = velocity[self.fixed]
+        return state
+
+    def prescribed(self, time: float) -> tuple[_Floats, _Floats]:
+        """Displacement and velocity (N, d) of the supports at a time."""
+        if isinstance(self.supports, MovingSupports):
+            return self.supports.at(time)
+        assert self.supports is not None
+        return self.supports.values, np.zeros(self.shape)
+
+    def external(self, time: float) -> _Floats:
+        """Weight and load (N, d) at a time, in newtons.
+
+        Raises
+        ------
+        XfemError
+            If the load has a wrong shape.
+        """
+        assert self.weight is not None
+        if self.load is None:
+            return self.weight
+        load = self.load(time)
+        if np.shape(load) != self.shape:
+            raise XfemError(f"load of shape {np.shape(load)} at t={time:g}; expected {self.shape}")
+        return self.weight + load
+
+    def viscous(self, velocity: _Floats) -> _Floats:
+        """Damping force C v (N, d), K with the rotations of the last evaluation of the force."""
+        if self.damping.mass == 0.0 and self.damping.stiffness == 0.0:
+            return np.zeros(self.shape)
+        force = self.damping.mass * self.mass.apply(velocity)
+        if self.damping.stiffness > 0.0:
+            self.force.add_frozen_product(velocity, self.damping.stiffness, force)
+        return force

@@ -1,0 +1,154 @@
+"""Explicit schemes: central differences, symplectic Euler, and forward Euler as it is printed.
+
+Central differences are written in velocity form, so that displacement and velocity belong to the
+same instant. All of them are free of any linear solve if the mass is diagonal.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import SuperLU, splu
+
+from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
+from verify.xfem.dynamics.integrator import (
+    StepFailedError,
+    StepForces,
+    check_state,
+    check_step,
+)
+from verify.xfem.errors import XfemError
+
+__all__ = ["CentralDifferences", "ForwardEuler", "SymplecticEuler"]
+
+_Floats = NDArray[np.float64]
+
+
+class _Explicit:
+    def __init__(self, body: DynamicBody, step_size: float) -> None:
+        """Prepare a body and a step in seconds."""
+        self.body = body
+        self.step_size = check_step(step_size)
+        self._solvers = None
+        if body.mass.diagonal is None and body.fixed.any():
+            if body.moving:
+                raise XfemError(
+                    "explicit step with moving supports and a mass that is not diagonal; use the "
+                    "side-wise mass"
+                )
+            self._solvers = [_supported(body, k) for k in range(body.shape[1])]
+
+    def _acceleration(
+        self, displacement: _Floats, velocity: _Floats, time: float
+    ) -> tuple[_Floats, StepForces]:
+        body = self.body
+        internal, _ = body.force.evaluate(displacement)
+        forces = StepForces(internal, body.external(time), body.viscous(velocity))
+        total = forces.external - forces.internal - forces.viscous
+        total[body.fixed] = 0.0
+        if self._solvers is None:
+            return body.mass.solve(total), forces
+        columns = [solver.solve(total[:, k]) for k, solver in enumerate(self._solvers)]
+        return np.stack(columns, axis=1), forces
+
+    def _finish(
+        self, state: MotionState, displacement: _Floats, velocity: _Floats, time: float
+    ) -> None:
+        if not (np.isfinite(displacement).all() and np.isfinite(velocity).all()):
+            raise StepFailedError(
+                f"{type(self).__name__}: not finite at t = {time:.6g} s with a step of "
+                f"{self.step_size:.6g} s; beyond the critical step?"
+            )
+        fixed = self.body.fixed
+        where, speed = self.body.prescribed(time)
+        displacement[fixed], velocity[fixed] = where[fixed], speed[fixed]
+        state.displacement[:], state.velocity[:], state.time = displacement, velocity, time
+
+
+def _supported(body: DynamicBody, component: int) -> SuperLU:
+    """Factor of the mass of the free nodes in one component."""
+    free = diags_array((~body.fixed[:, component]).astype(float))
+    held = diags_array(body.fixed[:, component].astype(float))
+    return splu(csc_array(free @ body.mass.matrix @ free + held))
+
+
+class CentralDifferences(_Explicit):
+    """Central differences (velocity Verlet), second order, symplectic.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    step_size : float
+        In seconds; stable below `verify.xfem.critical_step.critical_step` if linear. Damping
+        is taken at the velocity of the middle of the step before.
+    """
+
+    def __init__(self, body: DynamicBody, step_size: float) -> None:
+        super().__init__(body, step_size)
+        self._end: tuple[MotionState, _Floats, StepForces] | None = None
+
+    def _start(self, state: MotionState) -> tuple[_Floats, StepForces]:
+        """Acceleration at the start: that at the end of the last step, if it goes on from there."""
+        if self._end is not None and self.body.damping == RayleighDamping():
+            end, acceleration, forces = self._end
+            if end.time == state.time and np.array_equal(end.displacement, state.displacement):
+                return acceleration, forces
+        return self._acceleration(state.displacement, state.velocity, state.time)
+
+    def step(self, state: MotionState) -> StepForces:
+        """Advance by one step."""
+        check_state(state, self.body.shape)
+        h = self.step_size
+        first, before = self._start(state)
+        middle = state.velocity + 0.5 * h * first
+        displacement = state.displacement + h * middle
+        time = state.time + h
+        where, _ = self.body.prescribed(time)
+        displacement[self.body.fixed] = where[self.body.fixed]
+        second, after = self._acceleration(displacement, middle, time)
+        self._finish(state, displacement, middle + 0.5 * h * second, time)
+        self._end = (state.copy(), second, after)
+        return StepForces(
+            0.5 * (before.internal + after.internal),
+            0.5 * (before.external + after.external),
+            0.5 * (before.viscous + after.viscous),
+        )
+
+
+class SymplecticEuler(_Explicit):
+    """New velocity first, then the displacement with it: stable up to the critical step.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    step_size : float
+        In seconds.
+    """
+
+    def step(self, state: MotionState) -> StepForces:
+        """Advance by one step."""
+        check_state(state, self.body.shape)
+        h = self.step_size
+        acceleration, forces = self._acceleration(state.displacement, state.velocity, state.time)
+        velocity = state.velocity + h * acceleration
+        self._finish(state, state.displacement + h * velocity, velocity, state.time + h)
+        return forces
+
+
+class ForwardEuler(_Explicit):
+    """(2.43–44) as printed: unstable at every step without damping; a negative control.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    step_size : float
+        In seconds.
+    """
+
+    def step(self, state: MotionState) -> StepForces:
+        """Advance by one step."""
+        check_state(state, self.body.shape)
+        h = self.step_size
+        acceleration, forces = self._acceleration(state.displacement, state.velocity, state.time)
+        displacement = state.displacement + h * state.velocity
+        self._finish(state, displacement, state.velocity + h * acceleration, state.time + h)
+        return forces

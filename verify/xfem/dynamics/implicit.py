@@ -1,0 +1,123 @@
+"""Implicit schemes that solve their step to the end: Euler, trapezoidal, energy–momentum."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.corotational import TangentKind
+from verify.xfem.dynamics.averaged_stress_kernels import averaged_stress_kernels
+from verify.xfem.dynamics.body import DynamicBody
+from verify.xfem.dynamics.integrator import StepForces
+from verify.xfem.dynamics.linear_solver import LinearSolver, SparseLU
+from verify.xfem.dynamics.newton import NewtonIntegrator
+
+__all__ = ["EnergyMomentum", "ImplicitEuler", "Trapezoidal"]
+
+_Floats = NDArray[np.float64]
+
+
+class ImplicitEuler(NewtonIntegrator):
+    """(2.45–46) solved to the end. Dissipates: a mode of frequency ω loses half of its energy in
+    about ln 2/(ω² h), whatever its amplitude.
+
+    Parameters are those of `NewtonIntegrator`.
+    """  # noqa: D205
+
+    rate = 1.0
+    share = 1.0
+
+    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+        internal, _ = self.body.force.evaluate(displacement)
+        return StepForces(internal, self.body.external(time), self.body.viscous(velocity))
+
+
+class Trapezoidal(NewtonIntegrator):
+    """Newmark's method with β = ¼, γ = ½. Keeps the energy of linear motion exactly and that of
+    small nonlinear motion well; not unconditionally stable at large amplitudes.
+
+    Parameters are those of `NewtonIntegrator`.
+    """  # noqa: D205
+
+    rate = 2.0
+    share = 0.5
+
+    def _prepare(self) -> None:
+        start = self._start
+        internal, _ = self.body.force.evaluate(start.displacement)
+        viscous = self.body.viscous(start.velocity)
+        self._before = StepForces(internal, self.body.external(start.time).copy(), viscous)
+
+    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+        internal, _ = self.body.force.evaluate(displacement)
+        return StepForces(
+            0.5 * (self._before.internal + internal),
+            0.5 * (self._before.external + self.body.external(time)),
+            0.5 * (self._before.viscous + self.body.viscous(velocity)),
+        )
+
+
+class EnergyMomentum(NewtonIntegrator):
+    """Conserves energy, linear and angular momentum of a free body at any amplitude and step.
+
+    The internal force is a discrete gradient of the potential; see
+    `verify.xfem.dynamics.averaged_stress_kernels`. Its stiffness is not symmetric.
+
+    Parameters are those of `NewtonIntegrator`.
+
+    Attributes
+    ----------
+    substituted : (p,) bool array
+        Pieces that, in the last step, were too inverted for the stress in its plain form.
+    """
+
+    rate = 2.0
+    share = 0.5
+
+    def __init__(
+        self,
+        body: DynamicBody,
+        step_size: float,
+        tolerance: float = 1e-12,
+        iterations: int = 40,
+        solver: LinearSolver | None = None,
+    ) -> None:
+        super().__init__(body, step_size, tolerance, iterations, solver)
+        mesh = body.force.virtual.mesh
+        self._kernels = averaged_stress_kernels(mesh.dim, mesh.space)
+        self._first = body.force.rotations.copy()
+        self.substituted = np.zeros(len(self._first), dtype=bool)
+
+    def _default_solver(self) -> LinearSolver:
+        return SparseLU(self.body.pattern)
+
+    def _prepare(self) -> None:
+        force = self.body.force
+        force.evaluate(self._start.displacement)
+        self._first[:] = force.rotations
+        self.substituted[:] = False
+
+    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+        body, start = self.body, self._start
+        force = body.force
+        force.evaluate(displacement)
+        internal = np.zeros(body.shape)
+        if force.turning:
+            self._kernels.averaged_force(
+                force.virtual.cells, *force.geometry, self._first, force.rotations,
+                start.displacement, displacement, self.substituted, internal,
+            )  # fmt: skip
+        else:
+            force.add_frozen_product(0.5 * (start.displacement + displacement), 1.0, internal)
+        middle = start.time + 0.5 * self.step_size
+        viscous = body.viscous(0.5 * (start.velocity + velocity))
+        return StepForces(internal, body.external(middle), viscous)
+
+    def _add_stiffness(self, displacement: _Floats, kind: TangentKind) -> None:
+        force = self.body.force
+        if not force.turning:
+            super()._add_stiffness(displacement, kind)
+            return
+        self._kernels.add_averaged_stiffness(
+            force.virtual.cells, self.body.pattern.targets[: len(force.virtual.cells)],
+            *force.geometry, self._first, force.rotations,
+            self._start.displacement, displacement, self.substituted, self._blocks,
+        )  # fmt: skip

@@ -1,0 +1,84 @@
+"""What a body keeps when it is cut while it moves.
+
+The parts of a piece start with the motion of that piece: every new unknown node takes over the
+value of the unknown node that the same corner had before (a = 0 and ȧ = 0 in the thesis' terms).
+The field does not change, so energy and momenta do not either.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.dynamics.body import MotionState
+from verify.xfem.errors import XfemError
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["ancestors", "inherit_state"]
+
+
+def inherit_state(old: VirtualMesh, new: VirtualMesh, state: MotionState) -> MotionState:
+    """State of motion of a body that has been cut further.
+
+    Parameters
+    ----------
+    old, new : VirtualMesh
+        On the same uncut mesh; the cuts of the old one come first in the new one, and may have
+        grown.
+    state : MotionState
+        Of the old body.
+
+    Raises
+    ------
+    XfemError
+        As `ancestors`.
+    """
+    source = ancestors(old, new)
+    return MotionState(state.displacement[source], state.velocity[source], state.time)
+
+
+def ancestors(old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
+    """(N,) unknown node of the old body from which each one of the new body comes.
+
+    Raises
+    ------
+    XfemError
+        If the meshes differ, or the new pieces are not parts of the old ones.
+    """
+    same = new.mesh is old.mesh or (
+        np.array_equal(new.mesh.cells, old.mesh.cells)
+        and np.array_equal(new.mesh.points, old.mesh.points)
+    )
+    cuts = old.label.shape[1]
+    if not same or new.label.shape[1] < cuts:
+        raise XfemError(
+            "the new body is not the old one cut further: expected the same mesh, and the cuts of "
+            "the old body before any others"
+        )
+    piece = _parts_of(old, new, cuts)
+    source = np.full(new.node_count, -1)
+    source[new.cells] = old.cells[piece]
+    if (source[new.cells] != old.cells[piece]).any():
+        where = int(np.argmax((source[new.cells] != old.cells[piece]).any(axis=1)))
+        raise XfemError(
+            f"the parts of cell {int(new.parent[where])} join what the old body has separated"
+        )
+    return source
+
+
+def _parts_of(old: VirtualMesh, new: VirtualMesh, cuts: int) -> NDArray[np.int64]:
+    """(p,) piece of the old body of which each new piece is a part."""
+    starts = np.searchsorted(old.parent, np.arange(len(old.mesh.cells) + 1))
+    counts = np.diff(starts)
+    piece = starts[new.parent]
+    found = counts[new.parent] == 1
+    for k in range(counts.max(initial=0)):
+        # among several, the one that lies on the same side of every cut that made it
+        candidate = np.minimum(starts[new.parent] + k, len(old.parent) - 1)
+        valid = (k < counts[new.parent]) & ~found
+        label = old.label[candidate]
+        fits = ((label == 0) | (label == new.label[:, :cuts])).all(axis=1)
+        piece = np.where(valid & fits, candidate, piece)
+        found |= valid & fits
+    if not found.all():
+        where = int(new.parent[np.argmin(found)])
+        raise XfemError(f"a piece of cell {where} is no part of any piece of the old body")
+    return piece

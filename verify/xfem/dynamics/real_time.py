@@ -1,0 +1,141 @@
+"""Implicit Euler with one linearisation per step: the scheme of real-time simulation.
+
+(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v), K with frozen rotations: symmetric positive
+definite, so that the step always has a solution. Nothing is allocated per step but what the linear
+solver returns.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.xfem.assembly_kernels import constrain
+from verify.xfem.cholesky import Cholesky
+from verify.xfem.dynamics.body import DynamicBody, MotionState
+from verify.xfem.dynamics.integrator import (
+    StepFailedError,
+    StepForces,
+    check_state,
+    check_step,
+)
+from verify.xfem.dynamics.linear_solver import LinearSolver
+
+__all__ = ["RealTimeEuler"]
+
+_Floats = NDArray[np.float64]
+
+
+class RealTimeEuler:
+    """Implicit Euler, one linear solve per step.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    step_size : float
+        In seconds.
+    solver : LinearSolver, optional
+        For the sparsity of the body; by default a Cholesky factorisation.
+    """
+
+    def __init__(
+        self, body: DynamicBody, step_size: float, solver: LinearSolver | None = None
+    ) -> None:
+        self.body = body
+        self.step_size = check_step(step_size)
+        space = body.shape[1]
+        self.blocks = np.zeros((len(body.pattern.columns), space, space))
+        self.load = np.empty(body.shape)
+        self.solver = Cholesky(body.pattern, space) if solver is None else solver
+        self._places = body.mass.places(body.pattern)
+        self._values = body.mass.entries[2]
+        self._internal = np.empty(body.shape)
+        self._any_fixed = bool(body.fixed.any())
+
+    def step(self, state: MotionState) -> StepForces:
+        """Advance by one step."""
+        external = self.body.external(state.time + self.step_size).copy()
+        self.advance(state)
+        # rotations are still those at the start of the step, with which it was linearised
+        internal = self._internal.copy()
+        self.body.force.add_frozen_product(state.velocity, self.step_size, internal)
+        return StepForces(internal, external, self.body.viscous(state.velocity))
+
+    def advance(self, state: MotionState) -> None:
+        """Advance by one step without accounting for the forces: the hot path.
+
+        Raises
+        ------
+        StepFailedError
+            If the result is not finite.
+        """
+        check_state(state, self.body.shape)
+        self.evaluate(state)
+        self.assemble()
+        if self._any_fixed:
+            self._support(state)
+        self.solver.factorize(self.blocks)
+        change = self.solver.solve(self.load)
+        if not _advance(change, self.step_size, state.velocity, state.displacement):
+            raise StepFailedError(
+                f"RealTimeEuler: not finite after t = {state.time:.6g} s with a step of "
+                f"{self.step_size:.6g} s"
+            )
+        state.time += self.step_size
+
+    def evaluate(self, state: MotionState) -> None:
+        """Evaluate rotations and forces, and the right-hand side into `load`."""
+        body, h = self.body, self.step_size
+        damping = body.damping
+        body.force.evaluate(state.displacement, self._internal)
+        np.subtract(body.external(state.time + h), self._internal, out=self.load)
+        body.force.add_frozen_product(state.velocity, -(h + damping.stiffness), self.load)
+        if damping.mass > 0.0:
+            self.load -= damping.mass * body.mass.apply(state.velocity)
+        self.load *= h
+
+    def assemble(self) -> None:
+        """Assemble M + hC + h²K into `blocks`."""
+        body, h = self.body, self.step_size
+        self.blocks[:] = 0.0
+        body.force.add_stiffness(body.pattern, self.blocks, h * (h + body.damping.stiffness))
+        _add_mass(self.blocks, self._places, self._values, 1.0 + h * body.damping.mass)
+
+    def _support(self, state: MotionState) -> None:
+        """Let fixed components move as prescribed; what that does to the others goes right."""
+        body, h = self.body, self.step_size
+        change = None
+        fixed = body.fixed
+        where, _ = body.prescribed(state.time + h)
+        wanted = (where - state.displacement)[fixed] / h - state.velocity[fixed]
+        if wanted.any():
+            change = np.zeros(body.shape)
+            change[fixed] = wanted
+            self.load -= (body.pattern.matrix(self.blocks) @ change.ravel()).reshape(body.shape)
+        constrain(body.pattern.starts, body.pattern.columns, body.fixed, self.blocks)
+        self.load[body.fixed] = 0.0
+        if change is not None:
+            diagonal = np.einsum("nkk->nk", self.blocks[body.pattern.diagonal])
+            self.load[body.fixed] = (diagonal * change)[body.fixed]
+
+
+@njit(cache=True)
+def _add_mass(blocks, places, values, scale):
+    for entry in range(len(values)):
+        for k in range(blocks.shape[1]):
+            blocks[places[entry], k, k] += scale * values[entry]
+
+
+@njit(cache=True)
+def _advance(change, step_size, velocity, displacement):
+    """Apply the change of velocity unless it is not finite; whether it was."""
+    total = 0.0
+    for i in range(change.shape[0]):
+        for k in range(change.shape[1]):
+            total += abs(change[i, k])
+    if not np.isfinite(total):
+        return False
+    for i in range(change.shape[0]):
+        for k in range(change.shape[1]):
+            velocity[i, k] += change[i, k]
+            displacement[i, k] += step_size * velocity[i, k]
+    return True
