@@ -17,6 +17,9 @@ __all__ = ["MeasuredNorm", "cut_rules", "integrate_norm", "rules"]
 
 # spacings over the wanted one, without small common multiples
 _FAMILY = (1.0, 1.31, 1.73)
+# The few elements at a tip hold most of the error; finer cells around it make the integration
+# error of the energy norm there three to ten times smaller for twice the points.
+_GRADING = 0.3
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,7 @@ class MeasuredNorm:
 def rules(body: Body, size: float) -> list[Rule]:
     """Area rules for fields on elements of size `size` m, the finest first."""
     return [
-        area_rule(body, factor * size / 3, angle)
+        area_rule(body, factor * size / 3, angle, grading=_GRADING)
         for factor, angle in zip(_FAMILY, slab_angles(body), strict=True)
     ]
 

@@ -52,7 +52,12 @@ class _Monotone:
 
 
 def area_rule(
-    body: Body, spacing: float, angle: float = 0.5535, order: int = 2, depth: float = 1e-4
+    body: Body,
+    spacing: float,
+    angle: float = 0.5535,
+    order: int = 2,
+    depth: float = 1e-2,
+    grading: float = 1.0,
 ) -> Rule:
     """Quadrature of a body, split by its cuts and graded to its singular points.
 
@@ -67,6 +72,8 @@ def area_rule(
         Gauss points per cell and direction.
     depth : float
         Size of the cells at singular points, relative to `spacing`.
+    grading : float
+        Size of the cells around singular points, relative to their distance from them.
 
     Returns
     -------
@@ -82,10 +89,12 @@ def area_rule(
     singular = body.singular @ turn.T
     ends = np.array([[m.low, m.high] for m in curves]).ravel()
     poles = [p.centre[1] + s * p.radius for p, _ in pieces if isinstance(p, Arc) for s in (-1, 1)]
-    ys = graded_breaks(ends, np.array([*singular[:, 1], *poles]), spacing, depth * spacing)
+    ys = graded_breaks(ends, singular[:, 1], spacing, depth * spacing, grading)
+    if poles:  # x(y) is like a square root there
+        ys = graded_breaks(ys, np.array(poles), spacing, 1e-4 * spacing)
     corners = body.outline @ turn.T
     span = np.array([corners[:, 0].min(), corners[:, 0].max()])
-    xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
+    xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing, grading)
     has_arcs = any(isinstance(piece, Arc) for piece, _ in pieces)
     cells = [
         cell
@@ -115,10 +124,13 @@ def slab_angles(body: Body) -> tuple[float, float, float]:
     return chosen[0], chosen[1], chosen[2]
 
 
-def graded_breaks(breaks: Array, singular: Array, spacing: float, smallest: float) -> Array:
+def graded_breaks(
+    breaks: Array, singular: Array, spacing: float, smallest: float, grading: float = 1.0
+) -> Array:
     """Sorted break points with gaps of at most `spacing`, halving towards `singular` points.
 
-    A gap is at most as long as its distance to the nearest singular point, or `smallest`.
+    A gap is at most `grading` times as long as its distance to the nearest singular point, or
+    `smallest`.
     """
     # equal up to round-off is equal: a singular point must be a break to the last bit, or the
     # gaps beside it are not refined; and a gap of one bit would hold a point on the tip itself
@@ -147,7 +159,7 @@ def graded_breaks(breaks: Array, singular: Array, spacing: float, smallest: floa
         right = singular[at] - open_cells[:, 1]
         right = np.where(right >= 0, right, np.inf)
         length = open_cells[:, 1] - open_cells[:, 0]
-        split = length > np.maximum(np.minimum(left, right), smallest) * (1 + 1e-9)
+        split = length > np.maximum(grading * np.minimum(left, right), smallest) * (1 + 1e-9)
         low, high = open_cells[split].T
         middle = 0.5 * (low + high)
         open_cells = np.vstack([np.column_stack([low, middle]), np.column_stack([middle, high])])
