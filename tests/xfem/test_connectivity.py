@@ -9,6 +9,7 @@ from xfem_bodies import zero_modes
 from verify.xfem.cuts import Plane, PolygonPatch
 from verify.xfem.polyline import Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh
 
 SQUARE = rectangle_mesh((4, 4))
@@ -114,8 +115,6 @@ def test_turning_a_cut_round_changes_nothing_but_the_name_of_its_sides(x, y, slo
     "tip, length", [("inside", 0.25), ("through", 0.5), ("nearest", 0.5)], ids=lambda x: str(x)
 )
 def test_a_tip_inside_an_element_moves_to_an_edge_by_the_chosen_rule(tip, length):
-    from verify.xfem.subdivision import subdivide
-
     mesh = rectangle_mesh((4, 4))
     # the row of triangles is crossed at x = 0, 0.02.., 0.25, ...; the tip is in the third square
     virtual = cut_mesh(mesh, [line(-1.0, 0.52, 0.40, 0.52)], tip)
@@ -140,3 +139,31 @@ def test_a_strip_of_cut_triangles_enriches_two_nodes_more_than_it_has_triangles(
     cut_cells = len(np.unique(virtual.parent[virtual.split]))
     assert cut_cells == 32
     assert len(virtual.enriched_nodes) == cut_cells + 2
+
+
+def test_the_turns_of_a_spiral_do_not_disturb_each_other():
+    """Between two turns the level set changes its sign without a cut: nothing may split there."""
+    angle = np.linspace(0.0, 5.0 * np.pi, 400)
+    radius = 0.05 + 0.38 * angle / angle[-1]
+    spiral = Polyline(0.5 + radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1))
+    length = np.linalg.norm(np.diff(spiral.vertices, axis=0), axis=1).sum()
+    for n, tolerance in ((24, 0.05), (60, 0.02)):  # an element at each end may stay whole
+        virtual = cut_mesh(rectangle_mesh((n, n)), [spiral])
+        facets = subdivide(virtual).cut_facets
+        realised = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum()
+        assert virtual.bodies.max() == 0
+        assert realised == pytest.approx(length, abs=tolerance)
+        # chords of elements of size h√2 under radii above 0.05
+        assert np.abs(spiral.level_set(facets.reshape(-1, 2))).max() < 2.0 / n**2 / (8 * 0.05)
+
+
+def test_the_area_inside_a_circular_cut_converges_at_second_order():
+    angle = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+    circle = Polyline(0.5 + 0.3 * np.stack([np.cos(angle), np.sin(angle)], 1), closed=True)
+    errors = []
+    for n in (16, 32, 64):
+        virtual = cut_mesh(rectangle_mesh((n, n)), [circle])
+        inside = virtual.piece_side[:, 0] > 0
+        errors.append(abs(virtual.volumes[inside].sum() - np.pi * 0.09))
+    # |error| ≤ length · h²·2/8 · curvature / …: a factor of four per halving, within a third
+    assert errors[0] / errors[2] == pytest.approx(16.0, rel=1 / 3)

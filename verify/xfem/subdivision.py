@@ -51,29 +51,40 @@ class Subdivision:
 
 def subdivide(virtual: VirtualMesh) -> Subdivision:
     """Make the conforming sub-division of a cut mesh."""
-    mesh = virtual.mesh
+    mesh, zero = virtual.mesh, virtual.sub_cells.zero_points
     piece, barycentric, _ = virtual.solid_simplices
     whole = len(piece) - len(virtual.sub_cells.piece)
     ids = np.concatenate([mesh.cells[virtual.parent[piece[:whole]]], virtual.sub_cells.points])
     piece, ids, barycentric = _bisect_hanging(virtual, piece, ids, barycentric)
-    keys, columns, weights = _node_keys(virtual, piece, ids, barycentric)
-    # unknown nodes first, in their order; then the points of the cut
-    unique, first, cells = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    cells = cells.reshape(ids.shape)
-    corner = barycentric.reshape(-1, barycentric.shape[2])[first]
-    parent = virtual.parent[np.repeat(piece, ids.shape[1])[first]]
-    count, corners = corner.shape
+
+    # a mesh node moves with one unknown, a point of the cut with those of its edge
+    unknowns = virtual.cells[piece]
+    row, corner = np.nonzero(ids >= len(mesh.points))
+    node = np.take_along_axis(unknowns, barycentric.argmax(axis=2), axis=1)
+    weights, columns = barycentric[row, corner], unknowns[row]
+    support = np.sort(np.where(weights != 0.0, columns, -1), axis=1)
+    keys = np.concatenate([ids[row, corner][:, None], support], axis=1)
+    _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    node[row, corner] = virtual.node_count + number.ravel()
+    used, cells = np.unique(node, return_inverse=True)
+    cells = cells.reshape(node.shape)
+    nodes = used[used < virtual.node_count]
+
+    corners = ids.shape[1]
+    starts = np.concatenate(
+        [np.arange(len(nodes)), len(nodes) + corners * np.arange(len(first) + 1)]
+    )
     interpolation = csr_array(
         (
-            weights[first].ravel(),
-            columns[first].ravel(),
-            np.arange(0, count * corners + 1, corners),
+            np.concatenate([np.ones(len(nodes)), weights[first].ravel()]),
+            np.concatenate([nodes, columns[first].ravel()]),
+            starts,
         ),
-        shape=(count, virtual.node_count),
+        shape=(len(used), virtual.node_count),
     )
     interpolation.eliminate_zeros()
-    points = virtual.sub_cells.zero_points.positions[ids.ravel()[first]]
-    assert len(unique) == len(points) == len(parent)
+    cut_points = zero.positions[ids[row, corner][first]]
+    points = np.concatenate([virtual.node_points[nodes], cut_points])
     return Subdivision(
         points=points,
         cells=_oriented(points, cells),
@@ -84,22 +95,6 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
     )
 
 
-def _node_keys(
-    virtual: VirtualMesh, piece: _Ints, ids: _Ints, barycentric: _Floats
-) -> tuple[_Ints, _Ints, _Floats]:
-    """Keys that tell nodes apart: the point, and the unknowns from which it moves."""
-    corners = ids.shape[1]
-    unknowns = np.broadcast_to(virtual.cells[piece][:, None, :], barycentric.shape)
-    columns = unknowns.reshape(-1, corners)
-    weights = barycentric.reshape(-1, corners)
-    support = np.sort(np.where(weights != 0.0, columns, -1), axis=1)
-    # a mesh node moves with one unknown: let that be the whole key, so that nodes come first
-    is_node = (ids.ravel() < len(virtual.mesh.points))[:, None]
-    point = np.where(is_node, -1, ids.reshape(-1, 1))
-    order = np.where(is_node, np.flip(support, axis=1), support)
-    return np.concatenate([point, order], axis=1), columns, weights
-
-
 def _bisect_hanging(
     virtual: VirtualMesh, piece: _Ints, ids: _Ints, barycentric: _Floats
 ) -> tuple[_Ints, _Ints, _Floats]:
@@ -108,27 +103,45 @@ def _bisect_hanging(
     nodes = len(virtual.mesh.points)
     used = np.unique(virtual.sub_cells.points)
     used = used[used >= nodes] - nodes
+    ends = np.zeros(len(zero.positions), dtype=bool)
+    ends[zero.ends[used]] = True
+    near = ends[ids].sum(axis=1) >= 2
+    rest = (piece[~near], ids[~near], barycentric[~near])
+    piece, ids, barycentric = piece[near], ids[near], barycentric[near]
+    edges = _edge_keys(ids)
     for point in _bisection_order(zero, used):
         plus, minus = zero.ends[point]
+        if (min(plus, minus) << 32 | max(plus, minus)) not in edges:
+            continue
         has = (ids == plus).any(axis=1) & (ids == minus).any(axis=1)
         rows = np.flatnonzero(has)
-        if len(rows) == 0:
-            continue
         at = barycentric[rows, (ids[rows] == plus).argmax(axis=1)]
         to = barycentric[rows, (ids[rows] == minus).argmax(axis=1)]
         r, s = zero.shares(int(zero.cut[point]), np.array([plus]), np.array([minus]))
-        middle = s * at + r * to
         halves = []
         for end in (plus, minus):
             new_ids, new_corners = ids[rows].copy(), barycentric[rows].copy()
             local = (ids[rows] == end).argmax(axis=1)
             new_ids[np.arange(len(rows)), local] = nodes + point
-            new_corners[np.arange(len(rows)), local] = middle
-            halves.append((piece[rows], new_ids, new_corners))
-        piece = np.concatenate([piece[~has], halves[0][0], halves[1][0]])
-        ids = np.concatenate([ids[~has], halves[0][1], halves[1][1]])
-        barycentric = np.concatenate([barycentric[~has], halves[0][2], halves[1][2]])
-    return piece, ids, barycentric
+            new_corners[np.arange(len(rows)), local] = s * at + r * to
+            halves.append((new_ids, new_corners))
+            edges |= _edge_keys(new_ids)
+        piece = np.concatenate([piece[~has], piece[rows], piece[rows]])
+        ids = np.concatenate([ids[~has], halves[0][0], halves[1][0]])
+        barycentric = np.concatenate([barycentric[~has], halves[0][1], halves[1][1]])
+    return (
+        np.concatenate([rest[0], piece]),
+        np.concatenate([rest[1], ids]),
+        np.concatenate([rest[2], barycentric]),
+    )
+
+
+def _edge_keys(ids: _Ints) -> set[int]:
+    """Each edge of the simplices (q, c) as one number."""
+    first, second = np.triu_indices(ids.shape[1], 1)
+    low = np.minimum(ids[:, first], ids[:, second])
+    high = np.maximum(ids[:, first], ids[:, second])
+    return set(np.unique(low << 32 | high).tolist())
 
 
 def _bisection_order(zero: ZeroPoints, used: _Ints) -> _Ints:
@@ -152,10 +165,12 @@ def _cut_facets(points: _Floats, cells: _Ints, ids: _Ints) -> _Floats:
     """Facets where two cells meet in space but do not share their nodes."""
     corners = ids.shape[1]
     keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
-    doubled = np.bincount(ids[:, 0], minlength=ids.max() + 1) * 0
-    pairs = np.unique(np.stack([ids.ravel(), cells.ravel()], axis=1), axis=0)
-    np.add.at(doubled, pairs[:, 0], 1)
-    rows = np.flatnonzero((doubled[ids] > 1).any(axis=1))
+    # a point is doubled when it has several nodes: its first one is not the only one
+    some = np.zeros(ids.max() + 1, dtype=np.int64)
+    some[ids] = cells
+    doubled = np.zeros(len(some), dtype=bool)
+    doubled[ids[some[ids] != cells]] = True
+    rows = np.flatnonzero(doubled[ids].any(axis=1))
     facets, nodes = ids[rows][:, keep].reshape(-1, corners - 1), cells[rows][:, keep]
     order = np.argsort(facets, axis=1)
     facets = np.take_along_axis(facets, order, axis=1)
