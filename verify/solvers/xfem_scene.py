@@ -18,7 +18,7 @@ from verify.scene import (
     Traction,
     read_mesh,
 )
-from verify.solvers.boundary_parts import on_part
+from verify.scene.parts import on_part
 from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch
 from verify.xfem.elasticity import Material, State, isotropic
 from verify.xfem.loads import Density, body_force, traction

@@ -4,7 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.scene import Box, Polygon, Rectangle, Scene, parse_region
+from verify.scene.geometry import Box, Polygon, Rectangle
+from verify.scene.regions import parse_region
+from verify.scene.scene import Scene
 
 __all__ = ["on_part"]
 

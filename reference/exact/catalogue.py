@@ -1,0 +1,82 @@
+"""Exact solutions by name."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from reference.exact.airy import Airy
+from reference.exact.bending import Bending
+from reference.exact.crack_tip import CrackTip
+from reference.exact.griffith import Griffith
+from reference.exact.hooke import Hooke, hooke
+from reference.exact.linear import Linear
+from reference.exact.parameters import Parameters
+from reference.exact.patch import Patch
+from reference.exact.sinusoidal import Sinusoidal
+from reference.exact.solution import ExactSolution
+from verify.errors import InputError
+from verify.scene import Material
+from verify.scene.nearest import nearest
+
+__all__ = ["exact_solution", "exact_solution_names"]
+
+_CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] = {
+    "linear": (Linear, "uniform strain, uncut: matrix, shift"),
+    "patch": (
+        Patch,
+        "uniform strain on each side of a straight cut: point, slope or angle, strain, shift",
+    ),
+    "bending": (
+        Bending,
+        "pure bending on each side of a straight cut: point, slope or angle, stress_gradient, shift",
+    ),
+    "airy": (
+        Airy,
+        "sin·cosh fields on each side of a straight cut: point, slope or angle, above and below "
+        "(C, D, k each), shift",
+    ),
+    "smooth": (
+        Sinusoidal,
+        "sinusoids with a body force on each side of a straight cut: point, slope or angle, above "
+        "and below (rows A, k, phase of U and V), shift",
+    ),
+    "tip": (CrackTip, "crack-tip field of modes I and II: tip, angle, intensity (K_I, K_II)"),
+    "griffith": (
+        Griffith,
+        "crack in an infinite plate: centre, a, angle, remote stress (sxx, syy, sxy)",
+    ),
+}
+
+
+def exact_solution_names() -> dict[str, str]:
+    """Names of the exact solutions, each with one line on what it is and its parameters."""
+    return {name: text for name, (_, text) in _CATALOGUE.items()}
+
+
+def exact_solution(name: str, parameters: Mapping[str, Any], material: Material) -> ExactSolution:
+    """Make the exact solution called `name`.
+
+    Parameters
+    ----------
+    name : str
+        One of `exact_solution_names`.
+    parameters : mapping
+        Its parameters in SI units, as in the section ``[exact]`` of a case file.
+    material : Material
+
+    Raises
+    ------
+    InputError
+        If the name or a parameter is unknown, missing or has the wrong form.
+    """
+    if name not in _CATALOGUE:
+        raise InputError(f"no exact solution '{name}'{nearest(name, _CATALOGUE)}")
+    make, _ = _CATALOGUE[name]
+    law = hooke(material)
+    if law.dimension == 3 and name != "linear":
+        raise InputError(
+            f"exact solution '{name}' is plane; material.plane = 'strain' or 'stress' is missing"
+        )
+    given = Parameters(name, parameters)
+    solution = make(law, given)
+    given.close()
+    return solution

@@ -1,0 +1,155 @@
+"""Meshes of a scene that conform to its cuts (gmsh, OpenCASCADE kernel)."""
+
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.meshing.grading import Grading
+from reference.meshing.opening import ConformingMesh, open_cut
+from reference.meshing.session import gmsh_session, plane_triangles
+from verify.errors import InputError, UnsupportedSceneError
+from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
+
+__all__ = ["conforming_mesh"]
+
+Array = NDArray[np.float64]
+
+
+def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
+    """Mesh the body of a plane scene so that its cuts run along facets, and open them.
+
+    Parameters
+    ----------
+    scene : Scene
+        A rectangle or polygon with polyline and arc cuts; they may end inside, cross, branch
+        and reach beyond the body.
+    grading : Grading
+        Element sizes.
+
+    Returns
+    -------
+    ConformingMesh
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If the geometry is not a rectangle or polygon.
+    InputError
+        If gmsh cannot mesh the geometry, or no cut lies inside the body.
+    """
+    geometry = scene.geometry
+    if not isinstance(geometry, Rectangle | Polygon):
+        raise UnsupportedSceneError(
+            f"a conforming mesh of a '{geometry.kind}' geometry is not offered yet"
+        )
+    outline = geometry.outline()
+    # gmsh's tolerances are absolute: mesh a body of size one
+    origin, scale = outline.min(axis=0), float(np.ptp(outline, axis=0).max())
+    where = str(scene.file or "")
+    try:
+        with gmsh_session() as gmsh:
+            surface = _add_outline(gmsh, (outline - origin) / scale)
+            curves = [tag for cut in scene.cuts for tag in _add_cut(gmsh, cut, origin, scale)]
+            cut_curves = _fragment(gmsh, surface, curves)
+            _set_sizes(gmsh, grading, origin, scale)
+            gmsh.option.setNumber("Mesh.Algorithm", 5 if len(grading.points) else 6)
+            gmsh.model.mesh.generate(2)
+            points, cells, number = plane_triangles(gmsh)
+            facets = _curve_facets(gmsh, cut_curves, number)
+    except InputError:
+        raise
+    except Exception as error:  # gmsh raises bare Exception
+        raise InputError(f"gmsh could not mesh the body with its cuts ({error})", where) from None
+    if scene.cuts and not len(facets):
+        raise InputError("cuts: none of them lies inside the body", where)
+    return open_cut(points * scale + origin, cells, facets)
+
+
+def _add_outline(gmsh: ModuleType, outline: Array) -> int:
+    occ = gmsh.model.occ
+    corners = [occ.addPoint(x, y, 0.0) for x, y in outline]
+    edges = [occ.addLine(corners[i], corners[(i + 1) % len(corners)]) for i in range(len(corners))]
+    return int(occ.addPlaneSurface([occ.addCurveLoop(edges)]))
+
+
+def _add_cut(gmsh: ModuleType, cut: object, origin: Array, scale: float) -> list[int]:
+    occ = gmsh.model.occ
+    if isinstance(cut, ArcCut):
+        x, y = (np.asarray(cut.centre) - origin) / scale
+        # two arcs, so that a full circle has end points too
+        start, sweep = np.deg2rad(cut.start), np.deg2rad(cut.sweep)
+        stops = (start, start + sweep / 2, start + sweep)
+        ends = [
+            occ.addPoint(x + cut.radius / scale * np.cos(t), y + cut.radius / scale * np.sin(t), 0)
+            for t in (stops[:2] if cut.sweep == 360.0 else stops)
+        ]
+        centre = occ.addPoint(x, y, 0.0)
+        following = [*ends[1:], ends[0]] if cut.sweep == 360.0 else ends[1:]
+        if cut.sweep == 360.0:
+            half = [occ.addCircleArc(a, centre, b) for a, b in zip(ends, following, strict=True)]
+        else:
+            half = [occ.addCircleArc(a, centre, b) for a, b in zip(ends, following, strict=False)]
+        return [int(tag) for tag in half]
+    assert isinstance(cut, PolylineCut)
+    vertices = (cut.vertices() - origin) / scale
+    closed = np.array_equal(vertices[0], vertices[-1])
+    tags = [occ.addPoint(x, y, 0.0) for x, y in (vertices[:-1] if closed else vertices)]
+    if closed:
+        tags.append(tags[0])
+    return [int(occ.addLine(a, b)) for a, b in zip(tags, tags[1:], strict=False)]
+
+
+def _fragment(gmsh: ModuleType, surface: int, curves: list[int]) -> list[int]:
+    """Imprint the cuts on the body; return the curves of the cut that lie inside it."""
+    occ = gmsh.model.occ
+    if not curves:
+        occ.synchronize()
+        return []
+    _, images = occ.fragment([(2, surface)], [(1, tag) for tag in curves])
+    occ.synchronize()
+    surfaces = [tag for dim, tag in images[0] if dim == 2]
+    pieces = {abs(tag) for image in images[1:] for dim, tag in image if dim == 1}
+    inside, beyond = [], []
+    for curve in sorted(pieces):
+        sides = [s for s in gmsh.model.getAdjacencies(1, curve)[0] if s in surfaces]
+        embedded = [s for s in surfaces if (1, curve) in gmsh.model.mesh.getEmbedded(2, s)]
+        if len(sides) == 2 or embedded:
+            inside.append(curve)
+        elif not sides:
+            beyond.append((1, curve))
+    occ.remove(beyond, recursive=True)
+    occ.synchronize()
+    return inside
+
+
+def _set_sizes(gmsh: ModuleType, grading: Grading, origin: Array, scale: float) -> None:
+    size, radius, smallest = (
+        value / scale for value in (grading.size, grading.radius, grading.smallest)
+    )
+    field = gmsh.model.mesh.field
+    terms = []
+    for x, y in (grading.points - origin) / scale:
+        tag = field.add("MathEval")
+        squared = f"((x-({x:.17g}))^2+(y-({y:.17g}))^2)"
+        graded = f"{size:.17g}*({squared}/{radius**2:.17g})^{grading.exponent / 2:.17g}"
+        field.setString(tag, "F", f"{graded} + {smallest:.17g}")
+        terms.append(tag)
+    far = field.add("MathEval")
+    field.setString(far, "F", f"{size:.17g}")
+    least = field.add("Min")
+    field.setNumbers(least, "FieldsList", [*terms, far])
+    field.setAsBackgroundMesh(least)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+
+
+def _curve_facets(
+    gmsh: ModuleType, curves: list[int], number: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for curve in curves:
+        _, _, nodes = gmsh.model.mesh.getElements(1, curve)
+        if nodes:
+            found.append(number[np.asarray(nodes[0], dtype=np.int64)].reshape(-1, 2))
+    return np.concatenate(found)
