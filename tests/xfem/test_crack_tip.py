@@ -87,7 +87,8 @@ def test_the_energy_error_of_an_unenriched_tip_falls_with_the_square_root_of_h()
     """Odd n: the tip lies in the middle of a diagonal, which is an element edge."""
     errors, from_energies, totals = np.transpose([relative_energy_error(n) for n in (17, 33, 65)])
     assert totals == pytest.approx([ENERGY] * 3, rel=1e-3)  # quadrature across the singularity
-    assert np.log(errors[1] / errors[2]) / np.log(65 / 33) == pytest.approx(0.5, abs=0.01)
+    # the regular part of the error, O(h), still adds a little to the rate on these meshes
+    assert np.log(errors[1] / errors[2]) / np.log(65 / 33) == pytest.approx(0.5, abs=0.03)
     # E_h − E is the squared error, but for the interpolated boundary values (O(h²))
     assert errors == pytest.approx(from_energies, rel=0.01)
     # another P1 XFEM, its mesh not known: .4388, .3129, .2222
