@@ -80,6 +80,29 @@ def _gather(pivot, start, elements, variables, sees, begin, size, members, alive
 
 
 @njit(cache=True)
+def _see_neighbours(starts, columns, sees, variables):
+    """Let every node see its neighbours, not itself."""
+    for node in range(len(variables)):
+        for at in range(starts[node], starts[node + 1]):
+            if columns[at] != node:
+                sees[starts[node] + variables[node]] = columns[at]
+                variables[node] += 1
+
+
+@njit(cache=True)
+def _count_outside(pivot, found, start, elements, sees, alive, size, seen_by, outside):
+    """Nodes of each older element that the new one does not have."""
+    for node in found:
+        for k in range(elements[node]):
+            element = sees[start[node] + k]
+            if alive[element]:
+                if seen_by[element] != pivot:
+                    seen_by[element] = pivot
+                    outside[element] = size[element]
+                outside[element] -= 1
+
+
+@njit(cache=True)
 def _eliminate_all(starts, columns):
     count = len(starts) - 1
     start = starts[:-1].astype(np.int64)
@@ -90,11 +113,8 @@ def _eliminate_all(starts, columns):
     head = np.full(count + 1, -1, dtype=np.int64)
     after = np.full(count, -1, dtype=np.int64)
     before = np.full(count, -1, dtype=np.int64)
+    _see_neighbours(starts, columns, sees, variables)
     for node in range(count):
-        for at in range(starts[node], starts[node + 1]):
-            if columns[at] != node:
-                sees[start[node] + variables[node]] = columns[at]
-                variables[node] += 1
         degree[node] = variables[node]
         _link(node, degree, head, after, before)
     mark = np.full(count, -1, dtype=np.int64)
@@ -124,14 +144,7 @@ def _eliminate_all(starts, columns):
             pivot, start, elements, variables, sees, begin, size, members, alive, mark, space
         )
         found = space[:number]
-        for node in found:
-            for k in range(elements[node]):
-                element = sees[start[node] + k]
-                if alive[element]:
-                    if seen_by[element] != pivot:
-                        seen_by[element] = pivot
-                        outside[element] = size[element]
-                    outside[element] -= 1
+        _count_outside(pivot, found, start, elements, sees, alive, size, seen_by, outside)
         if filled + number > len(members):
             grown = np.empty(2 * len(members) + number, dtype=np.int64)
             grown[:filled] = members[:filled]
