@@ -13,7 +13,7 @@ from verify.report.markup import Markup, joined, tag
 __all__ = ["HEIGHT", "WIDTH", "Axis", "Panel", "log_range", "text"]
 
 WIDTH, HEIGHT = 372, 268
-_LEFT, _RIGHT, _TOP, _BOTTOM = 46, 96, 34, 40
+_LEFT, _RIGHT, _TOP, _BOTTOM = 46, 106, 34, 40
 
 
 def log_range(values: list[float], room: float = 0.08) -> tuple[float, float]:
@@ -83,7 +83,7 @@ class Panel:
     @property
     def gutter(self) -> float:
         """Pixel right of the axes where the curves' names begin."""
-        return self.x.end + 16
+        return self.x.end + 14
 
     def drawn(self, label: str, *content: Markup) -> Markup:
         """Return the whole figure; `label` is its alternative text."""
@@ -115,8 +115,9 @@ class Panel:
         marks += [f"M{self.x.at(v):.1f} {y0}v5" for v in labelled_x]
         marks += [f"M{x0} {self.y.at(v):.1f}h-3" for v in fine_y]
         marks += [f"M{x0} {self.y.at(v):.1f}h-5" for v in labelled_y]
-        labels = [_tick(v, self.x.at(v), y0 + 17, "middle") for v in labelled_x]
-        labels += [_tick(v, x0 - 8, self.y.at(v) + 4, "end") for v in labelled_y]
+        as_powers = [any(not 0.009 < v < 9999 for v in ticks) for ticks in (labelled_x, labelled_y)]
+        labels = [_tick(v, self.x.at(v), y0 + 17, "middle", as_powers[0]) for v in labelled_x]
+        labels += [_tick(v, x0 - 8, self.y.at(v) + 4, "end", as_powers[1]) for v in labelled_y]
         titles = [
             text((x0 + x1) / 2, y0 + 34, self.x_title, class_="axis", text_anchor="middle"),
             text(2, 12, self.y_title, class_="axis"),
@@ -129,10 +130,10 @@ def text(x: float, y: float, *content: str, **attributes: str) -> Markup:
     return tag("text", *content, x=f"{x:.1f}", y=f"{y:.1f}", **attributes)
 
 
-def _tick(value: float, x: float, y: float, anchor: str) -> Markup:
+def _tick(value: float, x: float, y: float, anchor: str, as_power: bool) -> Markup:
     exponent = math.floor(math.log10(value) + 1e-9)
     mantissa = round(value / 10.0**exponent)
-    if -3 < exponent < 4:
+    if not as_power:
         return text(x, y, f"{value:.{max(-exponent, 0)}f}", text_anchor=anchor)
     power = tag("tspan", str(exponent).replace("-", "−"), class_="power", dy="-5")
     return text(x, y, "10" if mantissa == 1 else f"{mantissa}·10", power, text_anchor=anchor)

@@ -47,8 +47,11 @@ def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup
 
 def _body(result: CaseResult, pictures: CasePictures) -> Markup:
     parts: list[Markup | None] = [_pictures(pictures), failures_table(result.solves)]
-    if diagrams := [d for name in metric_names(result) if (d := _diagrams(result, name))]:
-        parts += [tag("h3", "Convergence and cost"), *diagrams]
+    names = metric_names(result)
+    if diagrams := [d for name in names if (d := _diagrams(result, name)) is not None]:
+        curves = [curve for name in names for curve in error_curves(result, name)]
+        said = tag("p", " ".join(_reservations(curves, result)), class_="quiet")
+        parts += [tag("h3", "Convergence and cost"), said, *diagrams]
     parts += [orders_table(result), numbers_table(result), times_table(result)]
     reference = reference_record(result.reference)
     parts.append(tag("h3", "Reference"))
@@ -118,8 +121,7 @@ def _diagrams(result: CaseResult, metric: str) -> Markup | None:
     said = [
         f"{title[:1].upper()}{title[1:]}, against {source or 'an unnamed reference'}.",
         _floor_text(curves, y_range),
-        f"The triangle has the required order {slope[1]}." if slope else "No order is required.",
-        *_reservations(curves, result),
+        f"The triangle has the required order, {slope[1]}." if slope else "No order is required.",
     ]
     return tag(
         "figure",
@@ -150,7 +152,7 @@ def _reservations(curves: list[Curve], result: CaseResult) -> list[str]:
     if any(point.value <= 0 for curve in curves for point in curve.points):
         said.append("Errors of exactly zero are in the table only.")
     if any(curve.ends for curve in curves):
-        said.append("× marks a level that did not finish; the curve ends there.")
+        said.append("× marks a level that did not finish: the curve ends there.")
     timed = [p.duration for c in curves for p in c.points if p.duration]
     if timed:
         phases = ", ".join(dict.fromkeys(name for time in timed for name in time.phases))

@@ -6,6 +6,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+from numpy.typing import NDArray
 
 from verify.report.bodies import Body
 from verify.report.view import View
@@ -24,9 +26,7 @@ def draw(body: Body, view: View, target: Path) -> None:
     places = view.projected(body.points)
     if np.ptp(body.points[:, 2]) == 0 and len(body.values) == len(body.points):
         axes.tripcolor(
-            places[:, 0],
-            places[:, 1],
-            body.triangles,
+            Triangulation(places[:, 0], places[:, 1], body.triangles),
             body.values,
             shading="gouraud",
             cmap=view.colours,
@@ -39,7 +39,7 @@ def draw(body: Body, view: View, target: Path) -> None:
         (body.element_edges, 0.5, "black", 0.25),
         (_seen(body, places), 1.6, "#1a1a1a", 1.0),
     ):
-        segments = places[edges][:, :, :2]
+        segments = list(places[edges][:, :, :2])
         axes.add_collection(
             LineCollection(segments, linewidths=width, colors=colour, alpha=opacity)
         )
@@ -48,14 +48,14 @@ def draw(body: Body, view: View, target: Path) -> None:
     figure.savefig(target, format="png", facecolor="white")
 
 
-def _painted(body: Body, view: View, places: np.ndarray) -> PolyCollection:
+def _painted(body: Body, view: View, places: NDArray[np.float64]) -> PolyCollection:
     """Return the triangles from the farthest to the nearest, each in its mean colour."""
     order = np.argsort(places[body.triangles][:, :, 2].mean(axis=1))
     per_triangle = body.values
     if len(body.values) == len(body.points):
         per_triangle = body.values[body.triangles].mean(axis=1)
     painted = PolyCollection(
-        places[body.triangles[order]][:, :, :2],
+        list(places[body.triangles[order]][:, :, :2]),
         cmap=view.colours,
         edgecolors="face",
         linewidths=0.3,
@@ -65,7 +65,7 @@ def _painted(body: Body, view: View, places: np.ndarray) -> PolyCollection:
     return painted
 
 
-def _seen(body: Body, places: np.ndarray) -> np.ndarray:
+def _seen(body: Body, places: NDArray[np.float64]) -> NDArray[np.int64]:
     """Leave out lines on the far half of a solid: nothing here hides them."""
     depth = places[:, 2]
     if np.ptp(depth) == 0:

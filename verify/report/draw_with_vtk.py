@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pyvista
+from matplotlib import colormaps
 
 from verify.report.bodies import Body
 from verify.report.view import View
@@ -20,13 +21,13 @@ __all__ = ["draw", "main"]
 def draw(body: Body, view: View, target: Path) -> None:
     """Write a picture of `body` to the PNG file `target`."""
     plotter = pyvista.Plotter(off_screen=True, window_size=list(view.size), lighting="none")
-    plotter.set_background("white")
-    surface = pyvista.PolyData.from_regular_faces(body.points, body.triangles)
+    plotter.background_color = pyvista.Color("white")
+    surface = pyvista.PolyData.from_regular_faces(body.points, body.triangles.astype(int))
     surface["values"] = body.values
     plotter.add_mesh(
         surface,
         scalars="values",
-        cmap=view.colours,
+        cmap=colormaps[view.colours],
         clim=view.limits,
         show_scalar_bar=False,
         lighting=False,
@@ -38,8 +39,8 @@ def draw(body: Body, view: View, target: Path) -> None:
         (body.edges, 2.6, "#1a1a1a", 1.0),
     ):
         if len(edges):
-            lines = pyvista.PolyData(body.points + lift)
-            lines.lines = np.column_stack([np.full(len(edges), 2), edges]).ravel()
+            segments = np.column_stack([np.full(len(edges), 2), edges]).ravel()
+            lines = pyvista.PolyData(body.points + lift, lines=segments)
             plotter.add_mesh(lines, color=colour, line_width=width, opacity=opacity, lighting=False)
     _aim(plotter, body, view)
     plotter.enable_anti_aliasing("ssaa")

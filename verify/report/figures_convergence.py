@@ -2,7 +2,6 @@
 
 from verify.report.axes import Panel, log_range
 from verify.report.curves import Curve, Point
-from verify.report.markup import Markup
 from verify.report.marks import (
     abandoned,
     band,
@@ -11,6 +10,7 @@ from verify.report.marks import (
     slope_triangle,
     style_of,
 )
+from verify.report.markup import Markup
 from verify.report.notation import number_text
 from verify.result import CaseResult, Rate
 
@@ -42,7 +42,7 @@ def required_slope(result: CaseResult, metric: str) -> tuple[float, str] | None:
             and check.get("metric") == metric
         ):
             if isinstance(order := check.get("at_least"), int | float):
-                return float(order), f"≥ {order:g}"
+                return float(order), f"≥\N{NARROW NO-BREAK SPACE}{order:g}"
             if isinstance(order := check.get("equals"), int | float):
                 return float(order), f"{order:g}"
     return None
@@ -83,7 +83,7 @@ def _order(rate: Rate | None) -> str:
     if rate is None:
         return ""
     if rate.reason or rate.order is None:
-        return "no order: " + rate.reason.split(":")[0].split("(")[0].strip()[:12]
+        return rate.reason.replace("(", ":").split(":")[0].strip()[:16] or "no order"
     return f"order {rate.order:.2f}" + (
         f" ± {rate.uncertainty:.2f}" if rate.uncertainty >= 0.005 else ""
     )

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from verify.report.axes import Panel, log_range
 from verify.report.curves import Curve, Point
-from verify.report.markup import Markup, joined, tag
 from verify.report.marks import Style, curve_names, drawn_curve, style_of
+from verify.report.markup import Markup, joined, tag
 from verify.report.notation import number_text
 
 __all__ = ["time_figure", "unknowns_figure"]

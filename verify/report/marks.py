@@ -51,7 +51,7 @@ def drawn_curve(
     panel: Panel, curve: Curve, style: Style, abscissa: Callable[[Point], float | None]
 ) -> Markup:
     """Return the lines, error bars and markers of a curve."""
-    parts = []
+    parts: list[Markup | None] = []
     for stretch in curve.stretches:
         placed = [(p, x) for p in stretch if (x := abscissa(p)) is not None and p.value > 0]
         if not placed:
@@ -69,12 +69,17 @@ def abandoned(
 ) -> Markup:
     """Return a cross at each of `places` (values), where a solve failed and the curve ends."""
     parts = []
+    known = {p.level: (panel.x.at(p.size), panel.y.at(p.value)) for p in curve.points if p.size}
     for (x_value, y_value), (level, how) in zip(places, curve.ends, strict=True):
         x, y = panel.x.at(x_value), panel.y.at(y_value)
+        if level - 1 in known:
+            x0, y0 = known[level - 1]
+            lead = f"M{x0:.1f} {y0:.1f}L{x:.1f} {y:.1f}"
+            parts.append(tag("path", d=lead, class_="meshing", stroke=style.colour))
         cross = f"M{x - 4:.1f} {y - 4:.1f}l8 8m0 -8l-8 8"
         tip = tag("title", f"{curve.label}, level {level}: {how}")
         parts.append(tag("path", tip, d=cross, class_="abandoned", stroke=style.colour))
-        parts.append(text(x, y - 8, how, class_="note", text_anchor="middle", fill=style.colour))
+        parts.append(text(x - 4, y - 9, how, class_="note", fill=style.colour))
     return joined(*parts)
 
 
@@ -93,10 +98,11 @@ def curve_names(
     parts = []
     for (_, name, second, style), anchor, y in zip(ordered, wanted, places, strict=True):
         x = panel.gutter
-        lead = f"M{panel.x.end + 3:.1f} {anchor:.1f}L{x - 3:.1f} {y:.1f}"
+        lead = f"M{panel.x.end + 2:.1f} {anchor:.1f}L{x - 5:.1f} {y:.1f}"
         parts.append(tag("path", d=lead, class_="lead", stroke=style.colour))
-        parts.append(text(x, y + 4, _shortened(name), class_="name", fill=style.colour))
-        parts.append(text(x, y + 16, second, class_="note", fill=style.colour))
+        parts.append(_marker(x, y, style, name))
+        parts.append(text(x + 8, y + 4, _shortened(name), class_="name", fill=style.colour))
+        parts.append(text(x + 8, y + 16, second, class_="note", fill=style.colour))
     return joined(*parts)
 
 
@@ -147,9 +153,9 @@ def _error_bar(panel: Panel, point: Point, x: float, style: Style) -> Markup | N
 
 def _marker(x: float, y: float, style: Style, tip: str) -> Markup:
     shapes = {
-        "disc": f"M{x - 3.4:.1f} {y:.1f}a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0Z",
-        "square": f"M{x - 3.2:.1f} {y - 3.2:.1f}h6.4v6.4h-6.4Z",
-        "diamond": f"M{x:.1f} {y - 4.4:.1f}l4.4 4.4l-4.4 4.4l-4.4 -4.4Z",
+        "disc": f"M{x - 2.8:.1f} {y:.1f}a2.8 2.8 0 1 0 5.6 0a2.8 2.8 0 1 0 -5.6 0Z",
+        "square": f"M{x - 4:.1f} {y - 4:.1f}h8v8h-8Z",
+        "diamond": f"M{x:.1f} {y - 5.2:.1f}l5.2 5.2l-5.2 5.2l-5.2 -5.2Z",
         "triangle": f"M{x:.1f} {y - 4.2:.1f}l4 7.2h-8Z",
         "cross": f"M{x - 4:.1f} {y:.1f}h8M{x:.1f} {y - 4:.1f}v8",
     }

@@ -87,14 +87,18 @@ def with_interval(value: float | None, low: float | None, high: float | None) ->
     return joined(number(value, digits), " ", interval)
 
 
-def seconds_text(value: float | None) -> str:
-    """Return a duration in the unit that suits it."""
+def seconds_text(value: float | None, beside: float | None = None) -> str:
+    """Return a duration in the unit that suits it.
+
+    With `beside`, a duration that is written next to it, the number alone, in the same unit.
+    """
     if value is None:
         return _MISSING
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if value >= size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value * 1e6:.3g} µs"
+    judged = value if beside is None else beside
+    unit, size = next((u for u in (("s", 1.0), ("ms", 1e-3)) if judged >= u[1]), ("µs", 1e-6))
+    shown = value / size
+    written = f"{shown:.3g}" if shown < 999.5 else f"{shown:.0f}"
+    return written if beside is not None else f"{written} {unit}"
 
 
 def bytes_text(value: float | None) -> str:

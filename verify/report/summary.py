@@ -105,11 +105,12 @@ def verdict_table(run: Run) -> Markup:
 
 
 def _check_row(record: VerdictRecord) -> Markup:
+    observed = with_interval(record.observed, record.low, record.high)
     return tag(
         "tr",
         tag("td", check_text(record)),
-        tag("td", with_interval(record.observed, record.low, record.high), class_="number"),
-        tag("td", record.limit),
+        tag("td", observed, class_="number", data_label="observed "),
+        tag("td", record.limit, data_label="limit "),
         tag("td", badge(record.verdict), tag("div", record.reason, class_="reason")),
     )
 

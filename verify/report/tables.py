@@ -214,7 +214,7 @@ def _measured(solve: SolveRecord, metric: Metric | None) -> Any:
 def _spread(values: Sequence[float]) -> str:
     if not values:
         return "–"
-    middle = median(values)
+    middle, low, high = median(values), min(values), max(values)
     if len(values) == 1:
         return f"{seconds_text(middle)} (once)"
-    return f"{seconds_text(middle)} ({seconds_text(min(values))} to {seconds_text(max(values))})"
+    return f"{seconds_text(middle)} ({seconds_text(low, middle)}–{seconds_text(high, middle)})"

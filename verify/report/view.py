@@ -51,20 +51,13 @@ class View:
 
 def common_view(bodies: Sequence[Body], colours: str) -> View:
     """Return the one view in which all `bodies` are seen whole, with one colour scale."""
-    flat = all(np.ptp(body.points[:, 2]) == 0 for body in bodies)
-    if flat:
-        right, up, towards = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    else:
-        right = (-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0)
-        towards = (
-            np.cos(_ELEVATION) * np.cos(_AZIMUTH),
-            np.cos(_ELEVATION) * np.sin(_AZIMUTH),
-            np.sin(_ELEVATION),
-        )
-        up = tuple(np.cross(towards, right))
-    right, up, towards = (tuple(float(v) for v in axis) for axis in (right, up, towards))
-    axes = np.array([right, up])
-    places = np.concatenate([body.points @ axes.T for body in bodies])
+    axis = np.eye(3)
+    if any(np.ptp(body.points[:, 2]) > 0 for body in bodies):
+        e, a = _ELEVATION, _AZIMUTH
+        towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        right = np.array([-np.sin(a), np.cos(a), 0.0])
+        axis = np.array([right, np.cross(towards, right), towards])
+    places = np.concatenate([body.points @ axis[:2].T for body in bodies])
     low, high = places.min(axis=0), places.max(axis=0)
     room = _MARGIN * float((high - low).max()) or 1.0
     width, height = (high - low) + 2 * room
@@ -76,9 +69,9 @@ def common_view(bodies: Sequence[Body], colours: str) -> View:
     half = np.array([max(width, height * ratio), max(height, width / ratio)]) / 2
     (x0, y0), (x1, y1) = centre - half, centre + half
     return View(
-        right,
-        up,
-        towards,
+        tuple(axis[0].tolist()),
+        tuple(axis[1].tolist()),
+        tuple(axis[2].tolist()),
         (float(x0), float(x1), float(y0), float(y1)),
         size,
         colours,
