@@ -1,0 +1,55 @@
+"""Bodies with a cut, as the tests of corotation and motion need them."""
+
+import numpy as np
+
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.virtual import cut_mesh
+
+SOFT = 1e4  # Pa, the thesis' material
+DENSITY = 1000.0  # kg/m³
+GRAVITY = 9.8  # m/s²
+
+
+def material(dim, young=SOFT):
+    return isotropic(young, 0.3, "plane strain" if dim == 2 else "solid")
+
+
+def cut_square(n=8, point=(0.5, 0.53), normal=(-1.0 / 3.0, 1.0)):
+    return cut_mesh(rectangle_mesh((n, n)), [Plane(point, normal)])
+
+
+def cut_cube(n=3, point=(0.5, 0.5, 0.5), normal=(-1.0, -2.0, 3.0)):
+    return cut_mesh(box_mesh((n, n, n)), [Plane(point, normal)])
+
+
+def cut_body(dim):
+    return cut_square(4) if dim == 2 else cut_cube(2, (0.5, 0.53, 0.47))
+
+
+def cut_membrane():
+    flat = rectangle_mesh((4, 4))
+    x, y = flat.points.T
+    bent = SimplexMesh(np.stack([x, y, 0.3 * np.sin(3.0 * x)], axis=1), flat.cells)
+    return cut_mesh(bent, [Plane((0.5, 0.53, 0.0), (0.3, 1.0, 0.0))])
+
+
+def rotation(dim, angle, axis=(1.0, 2.0, -0.5)):
+    """Rotation matrix by Rodrigues' formula."""
+    if dim == 2:
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c, -s], [s, c]])
+    n = np.asarray(axis) / np.linalg.norm(axis)
+    K = np.array([[0.0, -n[2], n[1]], [n[2], 0.0, -n[0]], [-n[1], n[0], 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+
+
+def boundary_nodes(virtual):
+    """Unknown nodes on the boundary of the uncut mesh."""
+    mesh = virtual.mesh
+    on_boundary = np.zeros(len(mesh.points), dtype=bool)
+    for cell, opposite in mesh.boundary_facets:
+        on_boundary[np.delete(mesh.cells[cell], opposite)] = True
+    return on_boundary[virtual.node_parent]

@@ -1,0 +1,211 @@
+"""Corotational force, energy and stiffness: exact values, derivatives, invariances."""
+
+import numpy as np
+import pytest
+from cut_bodies import (
+    SOFT,
+    cut_body,
+    cut_cube,
+    cut_membrane,
+    cut_square,
+    material,
+    rotation,
+)
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.corotational import InternalForce
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.virtual import VirtualMesh, cut_mesh
+
+
+def _bodies():
+    membrane = InternalForce(cut_membrane(), isotropic(1.0, 0.3, "plane stress"))
+    solids = [
+        InternalForce(cut_body(dim), material(dim, 1.0), kinematics)
+        for dim in (2, 3)
+        for kinematics in ("corotational", "linear")
+    ]
+    return [*solids, membrane]
+
+
+def _disturbed(force, size=0.1, seed=2):
+    rng = np.random.default_rng(seed)
+    X = force.virtual.node_points
+    turned = X @ rotation(X.shape[1], 1.1).T - X if force.turning else np.zeros_like(X)
+    return turned + size * np.sqrt(force.virtual.mesh.measures.min()) * rng.normal(size=X.shape)
+
+
+def _energy_by_svd(virtual, lam, mu, displacement):
+    """Independent twin: singular values of each deformation gradient."""
+    total = 0.0
+    for piece, cell in enumerate(virtual.parent):
+        X = virtual.mesh.points[virtual.mesh.cells[cell]]
+        x = X + displacement[virtual.cells[piece]]
+        F = np.linalg.solve((X[1:] - X[0]), x[1:] - x[0]).T
+        s = np.linalg.svd(F)[1]
+        s[-1] *= np.sign(np.linalg.det(F))
+        total += virtual.volumes[piece] * (mu * ((s - 1) ** 2).sum() + lam / 2 * (s - 1).sum() ** 2)
+    return total
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("size", [0.1, 1.5])
+def test_energy_is_that_of_the_singular_values_also_where_pieces_are_inverted(dim, size):
+    force = InternalForce(cut_body(dim), material(dim, 1.0))
+    u = _disturbed(force, size)
+    if size > 1.0:
+        assert len(force.inverted(u)) > 0
+    expected = _energy_by_svd(force.virtual, force.lam[0], force.mu[0], u)
+    assert force.evaluate(u)[1] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("force", _bodies())
+def test_force_is_the_gradient_of_the_energy_and_stiffness_the_gradient_of_the_force(force):
+    u = _disturbed(force)
+    direction = np.random.default_rng(3).normal(size=u.shape)
+    # fourth-order differences: truncation h⁴, round-off 1e-16/h
+    step, weights = 2e-4, {-2: 1 / 12, -1: -2 / 3, 1: 2 / 3, 2: -1 / 12}
+    samples = {k: force.evaluate(u + k * step * direction) for k in weights}
+    slope = sum(w * samples[k][1] for k, w in weights.items()) / step
+    change = sum(w * samples[k][0] for k, w in weights.items()) / step
+    f = force.evaluate(u)[0]
+    assert np.sum(f * direction) == pytest.approx(slope, rel=1e-9)
+    pattern = block_pattern(force.virtual.cells, force.virtual.node_count)
+    K = pattern.matrix(force.stiffness(pattern, u))
+    product = (K @ direction.ravel()).reshape(u.shape)
+    assert np.abs(product - change).max() < 1e-9 * np.abs(change).max()
+    assert np.abs((K - K.T)).max() <= 1e-14 * np.abs(K).max()
+    assert force.left_out == 0
+
+
+@pytest.mark.parametrize("force", _bodies())
+def test_frozen_stiffness_has_no_negative_mode_and_equals_its_product(force):
+    u = _disturbed(force)
+    pattern = block_pattern(force.virtual.cells, force.virtual.node_count)
+    K = pattern.matrix(force.stiffness(pattern, u, "frozen"))
+    values = np.linalg.eigvalsh(K.toarray())
+    assert values[0] > -1e-13 * values[-1]
+    product = np.zeros_like(u)
+    force.add_frozen_product(u, 2.0, product)
+    assert np.abs(product.ravel() - 2.0 * K @ u.ravel()).max() < 1e-13 * np.abs(product).max()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_at_rest_both_stiffnesses_are_the_linear_one_and_so_is_linear_kinematics(dim):
+    v = cut_body(dim)
+    pattern = block_pattern(v.cells, v.node_count)
+    expected = LinearStiffness(v, material(dim)).assemble(pattern)
+    u = np.zeros_like(v.node_points)
+    for kinematics in ("corotational", "linear"):
+        force = InternalForce(v, material(dim), kinematics)
+        for kind in ("frozen", "exact"):
+            K = force.stiffness(pattern, u, kind)
+            assert np.abs(K - expected).max() < 1e-13 * np.abs(expected).max()
+    rng = np.random.default_rng(0)
+    u = rng.normal(size=u.shape)
+    f, energy = InternalForce(v, material(dim), "linear").evaluate(u)
+    g, other = LinearStiffness(v, material(dim)).force(u)
+    assert np.abs(f - g).max() < 1e-13 * np.abs(g).max()
+    assert energy == pytest.approx(other, rel=1e-13)
+
+
+def _upper_half_turned(v, angle):
+    X = v.node_points
+    dim = X.shape[1]
+    above = v.node_side[:, 0] > 0
+    moved = X @ rotation(dim, angle).T + np.linspace(0.2, 0.5, dim)
+    return np.where(above[:, None], moved - X, 0.0)
+
+
+@pytest.mark.parametrize("angle", np.radians([10.0, 30.0, 90.0, 179.0, 180.0, -135.0]))
+@pytest.mark.parametrize("body", [cut_square, cut_cube])
+def test_rigid_separation_costs_no_energy_at_any_rotation(body, angle):
+    v = body()
+    force = InternalForce(v, material(v.mesh.dim))
+    f, energy = force.evaluate(_upper_half_turned(v, angle))
+    # U − I is round-off of a few eps, squared
+    assert 0.0 <= energy < 1e-24 * SOFT
+    assert np.abs(f).max() < 1e-11 * SOFT
+
+
+@pytest.mark.parametrize(
+    ("degrees", "energy"), [(30.0, 162.233085), (90.0, 9038.461538)]
+)
+def test_linear_kinematics_pays_for_the_same_rotation(degrees, energy):
+    force = InternalForce(cut_square(), material(2), "linear")
+    found = force.evaluate(_upper_half_turned(force.virtual, np.radians(degrees)))[1]
+    # the printed values have six decimals
+    assert found == pytest.approx(energy, abs=1e-6)
+
+
+@pytest.mark.parametrize("force", _bodies())
+def test_internal_forces_have_no_resultant_and_in_corotation_no_moment(force):
+    u = _disturbed(force)
+    f = force.evaluate(u)[0]
+    size = np.abs(f).sum()
+    assert np.abs(f.sum(axis=0)).max() < 1e-14 * size
+    if force.turning:
+        x = force.virtual.node_points + u
+        moment = np.einsum("ni,nj->ij", x, f)
+        assert np.abs(moment - moment.T).max() < 1e-14 * size * np.abs(x).max()
+
+
+@pytest.mark.parametrize("force", [f for f in _bodies() if f.turning])
+def test_a_turned_body_has_the_turned_forces(force):
+    u, X = _disturbed(force), force.virtual.node_points
+    f, energy = (force.evaluate(u)[0].copy(), force.evaluate(u)[1])
+    for angle in (0.7, 2.4, np.pi):
+        Q = rotation(X.shape[1], angle)
+        turned, same = force.evaluate((X + u) @ Q.T - X)
+        assert same == pytest.approx(energy, rel=1e-13)
+        assert np.abs(turned - f @ Q.T).max() < 1e-12 * np.abs(f).max()
+
+
+def test_a_turned_membrane_resists_in_its_plane_only():
+    force = InternalForce(cut_membrane(), isotropic(1.0, 0.3, "plane stress"))
+    pattern = block_pattern(force.virtual.cells, force.virtual.node_count)
+    u = np.zeros_like(force.virtual.node_points)
+    values = np.linalg.eigvalsh(pattern.matrix(force.stiffness(pattern, u)).toarray())
+    # a triangle has 3 in-plane strains: no more stiff modes than 3 per piece
+    assert (values > 1e-10 * values[-1]).sum() <= 3 * len(force.virtual.cells)
+    assert values[0] > -1e-13 * values[-1]
+
+
+def test_energy_does_not_depend_on_the_numbering_of_nodes_and_cells():
+    rng = np.random.default_rng(5)
+    for v in (cut_body(2), cut_body(3)):
+        mesh, dim = v.mesh, v.mesh.dim
+        new = rng.permutation(len(mesh.points))
+        points = np.empty_like(mesh.points)
+        points[new] = mesh.points
+        cells = rng.permuted(new[mesh.cells][rng.permutation(len(mesh.cells))], axis=1)
+        cut = _plane_of(dim)
+        w = cut_mesh(SimplexMesh(points, cells), [cut])
+        energies = []
+        for body in (v, w):
+            X, side = body.node_points, body.node_side[:, :1]
+            u = 0.3 * np.sin(3.0 * X[:, ::-1] + side) + X @ rotation(dim, 1.0).T - X
+            energies.append(InternalForce(body, material(dim)).evaluate(u)[1])
+        assert energies[0] == pytest.approx(energies[1], rel=1e-13)
+
+
+def _plane_of(dim):
+    if dim == 2:
+        return Plane((0.5, 0.53), (-1.0 / 3.0, 1.0))
+    return Plane((0.5, 0.53, 0.47), (-1.0, -2.0, 3.0))
+
+
+def test_wrong_input_is_refused_in_one_sentence():
+    v: VirtualMesh = cut_body(2)
+    with pytest.raises(XfemError, match="kinematics 'quadratic'"):
+        InternalForce(v, material(2), "quadratic")  # type: ignore[arg-type]
+    with pytest.raises(XfemError, match="membrane"):
+        InternalForce(cut_membrane(), material(2), "linear")
+    with pytest.raises(XfemError, match="displacement of shape"):
+        InternalForce(v, material(2)).evaluate(np.zeros((3, 2)))
+    with pytest.raises(XfemError, match="λ of shape"):
+        InternalForce(v, isotropic([1.0, 2.0], 0.3, "plane strain"))

@@ -1,0 +1,123 @@
+"""Masses of a cut body: exact totals, moments and changes of basis."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, cut_body, cut_membrane
+
+from verify.xfem.cuts import Plane
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import consistent_mass, second_moments, side_wise_mass
+from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.virtual import cut_mesh
+
+LUMPINGS = ("enrichment", "row sum", "weighted diagonal")
+
+
+def _all_masses(v):
+    shifted = [shifted_mass(v, DENSITY, lumping) for lumping in LUMPINGS]
+    return [side_wise_mass(v, DENSITY), consistent_mass(v, DENSITY), *shifted]
+
+
+@pytest.mark.parametrize("body", [lambda: cut_body(2), lambda: cut_body(3), cut_membrane])
+def test_every_mass_gives_a_body_that_moves_as_one_its_own_kinetic_energy(body):
+    v = body()
+    total = DENSITY * v.mesh.measures.sum()
+    ones = np.ones((v.node_count, 1))
+    for mass in _all_masses(v):
+        assert np.sum(ones * mass.apply(ones)) == pytest.approx(total, rel=1e-13)
+        assert mass.weights.sum() == pytest.approx(total, rel=1e-13)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_separated_half_keeps_its_inertia_only_if_the_mass_knows_the_sides(dim):
+    v = cut_body(dim)
+    above = (v.node_side[:, :1] > 0).astype(float)
+    expected = DENSITY * v.volumes[v.bodies[v.cells[:, 0]] == v.bodies[np.argmax(above)]].sum()
+    side_wise, consistent, *shifted = _all_masses(v)
+    for mass in (side_wise, consistent):
+        assert np.sum(above * mass.apply(above)) == pytest.approx(expected, rel=1e-13)
+    for mass in shifted:  # (2.76–81): too heavy, M_ua is missing
+        assert np.sum(above * mass.apply(above)) > 1.01 * expected
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_second_moments_are_those_of_a_rule_of_higher_order(dim):
+    v = cut_body(dim)
+    moments = second_moments(v)
+    assert np.allclose(moments.sum(axis=2), v.shape_integrals, rtol=1e-12, atol=1e-18)
+    # independent: midpoints of edges (2D) and the 4-point rule (3D) are exact for quadratics
+    sub = v.sub_cells
+    a = 0.5 if dim == 2 else (5.0 - np.sqrt(5.0)) / 20.0
+    rule = np.full((dim + 1, dim + 1), a) + (1.0 - (dim + 1) * a) * np.eye(dim + 1)
+    expected = np.zeros_like(moments)
+    for point in rule:
+        N = np.einsum("v,kvi->ki", point, sub.barycentric)
+        w = sub.fraction * v.mesh.measures[v.parent[sub.piece]] / (dim + 1)
+        np.add.at(expected, sub.piece, w[:, None, None] * N[:, :, None] * N[:, None, :])
+    assert np.allclose(moments[v.split], expected[v.split], rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_every_mass_is_positive_definite_and_solved_by_its_inverse(dim):
+    v = cut_body(dim)
+    forces = np.random.default_rng(0).normal(size=v.node_points.shape)
+    for mass in _all_masses(v):
+        assert np.linalg.eigvalsh(mass.matrix.toarray())[0] > 0.0
+        assert np.allclose(mass.apply(mass.solve(forces)), forces, rtol=1e-9)
+        if mass.root is not None:
+            inverse = (mass.root @ mass.root.T).toarray()
+            assert np.allclose(inverse @ mass.matrix.toarray(), np.eye(v.node_count), atol=1e-9)
+
+
+def test_enrichment_lumping_is_diagonal_in_the_shifted_unknowns():
+    """(2.80–81): T' M T = diag(Σ m/n, Σ m/n (V_a ψ_a² + V_b ψ_b²)/V), p = T q."""
+    v = cut_body(2)
+    mesh = v.mesh
+    sides = np.sign(Plane((0.5, 0.53), (-1.0 / 3.0, 1.0)).level_set(mesh.points))
+    enriched = v.node_parent[len(mesh.points) :]
+    T = np.eye(v.node_count)
+    extra = np.arange(len(mesh.points), v.node_count)
+    T[extra, extra] = -sides[enriched]
+    T[extra, enriched] = 1.0
+    M = T.T @ shifted_mass(v, DENSITY, "enrichment").matrix.toarray() @ T
+    expected = np.zeros(v.node_count)
+    position = {node: row for node, row in zip(enriched, extra, strict=True)}
+    for cell, nodes in enumerate(mesh.cells):
+        above = sum(
+            v.fraction[p] for p in np.flatnonzero(v.parent == cell) if v.label[p, 0] >= 0
+        )
+        whole = not v.split[v.parent == cell].any()
+        for node in nodes:
+            share = DENSITY * mesh.measures[cell] / 3.0
+            expected[node] += share
+            if node in position and not whole:
+                psi = {+1: 0.5 * (1 - sides[node]), -1: 0.5 * (-1 - sides[node])}
+                square = above * psi[1] ** 2 + (1.0 - above) * psi[-1] ** 2
+                expected[position[node]] += share * square
+    assert np.abs(M - np.diag(expected)).max() < 1e-12 * expected.max()
+
+
+def test_the_pattern_of_a_mass_holds_its_couplings():
+    v = cut_body(2)
+    for mass in _all_masses(v):
+        pattern = mass.pattern(v)
+        blocks = np.zeros((len(pattern.columns), 1, 1))
+        blocks[mass.places(pattern), 0, 0] = mass.entries[2]
+        assert abs(pattern.matrix(blocks) - mass.matrix).max() == 0.0
+    with pytest.raises(XfemError, match="lacks couplings"):
+        shifted_mass(v, 1.0, "enrichment").places(side_wise_mass(v, 1.0).pattern(v))
+
+
+def test_densities_and_lumpings_that_make_no_sense_are_refused():
+    v = cut_body(2)
+    for density in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(XfemError, match="density"):
+            side_wise_mass(v, density)
+    with pytest.raises(XfemError, match="density of shape"):
+        side_wise_mass(v, [1.0, 2.0])
+    with pytest.raises(XfemError, match="lumping 'HRZ'"):
+        shifted_mass(v, 1.0, "HRZ")  # type: ignore[arg-type]
+    crossing = [Plane((0.5, 0.53), (0.0, 1.0)), Plane((0.52, 0.5), (1.0, 0.1))]
+    with pytest.raises(XfemError, match="unknowns"):
+        shifted_mass(cut_mesh(rectangle_mesh((4, 4)), crossing), 1.0, "enrichment")

@@ -1,0 +1,129 @@
+"""A freed part falls as the scheme's own parabola says, wherever the cut is."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, GRAVITY, cut_body, cut_cube, cut_square, material
+
+from verify.xfem.corotational import InternalForce
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    ForwardEuler,
+    ImplicitEuler,
+    RealTimeEuler,
+    SymplecticEuler,
+    Trapezoidal,
+)
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.supports import Supports
+
+FALLEN = {  # after 50 steps of 0.01 s
+    CentralDifferences: -1.225,
+    Trapezoidal: -1.225,
+    EnergyMomentum: -1.225,
+    ImplicitEuler: -1.2495,
+    RealTimeEuler: -1.2495,
+    SymplecticEuler: -1.2495,
+    ForwardEuler: -1.2005,
+}
+
+
+def _gravity(dim):
+    return -GRAVITY * np.eye(dim)[-1]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("scheme", FALLEN)
+def test_a_free_cut_body_falls_by_the_discrete_parabola(scheme, dim):
+    v = cut_body(dim)
+    mass = side_wise_mass(v, DENSITY)
+    body = DynamicBody(
+        InternalForce(v, material(dim)), mass, weight=mass.weight(_gravity(dim))
+    )
+    state = body.rest()
+    integrator = scheme(body, 0.01)
+    for _ in range(50):
+        integrator.step(state)
+    assert state.time == pytest.approx(0.5)
+    expected = FALLEN[scheme] * np.eye(dim)[-1]
+    # round-off in f_int, accumulated
+    assert np.abs(state.displacement - expected).max() < 1e-12
+
+
+@pytest.mark.parametrize("scheme", [s for s in FALLEN if s is not ForwardEuler])
+@pytest.mark.parametrize("offset", [0.5, 0.03, 1e-6, 1e-12, 0.0])
+def test_a_freed_half_falls_with_g_whatever_the_position_of_the_cut(scheme, offset):
+    v = cut_square(8, (0.5, 0.5 + offset / 8.0), (0.0, 1.0))
+    mass = side_wise_mass(v, DENSITY)
+    held = Supports.none(v).prescribe(v, v.mesh.points[:, 1] == 1.0)
+    body = DynamicBody(
+        InternalForce(v, material(2)), mass, weight=mass.weight(_gravity(2)), supports=held
+    )
+    state, still = body.rest(), body.rest()
+    integrator = scheme(body, 0.005)
+    lower = v.bodies == v.bodies[np.argmin(v.node_points[:, 1])]
+    for _ in range(20):
+        integrator.step(state)
+    steps = {-1.225: 20**2, -1.2495: 20 * 21}[FALLEN[scheme]]
+    parabola = -0.5 * GRAVITY * 0.005**2 * steps
+    assert np.abs(state.displacement[lower] - [0.0, parabola]).max() < 1e-12
+    # and the half that is held does not notice: it moves as if it had been alone
+    alone = DynamicBody(
+        InternalForce(v, material(2)),
+        mass,
+        weight=np.where(lower[:, None], 0.0, mass.weight(_gravity(2))),
+        supports=held,
+    )
+    other = scheme(alone, 0.005)
+    for _ in range(20):
+        other.step(still)
+    assert np.abs(state.displacement[~lower] - still.displacement[~lower]).max() < 1e-12
+
+
+def test_with_the_thesis_lumping_a_freed_half_falls_too_slowly():
+    """(2.80–81) leave out M_ua: at mid-cell, 8 × 8, −8.757 instead of −9.8."""
+    v = cut_square(8, (0.5, 0.4375), (0.0, 1.0))
+    lower = (v.node_side[:, :1] < 0).astype(float)
+    masses = {"exact": side_wise_mass(v, DENSITY), "thesis": shifted_mass(v, DENSITY, "enrichment")}
+    found = {}
+    for name, mass in masses.items():
+        pull = np.sum(lower * mass.weight(_gravity(2))[:, 1:])
+        found[name] = pull / np.sum(lower * mass.apply(lower))
+    assert found["exact"] == pytest.approx(-9.8, abs=1e-12)
+    assert found["thesis"] == pytest.approx(-8.757, abs=5e-4)
+
+
+def test_the_defect_of_the_thesis_lumping_shows_in_motion():
+    falls = {}
+    for name in ("exact", "thesis"):
+        v = cut_square(8, (0.5, 0.4375), (0.0, 1.0))
+        mass = (
+            side_wise_mass(v, DENSITY)
+            if name == "exact"
+            else shifted_mass(v, DENSITY, "enrichment")
+        )
+        held = Supports.none(v).prescribe(v, v.mesh.points[:, 1] == 1.0)
+        # stiff, so that what is left of elastic motion is small against the fall
+        body = DynamicBody(
+            InternalForce(v, material(2, 1e8)),
+            mass,
+            weight=mass.weight(_gravity(2)),
+            supports=held,
+        )
+        state, scheme = body.rest(), RealTimeEuler(body, 0.01)
+        for _ in range(50):
+            scheme.advance(state)
+        lower = v.bodies == v.bodies[np.argmin(v.node_points[:, 1])]
+        falls[name] = state.displacement[lower, 1].mean() / -1.2495 * -9.8
+    assert falls["exact"] == pytest.approx(-9.8, abs=1e-6)
+    # elastic strain g ρ L/E ≈ 1e-4
+    assert falls["thesis"] == pytest.approx(-8.757, abs=5e-3)
+
+
+def test_gravity_does_not_tear_a_sliver_from_its_neighbours():
+    v = cut_cube(2, (0.5, 0.5 + 1e-9, 0.5), (0.3, 0.1, 1.0))
+    mass = side_wise_mass(v, DENSITY)
+    acceleration = mass.solve(mass.weight(_gravity(3)))
+    assert np.abs(acceleration - _gravity(3)).max() < 1e-12
