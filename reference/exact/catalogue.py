@@ -27,7 +27,8 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     ),
     "bending": (
         Bending,
-        "pure bending on each side of a straight cut: point, slope or angle, stress_gradient, shift",
+        "pure bending on each side of a straight cut: point, slope or angle, stress_gradient, "
+        "shift",
     ),
     "airy": (
         Airy,

@@ -59,11 +59,8 @@ def boundary_work(solution: "ExactSolution", outline: Array) -> float:
                 if (p != q).any():
                     densities.append(_work_density(solution, p, q, size, direction))
     panels = np.linspace(0.0, 1.0, 9)
-    # |t| |u| and not |t·u|: what cancels to zero leaves its round-off behind
-    scale = sum(_gauss(lambda t, d=d: d(t)[1], panels[:-1], panels[1:]).sum() for d in densities)
-    return 0.5 * sum(
-        _adaptive(lambda t, d=d: d(t)[0], panels, _TOLERANCE * float(scale)) for d in densities
-    )
+    scale = sum(float(_gauss(bound, panels[:-1], panels[1:]).sum()) for _, bound in densities)
+    return 0.5 * sum(_adaptive(work, panels, _TOLERANCE * scale) for work, _ in densities)
 
 
 def elastic_energy(solution: "ExactSolution", outline: Array) -> float:
@@ -87,21 +84,29 @@ def elastic_energy(solution: "ExactSolution", outline: Array) -> float:
 
 def _work_density(
     solution: "ExactSolution", a: Array, b: Array, size: float, direction: Array | None
-) -> Callable[[Array], tuple[Array, Array]]:
-    """t·u, and |t| |u|, along the edge from a to b, as functions of its parameter in [0, 1]."""
+) -> tuple[Density, Density]:
+    """Give t·u and |t| |u| along the edge from a to b as functions of its parameter in [0, 1].
+
+    The second sets the tolerance: where t·u cancels to zero it leaves its round-off behind.
+    """
     length = float(np.linalg.norm(b - a))
     normal = np.array([b[1] - a[1], a[0] - b[0]]) / length
     inward = -normal * _INWARD * size if direction is None else direction
 
-    def density(t: Array) -> tuple[Array, Array]:
+    def both(t: Array) -> tuple[Array, Array]:
         points = a + t[:, None] * (b - a)
         near = points + inward
-        traction = solution.stress(points, near) @ normal
-        u = solution.displacement(points, near)
-        size_of_both = np.linalg.norm(traction, axis=1) * np.linalg.norm(u, axis=1)
-        return length * np.sum(traction * u, axis=1), length * size_of_both
+        return solution.stress(points, near) @ normal, solution.displacement(points, near)
 
-    return density
+    def work(t: Array) -> Array:
+        traction, u = both(t)
+        return length * np.asarray(np.sum(traction * u, axis=1))
+
+    def bound(t: Array) -> Array:
+        traction, u = both(t)
+        return length * np.asarray(np.linalg.norm(traction, axis=1) * np.linalg.norm(u, axis=1))
+
+    return work, bound
 
 
 def _adaptive(density: Density, panels: Array, tolerance: float) -> float:

@@ -54,7 +54,7 @@ class Griffith(ComplexCrack):
         return Potentials(
             0.5 * s * root + gamma * z,
             0.5 * s * z / root + gamma,
-            -0.5 * s * a**2 / root**3,
+            np.asarray(-0.5 * s * a**2 / root**3, dtype=complex),
             0.5 * s * bar - gamma * z.conj(),
             0.5 * s * z.conj() / bar - gamma,
         )

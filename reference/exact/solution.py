@@ -84,6 +84,5 @@ class ExactSolution(ABC):
             Corners in order, or a scene whose geometry is a rectangle or polygon.
         """
         outline = outline_of(body)
-        return (
-            elastic_energy(self, outline) if self.has_body_force else boundary_work(self, outline)
-        )
+        integrate = elastic_energy if self.has_body_force else boundary_work
+        return integrate(self, outline)

@@ -55,7 +55,7 @@ class StraightCutSolution(ExactSolution):
     def _local_gradient(
         self, s: Array, t: Array, above: NDArray[np.bool_]
     ) -> tuple[Array, Array, Array, Array]:
-        """Derivatives ∂s u_s, ∂t u_s, ∂s u_t, ∂t u_t, each (n,)."""
+        """Give the derivatives ∂s u_s, ∂t u_s, ∂s u_t, ∂t u_t, each (n,)."""
 
     def _local_body_force(
         self, s: Array, t: Array, above: NDArray[np.bool_]

@@ -1,0 +1,214 @@
+"""Exact solutions are held to the equations they claim to solve, then to known energies."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reference.exact import exact_solution, exact_solution_names
+from verify.errors import InputError
+from verify.scene import Material
+
+STRAIN = Material(young=1.0, poisson=0.3, plane="strain")
+STRESS = Material(young=1.0, poisson=0.3, plane="stress")
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+BOX = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+INCLINED = {"point": [0.5, 0.5], "slope": 1 / 3}
+
+SOLUTIONS = {
+    "linear": {"matrix": [[0.1, 0.2], [-0.3, 0.4]], "shift": [1.0, 2.0]},
+    "patch": {**INCLINED, "strain": [0.1, -0.05], "shift": [0.0, -0.02]},
+    "bending": {**INCLINED, "stress_gradient": [1.0, -0.5], "shift": [0.02, 0.0]},
+    "airy": {**INCLINED, "above": [0.1, 0.2, 2.0], "below": [-0.2, 0.1, 3.0]},
+    "smooth": {
+        **INCLINED,
+        "above": [[0.1, np.pi, 0.0], [0.05, np.pi, 90.0]],
+        "below": [[-0.05, 2 * np.pi, 0.0], [-0.05, 2 * np.pi, 90.0]],
+    },
+    "tip": {"tip": [0.1, 0.2], "angle": 20.0, "intensity": [1.0, 0.7]},
+    "griffith": {"a": 0.4, "centre": [0.1, 0.2], "angle": 20.0, "stress": [0.3, 1.0, 0.5]},
+}
+
+
+def solution(name, material=STRAIN):
+    return exact_solution(name, SOLUTIONS[name], material)
+
+
+def difference(field, points, h):
+    """Central differences of order 4; the last axis is the direction."""
+    columns = []
+    for step in h * np.eye(2):
+        near, far = (field(points + k * step) - field(points - k * step) for k in (1, 2))
+        columns.append((8 * near - far) / (12 * h))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.fixture
+def points():
+    # seeded, and off every cut of SOLUTIONS by more than the difference stencils
+    return np.random.default_rng(3).uniform(-0.95, 0.95, (60, 2))
+
+
+def test_every_named_solution_is_checked_here():
+    assert set(SOLUTIONS) == set(exact_solution_names())
+
+
+@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
+@pytest.mark.parametrize("name", SOLUTIONS)
+def test_the_gradient_is_the_derivative_of_the_displacement(name, material, points):
+    u = solution(name, material)
+    expected = difference(u.displacement, points, 1e-3)
+    # truncation h⁴·u⁽⁵⁾ ~ 1e-12·(1/0.02)^4.5 next to a tip; round-off 1e-16/h
+    scale = 1 + np.abs(expected).max()
+    assert np.median(np.abs(u.gradient(points) - expected)) < 1e-11 * scale
+    assert np.abs(u.gradient(points) - expected).max() < 1e-5 * scale
+
+
+@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
+@pytest.mark.parametrize("name", SOLUTIONS)
+def test_the_stress_is_in_equilibrium_with_the_body_force(name, material, points):
+    u = solution(name, material)
+    divergence = np.trace(difference(u.stress, points, 1e-3), axis1=2, axis2=3)
+    residual = divergence + u.body_force(points)
+    scale = 1 + np.abs(u.stress(points)).max()
+    assert np.median(np.abs(residual)) < 1e-9 * scale
+    assert np.abs(residual).max() < 1e-4 * scale
+
+
+@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
+@pytest.mark.parametrize("name", ["patch", "bending", "airy", "smooth"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_faces_of_a_straight_cut_are_free_of_traction(name, material, sign):
+    u = solution(name, material)
+    along, normal = np.array([3.0, 1.0]) / np.sqrt(10), np.array([-1.0, 3.0]) / np.sqrt(10)
+    face = np.array([0.5, 0.5]) + np.linspace(-0.5, 0.5, 11)[:, None] * along
+    traction = u.stress(face, face + sign * 0.01 * normal) @ normal
+    assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
+
+
+@pytest.mark.parametrize("name", ["tip", "griffith"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_faces_of_a_crack_are_free_of_traction(name, sign):
+    u = solution(name)
+    c, s = np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))
+    face = np.array([0.1, 0.2]) - np.linspace(0.02, 0.38, 11)[:, None] * np.array([c, s])
+    normal = np.array([-s, c])
+    traction = u.stress(face, face + sign * 1e-3 * normal) @ normal
+    assert np.abs(traction).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "name, value, digits",
+    [
+        ("patch", 3.434065934e-3, 1e-9),
+        ("bending", 0.02369791667, 2e-10),
+        ("airy", 2.7789417971, 1e-10),
+        ("smooth", 0.05589161925, 1e-10),
+    ],
+)
+def test_strain_energies_in_the_unit_square_are_the_known_ones(name, value, digits):
+    assert solution(name).strain_energy(SQUARE) == pytest.approx(value, rel=digits)
+
+
+@pytest.mark.parametrize(
+    "intensity, value", [([1.0, 0.0], 0.474129375227), ([0.0, 1.0], 1.203559183268)]
+)
+def test_strain_energies_of_the_tip_fields_are_the_known_ones(intensity, value):
+    u = exact_solution("tip", {"tip": [0.0, 0.0], "intensity": intensity}, STRAIN)
+    assert u.strain_energy(BOX) == pytest.approx(value, rel=2e-12)
+
+
+@pytest.mark.parametrize(
+    "stress, value", [([0, 1, 0], 8.07875793695), ([0.5, 0.5, 0.5], 7.5081993035)]
+)
+def test_strain_energies_around_a_griffith_crack_are_the_known_ones(stress, value):
+    u = exact_solution("griffith", {"a": 1.0, "stress": stress}, STRAIN)
+    assert u.strain_energy(2 * BOX) == pytest.approx(value, rel=1e-12)
+
+
+def test_an_energy_does_not_depend_on_how_the_outline_is_walked():
+    u = solution("airy")
+    forward = u.strain_energy(SQUARE)
+    assert u.strain_energy(SQUARE[::-1]) == pytest.approx(forward, rel=1e-13)
+    assert u.strain_energy(np.roll(SQUARE, 1, axis=0)) == pytest.approx(forward, rel=1e-13)
+
+
+@pytest.mark.parametrize("name", ["patch", "airy", "smooth", "griffith"])
+def test_energies_of_parts_add_up_also_where_an_outline_is_not_convex(name):
+    u = solution(name)
+    corner = np.array([[0, 0], [1, 0], [1, 0.45], [0.4, 0.45], [0.4, 1], [0, 1.0]])
+    rest = np.array([[0.4, 0.45], [1, 0.45], [1, 1], [0.4, 1.0]])
+    parts = u.strain_energy(corner) + u.strain_energy(rest)
+    assert parts == pytest.approx(u.strain_energy(SQUARE), rel=1e-11)
+
+
+def test_the_body_force_energy_agrees_with_the_boundary_work_where_there_is_none():
+    # two independent integrations of one field
+    from reference.exact.energy import elastic_energy
+
+    u = solution("airy")
+    assert elastic_energy(u, SQUARE) == pytest.approx(u.strain_energy(SQUARE), rel=1e-11)
+
+
+def test_a_griffith_crack_opens_by_its_ellipse():
+    u = exact_solution("griffith", {"a": 2.0, "stress": [0.0, 3.0, 0.0]}, STRAIN)
+    x = np.linspace(-1.99, 1.99, 21)
+    face = np.column_stack([x, np.zeros_like(x)])
+    up = np.array([0.0, 1e-3])
+    jump = u.displacement(face, face + up) - u.displacement(face, face - up)
+    assert jump[:, 1] == pytest.approx(4 * 3.0 * (1 - 0.3**2) * np.sqrt(4 - x**2), rel=1e-12)
+    assert np.abs(jump[:, 0]).max() < 1e-14
+
+
+def test_the_field_next_to_a_griffith_tip_is_the_tip_field():
+    crack = exact_solution("griffith", {"a": 1.0, "stress": [0.0, 1.0, 0.6]}, STRAIN)
+    tip = exact_solution(
+        "tip", {"tip": [1.0, 0.0], "intensity": list(crack.stress_intensity)}, STRAIN
+    )
+    angle = np.linspace(-3.1, 3.1, 13)
+    ring = np.array([1.0, 0.0]) + 1e-6 * np.column_stack([np.cos(angle), np.sin(angle)])
+    # the next term of the series is √r smaller: 1e-3
+    scale = np.abs(tip.stress(ring)).max()
+    assert np.abs(crack.stress(ring) - tip.stress(ring)).max() < 3e-3 * scale
+
+
+@pytest.mark.parametrize("name", ["patch", "airy", "griffith", "tip"])
+@settings(max_examples=40, deadline=None)
+@given(x=st.floats(-0.25, 0.05), off=st.floats(-1e-14, 1e-14), side=st.sampled_from([1.0, -1.0]))
+def test_a_point_off_the_cut_by_round_off_is_on_the_side_of_its_near_point(name, x, off, side):
+    u = solution(name)
+    angle = np.deg2rad(20.0) if name in ("griffith", "tip") else np.arctan(1 / 3)
+    origin = np.array([0.1, 0.2]) if name in ("griffith", "tip") else np.array([0.5, 0.5])
+    along, normal = (
+        np.array([np.cos(angle), np.sin(angle)]),
+        np.array([-np.sin(angle), np.cos(angle)]),
+    )
+    point = (origin + (x - 0.06) * along + off * normal)[None]
+    near = point + side * 0.05 * normal
+    inside = point + side * 1e-9 * normal
+    assert u.displacement(point, near) == pytest.approx(u.displacement(inside, near), abs=1e-7)
+    assert u.gradient(point, near) == pytest.approx(u.gradient(inside, near), rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "name, parameters, words",
+    [
+        ("grifith", {}, "did you mean 'griffith'"),
+        ("griffith", {"a": 1.0, "stres": [0, 1, 0]}, "did you mean 'stress'"),
+        ("griffith", {"a": 1.0}, "parameters.stress is missing; expected three numbers"),
+        ("griffith", {"a": -1.0, "stress": [0, 1, 0]}, "expected a positive number"),
+        ("patch", {**INCLINED, "strain": [0.1]}, "expects two numbers"),
+        ("patch", {**INCLINED, "strain": [0.1, float("nan")]}, "expects two numbers"),
+        ("patch", {**INCLINED, "angle": 3.0, "strain": [0, 0]}, "slope and angle"),
+        ("patch", {"point": [0, 0], "strain": [0, 0]}, "parameters.slope is missing"),
+        ("smooth", {**INCLINED, "above": [[1, 2], [1, 2, 3]], "below": 0}, "two rows of three"),
+    ],
+)
+def test_a_wrong_name_or_parameter_is_named_with_what_was_expected(name, parameters, words):
+    with pytest.raises(InputError, match=words):
+        exact_solution(name, parameters, STRAIN)
+
+
+def test_a_plane_solution_is_refused_in_space():
+    with pytest.raises(InputError, match="is plane"):
+        exact_solution("patch", SOLUTIONS["patch"], Material(young=1.0, poisson=0.3))
