@@ -71,6 +71,8 @@ class Cholesky:
         self._stack = np.empty(stack_depth(self._parent, below))
         self._update = np.empty(int(below.max(initial=0)) ** 2)
         self._place = np.empty(int(below.max(initial=0)), dtype=np.int64)
+        self._diagonal = np.empty(int(width.max(initial=0)))
+        self._gathered = np.empty(int(below.max(initial=0)))
 
     @property
     def factor_entries(self) -> int:
@@ -100,6 +102,7 @@ class Cholesky:
             self._stack,
             self._update,
             self._place,
+            self._diagonal,
         )
         if failed >= 0:
             raise SingularStiffnessError(int(self._order[failed // self._block]))
@@ -107,9 +110,15 @@ class Cholesky:
     def solve(self, load: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solution (N, block) for a right-hand side (N, block)."""
         x = np.ascontiguousarray(load[self._order])
-        flat = x.reshape(-1)
         solve_fronts(
-            self._bounds, self._row_start, self._rows, self._offset, self._factor, self._block, flat
+            self._bounds,
+            self._row_start,
+            self._rows,
+            self._offset,
+            self._factor,
+            self._block,
+            self._gathered,
+            x.reshape(-1),
         )
         solution = np.empty_like(x)
         solution[self._order] = x

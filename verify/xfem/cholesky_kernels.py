@@ -37,7 +37,8 @@ def front_rows(starts, columns, order, bounds):
     for k in range(nodes):
         rank[order[k]] = k
     for s in range(fronts):
-        front_of[bounds[s] : bounds[s + 1]] = s
+        for k in range(bounds[s], bounds[s + 1]):
+            front_of[k] = s
     head = np.full(fronts, -1, dtype=np.int64)
     following = np.full(fronts, -1, dtype=np.int64)
     parent = np.full(fronts, -1, dtype=np.int64)
@@ -49,7 +50,8 @@ def front_rows(starts, columns, order, bounds):
         begin = used
         if used + nodes > len(rows):
             grown = np.empty(2 * len(rows) + nodes, dtype=np.int64)
-            grown[:used] = rows[:used]
+            for at in range(used):
+                grown[at] = rows[at]
             rows = grown
         for k in range(bounds[s], bounds[s + 1]):
             for at in range(starts[order[k]], starts[order[k] + 1]):
@@ -249,6 +251,7 @@ def factorise_fronts(
     stack,
     update_space,
     place,
+    diagonal,
 ):
     """Factorise; return the scalar column (in the order) whose pivot failed, or -1."""
     block = blocks.shape[1]
@@ -257,7 +260,6 @@ def factorise_fronts(
     waiting_front = np.empty(fronts, dtype=np.int64)
     waiting = 0
     top = 0
-    diagonal = np.empty(max(1, np.max(np.diff(bounds))) * block)
     for s in range(fronts):
         width = (bounds[s + 1] - bounds[s]) * block
         below = (row_start[s + 1] - row_start[s]) * block
@@ -293,7 +295,8 @@ def factorise_fronts(
             _complement(panel, update)
             matrix = stack[top : top + below * below].reshape(below, below)
             for j in range(below):
-                matrix[j, j:] = update[j, j:]
+                for i in range(j, below):
+                    matrix[j, i] = update[j, i]
             top += below * below
             waiting_front[waiting] = s
             waiting += 1
@@ -301,10 +304,9 @@ def factorise_fronts(
 
 
 @njit(cache=True, fastmath={"contract", "reassoc"})
-def solve_fronts(bounds, row_start, rows, offset, factor, block, x):
+def solve_fronts(bounds, row_start, rows, offset, factor, block, gathered, x):
     """Solve L Lᵀ x = b in place; x (N·block,) is in the order of elimination."""
     fronts = len(bounds) - 1
-    gathered = np.empty(max(1, np.max(np.diff(row_start))) * block)
     for s in range(fronts):
         width = (bounds[s + 1] - bounds[s]) * block
         below = (row_start[s + 1] - row_start[s]) * block

@@ -147,7 +147,8 @@ def _eliminate_all(starts, columns):
         _count_outside(pivot, found, start, elements, sees, alive, size, seen_by, outside)
         if filled + number > len(members):
             grown = np.empty(2 * len(members) + number, dtype=np.int64)
-            grown[:filled] = members[:filled]
+            for at in range(filled):
+                grown[at] = members[at]
             members = grown
         begin[pivot] = filled
         for node in found:

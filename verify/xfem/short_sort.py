@@ -7,14 +7,16 @@ __all__ = ["sort_short"]
 
 @njit(cache=True)
 def sort_short(values):
-    """Sort a short array in place, by insertion where that is faster."""
-    if len(values) > 48:
-        values.sort()
-        return
-    for i in range(1, len(values)):
-        value = values[i]
-        k = i - 1
-        while k >= 0 and values[k] > value:
-            values[k + 1] = values[k]
-            k -= 1
-        values[k + 1] = value
+    """Sort in place by Shell's method; numba's own sort takes seconds to compile."""
+    gap = 1
+    while 3 * gap + 1 < len(values):
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, len(values)):
+            value = values[i]
+            k = i - gap
+            while k >= 0 and values[k] > value:
+                values[k + gap] = values[k]
+                k -= gap
+            values[k + gap] = value
+        gap //= 3
