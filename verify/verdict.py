@@ -140,7 +140,7 @@ def _judge_ratio(
         found.append((one.level, Interval(a.value / b.value, a.low / b.high, a.high / b.low)))
     all_levels = ", ".join(f"{ratio.value:.4g}" for _, ratio in found)
     decided = [
-        _decide(check, ratio, low, high, f"level {level} of ratios {all_levels}")
+        _decide(check, ratio, low, high, f"worst at level {level}; by level {all_levels}")
         for level, ratio in found
     ]
     order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL]
@@ -212,7 +212,7 @@ def _limit(check: Check) -> str:
         case RatioCheck(at_most=float(most)):
             return f"error ≤ {most:g} × that of {check.to}, on every level"
         case RatioCheck():
-            return f"error within {check.within:.3g} of that of {check.to} (ratio), on every level"
+            return f"error ratio to {check.to} within 1 ± {check.within:g}, on every level"
         case ValueCheck():
             return f"{check.equals:.10g} ± {check.relative_tolerance:g} (relative)"
 

@@ -48,7 +48,8 @@ class Body:
         The cuts inside the body, split where they meet each other.
     singular : (k, 2) array
         Points where derivatives may be unbounded: tips, kinks, junctions; and, unless an exact
-        solution is prescribed, mouths and corners of the outline.
+        solution is prescribed, corners of the outline (the ends of supports, mostly). A mouth
+        is not one: two traction-free wedges of less than half a turn are regular.
     tips : (t, 2) array
         Ends of cuts inside the body.
     """
@@ -91,9 +92,9 @@ def body_of(scene: Scene, singular: Array | None = None) -> Body:
     size = float(np.linalg.norm(np.ptp(outline, axis=0)))
     ends = [p.piece.point(np.array([t]))[0] for p in parts for t in (p.start, p.end)]
     tips = [e for e in ends if _count(e, ends, size) == 1 and not _on(e, outline, size)[0]]
-    special = [*_special(ends, parts, size), *outline]
-    if scene.judged_by_exact:  # fields that are prescribed on the outline are smooth there
-        special = [point for point in special if not _on(point, outline, size)[0]]
+    special = [e for e in _special(ends, parts, size) if not _on(e, outline, size)[0]]
+    if not scene.judged_by_exact:  # an exact field is smooth up to the outline
+        special += list(outline)
     found = _distinct(np.array([*special, *extra]).reshape(-1, 2), size)
     return Body(outline, cuts, parts, found, np.array(tips).reshape(-1, 2))
 

@@ -73,7 +73,8 @@ def area_rule(
     depth : float
         Size of the cells at singular points, relative to `spacing`.
     grading : float
-        Size of the cells around singular points, relative to their distance from them.
+        Size of the cells around tips, relative to their distance from them; 1 around other
+        singular points.
 
     Returns
     -------
@@ -86,15 +87,17 @@ def area_rule(
         (_part(part.piece, part.start, part.end).rotated(turn), False) for part in body.parts
     ]
     curves = [m for piece, outline in pieces for m in _monotone(piece, outline)]
-    singular = body.singular @ turn.T
+    singular, tips = body.singular @ turn.T, body.tips @ turn.T
     ends = np.array([[m.low, m.high] for m in curves]).ravel()
     poles = [p.centre[1] + s * p.radius for p, _ in pieces if isinstance(p, Arc) for s in (-1, 1)]
-    ys = graded_breaks(ends, singular[:, 1], spacing, depth * spacing, grading)
+    ys = graded_breaks(ends, singular[:, 1], spacing, depth * spacing)
+    ys = graded_breaks(ys, tips[:, 1], spacing, depth * spacing, grading)
     if poles:  # x(y) is like a square root there
         ys = graded_breaks(ys, np.array(poles), spacing, 1e-4 * spacing)
     corners = body.outline @ turn.T
     span = np.array([corners[:, 0].min(), corners[:, 0].max()])
-    xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing, grading)
+    xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
+    xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
     has_arcs = any(isinstance(piece, Arc) for piece, _ in pieces)
     cells = [
         cell

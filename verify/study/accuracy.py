@@ -149,17 +149,20 @@ def _measure(
     ruler: _Ruler,
 ) -> SolveRecord:
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
+    # the reference does not judge itself: its finest level would have no error
+    own = record.solver == REFERENCE and not scene.judged_by_exact
+    judge_of = None if own else reference
     metrics = []
     for asked in scene.quantities:
-        known, width = reference.quantities[asked.name] if reference else (None, 0.0)
-        source = reference.source if reference else ""
+        known, width = judge_of.quantities[asked.name] if judge_of else (None, 0.0)
+        source = judge_of.source if judge_of else ""
         unit = unit_of(asked, scene.dimension)
         metrics.append(Metric(asked.name, one.quantity(asked), unit, known, width, source))
     if reference is None:
         names = [*ERRORS, *(q.name for q in scene.quantities)]
         return _noted(replace(record, metrics=metrics), dict.fromkeys(names, missing))
-    if record.solver == REFERENCE and not scene.judged_by_exact:
-        return replace(record, metrics=metrics)  # it does not judge itself
+    if own:
+        return replace(record, metrics=metrics)
     errors, notes = _errors(one, reference, ruler)
     return _noted(replace(record, metrics=errors + metrics), notes)
 

@@ -107,7 +107,7 @@ def field_uncertainty(
         return Extrapolation(0.0, 0.0, 0.0, None, "successive levels are equal")
     order = observed_order(first, last, sizes[-3:])
     if order is not None and 0.5 * theoretical <= order <= 2 * theoretical + 0.5:
-        width = 1.25 * last / (ratio ** min(order, theoretical + 1) - 1)
+        width = 1.25 * last / (ratio ** min(order, theoretical) - 1)
         text = f"observed order {order:.2f}, safety factor 1.25"
         return Extrapolation(last, 0.0, width, order, text)
     width, text = _careful(first, last, ratio, order, theoretical)
