@@ -115,6 +115,13 @@ def test_a_much_smaller_error_satisfies_at_most_but_not_within():
     assert verdict({"check": "ratio", "within": 0.05}, records).verdict is Verdict.FAIL
 
 
+def test_a_ratio_of_round_off_means_nothing():
+    records = [solve(0, 2e-15), solve(0, 5e-16, solver="conforming")]
+    found = verdict({"check": "ratio", "within": 0.05}, records)
+    assert found.verdict is Verdict.UNDECIDED
+    assert "round-off" in found.reason
+
+
 def test_a_ratio_at_unequal_mesh_sizes_is_undecided():
     records = [solve(0, 0.1), solve(0, 0.1, solver="conforming", size=0.07)]
     found = verdict({"check": "ratio", "within": 0.05}, records)

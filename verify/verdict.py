@@ -11,6 +11,7 @@ from math import isfinite
 
 from verify.result import Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
+from verify.study.rates import ROUND_OFF
 
 __all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge"]
 
@@ -130,6 +131,9 @@ def _judge_ratio(
         b = _error(other, check.metric)
         if one.size and other.size and abs(one.size / other.size - 1) > _SAME_SIZE:
             text = f"level {one.level}: mesh sizes {one.size:.3g} and {other.size:.3g} m differ"
+            return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
+        if max(a.value, b.value) <= ROUND_OFF:
+            text = f"level {one.level}: both errors ({a.value:.1e}, {b.value:.1e}) are round-off"
             return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
         if b.low <= 0.0:
             text = (

@@ -98,3 +98,13 @@ def test_a_curved_quadratic_edge_is_refused_by_name():
     points[-1] += 1e-3
     with pytest.raises(InputError, match="curved edge"):
         SolutionField(solution(points, cells, np.zeros_like(points), order=2))
+
+
+def test_a_solution_without_volume_or_with_nodes_nowhere_is_refused():
+    points, cells = grid(1, 1)
+    with pytest.raises(InputError, match="without volume"):
+        SolutionField(solution(0 * points, cells, points))
+    broken = points.copy()
+    broken[0, 0] = np.nan
+    with pytest.raises(InputError, match="not finite"):
+        SolutionField(solution(broken, cells, points))

@@ -1,12 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cut_meshes import STRAIGHT, scene
 
-from verify.compare.body import body_of
+from verify.compare.body import _inner_parts, body_of
+from verify.compare.curves import Segment
 from verify.compare.cut_line import cut_rule, place_on_cut
 from verify.compare.slabs import area_rule, graded_breaks, slab_angles
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
+from verify.scene.planar import inside_polygon
 
 
 def level(y, name="cut", x=(-0.1, 1.1)):
@@ -128,6 +132,54 @@ def test_tips_kinks_and_junctions_are_known_and_smooth_points_are_not():
     assert len(crossing.tips) == 0
     assert any(np.allclose(point, [0.55, 0.5]) for point in crossing.singular)
     assert not len(body_of(scene(CUTS["circle"])).tips)
+
+
+def test_a_curve_given_by_many_vertices_is_not_refined_at_each():
+    x = np.linspace(-0.1, 1.1, 200)
+    curve = np.column_stack([x, 0.5 + 0.1 * np.sin(6 * x)])
+    body = body_of(scene([{"kind": "polyline", "points": curve.tolist()}]))
+    assert len(body.parts) > 150
+    assert len(body.singular) == 4  # corners of the outline
+    rule = area_rule(body, 0.05)
+    assert abs(rule.weights.sum() - 1) < 1e-13
+    assert len(rule.weights) < 100_000
+
+
+L_SHAPE = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.4], [0.3, 0.4], [0.3, 1.0], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_cuts_through_a_body_with_a_notch_lose_no_area(seed):
+    random = np.random.default_rng(seed)
+    cuts = []
+    for k in range(3):  # some through corners, along mesh lines, on each other's ends
+        ends = random.uniform(-0.2, 1.2, (2, 2))
+        if seed % 3 == 0:
+            ends = np.round(ends, 1)
+        if seed % 3 == 1 and k:
+            ends[0] = cuts[0]["points"][1]
+        cuts.append({"kind": "polyline", "name": f"c{k}", "points": ends.tolist()})
+    body = body_of(scene([]))
+    outline = np.array(L_SHAPE)
+    pieces = {c["name"]: [Segment(*np.array(c["points"]))] for c in cuts}
+    parts = [part for name in pieces for part in _inner_parts(name, pieces, outline)]
+    body = replace(body, outline=outline, cuts=pieces, parts=parts, singular=outline)
+    rule = area_rule(body, 0.1, slab_angles(body)[seed % 3])
+    assert abs(rule.weights.sum() - body.area) < 1e-13
+    assert rule.weights.min() >= 0
+    # each point is well inside: no point on a cut or outside
+    assert inside_polygon(rule.points, outline).all()
+    for part in parts:
+        foot = part.piece.point(part.piece.nearest(rule.points))
+        assert np.linalg.norm(rule.points - foot, axis=1).min() > 0
+
+
+@pytest.mark.parametrize("ends", [[[0, 0], [1, 1]], [[0, 1], [0.5, 0.5]], [[0.2, 0], [0.2, 1]]])
+def test_a_cut_from_corner_or_along_a_mesh_line_keeps_its_length(ends):
+    points = np.array(ends, dtype=float)
+    body = body_of(scene([{"kind": "polyline", "points": points.tolist()}]))
+    length = np.linalg.norm(points[1] - points[0])
+    assert cut_rule(body, 0.03).weights.sum() == pytest.approx(length, rel=1e-13)
 
 
 def test_a_box_is_refused_by_name():

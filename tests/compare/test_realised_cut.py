@@ -61,3 +61,14 @@ def test_no_cut_is_made_where_the_solver_made_none():
     assert not isinstance(field, SidedField)
     assert not displacement_jump(field, cut_rule(body, 0.1)).any()
     assert displacement_error(field, field, area_rule(body, 0.2)).absolute == 0.0
+
+
+def test_a_cut_that_runs_beyond_its_tip_is_not_taken_for_one_beside_it():
+    body = body_of(scene([{"kind": "polyline", "points": [[-0.1, 0.5], [0.5, 0.5]]}]))
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    facets = np.array([[[0.0, 0.5], [0.6, 0.5]], [[0.6, 0.5], [0.7, 0.5]]])
+    cells = np.array([[0, 1, 2], [0, 2, 3]])
+    too_long = solution(points, cells, points, cut_facets=facets)
+    assert cut_deviation(too_long, body) < 1e-15
+    bent = solution(points, cells, points, cut_facets=facets + np.array([0.0, 0.01]))
+    assert cut_deviation(bent, body) == pytest.approx(0.01)

@@ -214,6 +214,14 @@ def test_a_body_in_space_gets_notes_and_no_wrong_number():
     assert "box" in result.verdicts[0].reason
 
 
+def test_a_solution_on_half_of_the_body_is_not_measured_but_named():
+    whole = LEVELS[0]
+    half = solution(whole.points, whole.cells[:64], whole.displacement[0], size=whole.size)
+    result = assess([BOUND], {"xfem": {0: half}}, Cubic())
+    assert result.verdicts[0].verdict is Verdict.ERROR
+    assert "cover 0.5 of the body" in result.verdicts[0].reason
+
+
 def test_an_exact_case_without_its_exact_solution_is_refused():
     with pytest.raises(InputError, match="was not given"):
         assess_accuracy(case([]), [], {}, None)

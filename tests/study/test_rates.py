@@ -49,3 +49,7 @@ def test_two_levels_are_too_few():
 
 def test_an_error_of_exactly_zero_is_round_off_not_a_crash():
     assert rate([0.1, 0.0, 0.0, 0.0]).reason.startswith("floor")
+
+
+def test_levels_of_equal_size_have_no_rate():
+    assert "do not fall" in rate([0.1, 0.05, 0.02], sizes=[0.1, 0.1, 0.05]).reason

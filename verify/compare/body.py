@@ -14,6 +14,10 @@ __all__ = ["Body", "CutPart", "body_of"]
 
 Array = NDArray[np.float64]
 
+# A turn of less than 15° makes a singularity too weak to matter: r^-0.08 in the strain. Else each
+# vertex of a curve given as a polyline would cost its own grading.
+_KINK = np.deg2rad(15.0)
+
 
 @dataclass(frozen=True)
 class CutPart:
@@ -90,13 +94,12 @@ def body_of(scene: Scene, singular: Array | None = None) -> Body:
     parts = [part for name in cuts for part in _inner_parts(name, cuts, outline)]
     extra = np.zeros((0, 2)) if singular is None else np.asarray(singular, float).reshape(-1, 2)
     size = float(np.linalg.norm(np.ptp(outline, axis=0)))
-    ends = [p.piece.point(np.array([t]))[0] for p in parts for t in (p.start, p.end)]
-    tips = [e for e in ends if _count(e, ends, size) == 1 and not _on(e, outline, size)[0]]
-    special = [e for e in _special(ends, parts, size) if not _on(e, outline, size)[0]]
-    if not scene.judged_by_exact:  # an exact field is smooth up to the outline
-        special += list(outline)
-    found = _distinct(np.array([*special, *extra]).reshape(-1, 2), size)
-    return Body(outline, cuts, parts, found, np.array(tips).reshape(-1, 2))
+    tips, special = _ends(parts, size)
+    tips, special = tips[~_on(tips, outline, size)], special[~_on(special, outline, size)]
+    # an exact field is smooth up to the outline
+    corners = outline[:0] if scene.judged_by_exact else outline
+    found = _distinct(np.vstack([special, extra, corners]), size)
+    return Body(outline, cuts, parts, found, tips)
 
 
 def _inner_parts(name: str, cuts: dict[str, list[Piece]], outline: Array) -> list[CutPart]:
@@ -116,30 +119,22 @@ def _inner_parts(name: str, cuts: dict[str, list[Piece]], outline: Array) -> lis
     return parts
 
 
-def _special(ends: list[Array], parts: list[CutPart], size: float) -> list[Array]:
-    """Find the ends of parts that are not smooth points within one cut."""
-    tangents = [
-        sign * part.piece.tangent(np.array([t]))[0]
-        for part in parts
-        for t, sign in ((part.start, 1.0), (part.end, -1.0))
-    ]
-    found = []
-    for end in ends:
-        meeting = [
-            tangents[i] for i, e in enumerate(ends) if np.linalg.norm(e - end) < 1e-12 * size
-        ]
-        smooth = len(meeting) == 2 and float(meeting[0] @ meeting[1]) < -1 + 1e-12
-        if not smooth:
-            found.append(end)
-    return found
+def _ends(parts: list[CutPart], size: float) -> tuple[Array, Array]:
+    """Find the free ends (k, 2) of the parts, and all their ends that are not smooth points."""
+    places = [(p.piece, t, s) for p in parts for t, s in ((p.start, 1.0), (p.end, -1.0))]
+    ends = np.array([piece.point(np.array([t]))[0] for piece, t, _ in places]).reshape(-1, 2)
+    away = np.array([s * piece.tangent(np.array([t]))[0] for piece, t, s in places]).reshape(-1, 2)
+    apart = np.abs(ends[:, None] - ends[None]).max(axis=2)
+    meeting = apart <= 1e-12 * size
+    count = meeting.sum(axis=1)
+    # of two ends that meet, the tangents point in opposite directions unless there is a kink
+    straight = (meeting & (away @ away.T < -np.cos(_KINK))).any(axis=1)
+    return ends[count == 1], ends[~((count == 2) & straight)]
 
 
 def _on(points: Array, outline: Array, size: float) -> NDArray[np.bool_]:
-    return distance_to_outline(np.atleast_2d(points), outline) <= 1e-12 * size
-
-
-def _count(point: Array, points: list[Array], size: float) -> int:
-    return sum(bool(np.linalg.norm(p - point) <= 1e-12 * size) for p in points)
+    on: NDArray[np.bool_] = distance_to_outline(points, outline) <= 1e-12 * size
+    return on
 
 
 def _distinct(points: Array, size: float) -> Array:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
 from verify.compare.simplices import simplices, straight_or_raise
+from verify.errors import InputError
 from verify.solution import Solution
 
 __all__ = ["ROUND_OFF", "Field", "SolutionField"]
@@ -53,7 +54,7 @@ class SolutionField:
     Raises
     ------
     InputError
-        If quadratic cells have curved edges.
+        If nodes are not finite, no cell has a volume, or quadratic cells have curved edges.
     """
 
     def __init__(self, solution: Solution, step: int = -1) -> None:
@@ -62,7 +63,11 @@ class SolutionField:
         self._cells = np.ascontiguousarray(solution.cells)
         if solution.order == 2:
             straight_or_raise(solution.points, self._cells)
+        if not np.isfinite(solution.points).all():
+            raise InputError("a solution has nodes whose coordinates are not finite")
         shape = simplices(solution.points, self._cells)
+        if shape.degenerate.all():
+            raise InputError("all cells of a solution are without volume")
         self._shape = shape
         self.degenerate_cells = int(shape.degenerate.sum())
         lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)

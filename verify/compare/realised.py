@@ -30,12 +30,17 @@ def field_of(solution: Solution, body: Body) -> Field:
 
 
 def cut_deviation(solution: Solution, body: Body) -> float:
-    """Largest distance of the realised cut from the cuts as asked, m (0 without cuts)."""
+    """Largest distance of the realised cut from the cuts as asked, m, beyond tips left out."""
     facets = solution.cut_facets
     if not len(facets) or not body.parts:
         return 0.0
     probes = np.concatenate([facets[:, 0], facets[:, 1], facets.mean(axis=1)])
-    return float(np.linalg.norm(probes - _nearest_on_cuts(probes, body), axis=1).max())
+    foot = _nearest_on_cuts(probes, body)
+    beside = np.linalg.norm(probes - foot, axis=1)
+    if len(body.tips):  # a cut that is too long has no other side to be read from
+        at_tip = np.linalg.norm(foot[:, None] - body.tips, axis=2).min(axis=1)
+        beside = beside[at_tip > ROUND_OFF * body.size]
+    return float(beside.max(initial=0.0))
 
 
 class SidedField:

@@ -35,6 +35,9 @@ __all__ = ["assess_accuracy"]
 
 REFERENCE = "reference"
 
+# A solver may drop slivers; a mesh that misses more of the body than this is another body.
+_COVERED = 0.01
+
 
 def assess_accuracy(
     scene: Scene,
@@ -149,6 +152,12 @@ def _measure(
     ruler: _Ruler,
 ) -> SolveRecord:
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
+    covered = one.coverage
+    if abs(covered - 1) > _COVERED:
+        text = f"the cells of the solution cover {covered:.4g} of the body"
+        return _noted(record, dict.fromkeys([*ERRORS, *(q.name for q in scene.quantities)], text))
+    if abs(covered - 1) > 1e-9:
+        record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
     # the reference does not judge itself: its finest level would have no error
     own = record.solver == REFERENCE and not scene.judged_by_exact
     judge_of = None if own else reference

@@ -6,6 +6,7 @@ from verify.compare.opening import opening
 from verify.compare.point_displacement import point_displacement
 from verify.compare.realised import field_of
 from verify.compare.sampled import Sampled
+from verify.compare.simplices import simplices
 from verify.compare.strain_energy import strain_energy
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity, Quantity
 from verify.solution import Solution
@@ -26,6 +27,12 @@ class Measured:
     def __init__(self, solution: Solution, body: Body, law: Hooke) -> None:
         self.solution, self.body, self.law = solution, body, law
         self.field = Sampled(field_of(solution, body))
+
+    @property
+    def coverage(self) -> float:
+        """Volume of the cells over that of the body: 1, or something is missing or twice there."""
+        shape = simplices(self.solution.points, self.solution.cells)
+        return float(shape.volume.sum()) / self.body.area
 
     def quantity(self, asked: Quantity) -> float:
         """Value of a quantity of interest, in the unit that `unit_of` gives."""

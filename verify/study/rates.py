@@ -6,7 +6,7 @@ from math import log
 
 from verify.result import Rate
 
-__all__ = ["observed_rate"]
+__all__ = ["ROUND_OFF", "observed_rate"]
 
 # Relative errors below this are round-off of a direct solver on 1e5 unknowns.
 ROUND_OFF = 1e-11
@@ -36,6 +36,9 @@ def observed_rate(
         the pair before, plus what the half-widths of the two errors allow.
     """
     levels = list(zip(sizes, errors, uncertainties, strict=True))
+    if any(b >= a for a, b in pairwise(sizes)):
+        text = ", ".join(f"{size:.3g}" for size in sizes)
+        return Rate(solver, metric, None, 0.0, f"mesh sizes {text} m do not fall", [])
     slopes = [
         log(a[1] / b[1]) / log(a[0] / b[0]) if a[1] > 0 and b[1] > 0 else float("nan")
         for a, b in pairwise(levels)
