@@ -11,6 +11,8 @@ from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 __all__ = ["Curve", "Duration", "Point", "duration", "error_curves", "is_error", "metric_names"]
 
 MESHING = "meshing"
+# Beyond these a number is a symptom, and powers of ten around it overflow
+_DRAWABLE = (1e-200, 1e200)
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,8 @@ def duration(solve: SolveRecord) -> Duration | None:
     added phase by phase (the spread is then an upper bound).
     """
     timed = {name: values for name, values in solve.timings.items() if values and name != MESHING}
-    if not timed:
+    everything = [second for values in solve.timings.values() for second in values]
+    if not timed or not all(math.isfinite(second) and second >= 0 for second in everything):
         return None
     counts = {len(values) for values in timed.values()}
     if len(counts) == 1:
@@ -142,7 +145,8 @@ def _can_be_drawn(measured: Metric) -> bool:
     known = (
         measured.unit == "1" if measured.reference is None else math.isfinite(measured.reference)
     )
-    return known and math.isfinite(measured.value) and math.isfinite(measured.uncertainty)
+    numbers = (measured.value, measured.uncertainty)
+    return known and all(math.isfinite(n) and abs(n) < _DRAWABLE[1] for n in numbers)
 
 
 def _point(solve: SolveRecord, measured: Metric) -> Point:
@@ -150,5 +154,7 @@ def _point(solve: SolveRecord, measured: Metric) -> Point:
     if measured.reference is not None:
         scale = abs(measured.reference) or 1.0
         value, uncertainty = abs(value - measured.reference) / scale, uncertainty / scale
-    size = solve.size if solve.size and math.isfinite(solve.size) and solve.size > 0 else None
-    return Point(solve.level, size, solve.unknowns or None, value, uncertainty, duration(solve))
+    drawn = value if value >= _DRAWABLE[0] else 0.0
+    size = solve.size if solve.size and _DRAWABLE[0] < solve.size < _DRAWABLE[1] else None
+    unknowns = solve.unknowns if solve.unknowns and solve.unknowns > 0 else None
+    return Point(solve.level, size, unknowns, drawn, max(uncertainty, 0.0), duration(solve))

@@ -28,7 +28,8 @@ def error_range(curves: list[Curve], sloped: bool) -> tuple[float, float] | None
         return None
     smallest = min(point.value for point in points)
     values = [p.value for p in points] + [p.value + p.uncertainty for p in points]
-    values += [p.uncertainty for p in points if p.uncertainty > smallest / 30]
+    # half of it as well, so that the band below it can be seen
+    values += [p.uncertainty / 2 for p in points if p.uncertainty > smallest / 30]
     low, high = log_range(values)
     return (low / 2.2 if sloped else low), high
 

@@ -76,7 +76,7 @@ def with_interval(value: float | None, low: float | None, high: float | None) ->
     """Return an observed value and the interval in which the true one lies."""
     if value is None:
         return joined(_MISSING)
-    if low is None or high is None or low == high:
+    if low is None or high is None or low == high or not all(map(math.isfinite, (low, high))):
         return number(value)
     digits = 4
     while digits < 10 and _decimal(low, digits) == _decimal(high, digits):
@@ -92,7 +92,7 @@ def seconds_text(value: float | None, beside: float | None = None) -> str:
 
     With `beside`, a duration that is written next to it, the number alone, in the same unit.
     """
-    if value is None:
+    if value is None or not math.isfinite(value):
         return _MISSING
     judged = value if beside is None else beside
     unit, size = next((u for u in (("s", 1.0), ("ms", 1e-3)) if judged >= u[1]), ("µs", 1e-6))
@@ -103,4 +103,6 @@ def seconds_text(value: float | None, beside: float | None = None) -> str:
 
 def bytes_text(value: float | None) -> str:
     """Return an amount of memory."""
-    return _MISSING if value is None else f"{value / 2**20:,.0f} MiB".replace(",", "\N{THIN SPACE}")
+    if value is None or not math.isfinite(value):
+        return _MISSING
+    return f"{value / 2**20:,.0f} MiB".replace(",", "\N{THIN SPACE}")

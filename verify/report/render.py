@@ -5,12 +5,12 @@ from pathlib import Path
 
 from verify.report.exports import csv_rows, json_document, junit_document
 from verify.report.page import page
-from verify.report.pictures import CasePictures, Picture, case_pictures, drawn
-from verify.report.run_directory import Run, load_run
+from verify.report.pictures import CasePictures, case_pictures, drawn
+from verify.report.run_directory import load_run
 
 __all__ = ["render"]
 
-_PICTURE_BYTES = 8_000_000  # of images in a page; with base64 and figures it stays below 15 MB
+_PAGE_BYTES = 14_500_000  # what a mail system or a code host still takes
 
 
 def render(directory: Path) -> Path:
@@ -32,36 +32,34 @@ def render(directory: Path) -> Path:
         If the files cannot be written.
     """
     run = load_run(directory)
-    pictures, notes = _all_pictures(run)
+    pictures = [case_pictures(run.root, entry) for entry in run.entries]
+    notes = []
+    if reason := drawn([picture for shown in pictures for picture in shown.all]):
+        notes.append(f"pictures were drawn by matplotlib because {reason}.")
+    text = page(run, pictures, notes)
+    excess = len(text.encode("utf-8")) - _PAGE_BYTES
+    if excess > 0:
+        text = page(run, pictures, [*notes, _left_out(pictures, excess)])
     _write(directory / "results.json", json_document(run))
     _write(directory / "results.csv", csv_rows(run))
     _write(directory / "junit.xml", junit_document(run))
     target = directory / "report.html"
-    _write(target, page(run, pictures, notes))
+    _write(target, text)
     return target
 
 
-def _all_pictures(run: Run) -> tuple[list[CasePictures], list[str]]:
-    pictures = [case_pictures(run.root, entry) for entry in run.entries]
-    everything = [picture for shown in pictures for picture in shown.all]
-    notes = []
-    if reason := drawn(everything):
-        notes.append(
-            f"pictures were drawn by matplotlib, without hidden-surface removal, because {reason}."
-        )
-    return pictures, notes + _left_out(pictures, everything)
-
-
-def _left_out(pictures: list[CasePictures], everything: list[Picture]) -> list[str]:
-    """Leave out the last pictures if all of them would make the page too large."""
-    total, dropped = 0, 0
-    for shown in pictures:
-        total += sum(len(picture.image) for picture in shown.all)
-        if total > _PICTURE_BYTES:
-            dropped += len(shown.all)
-            shown.deformed, shown.error = [], []
-            shown.notes.append("Its pictures are left out to keep the page below 15 MB.")
-    return [f"{dropped} of {len(everything)} pictures are left out."] if dropped else []
+def _left_out(pictures: list[CasePictures], excess: int) -> str:
+    """Leave out the pictures of the last cases until the page is `excess` bytes smaller."""
+    dropped, total = 0, sum(len(shown.all) for shown in pictures)
+    for shown in reversed(pictures):
+        if excess <= 0:
+            break
+        excess -= sum(len(picture.address) for picture in shown.all)
+        dropped += len(shown.all)
+        shown.deformed, shown.error = [], []
+        shown.notes.append("Its pictures are left out to keep the page small.")
+    size = f"{_PAGE_BYTES / 1e6:.3g} MB"
+    return f"{dropped} of {total} pictures are left out to keep the page below {size}."
 
 
 def _write(path: Path, content: str) -> None:

@@ -116,10 +116,10 @@ def _check_row(record: VerdictRecord) -> Markup:
 
 
 def _warnings(run: Run) -> Markup:
-    said = [f"{defect[:1].upper()}{defect[1:]}." for defect in run.defects]
+    said = [f"{defect}." for defect in run.defects]
     if (run.record.get("provenance") or {}).get("dirty"):
         said.append(
-            "The code differed from its commit when this ran: it cannot be reproduced from it."
+            "the code differed from its commit when this ran: it cannot be reproduced from it."
         )
     return joined(*(tag("p", "Note: " + sentence, class_="warning") for sentence in said))
 

@@ -181,8 +181,14 @@ def _value(value: Any) -> Markup:
         said = [joined(_words(name), " ", _value(entry)) for name, entry in value.items()]
         return joined(*_separated(said))
     if isinstance(value, float):
-        return number(value, 7)
+        return number(value, _digits(value))
     return number(value) if value is None or isinstance(value, int) else joined(str(value))
+
+
+def _digits(value: float, most: int = 7) -> int:
+    """Return how many significant digits `value` needs, up to `most`."""
+    whole = float(f"{value:.{most}g}")
+    return next((n for n in range(2, most) if float(f"{value:.{n}g}") == whole), most)
 
 
 def _separated(parts: list[Markup]) -> list[Any]:

@@ -1,0 +1,24 @@
+import pytest
+from synthetic_run import make_run
+
+from verify.report import render
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "browser: opens the report in headless Chromium")
+
+
+@pytest.fixture(scope="module")
+def plain_run(tmp_path_factory):
+    """Return a rendered run of three cases without stored solutions."""
+    root = make_run(tmp_path_factory.mktemp("plain") / "run", pictures=False)
+    render(root)
+    return root
+
+
+@pytest.fixture(scope="module")
+def pictured_run(tmp_path_factory):
+    """Return a rendered run of three cases with pictures."""
+    root = make_run(tmp_path_factory.mktemp("pictured") / "run")
+    render(root)
+    return root

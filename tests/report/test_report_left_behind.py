@@ -1,0 +1,133 @@
+"""Claims about runs that were killed or damaged: nothing is hidden, nothing is invented."""
+
+import json
+from dataclasses import asdict
+from xml.etree import ElementTree
+
+import pytest
+from page_parser import parsed
+from synthetic_run import make_run
+
+from verify.errors import InputError
+from verify.report import load_run, render
+from verify.result import SolveRecord, Status
+
+
+@pytest.fixture
+def root(tmp_path):
+    return make_run(tmp_path / "run", pictures=False)
+
+
+def said(root):
+    return parsed(render(root).read_text(encoding="utf-8")).text
+
+
+def result_of(root):
+    return root / "cases" / "statics__f3_inclined" / "result.json"
+
+
+def test_a_killed_run_lists_what_had_finished_and_what_had_not_started(root):
+    record = json.loads((root / "run.json").read_text())
+    record["finished"] = None
+    record["cases"].append("statics/never_begun")
+    (root / "run.json").write_text(json.dumps(record))
+    folder = result_of(root).parent
+    result_of(root).unlink()
+    for level, status in enumerate((Status.SOLVED, Status.FAILED)):
+        solve = SolveRecord("statics/f3_inclined", "xfem", level, status, "boom")
+        (folder / f"xfem-{level}").mkdir()
+        content = {"key": "k", "record": asdict(solve), "files": {}}
+        (folder / f"xfem-{level}" / "record.json").write_text(json.dumps(content))
+    text = said(root)
+    assert "the run has not finished" in text
+    assert "statics/f3_inclined: not judged: the run was stopped before its comparison" in text
+    assert "1 of its solves had finished" in text
+    assert "boom" in text
+    assert "statics/never_begun: not started" in text
+    suite = ElementTree.parse(root / "junit.xml").getroot()
+    assert suite.get("errors") == "3"  # one of its own, the unjudged case, the one not begun
+
+
+@pytest.mark.parametrize(
+    "content, reason",
+    [
+        ("{", "not a JSON file"),
+        ("", "not a JSON file"),
+        ("[]", "not a result of schema version 1"),
+        ('{"schema": 99}', "not a result of schema version 1"),
+        ('{"schema": 1}', "not a readable result"),
+        ("\ud800".encode("utf-8", "surrogatepass"), "not a JSON file"),
+    ],
+)
+def test_a_damaged_result_is_a_row_with_its_reason(root, content, reason):
+    result_of(root).write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert reason in said(root)
+    entry = load_run(root).entries[0]
+    assert entry.result is None
+    assert reason in entry.defect
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda r: r.update(title=["a"]),
+        lambda r: r["verdicts"][0].update(observed="much"),
+        lambda r: r["solves"][0].update(level=None),
+        lambda r: r["solves"][0].update(timings={"solve": "fast"}),
+        lambda r: r["solves"][0]["metrics"][0].update(value=None),
+        lambda r: r["rates"][0].update(pairwise=7),
+    ],
+)
+def test_a_result_with_a_wrong_type_in_it_is_a_row_too(root, spoil):
+    result = json.loads(result_of(root).read_text())
+    spoil(result)
+    result_of(root).write_text(json.dumps(result))
+    assert "result.json is not readable" in said(root)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 0.0, -1.0, 1e-320, 1e300])
+def test_numbers_that_a_logarithm_cannot_take_do_not_stop_the_report(root, value):
+    result = json.loads(result_of(root).read_text())
+    for solve in result["solves"]:
+        for metric in solve["metrics"]:
+            metric.update(value=value, uncertainty=value)
+        solve.update(size=value, timings={"solve": [value], "meshing": []})
+    result["rates"][0].update(order=value)
+    result["verdicts"][0].update(observed=value, low=value, high=value)
+    result_of(root).write_text(json.dumps(result))
+    assert "F3" in said(root)
+    assert json.loads((root / "results.json").read_text())["cases"][0]["result"]
+
+
+def test_a_case_without_solves_checks_or_levels_renders(root):
+    result = json.loads(result_of(root).read_text())
+    result.update(solves=[], rates=[], verdicts=[], reference={}, scene={})
+    result_of(root).write_text(json.dumps(result))
+    text = said(root)
+    assert "No check is stated for statics/f3_inclined" in text
+    assert "No reference is recorded" in text
+
+
+def test_a_single_level_is_drawn(root):
+    result = json.loads(result_of(root).read_text())
+    result["solves"] = result["solves"][:1]
+    result_of(root).write_text(json.dumps(result))
+    assert "F3" in said(root)
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", '{"schema": 7}', '{"schema": 1, "cases": 5}'])
+def test_results_without_a_usable_run_record_are_still_reported(root, content):
+    (root / "run.json").unlink()
+    if content is not None:
+        (root / "run.json").write_text(content)
+    text = said(root)
+    assert "run.json" in text
+    assert "Soft-tissue strip" in text
+
+
+def test_a_directory_without_a_run_is_one_clear_error(tmp_path):
+    with pytest.raises(InputError, match=r"holds no run \(run.json is missing\)"):
+        render(tmp_path)
+    with pytest.raises(InputError, match="no such directory"):
+        render(tmp_path / "nowhere")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,153 @@
+"""Claims about the page: whole, self-contained, escaped, complete."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+from page_parser import parsed
+from synthetic_run import HOSTILE, make_run
+
+from verify.report import render
+
+
+def page_of(root):
+    return (root / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_page_is_well_formed_and_fetches_nothing(pictured_run):
+    text = page_of(pictured_run)
+    page = parsed(text)
+    addresses = [
+        a[k] for _, a in page.elements for k in ("src", "href", "srcset", "data") if k in a
+    ]
+    assert addresses
+    assert all(a.startswith(("#", "data:image/")) for a in addresses)
+    style = re.search("<style>(.*)</style>", text, re.DOTALL)[1]
+    assert "url(" not in style
+    assert "@import" not in style
+    assert not page.all("script")
+    assert not page.all("link")
+
+
+def test_every_link_within_the_page_leads_somewhere(pictured_run):
+    page = parsed(page_of(pictured_run))
+    assert {a["href"][1:] for a in page.all("a")} <= set(page.ids)
+
+
+def test_every_picture_and_figure_has_an_alternative_text(pictured_run):
+    page = parsed(page_of(pictured_run))
+    assert len(page.all("img")) == 9
+    assert all(len(image["alt"]) > 20 for image in page.all("img"))
+    panels = [svg for svg in page.all("svg") if svg["class"] == "panel"]
+    assert len(panels) == 3 * 7  # size, unknowns, time for 2 + 3 + 2 metrics
+    assert all("XFEM" in panel["aria-label"] for panel in panels)
+
+
+def test_words_of_a_case_file_cannot_become_markup(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False, hostile=True)
+    page = parsed(page_of(render(root).parent))
+    assert not page.all("script")
+    assert "<script>alert('x')</script>" in page.text
+    assert "\u202e" not in page.text
+    assert "\x00" not in page.text
+
+
+def test_hostile_words_in_every_text_of_a_result_stay_text(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    file = root / "cases" / "statics__griffith_inside" / "result.json"
+
+    def poisoned(value, key=""):
+        if isinstance(value, dict):
+            return {k: poisoned(v, k) for k, v in value.items()}
+        if isinstance(value, list):
+            return [poisoned(v, key) for v in value]
+        keep = ("case", "status", "verdict", "unit", "solution")
+        return HOSTILE + value if isinstance(value, str) and key not in keep else value
+
+    file.write_text(json.dumps(poisoned(json.loads(file.read_text()))))
+    record = json.loads((root / "run.json").read_text())
+    (root / "run.json").write_text(json.dumps(poisoned({**record, "cases": []})))
+    page = parsed(page_of(render(root).parent))
+    assert not page.all("script")
+    assert "griffith_inside" in page.text
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "3 cases with 6 checks: 3 passed, 1 failed, 1 undecided, 1 not judged",
+        "killed after 60 s",
+        "cannot do a tip inside an element",
+        "is not clearly below the error 0.12",
+        "oscillating: 1.4, 0.2",
+        "zero-volume piece dropped",
+        "displacements × 2",
+        "conforming P2, 3 levels, GCI",
+        "median of 3 repetitions",
+        "0123456789abcdef",
+        "it cannot be reproduced from it",
+        "How to read this",
+    ],
+)
+def test_the_page_says(pictured_run, words):
+    assert words in parsed(page_of(pictured_run)).text
+
+
+def test_a_verdict_is_a_word_not_only_a_colour(plain_run):
+    page = parsed(page_of(plain_run))
+    for word in ("PASS", "FAIL", "UNDECIDED", "ERROR"):
+        assert word in page.text
+
+
+def test_rendering_again_gives_the_same_bytes(plain_run):
+    names = ("report.html", "results.json", "results.csv", "junit.xml")
+    before = [(plain_run / name).read_bytes() for name in names]
+    render(plain_run)
+    assert [(plain_run / name).read_bytes() for name in names] == before
+    assert not list(plain_run.glob("*.partial"))
+
+
+def test_a_run_directory_can_be_moved_before_it_is_rendered(pictured_run, tmp_path):
+    moved = shutil.copytree(pictured_run, tmp_path / "a b'c")
+    assert len(parsed(page_of(render(moved).parent)).all("img")) == 9
+
+
+def test_figures_and_tables_of_120_cases_take_less_than_5_megabytes(tmp_path, plain_run):
+    root = tmp_path / "run"
+    names = []
+    for i in range(40):
+        for case in sorted((plain_run / "cases").iterdir()):
+            result = json.loads((case / "result.json").read_text())
+            result["case"] = f"{result['case']}_{i}"
+            names.append(result["case"])
+            folder = root / "cases" / result["case"].replace("/", "__")
+            folder.mkdir(parents=True)
+            (folder / "result.json").write_text(json.dumps(result))
+    (root / "run.json").write_text(json.dumps({"schema": 1, "cases": names, "finished": "x"}))
+    assert render(root).stat().st_size < 5e6
+
+
+def test_pictures_are_left_out_with_a_note_before_a_page_gets_too_large(
+    pictured_run, tmp_path, monkeypatch
+):
+    root = shutil.copytree(pictured_run, tmp_path / "run")
+    limit = (root / "report.html").stat().st_size - 1000
+    monkeypatch.setattr("verify.report.render._PAGE_BYTES", limit)
+    page = parsed(page_of(render(root).parent))
+    assert (root / "report.html").stat().st_size < limit
+    assert len(page.all("img")) == 6
+    assert "3 of 9 pictures are left out" in page.text
+
+
+def test_the_report_needs_no_solver():
+    code = (
+        "import sys, verify.report\n"
+        "wrong = {'dolfinx', 'gmsh', 'petsc4py', 'mpi4py', 'numba', 'reference', 'verify.xfem',"
+        " 'verify.compare', 'verify.solvers', 'pyvista', 'vtk'} & set(sys.modules)\n"
+        "sys.exit(f'imported {wrong}' if wrong else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,159 @@
+"""Claims about the pictures: right body, one view, and never the end of the report."""
+
+import io
+import json
+import sys
+
+import numpy as np
+import pytest
+from page_parser import parsed
+from PIL import Image
+from synthetic_run import cut_square, make_run, write_error_field
+
+from verify.report import draw_with_matplotlib, load_run, pictures, render
+from verify.report.bodies import Body, deformed_body, error_body
+from verify.report.pictures import case_pictures, drawn
+from verify.report.view import common_view
+from verify.solution import Solution, write_solution
+
+BY_SIGNAL = [sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"]
+BY_EXCEPTION = [sys.executable, "-c", "raise ImportError('libGL.so.1')"]
+WITHOUT_A_WORD = [sys.executable, "-c", ""]
+NOT_THERE = ["/no/such/interpreter"]
+
+
+def tetrahedra() -> Solution:
+    """Return two tetrahedra that share a face, one moved up."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], dtype=float)
+    displacement = np.zeros((1, 5, 3))
+    displacement[0, 4, 2] = 0.2
+    return Solution(
+        points=points, cells=np.array([[0, 1, 2, 3], [1, 2, 3, 4]]), displacement=displacement
+    )
+
+
+def lengths(body: Body) -> float:
+    ends = body.points[body.edges]
+    return float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum())
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_outline_is_the_boundary_with_both_faces_of_the_cut(order):
+    body = deformed_body(cut_square(8, order), 0.0)
+    assert lengths(body) == pytest.approx(4 + 2 * np.hypot(1, 1 / 3), rel=1e-12)
+
+
+def test_the_outline_of_an_edge_cut_ends_at_its_tip():
+    body = deformed_body(cut_square(8, slender=True), 0.0)
+    assert lengths(body) == pytest.approx(2 * (0.02 + 0.1) + 2 * 0.01, rel=1e-12)
+
+
+def test_only_the_outer_facets_of_a_solid_are_drawn():
+    body = deformed_body(tetrahedra(), 1.0)
+    assert len(body.triangles) == 6
+
+
+def test_all_bodies_of_a_case_fit_into_one_view():
+    bodies = [deformed_body(cut_square(8), scale) for scale in (0.0, 5.0, 40.0)]
+    view = common_view(bodies, "cividis")
+    x0, x1, y0, y1 = view.window
+    for body in bodies:
+        assert (body.points[:, 0].min() > x0) & (body.points[:, 0].max() < x1)
+        assert (body.points[:, 1].min() > y0) & (body.points[:, 1].max() < y1)
+    assert (x1 - x0) / (y1 - y0) == pytest.approx(view.size[0] / view.size[1], rel=0.01)
+    assert view.limits[1] == max(body.values.max() for body in bodies)
+
+
+def ink(data: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float) < 250
+
+
+@pytest.mark.graphics
+def test_vtk_and_matplotlib_show_the_same_body(tmp_path):
+    body = deformed_body(cut_square(12, opening=0.05), 2.0)
+    view = common_view([body], "cividis")
+    picture = pictures.Picture("", "", body, view)
+    assert drawn([picture]) == ""
+    draw_with_matplotlib.draw(body, view, tmp_path / "m.png")
+    one, two = ink(picture.image), ink((tmp_path / "m.png").read_bytes())
+    assert one.shape == two.shape == view.size[::-1]
+    # lines are a little wider in one than in the other: below 1 % of the picture
+    assert np.mean(one != two) < 0.01
+    assert 0.5 < one.mean() < 0.95
+    # the opened cut is white in both, right through the middle of the body
+    middle = one[:, one.shape[1] // 2]
+    assert np.count_nonzero(np.diff(middle.astype(int)) == 1) == 2
+
+
+def test_a_solid_can_be_drawn_without_opengl(tmp_path):
+    body = deformed_body(tetrahedra(), 1.0)
+    draw_with_matplotlib.draw(body, common_view([body], "cividis"), tmp_path / "m.png")
+    assert ink((tmp_path / "m.png").read_bytes()).mean() > 0.1
+
+
+@pytest.mark.parametrize(
+    "command, reason",
+    [
+        (BY_SIGNAL, "ended by signal 11"),
+        (BY_EXCEPTION, "libGL.so.1"),
+        (WITHOUT_A_WORD, "drew nothing"),
+        (NOT_THERE, "could not be started"),
+    ],
+)
+def test_a_machine_without_opengl_gets_pictures_by_matplotlib_and_a_note(
+    tmp_path, monkeypatch, command, reason
+):
+    monkeypatch.setattr(pictures, "_VTK", command)
+    root = make_run(tmp_path / "run")
+    page = parsed(render(root).read_text(encoding="utf-8"))
+    assert len(page.all("img")) == 9
+    assert "drawn by matplotlib" in page.text
+    assert reason in page.text
+
+
+def test_missing_and_damaged_solutions_become_notes(tmp_path):
+    root = make_run(tmp_path / "run")
+    folder = root / "cases" / "statics__f3_inclined"
+    (folder / "xfem-3" / "solution.vtu").write_text("no mesh")
+    (folder / "conforming-3" / "solution.json").unlink()
+    (folder / "error_field.vtu").unlink()
+    shown = case_pictures(root, load_run(root).entries[0])
+    assert not shown.all
+    notes = " ".join(shown.notes)
+    assert "No picture of XFEM, level 3: the stored solution not a readable solution" in notes
+    assert "No picture of conforming P1, level 3: the stored solution no such file" in notes
+    assert "no error field is stored" in notes
+
+
+def test_a_solution_outside_the_run_directory_is_not_read(tmp_path):
+    root = make_run(tmp_path / "run")
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    result = json.loads(file.read_text())
+    for solve in result["solves"]:
+        solve["solution"] = "../../secret/solution.json"
+    result["pictures"] = {"error_field": "/etc/passwd"}
+    file.write_text(json.dumps(result))
+    shown = case_pictures(root, load_run(root).entries[0])
+    assert not shown.all
+    assert "outside the run directory" in shown.notes[0]
+
+
+def test_an_error_field_that_is_zero_or_not_finite_is_handled(tmp_path):
+    solution = cut_square(4)
+    n = len(solution.points)
+    write_error_field(solution, tmp_path / "zero.vtu", np.zeros(n))
+    view = common_view([error_body(tmp_path / "zero.vtu")], "YlOrBr")
+    assert view.limits == (0.0, 1.0)
+    write_error_field(solution, tmp_path / "nan.vtu", np.full(n, np.nan))
+    with pytest.raises(ValueError, match="not finite"):
+        error_body(tmp_path / "nan.vtu")
+
+
+def test_bodies_at_rest_are_drawn_at_true_scale(tmp_path):
+    root = make_run(tmp_path / "run")
+    folder = root / "cases" / "statics__f3_inclined"
+    for solver in ("xfem", "conforming"):
+        write_solution(cut_square(8, opening=0.0), folder / f"{solver}-3" / "solution")
+    shown = case_pictures(root, load_run(root).entries[0])
+    assert shown.scale == 1.0
+    assert len(shown.deformed) == 2
