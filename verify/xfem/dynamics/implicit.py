@@ -14,6 +14,9 @@ __all__ = ["EnergyMomentum", "ImplicitEuler", "Trapezoidal"]
 
 _Floats = NDArray[np.float64]
 
+# after so many evaluations in a step, pieces that have taken the substitute keep it
+_FREE_EVALUATIONS = 8
+
 
 class ImplicitEuler(NewtonIntegrator):
     """(2.45–46) solved to the end. Dissipates: a mode of frequency ω loses half of its energy in
@@ -77,13 +80,14 @@ class EnergyMomentum(NewtonIntegrator):
         body: DynamicBody,
         step_size: float,
         tolerance: float = 1e-12,
-        iterations: int = 40,
+        iterations: int = 80,
         solver: LinearSolver | None = None,
     ) -> None:
         super().__init__(body, step_size, tolerance, iterations, solver)
         mesh = body.force.virtual.mesh
         self._kernels = averaged_stress_kernels(mesh.dim, mesh.space)
         self._first = body.force.rotations.copy()
+        self._evaluations = 0
         self.substituted = np.zeros(len(self._first), dtype=bool)
 
     def _default_solver(self) -> LinearSolver:
@@ -93,13 +97,16 @@ class EnergyMomentum(NewtonIntegrator):
         force = self.body.force
         force.evaluate(self._start.displacement)
         self._first[:] = force.rotations
-        self.substituted[:] = False
+        self._evaluations = 0
 
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
         body, start = self.body, self._start
         force = body.force
         force.evaluate(displacement)
         internal = np.zeros(body.shape)
+        self._evaluations += 1
+        if self._evaluations <= _FREE_EVALUATIONS:
+            self.substituted[:] = False
         if force.turning:
             self._kernels.averaged_force(
                 force.virtual.cells, *force.geometry, self._first, force.rotations,

@@ -133,11 +133,13 @@ class NewtonIntegrator(ABC):
                 if np.linalg.norm(residual) < norm:
                     accepted = True
                     break
+            if not accepted and norm <= max(1e3 * self.tolerance * scale, 1e2 * floor):
+                _, forces, _ = self._residual(displacement)
+                return displacement, self._velocity(displacement), forces
             if not accepted:
-                if norm <= max(1e3 * self.tolerance * scale, 1e2 * floor):
-                    _, forces, _ = self._residual(displacement)
-                    return displacement, self._velocity(displacement), forces
-                break
+                # a dead end of the residual, not a root: leap over it
+                trial = displacement + correction
+                residual, forces, scale = self._residual(trial)
             displacement, norm = trial, np.linalg.norm(residual)
         raise StepFailedError(
             f"{type(self).__name__}: step from t = {self._start.time:.6g} s by "

@@ -1,0 +1,277 @@
+"""Energy and momentum accounts of cut bodies in motion."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, GRAVITY, cut_body, cut_cube, cut_square, material, rotation
+
+from verify.xfem.corotational import InternalForce
+from verify.xfem.critical_step import critical_step
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    ForwardEuler,
+    ImplicitEuler,
+    MovingSupports,
+    RayleighDamping,
+    RealTimeEuler,
+    StepFailedError,
+    SymplecticEuler,
+    Trapezoidal,
+)
+from verify.xfem.energy_ledger import run
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.supports import Supports
+
+SCHEMES = [
+    CentralDifferences,
+    SymplecticEuler,
+    ForwardEuler,
+    RealTimeEuler,
+    ImplicitEuler,
+    Trapezoidal,
+    EnergyMomentum,
+]
+
+
+def _free(v, kinematics="corotational"):
+    return DynamicBody(
+        InternalForce(v, material(v.mesh.dim), kinematics), side_wise_mass(v, DENSITY)
+    )
+
+
+def _critical(body):
+    v = body.force.virtual
+    stiffness = LinearStiffness(v, material(v.mesh.dim)).assemble(body.pattern)
+    return critical_step(body.pattern.matrix(stiffness), body.mass)
+
+
+def _moving(body, strain, spin=0.0):
+    """Stretched along x, with a spin in 1/s about the centre and a drift."""
+    state, X = body.rest(), body.force.virtual.node_points
+    dim = X.shape[1]
+    state.displacement[:, 0] = strain * (X[:, 0] - 0.5)
+    W = spin * (rotation(dim, 0.5 * np.pi) - rotation(dim, -0.5 * np.pi)) / 2.0
+    state.velocity[:] = (X - 0.5) @ W.T + 0.1 * np.arange(1, dim + 1)
+    return state
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_account_closes_for_every_scheme_with_loads_supports_and_damping(scheme, dim):
+    v = cut_body(dim)
+    X = v.node_points
+    fixed = np.repeat(X[:, -1:] == 0.0, dim, axis=1)
+
+    def motion(t):
+        along = np.eye(dim)[0]
+        return np.outer(0.02 * np.sin(9 * t) * np.ones(len(X)), along), np.outer(
+            0.18 * np.cos(9 * t) * np.ones(len(X)), along
+        )
+
+    mass = side_wise_mass(v, DENSITY)
+    rng = np.random.default_rng(1)
+    push = rng.normal(size=X.shape)
+    body = DynamicBody(
+        InternalForce(v, material(dim)),
+        mass,
+        weight=mass.weight(-GRAVITY * np.eye(dim)[-1]),
+        load=lambda t: np.sin(20.0 * t) * push,
+        supports=MovingSupports(fixed, motion),
+        damping=RayleighDamping(0.5, 1e-3),
+    )
+    state = body.rest()
+    account = run(scheme(body, 0.005), body, state, 40)
+    size = np.ptp(account.gravity) + account.kinetic.max()
+    for column in ("load_work", "support_work", "damping"):
+        assert np.abs(getattr(account, column)).max() > 1e-6 * size
+    conserves = scheme is EnergyMomentum
+    assert (np.abs(account.algorithmic).max() < 1e-12 * size) == conserves
+    assert np.ptp(account.balance) <= 1e-9 * size
+    assert np.ptp(account.balance + account.unbalanced) <= 1e-12 * size
+    assert (np.diff(account.damping) > -1e-12 * size).all() or scheme in (
+        CentralDifferences,
+        SymplecticEuler,
+        ForwardEuler,
+    )
+    # impulses account for the momentum
+    gained = account.momentum - account.momentum[0]
+    assert np.abs(gained - account.impulse).max() < 1e-9 * np.abs(account.momentum).max()
+    where, _ = motion(state.time)
+    assert np.abs(state.displacement - where)[fixed].max() < 1e-15
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_free_body_keeps_its_linear_momentum(scheme, dim):
+    body = _free(cut_body(dim))
+    state = _moving(body, 0.05, 1.0)
+    account = run(scheme(body, 0.5 * _critical(body)), body, state, 50)
+    drift = np.abs(account.momentum - account.momentum[0]).max()
+    # round-off of the largest momenta that cancel, over 50 steps
+    largest = np.sqrt(2.0 * account.kinetic.max() * DENSITY)
+    assert drift < 50 * 64 * np.finfo(float).eps * largest
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_angular_momentum_is_kept_by_those_schemes_that_should(dim):
+    drifts = {}
+    for scheme in SCHEMES:
+        body = _free(cut_body(dim))
+        state = _moving(body, 0.05, 2.0)
+        account = run(scheme(body, 0.5 * _critical(body)), body, state, 100)
+        turning = account.angular_momentum
+        drifts[scheme] = np.abs(turning - turning[0]).max() / np.abs(turning).max()
+    for scheme in (CentralDifferences, SymplecticEuler, EnergyMomentum):
+        assert drifts[scheme] < 1e-11
+    for scheme in (RealTimeEuler, ImplicitEuler, ForwardEuler):
+        assert drifts[scheme] > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("share", "bound"), [(0.9, 1e-4), (0.5, 3e-5), (0.25, 1e-5)]
+)
+def test_central_differences_hold_the_energy_of_small_strains_over_ten_thousand_steps(share, bound):
+    body = _free(cut_square(4))
+    state = _moving(body, 1e-4)
+    state.velocity[:] = 0.0
+    step = share * _critical(body)
+    scheme = CentralDifferences(body, step)
+    account = run(scheme, body, state, 10_000)
+    # the energy itself oscillates with (ωh)²; drift is what is left of it on average
+    first, last = account.mechanical[:2000].mean(), account.mechanical[-2000:].mean()
+    assert abs(last / first - 1.0) <= bound
+    assert np.ptp(account.balance) <= 1e-10 * account.mechanical[0]
+
+
+def test_central_differences_stay_bounded_at_large_strain_and_spin():
+    """15 % strain at .7 of the linear critical step; at .9 slivers invert without a policy."""
+    body = _free(cut_square(4))
+    state = _moving(body, 0.15, 1.0)
+    account = run(CentralDifferences(body, 0.7 * _critical(body)), body, state, 10_000)
+    share = account.mechanical / account.mechanical[0]
+    assert share.min() > 0.9
+    assert share.max() < 1.02
+    assert len(body.force.inverted(state.displacement)) == 0
+    turning = account.angular_momentum
+    assert np.abs(turning - turning[0]).max() < 1e-9 * np.abs(turning).max()
+
+
+def test_trapezoidal_with_converged_newton_keeps_small_strain_energy_over_ten_thousand_steps():
+    body = _free(cut_square(2))
+    state = _moving(body, 1e-3)
+    account = run(Trapezoidal(body, 2.0 * _critical(body)), body, state, 10_000)
+    elastic = account.mechanical[0] - account.kinetic[0]
+    assert np.abs(account.mechanical - account.mechanical[0]).max() <= 1e-3 * elastic
+
+
+@pytest.mark.parametrize("share", [0.9, 4.0])
+def test_the_energy_momentum_scheme_conserves_at_large_amplitude_over_many_steps(share):
+    body = _free(cut_square(2))
+    state = _moving(body, 0.4, 3.0)
+    account = run(EnergyMomentum(body, share * _critical(body)), body, state, 2000)
+    assert account.drift <= 1e-8
+    turning = account.angular_momentum
+    assert np.abs(turning - turning[0]).max() <= 1e-8 * np.abs(turning).max()
+    assert np.ptp(account.strain) > 0.1 * account.mechanical[0]
+
+
+@pytest.mark.parametrize(("dim", "share"), [(2, 0.9), (2, 4.0), (3, 0.9)])
+def test_the_energy_momentum_scheme_conserves_over_ten_thousand_steps(dim, share):
+    body = _free(cut_square(4) if dim == 2 else cut_cube(1, (0.5, 0.53, 0.47)))
+    state = _moving(body, 0.3, 2.0)
+    account = run(EnergyMomentum(body, share * _critical(body)), body, state, 10_000)
+    assert account.drift <= 1e-8
+    turning = account.angular_momentum
+    assert np.abs(turning - turning[0]).max() <= 1e-8 * np.abs(turning).max()
+
+
+def test_energy_is_kept_while_pieces_turn_inside_out():
+    body = _free(cut_cube(2, (0.5, 0.53, 0.47)))
+    state = _moving(body, 0.3, 3.0)
+    scheme = EnergyMomentum(body, 0.9 * _critical(body))
+    inverted, first = 0, None
+    for _ in range(8):
+        account = run(scheme, body, state, 25)
+        first = account.mechanical[0] if first is None else first
+        inverted = max(inverted, len(body.force.inverted(state.displacement)))
+        assert account.mechanical[-1] == pytest.approx(first, rel=1e-9)
+    assert inverted > 0
+
+
+def test_implicit_euler_halves_the_energy_of_a_mode_in_ln_2_over_omega_squared_h():
+    body = _free(cut_square(4), "linear")
+    K = body.pattern.matrix(LinearStiffness(body.force.virtual, material(2)).assemble(body.pattern))
+    root = np.repeat(np.sqrt(body.mass.diagonal), 2)
+    values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
+    mode = int(np.argmax(values > 1e-6 * values[-1]))  # the slowest that is not rigid
+    omega = np.sqrt(values[mode])
+    for scheme in (ImplicitEuler, RealTimeEuler):
+        h = 0.02 / omega
+        state = body.rest()
+        state.displacement[:] = 1e-3 * (vectors[:, mode] / root).reshape(body.shape)
+        steps = round(np.log(2.0) / (omega**2 * h) / h)
+        account = run(scheme(body, h), body, state, steps)
+        # each step divides by 1 + (ωh)²: exact; the formula differs by (ωh)²/2
+        exact = (1.0 + (omega * h) ** 2) ** -steps
+        assert account.mechanical[-1] / account.mechanical[0] == pytest.approx(exact, rel=1e-8)
+        assert account.mechanical[-1] / account.mechanical[0] == pytest.approx(0.5, rel=1e-3)
+        lost = account.mechanical[0] - account.mechanical[-1]
+        assert account.algorithmic[-1] == pytest.approx(lost, rel=1e-9)
+
+
+def test_forward_euler_gains_energy_at_any_step():
+    for share in (0.5, 0.1, 0.02):
+        body = _free(cut_square(4), "linear")
+        state = _moving(body, 1e-3)
+        try:
+            account = run(ForwardEuler(body, share * _critical(body)), body, state, 300)
+        except StepFailedError:
+            continue
+        assert account.mechanical[-1] > account.mechanical[0]
+        assert account.algorithmic[-1] < 0.0
+
+
+@pytest.mark.parametrize("scheme", [s for s in SCHEMES if s is not RealTimeEuler])
+def test_a_damped_mode_decays_as_rayleigh_says(scheme):
+    body = _free(cut_square(4), "linear")
+    K = body.pattern.matrix(LinearStiffness(body.force.virtual, material(2)).assemble(body.pattern))
+    root = np.repeat(np.sqrt(body.mass.diagonal), 2)
+    values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
+    mode = int(np.argmax(values > 1e-6 * values[-1]))
+    omega = np.sqrt(values[mode])
+    body = DynamicBody(
+        body.force, body.mass, damping=RayleighDamping(0.1 * omega, 0.1 / omega)
+    )
+    shape = (vectors[:, mode] / root).reshape(body.shape)
+    state = body.rest()
+    state.displacement[:] = 1e-3 * shape
+    h = 2e-3 / omega
+    integrator = scheme(body, h)
+    for _ in range(500):
+        integrator.step(state)
+    ratio, t = 0.1, 500 * h  # ζ = α/2ω + βω/2
+    damped = omega * np.sqrt(1.0 - ratio**2)
+    exact = np.exp(-ratio * omega * t) * (
+        np.cos(damped * t) + ratio * omega / damped * np.sin(damped * t)
+    )
+    amplitude = np.sum(body.mass.apply(shape) * state.displacement) / 1e-3
+    # first-order schemes: ωh t ω/2 = 1e-3
+    assert amplitude == pytest.approx(exact, abs=2e-3)
+
+
+def test_masses_that_are_not_diagonal_move_with_every_scheme():
+    v = cut_body(2)
+    held = Supports.none(v).prescribe(v, v.mesh.points[:, 1] == 0.0)
+    mass = shifted_mass(v, DENSITY, "enrichment")
+    for scheme in SCHEMES:
+        body = DynamicBody(
+            InternalForce(v, material(2)),
+            mass,
+            weight=mass.weight([0.0, -GRAVITY]),
+            supports=held,
+        )
+        account = run(scheme(body, 0.003), body, body.rest(), 30)
+        assert np.ptp(account.balance) <= 1e-9 * np.ptp(account.gravity)
