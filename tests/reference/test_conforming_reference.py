@@ -1,0 +1,122 @@
+"""The FEniCSx side against exact solutions and against what a cut must do to a mesh."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from reference.exact import exact_solution
+from verify.errors import InputError
+from verify.scene import Scene, load_scene
+
+# looked up and not imported: the DOLFINx wheel loads only behind `dolfinx_solver`
+_MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.skipif(bool(_MISSING), reason=f"needs {' and '.join(_MISSING)}"),
+]
+
+
+def polyline(name, *points):
+    return {"kind": "polyline", "name": name, "points": [list(p) for p in points]}
+
+
+def clamped_square(cuts):
+    """Give a unit square, clamped all around, under its weight."""
+    return Scene.model_validate(
+        {
+            "title": "square",
+            "requirement": "none",
+            "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
+            "mesh": {"cells": [[8, 8]]},
+            "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
+            "supports": [{"where": "boundary", "displacement": [0, 0]}],
+            "loads": [{"kind": "gravity", "acceleration": [0, -1]}],
+            "cuts": cuts,
+        }
+    )
+
+
+def energies(case, solver):
+    from verify.solvers import find_solver
+
+    scene, found = load_scene(case), find_solver(solver)
+    exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    values = [
+        float(found.solve(scene, level).ledger["strain"][0]) for level in range(found.levels(scene))
+    ]
+    return np.array(values) / exact.strain_energy(scene) - 1
+
+
+# A cut of F facets that is a tree has F + 1 nodes. A tip keeps one, a point inside an arm or a
+# mouth gets two, a junction of k arms k: the extra nodes are F + 1 − (tips) + (k − 2 more per
+# junction), so F − 1 for a tree whose ends are all tips, one more per mouth.
+SHAPES = {
+    "inner": ([polyline("a", (0.2, 0.43), (0.7, 0.61))], -1),
+    "kinked": ([polyline("a", (0.2, 0.3), (0.5, 0.6), (0.8, 0.3))], -1),
+    "arc": ([{"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2, "sweep": 180}], -1),
+    "edge": ([polyline("a", (-0.1, 0.43), (0.5, 0.5))], 0),
+    "through": ([polyline("a", (-0.1, 0.43), (1.1, 0.6))], 1),
+    "T": ([polyline("a", (0.2, 0.5), (0.8, 0.5)), polyline("b", (0.5, 0.5), (0.5, 0.8))], -1),
+    "X": ([polyline("a", (0.2, 0.45), (0.8, 0.5)), polyline("b", (0.5, 0.2), (0.45, 0.8))], -1),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("graded", [False, True])
+def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape, graded):
+    from reference.meshing import Grading, conforming_mesh, singular_points
+
+    cuts, extra = SHAPES[shape]
+    scene = clamped_square(cuts)
+    points = singular_points(scene) if graded else np.zeros((0, 2))
+    mesh = conforming_mesh(scene, Grading(0.09, points, 0.5))
+    doubled = len(mesh.parent) - len(np.unique(mesh.parent))
+    assert doubled == len(mesh.cut_facets) + extra
+    assert mesh.pieces.max() + 1 == (2 if shape == "through" else 1)
+    a, b, c = (mesh.points[mesh.cells[:, k]] for k in range(3))
+    area = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    assert area.min() > 0
+    assert area.sum() == pytest.approx(1.0, rel=1e-13)
+
+
+def test_the_same_scene_gives_the_same_mesh_twice():
+    from reference.meshing import Grading, conforming_mesh, singular_points
+
+    scene = clamped_square(SHAPES["X"][0])
+    one, two = (conforming_mesh(scene, Grading(0.1, singular_points(scene), 0.5)) for _ in "ab")
+    assert np.array_equal(one.points, two.points)
+    assert np.array_equal(one.cells, two.cells)
+
+
+@pytest.mark.parametrize("solver", ["conforming", "reference"])
+def test_a_field_linear_on_each_side_is_reproduced(solver):
+    # in the space on every level; only the round-off of a direct solve is left
+    assert np.abs(energies("statics/f1_patch", solver)).max() < 1e-11
+
+
+def test_linear_elements_reach_their_order_in_energy_on_a_smooth_field():
+    errors = energies("statics/f3_inclined", "conforming")
+    order = np.log2(errors[:-1] / errors[1:])
+    assert (errors > 0).all()  # boundary values are interpolated, yet the energy is above
+    assert order[-1] == pytest.approx(2.0, abs=0.05)
+
+
+def test_graded_quadratic_elements_beat_the_demand_at_the_griffith_crack():
+    errors = energies("statics/griffith_edges", "reference")
+    assert abs(errors[-1]) < 1e-5
+    # energy norm of order 2 is energy of order 4; the first two levels show it within one half
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.5)
+
+
+def test_ungraded_linear_elements_show_the_half_order_of_the_tip():
+    errors = energies("statics/griffith_edges", "conforming")
+    assert np.log2(errors[-2] / errors[-1]) == pytest.approx(1.0, abs=0.1)  # 2 · ½
+
+
+def test_a_piece_that_nothing_holds_is_named_and_not_solved():
+    from verify.solvers import find_solver
+
+    disc = {"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2}
+    with pytest.raises(InputError, match="no support holds"):
+        find_solver("reference").solve(clamped_square([disc]), 0)
