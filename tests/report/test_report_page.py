@@ -135,7 +135,7 @@ def test_pictures_are_left_out_with_a_note_before_a_page_gets_too_large(
 ):
     root = shutil.copytree(pictured_run, tmp_path / "run")
     limit = (root / "report.html").stat().st_size - 1000
-    monkeypatch.setattr("verify.report.render._PAGE_BYTES", limit)
+    monkeypatch.setattr("verify.report.rendering._PAGE_BYTES", limit)
     page = parsed(page_of(render(root).parent))
     assert (root / "report.html").stat().st_size < limit
     assert len(page.all("img")) == 6
