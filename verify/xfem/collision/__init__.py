@@ -1,0 +1,1 @@
+"""Bounding-volume trees of surfaces, and queries of tools against them."""

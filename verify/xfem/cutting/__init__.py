@@ -1,0 +1,1 @@
+"""Semi-progressive cutting: elements are split as a tool crosses them through."""

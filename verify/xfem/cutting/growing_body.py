@@ -1,0 +1,341 @@
+"""A body that is cut again and again: every cut costs what it touches.
+
+The same pieces and the same joins as `verify.xfem.virtual.cut_mesh` gives for all cuts at once,
+kept up to date cell by cell. Numbers of pieces and unknown nodes never change: cells and nodes
+keep theirs, new ones follow.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.cuts import Cut
+from verify.xfem.cutting.growing_array import GrowingArray
+from verify.xfem.cutting.patch import MeshPatch, PatchCutter
+from verify.xfem.cutting.point_numbers import PointNumbers
+from verify.xfem.cutting.renumber_kernels import (
+    labelled,
+    match_pieces,
+    number_unknowns,
+    retire,
+    write_pieces,
+)
+from verify.xfem.errors import XfemError
+from verify.xfem.joining import PatchSlots, join_slots
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.split import Partition, split_cells
+
+__all__ = ["CutsNear", "GrowingBody", "Increment"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+# the cuts near a patch: the number of each, and the cut as that patch sees it
+CutsNear = Callable[[MeshPatch], tuple[_Ints, Sequence[Cut]]]
+
+
+@dataclass(frozen=True)
+class Increment:
+    """What one cut did to a body.
+
+    Attributes
+    ----------
+    cells : int array
+        Cells that were split, or whose pieces were.
+    touched : int array
+        Cells around the nodes of these: no other cell has new unknowns.
+    nodes_before : int
+        Number of unknown nodes before.
+    source : (new,) int array
+        Unknown node from which each new one inherits displacement and velocity.
+    """
+
+    cells: _Ints
+    touched: _Ints
+    nodes_before: int
+    source: _Ints
+
+    def inherit(self, values: _Floats) -> _Floats:
+        """Nodal values (N_before, ...) after the cut: new nodes move as their source does.
+
+        The displacement field does not change, and the lumped masses of the parts of a piece sum
+        to its own: energy and momentum are continuous.
+
+        Raises
+        ------
+        XfemError
+            If the number of values is not that of the unknown nodes before the cut.
+        """
+        if len(values) != self.nodes_before:
+            raise XfemError(f"{len(values)} nodal values; expected {self.nodes_before}")
+        return np.concatenate([values, values[self.source]])
+
+
+class GrowingBody:
+    """Pieces and unknowns of a mesh under repeated cuts.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+
+    Attributes
+    ----------
+    piece_cells : GrowingArray
+        (p, d + 1) unknown nodes of each piece.
+    piece_parent, piece_fraction, piece_label : GrowingArray
+        (p,), (p,), (p, cuts): as in `VirtualMesh`, in the order in which pieces came.
+    first_piece, next_piece
+        Pieces of a cell: the first, and after each the next or -1.
+    node_parent : GrowingArray
+        (N,) mesh node of each unknown node.
+    points : PointNumbers
+        Points where cuts meet the mesh.
+    sub_piece, sub_points, sub_barycentric, sub_fraction : GrowingArray
+        Sub-simplices as in `SubCells`; piece -1 if no longer in use.
+    sub_range : (m, 2) int array
+        First sub-simplex of each cell, and one past the last.
+    split_cells : (m,) bool array
+        Whether a cell is split.
+    """
+
+    def __init__(self, mesh: SimplexMesh) -> None:
+        cells, corners = mesh.cells.shape
+        self.mesh = mesh
+        self.patches = PatchCutter(mesh)
+        self.piece_cells = GrowingArray(mesh.cells)
+        self.piece_parent = GrowingArray(np.arange(cells))
+        self.piece_fraction = GrowingArray(np.ones(cells))
+        self.piece_label = GrowingArray(np.zeros((cells, 0), dtype=np.int8))
+        self.first_piece = np.arange(cells)
+        self.next_piece = GrowingArray(np.full(cells, -1))
+        self.node_parent = GrowingArray(np.arange(len(mesh.points)))
+        self.points = PointNumbers(len(mesh.points), mesh.space)
+        self.sub_piece = GrowingArray(np.empty(0, dtype=np.int64))
+        self.sub_points = GrowingArray(np.empty((0, corners), dtype=np.int64))
+        self.sub_barycentric = GrowingArray(np.empty((0, corners, corners)))
+        self.sub_fraction = GrowingArray(np.empty(0))
+        self.sub_range = np.zeros((cells, 2), dtype=np.int64)
+        self.cut_count = 0
+        self.split_cells = np.zeros(cells, dtype=bool)
+        self._dropped = np.zeros(cells, dtype=np.int64)
+
+    @property
+    def node_count(self) -> int:
+        """Number of unknown nodes."""
+        return len(self.node_parent)
+
+    @property
+    def dropped(self) -> int:
+        """Pieces left out because their volume is exactly zero."""
+        return int(self._dropped.sum())
+
+    def split_by(self, cells: _Ints, cut: int) -> NDArray[np.bool_]:
+        """Whether a cut has split cells, or pieces of them."""
+        return labelled(cells, cut, self.piece_label.rows, self.first_piece, self.next_piece.rows)
+
+    def add_cut(self) -> int:
+        """Make room for one more cut; its number."""
+        label = np.zeros((len(self.piece_label), self.cut_count + 1), dtype=np.int8)
+        label[:, :-1] = self.piece_label.rows
+        self.piece_label = GrowingArray(label)
+        self.cut_count += 1
+        return self.cut_count - 1
+
+    def split(self, candidates: _Ints, cuts_near: CutsNear) -> Increment | None:
+        """Bring some cells up to date with the cuts; None if nothing changes.
+
+        Parameters
+        ----------
+        candidates : int array
+            Cells that may have to be split.
+        cuts_near : callable
+            Gives the cuts near a patch as (number of each, cut as that patch sees it); it must
+            contain every cut that splits a cell of the patch.
+
+        Raises
+        ------
+        XfemError
+            If a cut would join what is already separate.
+        """
+        wanted = np.unique(candidates)
+        while len(wanted):
+            patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
+            numbers, cuts = cuts_near(patch)
+            partition = split_cells(patch, cuts)
+            state = self._compare(patch, partition, numbers)
+            more = np.setdiff1d(state.changed_cells, wanted, assume_unique=True)
+            if len(more) == 0:
+                return self._update(patch, partition, numbers, state)
+            # a cell at the edge of the patch changes too: its own surroundings are needed
+            wanted = np.union1d(wanted, more)
+        return None
+
+    def _compare(self, patch: MeshPatch, partition: Partition, numbers: _Ints) -> "_Comparison":
+        """Match the pieces of a patch with the stored ones."""
+        fraction = partition.fraction
+        solid = fraction > 0.0
+        label = np.zeros((len(solid), self.cut_count), dtype=np.int8)
+        label[:, numbers] = partition.label
+        cell = patch.whole_cells[partition.parent]
+        old = np.empty(len(solid), dtype=np.int64)
+        changed = np.zeros(len(solid), dtype=bool)
+        orphan = match_pieces(
+            cell,
+            label,
+            solid,
+            self.piece_label.rows,
+            self.first_piece,
+            self.next_piece.rows,
+            old,
+            changed,
+        )
+        if orphan >= 0:
+            raise XfemError(f"a cut would join parts of cell {cell[orphan]} that are separate")
+        return _Comparison(cell, label, fraction, solid, old, changed)
+
+    def _update(
+        self, patch: MeshPatch, partition: Partition, numbers: _Ints, state: "_Comparison"
+    ) -> Increment | None:
+        cells = state.changed_cells
+        if len(cells) == 0:
+            return None
+        slots = join_slots(patch, partition)
+        before = self.node_count
+        place = self._renumber(patch, partition, slots, state)
+        self._store_simplices(patch, partition, numbers, cells, place)
+        self.split_cells[cells] = True
+        self._dropped[cells] = 0
+        empty = state.cell[~state.solid]
+        np.add.at(self._dropped, empty[np.isin(empty, cells)], 1)
+        touched = self.patches.cells_around(self.patches.nodes_of(cells))
+        return Increment(cells, touched, before, self._source)
+
+    def _renumber(
+        self, patch: MeshPatch, partition: Partition, slots: PatchSlots, state: "_Comparison"
+    ) -> _Ints:
+        """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
+        pieces, total = len(state.old), len(slots.piece_cell)
+        local_cell = slots.cells[slots.piece_cell]
+        cell = patch.whole_cells[local_cell]
+        nodes = self.mesh.cells[cell]
+        inner = np.zeros(len(patch.whole_nodes), dtype=bool)
+        places = np.searchsorted(patch.whole_cells, state.changed_cells)
+        inner[patch.cells[places]] = True
+        touched = inner[patch.cells[local_cell]]
+
+        solid, old = np.ones(total, dtype=bool), self.first_piece[cell]
+        solid[:pieces], old[:pieces] = state.solid, state.old
+        home = np.ones(nodes.shape, dtype=bool)
+        sign = np.where(partition.points.values[patch.cells[partition.parent]] >= 0.0, 1, -1)
+        label = partition.label[:, None, :]
+        home[:pieces] = ((label == 0) | (label == sign)).all(axis=2)
+
+        number = np.empty(int(slots.group.max(initial=-1)) + 1, dtype=np.int64)
+        source = np.empty(len(number), dtype=np.int64)
+        before = self.node_count
+        after = number_unknowns(
+            slots.group,
+            solid,
+            home,
+            touched,
+            old,
+            self.piece_cells.rows,
+            len(self.mesh.points),
+            before,
+            number,
+            source,
+        )
+        if after < 0:
+            raise XfemError(f"a cut would join parts of cell {cell[-1 - after]} that are separate")
+        self._source = source[: after - before]
+        self.node_parent.append(self.node_parent.rows[self._source])
+        return self._write(cell, slots.group, touched, number, solid, old, state)
+
+    def _write(
+        self,
+        cell: _Ints,
+        group: _Ints,
+        touched: NDArray[np.bool_],
+        number: _Ints,
+        solid: NDArray[np.bool_],
+        old: _Ints,
+        state: "_Comparison",
+    ) -> _Ints:
+        place = np.empty(len(old), dtype=np.int64)
+        changed = np.zeros(len(old), dtype=bool)
+        changed[: len(state.changed)] = state.changed
+        stores = (
+            self.next_piece,
+            self.piece_cells,
+            self.piece_parent,
+            self.piece_fraction,
+            self.piece_label,
+        )
+        count = len(self.piece_cells)
+        for store in stores:
+            store.extend(len(state.old))
+        after = write_pieces(
+            cell,
+            group,
+            touched,
+            number,
+            solid,
+            changed,
+            old,
+            state.fraction,
+            state.label,
+            self.next_piece.rows,
+            self.piece_cells.rows,
+            self.piece_parent.rows,
+            self.piece_fraction.rows,
+            self.piece_label.rows,
+            count,
+            place,
+        )
+        for store in stores:
+            store.rows = store.rows[:after]
+        return place
+
+    def _store_simplices(
+        self,
+        patch: MeshPatch,
+        partition: Partition,
+        numbers: _Ints,
+        cells: _Ints,
+        place: _Ints,
+    ) -> None:
+        """Replace the sub-simplices of the changed cells."""
+        ids = self.points.number(partition.points, patch.whole_nodes, numbers)
+        cell = patch.whole_cells[partition.parent[partition.sub_piece]]
+        rows = np.flatnonzero((partition.sub_fraction > 0.0) & np.isin(cell, cells))
+        rows = rows[np.argsort(cell[rows], kind="stable")]
+        retire(self.sub_piece.rows, self.sub_range, cells)
+        begin = len(self.sub_piece)
+        self.sub_piece.append(place[partition.sub_piece[rows]])
+        self.sub_points.append(ids[partition.sub_points[rows]])
+        self.sub_barycentric.append(partition.sub_barycentric[rows])
+        self.sub_fraction.append(partition.sub_fraction[rows])
+        edges = (
+            np.searchsorted(cell[rows], cells, side="left"),
+            np.searchsorted(cell[rows], cells, side="right"),
+        )
+        self.sub_range[cells] = begin + np.stack(edges, axis=1)
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """Pieces of a patch against the stored ones: cell, labels, share, and the old piece."""
+
+    cell: _Ints
+    label: NDArray[np.int8]
+    fraction: _Floats
+    solid: NDArray[np.bool_]
+    old: _Ints
+    changed: NDArray[np.bool_]
+
+    @property
+    def changed_cells(self) -> _Ints:
+        """Cells of the pieces whose labels are new, ascending."""
+        return np.unique(self.cell[self.changed & self.solid])

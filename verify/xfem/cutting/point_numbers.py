@@ -1,0 +1,142 @@
+"""One number for each point where cuts meet the mesh, however often and in whatever order.
+
+A zero point belongs to the simplex spanned by some mesh nodes (its support) and to the zero sets
+of some cuts. If the support has one node more than there are cuts, these sets say which point it
+is; otherwise the edge on which it was found does.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.xfem.cutting.growing_array import GrowingArray
+from verify.xfem.cutting.row_numbers import RowNumbers, number_of_row
+from verify.xfem.zero_points import ZeroPoints
+
+__all__ = ["PointNumbers"]
+
+_Ints = NDArray[np.int64]
+
+_NODES, _CUTS = 4, 3  # a point of a tetrahedron has at most that many
+_WIDTH = _NODES + _CUTS
+
+
+class PointNumbers:
+    """Numbers of zero points: mesh nodes keep theirs, zero points follow.
+
+    Attributes
+    ----------
+    nodes : int
+        Number of mesh nodes.
+    positions : GrowingArray
+        (k, s) of the zero points, in metres.
+    ends : GrowingArray
+        (k, 2) numbers of the ends (plus, minus) of an edge on which each lies.
+    cut : GrowingArray
+        (k,) cut whose zero it is on that edge.
+    """
+
+    def __init__(self, nodes: int, space: int) -> None:
+        self.nodes = nodes
+        self.positions = GrowingArray(np.empty((0, space)))
+        self.ends = GrowingArray(np.empty((0, 2), dtype=np.int64))
+        self.cut = GrowingArray(np.empty(0, dtype=np.int64))
+        self._table = RowNumbers(_WIDTH)
+        self._supports = GrowingArray(np.empty((0, _WIDTH), dtype=np.int64))
+
+    @property
+    def supports(self) -> _Ints:
+        """(k, 7) mesh nodes (4) and cuts (3) of each zero point, ascending, padded at the end."""
+        return self._supports.rows
+
+    def number(self, points: ZeroPoints, whole_nodes: _Ints, cuts: _Ints) -> _Ints:
+        """Numbers of all points of a patch: its nodes, then its zero points.
+
+        Parameters
+        ----------
+        points : ZeroPoints
+            Of the patch.
+        whole_nodes : int array
+            Number in the whole mesh of each node of the patch.
+        cuts : int array
+            Number in the whole list of each cut of the patch.
+        """
+        local, more = len(whole_nodes), len(points.ends)
+        numbers = np.empty(local + more, dtype=np.int64)
+        numbers[:local] = whole_nodes
+        if more == 0:
+            return numbers
+        table, known, count = self._table.open_for(more)
+        self._supports.extend(more)
+        after = _number_points(
+            points.ends,
+            cuts[points.cut],
+            local,
+            self.nodes,
+            numbers,
+            self._supports.rows,
+            table,
+            known,
+            count,
+        )
+        self._table.close(after)
+        self._supports.rows = self._supports.rows[:after]
+        fresh = numbers[local:] - self.nodes - count
+        new = np.empty(after - count, dtype=np.int64)
+        rows = np.flatnonzero(fresh >= 0)
+        # of equal points the first is taken
+        new[fresh[rows][::-1]] = rows[::-1]
+        self.positions.append(points.positions[local + new])
+        self.ends.append(numbers[points.ends[new]])
+        self.cut.append(cuts[points.cut[new]])
+        return numbers
+
+
+@njit(cache=True)
+def _merge(row, begin, end, value):
+    """Insert a value into an ascending list padded with the largest integer."""
+    for k in range(begin, end):
+        if row[k] == value:
+            return
+        if row[k] > value:
+            value, row[k] = row[k], value
+
+
+@njit(cache=True)
+def _number_points(ends, cut, local, nodes, numbers, supports, table, known, count):
+    none = np.iinfo(np.int64).max
+    row = np.empty(_WIDTH, dtype=np.int64)
+    edge = np.full(_WIDTH, -1, dtype=np.int64)
+    for z in range(len(ends)):
+        row[:] = none
+        for e in range(2):
+            number = numbers[ends[z, e]]
+            if number < nodes:
+                _merge(row, 0, _NODES, number)
+                continue
+            for k in range(_NODES):
+                if supports[number - nodes, k] < none:
+                    _merge(row, 0, _NODES, supports[number - nodes, k])
+        _merge(row, _NODES, _WIDTH, cut[z])
+        first, second = numbers[ends[z, 0]] - nodes, numbers[ends[z, 1]] - nodes
+        if first >= 0 and second >= 0:
+            for i in range(_NODES, _WIDTH):
+                for j in range(_NODES, _WIDTH):
+                    common = supports[first, i]
+                    if common < none and common == supports[second, j]:
+                        _merge(row, _NODES, _WIDTH, common)
+        support, on = 0, 0
+        for k in range(_NODES):
+            support += row[k] < none
+        for k in range(_NODES, _WIDTH):
+            on += row[k] < none
+        before = count
+        if support == on + 1:
+            number, count = number_of_row(row, table, known, count)
+        else:
+            edge[0], edge[1], edge[2] = cut[z], first + nodes, second + nodes
+            number, count = number_of_row(edge, table, known, count)
+        if count > before:
+            supports[number] = row
+        numbers[local + z] = nodes + number
+    return count

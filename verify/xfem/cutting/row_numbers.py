@@ -1,0 +1,106 @@
+"""Numbers for rows of integers: equal rows, equal numbers, in the order of their first coming."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.xfem.cutting.growing_array import GrowingArray
+
+__all__ = ["RowNumbers", "find_row", "number_of_row"]
+
+_Ints = NDArray[np.int64]
+
+
+class RowNumbers:
+    """A hash table with open addressing.
+
+    Parameters
+    ----------
+    width : int
+        Length of the rows.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._known = GrowingArray(np.empty((0, width), dtype=np.int64))
+        self._table = np.full(64, -1, dtype=np.int64)
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    @property
+    def rows(self) -> _Ints:
+        """All rows so far (k, width)."""
+        return self._known.rows
+
+    def number(self, rows: _Ints) -> _Ints:
+        """Numbers (q,) of rows (q, width), new ones in the order given."""
+        table, room, count = self.open_for(len(rows))
+        numbers = np.empty(len(rows), dtype=np.int64)
+        self.close(_number_rows(rows, table, room, count, numbers))
+        return numbers
+
+    def open_for(self, more: int) -> tuple[_Ints, _Ints, int]:
+        """Table, room for rows and their count, for a kernel that adds at most `more` rows."""
+        count = len(self._known)
+        if 2 * (count + more) > len(self._table):
+            self._table = np.full(4 * (count + more), -1, dtype=np.int64)
+            _fill(self._table, self._known.rows)
+        self._known.extend(more)
+        return self._table, self._known.rows, count
+
+    def close(self, count: int) -> None:
+        """Tell how many rows there are after `open_for`."""
+        self._known.rows = self._known.rows[:count]
+
+
+@njit(cache=True)
+def _place(row, table, known):
+    """Where in the table the row is, or belongs."""
+    code = np.uint64(14695981039346656037)  # Fowler, Noll and Vo's numbers
+    for value in row:
+        code = (code ^ np.uint64(value)) * np.uint64(1099511628211)
+        code = code ^ (code >> np.uint64(29))
+    size = len(table)
+    start = np.int64(code % np.uint64(size))
+    for step in range(size):
+        at = (start + step) % size
+        if table[at] < 0:
+            return at
+        same = True
+        for k in range(len(row)):
+            if known[table[at], k] != row[k]:
+                same = False
+                break
+        if same:
+            return at
+    return -1  # never: the table is at most half full
+
+
+@njit(cache=True)
+def find_row(row, table, known):
+    """Give the number of a row, -1 if it has none."""
+    return table[_place(row, table, known)]
+
+
+@njit(cache=True)
+def number_of_row(row, table, known, count):
+    """Give (number of the row, count of rows): a new row gets the next number."""
+    at = _place(row, table, known)
+    if table[at] < 0:
+        table[at] = count
+        known[count] = row
+        return count, count + 1
+    return table[at], count
+
+
+@njit(cache=True)
+def _number_rows(rows, table, known, count, numbers):
+    for q in range(len(rows)):
+        numbers[q], count = number_of_row(rows[q], table, known, count)
+    return count
+
+
+@njit(cache=True)
+def _fill(table, known):
+    for number in range(len(known)):
+        table[_place(known[number], table, known)] = number

@@ -1,0 +1,189 @@
+"""Semi-progressive cutting: an element is split when the tool has crossed it through.
+
+The algorithm of the thesis (section 3.2.3) with its listing corrected: the element tested is the
+neighbour, not the one the tool was in; it is split when *all* edges that the cut crosses have been
+passed (three or four in a tetrahedron, two in a triangle), each counted once; and the first
+element of a stroke is found through the bounding boxes of the surface, all others by walking.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.collision.bounding_tree import BoundingTree
+from verify.xfem.cuts import Cut
+from verify.xfem.cutting.growing_body import GrowingBody, Increment
+from verify.xfem.cutting.patch import MeshPatch
+from verify.xfem.cutting.stroke import Stroke
+from verify.xfem.cutting.whole_mesh import whole_mesh
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.tool_path import ToolPath
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Crossings", "SemiProgressiveCutter"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Elements that strokes have split, in the order in which they were (Table 4.6).
+
+    Attributes
+    ----------
+    cell, stroke : (k,) int array
+        Element, and stroke that split it.
+    entry : (k,) float array
+        When the blade first passed one of the edges that the cut crosses, in seconds.
+    leave : (k,) float array
+        When it had passed all of them, in seconds.
+    seen : (k,) float array
+        Time of the `advance` that split the element: `leave`, rounded up to a frame.
+    """
+
+    cell: _Ints
+    stroke: _Ints
+    entry: _Floats
+    leave: _Floats
+    seen: _Floats
+
+    @property
+    def delay(self) -> _Floats:
+        """Time (k,) from the first to the last edge: element size over tool speed, in seconds."""
+        return self.leave - self.entry
+
+
+class SemiProgressiveCutter:
+    """A body under a tool.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+        In the material frame, in which the paths are given as well.
+
+    Attributes
+    ----------
+    body : GrowingBody
+        The pieces and unknowns as they are now.
+    strokes : list of Stroke
+    """
+
+    def __init__(self, mesh: SimplexMesh) -> None:
+        self.mesh = mesh
+        self.body = GrowingBody(mesh)
+        self.strokes: list[Stroke] = []
+        self._size = np.linalg.norm(mesh.edge_vectors, axis=2).max(axis=1)
+        cell, corner = mesh.boundary_facets.T
+        others = np.array([np.delete(np.arange(mesh.dim + 1), k) for k in range(mesh.dim + 1)])
+        self._skin_cell = cell
+        self._skin = BoundingTree(mesh.points, mesh.cells[cell[:, None], others[corner]])
+        self._interior = BoundingTree(mesh.points, mesh.cells)
+        self._strokes_near = np.zeros(len(mesh.cells), dtype=np.int64)
+        self._records: list[tuple[_Ints, int, _Floats, _Floats, float]] = []
+
+    def begin(self, path: ToolPath) -> Stroke:
+        """Begin a stroke along a path, known whole or to be extended as the tool moves.
+
+        Raises
+        ------
+        XfemError
+            If the path is not in the space of the mesh.
+        """
+        if path.blades.shape[2] != self.mesh.space:
+            raise XfemError(
+                f"tool path in {path.blades.shape[2]}D; the mesh has points in {self.mesh.space}D"
+            )
+        stroke = Stroke(self.mesh, path, self.body.add_cut(), self._strokes_near)
+        self.strokes.append(stroke)
+        return stroke
+
+    def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
+        """Add positions to the path of the last stroke.
+
+        Raises
+        ------
+        XfemError
+            If no stroke has begun, or the longer path is not valid (see `ToolPath`).
+        """
+        if not self.strokes:
+            raise XfemError("no stroke to extend; begin one first")
+        self.strokes[-1].extend(blades, times)
+
+    def advance(self, time: float) -> Increment | None:
+        """Move all tools to where they are at that time, and split what they have crossed.
+
+        Parameters
+        ----------
+        time : float
+            In seconds; time does not run backwards, a smaller one than before changes nothing.
+
+        Returns
+        -------
+        Increment or None
+            None if no element was split.
+        """
+        found = [
+            stroke.advance(time, self._size, self._skin, self._skin_cell, self._interior)
+            for stroke in self.strokes
+        ]
+        candidates = np.concatenate([np.empty(0, dtype=np.int64), *found])
+        if len(candidates) == 0:
+            return None
+        increment = self.body.split(candidates, self._cuts_near)
+        if increment is not None:
+            self._record(increment, time)
+        return increment
+
+    @property
+    def cuts(self) -> list[Cut]:
+        """What has been cut so far; `cut_mesh` with these gives the same pieces and joins."""
+        return [stroke.cut for stroke in self.strokes]
+
+    def virtual_mesh(self) -> VirtualMesh:
+        """Copy the body as it is now; unknown nodes keep their numbers."""
+        nodes = np.arange(len(self.mesh.points))
+        columns = [stroke.level_sets(nodes) for stroke in self.strokes]
+        level_sets = np.stack(columns, axis=1) if columns else np.zeros((len(nodes), 0))
+        return whole_mesh(self.body, level_sets)
+
+    @property
+    def crossings(self) -> Crossings:
+        """When each element was entered and split."""
+        rows = self._records
+        return Crossings(
+            np.concatenate([np.empty(0, dtype=np.int64), *(r[0] for r in rows)]),
+            np.repeat([r[1] for r in rows], [len(r[0]) for r in rows]).astype(np.int64),
+            np.concatenate([np.empty(0), *(r[2] for r in rows)]),
+            np.concatenate([np.empty(0), *(r[3] for r in rows)]),
+            np.repeat([r[4] for r in rows], [len(r[0]) for r in rows]).astype(float),
+        )
+
+    def _cuts_near(self, patch: MeshPatch) -> tuple[_Ints, list[Cut]]:
+        near = [stroke for stroke in self.strokes if stroke.near[patch.whole_cells].any()]
+        numbers = np.array([stroke.number for stroke in near], dtype=np.int64)
+        return numbers, [stroke.seen_by(patch) for stroke in near]
+
+    def _record(self, increment: Increment, time: float) -> None:
+        cells = increment.cells
+        nodes = np.unique(self.mesh.cells[cells])
+        for stroke in self.strokes:
+            mine = cells[self.body.split_by(cells, stroke.number) & ~stroke.recorded[cells]]
+            if len(mine) == 0:
+                continue
+            stroke.recorded[mine] = True
+            stroke.fix(nodes)
+            # a stroke that splits only a piece has not passed all edges of the element
+            leave = np.minimum(stroke.leave[mine], stroke.front)
+            entry = np.minimum(stroke.entry[mine], leave)
+            self._records.append(
+                (
+                    mine,
+                    stroke.number,
+                    stroke.path.time_at(entry),
+                    stroke.path.time_at(leave),
+                    time,
+                )
+            )

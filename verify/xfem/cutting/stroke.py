@@ -1,0 +1,178 @@
+"""One stroke of a tool: its path, where it is in the mesh, and when it entered and left cells."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.collision.bounding_tree import BoundingTree
+from verify.xfem.cuts import Cut
+from verify.xfem.cutting.patch import MeshPatch
+from verify.xfem.cutting.walk_kernels import cells_hit, walk
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.tool_path import Sweep, ToolPath
+
+__all__ = ["SeenCut", "Stroke"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+_ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.split`
+
+
+class SeenCut:
+    """A sweep as the nodes of one mesh see it: their level sets are those once taken.
+
+    Parameters
+    ----------
+    nodes : (n, s) float array
+        Nodes of the mesh or patch.
+    values : (n,) float array
+        Their level sets, in metres.
+    sweep : Sweep
+    front : float
+        How far the blade has come, in metres.
+    """
+
+    def __init__(self, nodes: _Floats, values: _Floats, sweep: Sweep, front: float) -> None:
+        self._nodes, self._values = nodes, values
+        self._part = sweep.until(front)
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Values taken, at the nodes; the distance to the sweep elsewhere."""
+        if points is self._nodes:
+            return self._values
+        if points.shape == self._nodes.shape and np.array_equal(points, self._nodes):
+            return self._values
+        return self._part.level_set(points)
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Distance to the rim or to the blade, negative past it."""
+        return self._part.depth(points)
+
+
+class Stroke:
+    """A path on its way through a mesh.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    path : ToolPath
+    number : int
+        Of the cut.
+    strokes_near : (m,) int array
+        Shared by all strokes: how many of them came near a cell.
+
+    Attributes
+    ----------
+    front : float
+        How far the blade has come, in metres; negative before it starts.
+    entry, leave : (m,) float array
+        Travel of the blade when it entered a cell and when it had crossed it through, in metres;
+        infinite if it has not.
+    near : (m,) bool array
+        Cells near which the blade came.
+    recorded : (m,) bool array
+        Cells whose crossing has been recorded.
+    """
+
+    def __init__(self, mesh: SimplexMesh, path: ToolPath, number: int, strokes_near: _Ints) -> None:
+        self.path, self.number = path, number
+        self.front = -1.0
+        self.near = np.zeros(len(mesh.cells), dtype=bool)
+        self.entry = np.full(len(mesh.cells), np.inf)
+        self.leave = np.full(len(mesh.cells), np.inf)
+        self.recorded = np.zeros(len(mesh.cells), dtype=bool)
+        self._mesh, self._strokes_near = mesh, strokes_near
+        self._snap = _ROUND_OFF * mesh.extent
+        self._values = np.full(len(mesh.points), np.nan)
+        self._fixed = np.zeros(len(mesh.points), dtype=bool)
+        self._settled = np.zeros(len(mesh.cells), dtype=bool)
+        self._turns = np.zeros(len(mesh.cells), dtype=np.int64)
+        self._turn = 0
+        self._frontier = np.empty(0, dtype=np.int64)
+
+    def advance(
+        self,
+        time: float,
+        size: _Floats,
+        skin: BoundingTree,
+        skin_cell: _Ints,
+        interior: BoundingTree,
+    ) -> _Ints:
+        """Move the blade to where it is at that time; cells that may have to be split.
+
+        Parameters
+        ----------
+        time : float
+            In seconds.
+        size : (m,) float array
+            Longest edge from the first node of each cell, in metres.
+        skin : BoundingTree
+            Of the boundary facets: where the blade comes in.
+        skin_cell : int array
+            Cell of each of these.
+        interior : BoundingTree
+            Of the cells: where it starts.
+        """
+        front = self.path.travel_at(time)
+        if front <= self.front or self.path.length == 0.0:
+            return np.empty(0, dtype=np.int64)
+        sweep = self.path.surface.arrays
+        hit = skin_cell[cells_hit(sweep, self.front, front, skin.low, skin.high, skin.order)]
+        if self.front < 0.0:
+            hit = np.concatenate([hit, self._start(interior)])
+        self.front = front
+        self._turn += 1
+        candidates, self._frontier = walk(
+            np.concatenate([self._frontier, hit]),
+            front,
+            self._mesh.cells,
+            self._mesh.neighbours,
+            self._mesh.points,
+            size,
+            self._snap,
+            sweep,
+            self._values,
+            self._turn,
+            self._turns,
+            self._settled,
+            self.near,
+            self._strokes_near,
+            self.entry,
+            self.leave,
+        )
+        return candidates
+
+    def _start(self, interior: BoundingTree) -> _Ints:
+        """Cells in which the blade is when the stroke begins."""
+        blade = self.path.blades[0]
+        ends = np.stack([blade[:-1], blade[1:]], axis=1) if len(blade) > 1 else blade[None]
+        found = [interior.meeting_box(end.min(axis=0), end.max(axis=0)) for end in ends]
+        return np.concatenate(found)
+
+    def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
+        """Add positions to the path; level sets of nodes already used for a cut stay."""
+        self.path = self.path.extended(blades, times)
+        self._values[~self._fixed] = np.nan
+
+    def fix(self, nodes: _Ints) -> None:
+        """From now on the level sets of these nodes do not change."""
+        self._fixed[nodes] = True
+
+    def level_sets(self, nodes: _Ints) -> _Floats:
+        """Level sets of mesh nodes, computed where they have not been, in metres."""
+        unknown = nodes[np.isnan(self._values[nodes])]
+        if len(unknown):
+            values = self.path.sweep.level_set(self._mesh.points[unknown])
+            self._values[unknown] = np.where(np.abs(values) <= self._snap, 0.0, values)
+        return self._values[nodes]
+
+    def seen_by(self, patch: MeshPatch) -> Cut:
+        """Give the cut so far, as a patch sees it."""
+        values = self.level_sets(patch.whole_nodes)
+        return SeenCut(patch.points, values, self.path.sweep, self.front)
+
+    @property
+    def cut(self) -> Cut:
+        """The cut so far, for `cut_mesh` on the whole mesh."""
+        values = self.level_sets(np.arange(len(self._mesh.points)))
+        return SeenCut(self._mesh.points, values, self.path.sweep, self.front)

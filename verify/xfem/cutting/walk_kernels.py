@@ -1,0 +1,135 @@
+"""The walk of a sweep through the mesh: from the cells it was in to their neighbours.
+
+For a cell the kernel asks where the zero set of the level set crosses its edges, and of each such
+point whether it lies on the sweep and whether the blade has passed it. The tolerances are those of
+`verify.xfem.split`, so that a cell that the walk calls crossed through is one that is split.
+"""
+
+import numpy as np
+from numba import njit
+
+from verify.xfem.collision.tree_kernels import items_near_plane
+from verify.xfem.sweep_kernels import probe
+
+__all__ = ["AT_END", "REACH", "cells_hit", "walk"]
+
+AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
+REACH = 0.5  # element sizes: a zero point farther from the sweep than that is not on it
+
+
+@njit(cache=True)
+def cells_hit(sweep, after, front, low, high, order):
+    """Items of a tree near the facets swept between two travels; may hold doubles."""
+    found = [np.int64(0) for _ in range(0)]
+    corners = sweep.corners
+    for t in range(len(corners)):
+        if sweep.travel[t].max() < after or sweep.travel[t].min() > front:
+            continue
+        floor, ceiling = corners[t, 0].copy(), corners[t, 0].copy()
+        for k in range(1, corners.shape[1]):
+            for i in range(corners.shape[2]):
+                floor[i] = min(floor[i], corners[t, k, i])
+                ceiling[i] = max(ceiling[i], corners[t, k, i])
+        items = items_near_plane(low, high, order, floor, ceiling, sweep.normals[t], corners[t, 0])
+        found.extend(items)
+    return np.array(found, dtype=np.int64)
+
+
+@njit(cache=True)
+def _level(node, points, snap, sweep, phi):
+    if np.isnan(phi[node]):
+        value = probe(points[node], sweep)[0]
+        phi[node] = 0.0 if abs(value) <= snap else value
+    return phi[node]
+
+
+@njit(cache=True)
+def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave):
+    """(near the sweep, entered, crossed through, latest travel) of a cell.
+
+    Writes the travel at which the blade entered it, and crossed it through.
+    """
+    corners, space = cells.shape[1], points.shape[1]
+    place = np.empty(space)
+    near, entered, through, any_zero, latest = False, False, True, False, 0.0
+    for a in range(corners):
+        for b in range(a + 1, corners):
+            p, m = cells[cell, a], cells[cell, b]
+            above, below = _level(p, points, snap, sweep, phi), _level(m, points, snap, sweep, phi)
+            if (above >= 0.0) == (below >= 0.0):
+                continue
+            if above < 0.0:
+                p, m, above, below = m, p, below, above
+            any_zero = True
+            for i in range(space):
+                place[i] = (above * points[m, i] - below * points[p, i]) / (above - below)
+            level, beyond, travel = probe(place, sweep)
+            if abs(level) <= size[cell] and beyond <= size[cell]:
+                near = near or travel <= front + size[cell]
+                latest = max(latest, travel)
+            on = abs(level) <= REACH * size[cell] and beyond <= AT_END * size[cell]
+            if on and travel <= front + AT_END * size[cell]:
+                entered = True
+                entry[cell] = min(entry[cell], travel)
+            else:
+                through = False
+    if any_zero and through:
+        leave[cell] = latest
+    return near, entered, any_zero and through, latest
+
+
+@njit(cache=True)
+def walk(
+    seeds,
+    front,
+    cells,
+    neighbours,
+    points,
+    size,
+    snap,
+    sweep,
+    phi,
+    turn,
+    turns,
+    settled,
+    near_cell,
+    strokes_near,
+    entry,
+    leave,
+):
+    """Walk from the seeds to all cells near what has been swept.
+
+    Returns the cells that may have to be split, and those from which to go on next time.
+    `settled` marks cells that the blade has left behind, `near_cell` all that were ever near it.
+    """
+    queue, candidates = [np.int64(0) for _ in range(0)], [np.int64(0) for _ in range(0)]
+    frontier = [np.int64(0) for _ in range(0)]
+    for cell in seeds:
+        if turns[cell] != turn:
+            turns[cell] = turn
+            queue.append(cell)
+    at = 0
+    while at < len(queue):
+        cell = queue[at]
+        at += 1
+        if settled[cell]:
+            continue
+        near, entered, through, latest = _cross(
+            cell, front, cells, points, size, snap, sweep, phi, entry, leave
+        )
+        if not near:
+            continue
+        if not near_cell[cell]:
+            near_cell[cell] = True
+            strokes_near[cell] += 1
+        if through or (entered and strokes_near[cell] > 1):
+            candidates.append(cell)
+        if through or latest < front - size[cell]:
+            settled[cell] = True
+        else:
+            frontier.append(cell)
+        for other in neighbours[cell]:
+            if other >= 0 and turns[other] != turn:
+                turns[other] = turn
+                queue.append(other)
+    return np.array(candidates, dtype=np.int64), np.array(frontier, dtype=np.int64)
