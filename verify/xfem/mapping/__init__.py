@@ -1,0 +1,1 @@
+"""Surfaces that move with a cut body."""

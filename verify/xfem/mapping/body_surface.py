@@ -1,0 +1,105 @@
+"""The surface of the material itself: the mesh's own boundary, split, and the faces of the cuts.
+
+Each piece's share of it closes around the material: facets on the boundary of the mesh, and inner
+facets from the polygons in which cuts cross elements (thesis 3.2.4), oriented outwards, with
+vertices doubled where, and only where, the material is separate.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.cutting.growing_body import GrowingBody, Increment
+from verify.xfem.mapping.edge_points import EdgePoints
+from verify.xfem.mapping.exposed_kernels import exposed_facets
+from verify.xfem.mapping.moving_surface import MovingSurface
+
+__all__ = ["BodySurface"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class BodySurface:
+    """Outer and inner surface of a growing body; every update costs what the cut touched.
+
+    Parameters
+    ----------
+    body : GrowingBody
+        Of triangles in the plane or tetrahedra.
+
+    Attributes
+    ----------
+    surface : MovingSurface
+    """
+
+    def __init__(self, body: GrowingBody) -> None:
+        mesh = body.mesh
+        self._body = body
+        self.surface = MovingSurface(mesh.dim + 1, mesh.space, mesh.dim)
+        self._edges = EdgePoints(mesh.points, body.points)
+        self._facets_of_cell: dict[int, _Ints] = {}
+        boundary = np.unique(mesh.boundary_facets[:, 0])
+        split = np.flatnonzero(body.split_cells)
+        self._cover(np.union1d(boundary, split), split)
+
+    def update(self, increment: Increment | None) -> None:
+        """Follow a cut."""
+        if increment is not None:
+            self._cover(increment.touched, increment.cells)
+
+    def _cover(self, cells: _Ints, split: _Ints) -> None:
+        """Make the facets of some cells anew; `split` are those with new sub-simplices."""
+        body, mesh = self._body, self._body.mesh
+        if len(split):
+            ranges = body.sub_range[split]
+            rows = np.concatenate([np.arange(a, b) for a, b in ranges])
+            self._edges.add(body.sub_points.rows[rows].ravel())
+        old = [self._facets_of_cell.pop(cell) for cell in cells.tolist() if cell in self._facets_of_cell]
+        if old:
+            self.surface.retire(np.concatenate(old))
+        ids, at, piece, cell, inner, inside = exposed_facets(
+            cells,
+            body.split_cells,
+            mesh.cells,
+            mesh.neighbours,
+            body.piece_cells.rows,
+            body.first_piece,
+            body.next_piece.rows,
+            body.sub_range,
+            body.sub_piece.rows,
+            body.sub_points.rows,
+            body.sub_barycentric.rows,
+        )
+        ids, at = _outwards(mesh.points[mesh.cells[cell]], ids, at, inside)
+        ids, source, share = self._edges.bisect(ids)
+        at = share @ at[source]
+        piece, cell = piece[source], cell[source]
+        corners = ids.shape[1]
+        row = np.repeat(np.arange(len(ids)), corners)
+        weights = at.reshape(len(row), -1)
+        material = np.einsum("qc,qcs->qs", weights, mesh.points[mesh.cells[cell[row]]])
+        vertex = self.surface.weld(
+            ids.ravel(), material, body.piece_cells.rows[piece[row]], weights
+        )
+        numbers = self.surface.add(vertex.reshape(ids.shape), piece, inner[source])
+        # facets come cell by cell
+        starts = np.flatnonzero(np.diff(cell, prepend=-1))
+        for begin, part in zip(starts, np.split(numbers, starts[1:]), strict=True):
+            self._facets_of_cell[int(cell[begin])] = part
+
+
+def _outwards(
+    elements: _Floats, ids: _Ints, at: _Floats, inside: _Floats
+) -> tuple[_Ints, _Floats]:
+    """Turn facets so that a point inside their (convex) piece is behind them."""
+    corners = at @ elements
+    away = corners[:, 0] - np.einsum("qc,qcs->qs", inside, elements)
+    along = corners[:, 1:] - corners[:, :1]
+    if ids.shape[1] == 2:
+        normal = np.stack([along[:, 0, 1], -along[:, 0, 0]], axis=1)
+    else:
+        normal = np.cross(along[:, 0], along[:, 1])
+    wrong = (normal * away).sum(axis=1) < 0.0
+    ids[wrong, 0], ids[wrong, 1] = ids[wrong, 1], ids[wrong, 0].copy()
+    at[wrong, 0], at[wrong, 1] = at[wrong, 1], at[wrong, 0].copy()
+    return ids, at

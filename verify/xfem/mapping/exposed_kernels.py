@@ -1,0 +1,134 @@
+"""Facets of elements and of their sub-simplices that lie on the surface of the material."""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["exposed_facets"]
+
+
+@njit(cache=True)
+def _has_partner(piece, cell, opposite, cells, neighbours, piece_cells, first_piece, next_piece):
+    """Whether a piece across a face of the cell moves with the same unknowns on that face."""
+    other = neighbours[cell, opposite]
+    partner = first_piece[other] if other >= 0 else -1
+    corners = cells.shape[1]
+    while partner >= 0:
+        same = True
+        for a in range(corners):
+            if a == opposite:
+                continue
+            for b in range(corners):
+                if cells[other, b] == cells[cell, a]:
+                    same = same and piece_cells[partner, b] == piece_cells[piece, a]
+        if same:
+            return True
+        partner = next_piece[partner]
+    return False
+
+
+@njit(cache=True)
+def _same_set(a, skip_a, b, skip_b):
+    for i in range(len(a)):
+        if i == skip_a:
+            continue
+        found = False
+        for j in range(len(b)):
+            found = found or (j != skip_b and a[i] == b[j])
+        if not found:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _face_of(barycentric, skip):
+    """Corner opposite to the face of the element in which a facet lies, or -1."""
+    for a in range(barycentric.shape[1]):
+        flat = True
+        for k in range(barycentric.shape[0]):
+            flat = flat and (k == skip or barycentric[k, a] == 0.0)
+        if flat:
+            return a
+    return -1
+
+
+@njit(cache=True)
+def exposed_facets(
+    wanted, split, cells, neighbours, piece_cells, first_piece, next_piece,
+    sub_range, sub_piece, sub_points, sub_barycentric,
+):  # fmt: skip
+    """Facets of these cells on the surface of the material.
+
+    Returns for each: point numbers (q, d), barycentric corners (q, d, d + 1), piece, cell,
+    whether it lies on a cut, and a point (q, d + 1) inside its piece.
+    """
+    corners = cells.shape[1]
+    room = 0
+    for cell in wanted:
+        room += corners * max(1, sub_range[cell, 1] - sub_range[cell, 0])
+    ids = np.empty((room, corners - 1), dtype=np.int64)
+    at = np.zeros((room, corners - 1, corners))
+    piece_of, cell_of = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+    inner, inside = np.empty(room, dtype=np.bool_), np.empty((room, corners))
+    count = 0
+    for cell in wanted:
+        begin, end = sub_range[cell]
+        if not split[cell]:
+            piece = first_piece[cell]
+            for a in range(corners):
+                if _has_partner(
+                    piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
+                ):
+                    continue
+                k = 0
+                for b in range(corners):
+                    if b != a:
+                        ids[count, k], at[count, k, b] = cells[cell, b], 1.0
+                        k += 1
+                piece_of[count], cell_of[count] = piece, cell
+                inner[count] = neighbours[cell, a] >= 0
+                inside[count] = 1.0 / corners
+                count += 1
+            continue
+        for s in range(begin, end):
+            for skip in range(corners):
+                lonely = True
+                for t in range(begin, end):
+                    if t == s or sub_piece[t] != sub_piece[s]:
+                        continue
+                    for other in range(corners):
+                        if _same_set(sub_points[s], skip, sub_points[t], other):
+                            lonely = False
+                if not lonely:
+                    continue
+                face = _face_of(sub_barycentric[s], skip)
+                if face >= 0 and _has_partner(
+                    sub_piece[s], cell, face, cells, neighbours, piece_cells, first_piece,
+                    next_piece,
+                ):  # fmt: skip
+                    continue
+                k = 0
+                for b in range(corners):
+                    if b != skip:
+                        ids[count, k] = sub_points[s, b]
+                        at[count, k] = sub_barycentric[s, b]
+                        k += 1
+                piece_of[count], cell_of[count] = sub_piece[s], cell
+                inner[count] = face < 0 or neighbours[cell, face] >= 0
+                _mean_of_piece(sub_piece, sub_barycentric, begin, end, sub_piece[s], inside[count])
+                count += 1
+    return (
+        ids[:count], at[:count], piece_of[:count], cell_of[:count], inner[:count], inside[:count]
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _mean_of_piece(sub_piece, sub_barycentric, begin, end, piece, out):
+    """Write the mean of the corners of a (convex) piece."""
+    out[:] = 0.0
+    seen = 0
+    for s in range(begin, end):
+        if sub_piece[s] == piece:
+            for k in range(sub_barycentric.shape[1]):
+                out += sub_barycentric[s, k]
+            seen += sub_barycentric.shape[1]
+    out /= seen

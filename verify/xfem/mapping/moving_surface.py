@@ -1,0 +1,178 @@
+"""A surface whose vertices move with the unknowns of a cut body: x = X + W u.
+
+Every vertex belongs to one piece: its weights are its barycentric coordinates in the parent
+element, its nodes the unknown nodes of the piece (barycentric mapping, thesis 3.2.2). Forces go
+back by the transpose, so that the virtual work of a force on the surface and of what the solver
+gets is the same.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.xfem.cutting.growing_array import GrowingArray
+from verify.xfem.cutting.row_numbers import RowNumbers
+from verify.xfem.errors import XfemError
+
+__all__ = ["MovingSurface"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class MovingSurface:
+    """Facets (segments in 2D, triangles in 3D) that come and go, and vertices that only come.
+
+    Parameters
+    ----------
+    corners : int
+        Corners of an element: the length of a vertex's row of weights.
+    space : int
+        Dimension of the points.
+
+    Attributes
+    ----------
+    material : GrowingArray
+        (v, s) positions X of the vertices in the material frame, in metres.
+    nodes, weights : GrowingArray
+        (v, corners) unknown nodes and weights of each vertex: the rows of W.
+    facets : GrowingArray
+        (f, k) vertices; the first is -1 where a facet is no longer in use.
+    facet_piece : GrowingArray
+        (f,) piece on whose surface it lies.
+    inner : GrowingArray
+        (f,) whether it lies on a cut.
+    """
+
+    def __init__(self, corners: int, space: int, facet_corners: int) -> None:
+        self.material = GrowingArray(np.empty((0, space)))
+        self.nodes = GrowingArray(np.empty((0, corners), dtype=np.int64))
+        self.weights = GrowingArray(np.empty((0, corners)))
+        self.facets = GrowingArray(np.empty((0, facet_corners), dtype=np.int64))
+        self.facet_piece = GrowingArray(np.empty(0, dtype=np.int64))
+        self.inner = GrowingArray(np.empty(0, dtype=bool))
+        self._keys = RowNumbers(corners + 1)
+
+    def weld(self, point: _Ints, material: _Floats, nodes: _Ints, weights: _Floats) -> _Ints:
+        """Vertices (q,) of corners: one for each point and set of unknowns from which it moves.
+
+        Parameters
+        ----------
+        point : (q,) int array
+            Number of the material point.
+        material : (q, s) float array
+        nodes, weights : (q, corners) arrays
+            Unknown nodes and weights; weights of exactly zero do not count.
+        """
+        key = np.empty((len(point), nodes.shape[1] + 1), dtype=np.int64)
+        key[:, 0] = point
+        key[:, 1:] = np.sort(np.where(weights != 0.0, nodes, -1), axis=1)
+        before = len(self._keys)
+        vertex = self._keys.number(key)
+        first = np.empty(len(self._keys) - before, dtype=np.int64)
+        new = np.flatnonzero(vertex >= before)
+        first[vertex[new[::-1]] - before] = new[::-1]
+        self.material.append(material[first])
+        self.nodes.append(nodes[first])
+        self.weights.append(weights[first])
+        return vertex
+
+    def add(self, facets: _Ints, piece: _Ints, inner: NDArray[np.bool_]) -> _Ints:
+        """Append facets (q, k); their numbers."""
+        begin = len(self.facets)
+        self.facets.append(facets)
+        self.facet_piece.append(piece)
+        self.inner.append(inner)
+        return np.arange(begin, len(self.facets))
+
+    def retire(self, facets: _Ints) -> None:
+        """Take facets out of use."""
+        self.facets.rows[facets, 0] = -1
+
+    @property
+    def used(self) -> _Ints:
+        """Numbers of the facets in use."""
+        return np.flatnonzero(self.facets.rows[:, 0] >= 0)
+
+    def positions(self, displacement: _Floats, out: _Floats | None = None) -> _Floats:
+        """Positions (v, s) of the vertices for a displacement (N, s) of the unknown nodes.
+
+        Parameters
+        ----------
+        displacement : (N, s) float array
+            In metres.
+        out : (v, s) float array, optional
+            Written instead of a new array: a step then allocates nothing.
+
+        Raises
+        ------
+        XfemError
+            If `displacement` has fewer rows than there are unknown nodes.
+        """
+        self._check(displacement)
+        if out is None:
+            out = np.empty_like(self.material.rows)
+        _interpolate(self.material.rows, self.nodes.rows, self.weights.rows, displacement, out)
+        return out
+
+    def nodal_forces(self, forces: _Floats, out: _Floats) -> _Floats:
+        """Add forces (v, s) on the vertices to the forces `out` (N, s) on the unknown nodes: Wᵀf."""
+        self._check(out)
+        _spread(self.nodes.rows, self.weights.rows, forces, out)
+        return out
+
+    def facet_force(self, facet: int, at: _Floats, force: _Floats, out: _Floats) -> _Floats:
+        """Add a force (s,) at a point of a facet to the forces `out` (N, s).
+
+        Parameters
+        ----------
+        facet : int
+        at : (k,) float array
+            Barycentric coordinates of the point in the facet.
+        force : (s,) float array
+            In newtons.
+        out : (N, s) float array
+        """
+        self._check(out)
+        vertices = self.facets.rows[facet]
+        if vertices[0] < 0:
+            raise XfemError(f"facet {facet} is no longer in use")
+        _spread(
+            self.nodes.rows[vertices], self.weights.rows[vertices], at[:, None] * force, out
+        )
+        return out
+
+    def _check(self, nodal: _Floats) -> None:
+        if nodal.ndim != 2 or nodal.shape[1] != self.material.rows.shape[1]:
+            raise XfemError(
+                f"nodal values of shape {nodal.shape}; expected (N, {self.material.rows.shape[1]})"
+            )
+        if len(self.nodes) and len(nodal) <= self._largest_node():
+            raise XfemError(
+                f"{len(nodal)} nodal values; expected at least {self._largest_node() + 1}"
+            )
+
+    def _largest_node(self) -> int:
+        seen = getattr(self, "_largest", (0, -1))
+        if seen[0] < len(self.nodes):
+            seen = (len(self.nodes), max(seen[1], int(self.nodes.rows[seen[0] :].max())))
+            self._largest = seen
+        return seen[1]
+
+
+@njit(cache=True)
+def _interpolate(material, nodes, weights, displacement, out):
+    for v in range(len(nodes)):
+        for i in range(material.shape[1]):
+            total = material[v, i]
+            for k in range(nodes.shape[1]):
+                total += weights[v, k] * displacement[nodes[v, k], i]
+            out[v, i] = total
+
+
+@njit(cache=True)
+def _spread(nodes, weights, forces, out):
+    for v in range(len(nodes)):
+        for k in range(nodes.shape[1]):
+            for i in range(forces.shape[1]):
+                out[nodes[v, k], i] += weights[v, k] * forces[v, i]
