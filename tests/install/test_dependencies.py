@@ -1,0 +1,61 @@
+"""What is imported is declared, and what is declared is imported."""
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Distribution -> what it is imported as, where that is another name.
+IMPORTED_AS = {
+    "dolfinx-solver-real": {
+        "dolfinx", "dolfinx_solver", "ufl", "basix", "ffcx", "petsc4py", "mpi4py",
+    },
+    "pillow": {"PIL"},
+    "import-linter": {"importlinter"},
+}  # fmt: skip
+
+
+def declared(*groups):
+    """Return the import names of the base dependencies (``None``) or of extras."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    names = set()
+    for group in groups:
+        lines = project["optional-dependencies"][group] if group else project["dependencies"]
+        for line in lines:
+            distribution = re.match(r"[A-Za-z0-9._-]+", line).group()
+            names |= IMPORTED_AS.get(distribution, {distribution.replace("-", "_")})
+    return names - {"cutting_verification"}
+
+
+def imported(*folders):
+    """Return the third-party top-level names that the Python files in the folders import."""
+    names, own = set(), {"verify", "reference"}
+    for folder in folders:
+        for file in (ROOT / folder).rglob("*.py"):
+            if folder == "tests":
+                own.add(file.stem)  # tests import the modules beside them
+            for node in ast.walk(ast.parse(file.read_bytes())):
+                if isinstance(node, ast.Import):
+                    names |= {alias.name.split(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom):
+                    names.add(node.module.split(".")[0])
+    return names - own - set(sys.stdlib_module_names)
+
+
+def test_framework_imports_only_its_base_dependencies():
+    assert imported("verify") <= declared(None)
+
+
+def test_reference_imports_only_the_base_and_the_fenicsx_extra():
+    assert imported("reference") <= declared(None, "gmsh", "fenicsx")
+
+
+def test_tests_import_only_what_is_declared():
+    assert imported("tests") <= declared(None, "gmsh", "fenicsx", "test", "dev")
+
+
+def test_every_base_dependency_is_used():
+    assert declared(None) <= imported("verify", "reference")
