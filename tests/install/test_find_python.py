@@ -73,12 +73,31 @@ def test_python_of_a_version_manager_is_found_in_the_home(root, tmp_path, progra
     for name in ("python3", "python3.12", "python3.13", "python3.14", "python"):
         put(name, REFUSING_SHIM)
     # A PATH that holds the tools but no Python.
-    for tool in ("bash", "env", "timeout", "awk", "ls", "sh"):
+    for tool in ("bash", "env", "timeout", "awk", "ls", "sed", "sh"):
         (tmp_path / "bin" / tool).symlink_to(f"/usr/bin/{tool}")
     (tmp_path / place).parent.mkdir(parents=True)
     (tmp_path / place).write_text(passing_on_to_this_python())
     (tmp_path / place).chmod(0o755)
     found = find_python(root, str(tmp_path / "bin"), tmp_path)
+    assert found.returncode == 0, found.stderr
+    assert os.access(found.stdout.strip(), os.X_OK)
+
+
+def test_python_is_found_beside_the_shims_that_refuse(root, tmp_path, programs):
+    put, _ = programs
+    for tool in ("bash", "env", "timeout", "awk", "ls", "sed", "sh"):
+        (tmp_path / "bin" / tool).symlink_to(f"/usr/bin/{tool}")
+    shims = tmp_path / "elsewhere/shims"
+    shims.mkdir(parents=True)
+    for name in ("python3", "python3.12", "python3.13", "python3.14", "python"):
+        put(name, REFUSING_SHIM).rename(shims / name)
+    python = tmp_path / "elsewhere/versions/3.12.9/bin/python3"
+    python.parent.mkdir(parents=True)
+    python.write_text(passing_on_to_this_python())
+    python.chmod(0o755)
+    home = tmp_path / "an empty home"
+    home.mkdir()
+    found = find_python(root, f"{shims}:{tmp_path / 'bin'}", home)
     assert found.returncode == 0, found.stderr
     assert os.access(found.stdout.strip(), os.X_OK)
 
