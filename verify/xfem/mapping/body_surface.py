@@ -54,7 +54,11 @@ class BodySurface:
             ranges = body.sub_range[split]
             rows = np.concatenate([np.arange(a, b) for a, b in ranges])
             self._edges.add(body.sub_points.rows[rows].ravel())
-        old = [self._facets_of_cell.pop(cell) for cell in cells.tolist() if cell in self._facets_of_cell]
+        old = [
+            self._facets_of_cell.pop(cell)
+            for cell in cells.tolist()
+            if cell in self._facets_of_cell
+        ]
         if old:
             self.surface.retire(np.concatenate(old))
         ids, at, piece, cell, inner, inside = exposed_facets(
@@ -88,9 +92,7 @@ class BodySurface:
             self._facets_of_cell[int(cell[begin])] = part
 
 
-def _outwards(
-    elements: _Floats, ids: _Ints, at: _Floats, inside: _Floats
-) -> tuple[_Ints, _Floats]:
+def _outwards(elements: _Floats, ids: _Ints, at: _Floats, inside: _Floats) -> tuple[_Ints, _Floats]:
     """Turn facets so that a point inside their (convex) piece is behind them."""
     corners = at @ elements
     away = corners[:, 0] - np.einsum("qc,qcs->qs", inside, elements)

@@ -1,7 +1,9 @@
 """Points on edges, and facets bisected at them: no hanging vertex is left on a surface.
 
 Where a cut ends, a facet beside the end has a point on its edge that is not a vertex of it. All
-facets along an edge ask the same record of points, so that they are bisected alike.
+facets along an edge ask the same record of points, so that they are bisected alike. Edges on which
+elements meet lie on an edge of the mesh, or on the line in which a cut crosses a face of it: the
+record is by these.
 """
 
 import numpy as np
@@ -17,6 +19,12 @@ __all__ = ["EdgePoints"]
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
+_NODES, _CUTS = 4, 3  # as `PointNumbers.supports` lists them
+_FACE = 3  # corners of a face
+_WIDTH = _FACE + 1  # a line: the nodes of an edge or a face, and the cut that crosses it
+_NONE = np.iinfo(np.int64).max
+_OFF_LINE = 1e-20  # squared distance from a line, over its squared length, that is on it
+
 
 class EdgePoints:
     """Which points lie inside which edges.
@@ -31,31 +39,30 @@ class EdgePoints:
 
     def __init__(self, nodes: _Floats, points: PointNumbers) -> None:
         self._nodes, self._points = nodes, points
-        self._edges = RowNumbers(2)
+        self._lines = RowNumbers(_WIDTH)
         self._first = GrowingArray(np.empty(0, dtype=np.int64))
-        self._next = GrowingArray(np.empty(0, dtype=np.int64))
+        self._entries = GrowingArray(np.empty((0, 2), dtype=np.int64))
+        self._recorded = GrowingArray(np.empty(0, dtype=bool))
 
     def add(self, numbers: _Ints) -> None:
-        """Record points (by number; mesh nodes are ignored) on the edges on which they lie."""
-        count = len(self._points.ends)
-        fresh = self._next.extend(count - len(self._next))
-        self._next.rows[fresh:] = -2  # not recorded
-        table, known, edges = self._edges.open_for(len(numbers))
-        begin = self._first.extend(len(numbers))
+        """Record points (by number; mesh nodes are ignored) on the lines on which they lie."""
+        fresh = self._recorded.extend(len(self._points.ends) - len(self._recorded))
+        self._recorded.rows[fresh:] = False
+        zero = numbers[numbers >= self._points.nodes] - self._points.nodes
+        zero = np.unique(zero[~self._recorded.rows[zero]])
+        self._recorded.rows[zero] = True
+        table, known, lines = self._lines.open_for(_CUTS * len(zero))
+        begin = self._first.extend(_CUTS * len(zero))
         self._first.rows[begin:] = -1
-        after = _record(
-            numbers,
-            self._points.nodes,
-            self._points.ends.rows,
-            self._points.supports,
-            table,
-            known,
-            edges,
-            self._first.rows,
-            self._next.rows,
-        )
-        self._edges.close(after)
-        self._first.rows = self._first.rows[:after]
+        used = len(self._entries)
+        self._entries.extend(_CUTS * len(zero))
+        lines, used = _record(
+            zero, self._points.supports, table, known, lines, self._first.rows,
+            self._entries.rows, used,
+        )  # fmt: skip
+        self._lines.close(lines)
+        self._first.rows = self._first.rows[:lines]
+        self._entries.rows = self._entries.rows[:used]
 
     def bisect(self, facets: _Ints) -> tuple[_Ints, _Ints, _Floats]:
         """Bisect triangles at all recorded points on their edges; segments stay.
@@ -73,12 +80,12 @@ class EdgePoints:
         weights : (q, k, k) float array
             Barycentric coordinates of its corners (second axis) in that facet.
         """
-        if facets.shape[1] == 2 or len(self._edges) == 0:
+        if facets.shape[1] == 2 or len(self._lines) == 0 or len(facets) == 0:
             corners = facets.shape[1]
             eye = np.broadcast_to(np.eye(corners), (len(facets), corners, corners))
             return facets, np.arange(len(facets)), eye
-        table, known, count = self._edges.open_for(0)
-        self._edges.close(count)
+        table, known, count = self._lines.open_for(0)
+        self._lines.close(count)
         return _bisect(
             facets,
             self._points.nodes,
@@ -88,26 +95,30 @@ class EdgePoints:
             table,
             known,
             self._first.rows,
-            self._next.rows,
+            self._entries.rows,
         )
 
 
 @njit(cache=True)
-def _record(numbers, nodes, ends, supports, table, known, edges, first, following):
-    none = np.iinfo(np.int64).max
-    row = np.empty(2, dtype=np.int64)
-    for number in numbers:
-        z = number - nodes
-        if z < 0 or following[z] != -2:
-            continue
-        if supports[z, 2] == none:
-            row[0], row[1] = supports[z, 0], supports[z, 1]
-        else:
-            row[0], row[1] = min(ends[z, 0], ends[z, 1]), max(ends[z, 0], ends[z, 1])
-        edge, edges = number_of_row(row, table, known, edges)
-        following[z] = first[edge]
-        first[edge] = z
-    return edges
+def _record(zero, supports, table, known, lines, first, entries, used):
+    """Enter points into the lists of their lines; the counts of lines and entries."""
+    row = np.empty(_WIDTH, dtype=np.int64)
+    for z in zero:
+        if supports[z, _FACE] != _NONE:
+            continue  # inside an element: nobody else meets it
+        row[:_FACE] = supports[z, :_FACE]
+        for k in range(_NODES, _NODES + _CUTS):
+            if supports[z, k] == _NONE:
+                continue
+            # on an edge of the mesh the cut does not matter
+            row[_FACE] = supports[z, k] if row[_FACE - 1] != _NONE else _NONE
+            line, lines = number_of_row(row, table, known, lines)
+            entries[used, 0], entries[used, 1] = z, first[line]
+            first[line] = used
+            used += 1
+            if row[_FACE] == _NONE:
+                break
+    return lines, used
 
 
 @njit(cache=True)
@@ -117,54 +128,84 @@ def _place(number, nodes, node_points, positions, out):
 
 
 @njit(cache=True)
-def _edge_of(x, y, nodes, supports, row):
-    """Write the mesh edge that holds both points, or else the edge between them."""
-    none = np.iinfo(np.int64).max
-    row[0] = row[1] = none
-    for number in (x, y):
-        for k in range(3):
-            if number < nodes:
-                support = number if k == 0 else none
-            else:
-                support = supports[number - nodes, k]
-            if support == none or support == row[0] or support == row[1]:
-                continue
-            if row[1] != none:
-                row[0], row[1] = min(x, y), max(x, y)
-                return
-            row[1] = support
-            if row[0] > row[1]:
-                row[0], row[1] = row[1], row[0]
+def _join(number, nodes, supports, row):
+    """Insert the mesh nodes of a point into the ascending list row[:3]; False if there is no room."""
+    for k in range(_NODES):
+        value = number if number < nodes else supports[number - nodes, k]
+        if value == _NONE:
+            break
+        for j in range(_FACE):
+            if row[j] == value:
+                value = _NONE
+                break
+            if row[j] > value:
+                value, row[j] = row[j], value
+        if value != _NONE:
+            return False
+        if number < nodes:
+            break
+    return True
 
 
 @njit(cache=True)
-def _inner_point(x, y, nodes, node_points, positions, supports, table, known, first, following):
-    """(a recorded point strictly between x and y or -1, its share from x to y)."""
-    row = np.empty(2, dtype=np.int64)
-    _edge_of(x, y, nodes, supports, row)
-    edge = find_row(row, table, known)
-    if edge < 0:
-        return -1, 0.0
+def _between(x, y, nodes, node_points, positions, first, entries, line, straight):
+    """(a point of the line's list strictly between x and y or -1, its share from x to y)."""
     space = node_points.shape[1]
     a, b, c = np.empty(space), np.empty(space), np.empty(space)
     _place(x, nodes, node_points, positions, a)
     _place(y, nodes, node_points, positions, b)
-    z = first[edge]
-    while z >= 0:
-        if nodes + z != x and nodes + z != y:
-            _place(nodes + z, nodes, node_points, positions, c)
-            along, total = 0.0, 0.0
-            for i in range(space):
-                along += (c[i] - a[i]) * (b[i] - a[i])
-                total += (b[i] - a[i]) ** 2
-            if 0.0 < along < total:
-                return nodes + z, along / total
-        z = following[z]
+    entry = first[line]
+    while entry >= 0:
+        z = nodes + entries[entry, 0]
+        entry = entries[entry, 1]
+        if z == x or z == y:
+            continue
+        _place(z, nodes, node_points, positions, c)
+        along, total, square = 0.0, 0.0, 0.0
+        for i in range(space):
+            along += (c[i] - a[i]) * (b[i] - a[i])
+            total += (b[i] - a[i]) ** 2
+            square += (c[i] - a[i]) ** 2
+        off = square * total - along * along
+        if 0.0 < along < total and (straight or off <= _OFF_LINE * total * total):
+            return z, along / total
     return -1, 0.0
 
 
 @njit(cache=True)
-def _bisect(facets, nodes, node_points, positions, supports, table, known, first, following):
+def _inner_point(x, y, nodes, node_points, positions, supports, table, known, first, entries):
+    """(a recorded point strictly between x and y or -1, its share from x to y)."""
+    row = np.full(_WIDTH, _NONE, dtype=np.int64)
+    if not (_join(x, nodes, supports, row) and _join(y, nodes, supports, row)):
+        return -1, 0.0
+    if row[_FACE - 1] == _NONE:
+        line = find_row(row, table, known)
+        if line < 0:
+            return -1, 0.0
+        return _between(x, y, nodes, node_points, positions, first, entries, line, True)
+    for number, other in ((x, y), (y, x)):
+        if number < nodes:
+            continue
+        for k in range(_NODES, _NODES + _CUTS):
+            row[_FACE] = supports[number - nodes, k]
+            line = find_row(row, table, known) if row[_FACE] != _NONE else -1
+            if line < 0:
+                continue
+            straight = False
+            for j in range(_NODES, _NODES + _CUTS):
+                if other >= nodes and supports[other - nodes, j] == row[_FACE]:
+                    straight = True
+            # a mesh node may lie on the line of a cut without being told so
+            if not straight and other >= nodes:
+                continue
+            z, share = _between(x, y, nodes, node_points, positions, first, entries, line, straight)
+            if z >= 0:
+                return z, share
+    return -1, 0.0
+
+
+@njit(cache=True)
+def _bisect(facets, nodes, node_points, positions, supports, table, known, first, entries):
     stack_ids = [facets[0].copy() for _ in range(0)]
     stack_weights = [np.eye(3) for _ in range(0)]
     ids, sources, weights = (
@@ -181,7 +222,7 @@ def _bisect(facets, nodes, node_points, positions, supports, table, known, first
             for j in range(3):
                 at, share = _inner_point(
                     facet[j], facet[(j + 1) % 3], nodes, node_points, positions, supports,
-                    table, known, first, following,
+                    table, known, first, entries,
                 )  # fmt: skip
                 if at >= 0:
                     k = j

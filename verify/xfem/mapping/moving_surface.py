@@ -137,9 +137,7 @@ class MovingSurface:
         vertices = self.facets.rows[facet]
         if vertices[0] < 0:
             raise XfemError(f"facet {facet} is no longer in use")
-        _spread(
-            self.nodes.rows[vertices], self.weights.rows[vertices], at[:, None] * force, out
-        )
+        _spread(self.nodes.rows[vertices], self.weights.rows[vertices], at[:, None] * force, out)
         return out
 
     def _check(self, nodal: _Floats) -> None:

@@ -1,0 +1,53 @@
+"""What a closed oriented surface must satisfy, measured from its facets alone."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.mapping.moving_surface import MovingSurface
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["enclosed_by_body", "loose_edges", "pinched_edges", "volume_by_body"]
+
+
+def loose_edges(facets: NDArray[np.int64]) -> int:
+    """Edges (2D: vertices) that are not used as often in one direction as in the other."""
+    if facets.shape[1] == 2:
+        size = facets.max(initial=-1) + 1
+        ends = [np.bincount(facets[:, k], minlength=size) for k in range(2)]
+        return int((ends[0] != ends[1]).sum())
+    uses = _directed(facets)
+    return sum(uses[edge] != uses.get((edge[1], edge[0]), 0) for edge in uses)
+
+
+def pinched_edges(facets: NDArray[np.int64]) -> int:
+    """Edges at which more than two triangles meet, as they do where a cut is still closed."""
+    return sum(count > 1 for count in _directed(facets).values()) // 2
+
+
+def _directed(facets: NDArray[np.int64]) -> dict[tuple[int, int], int]:
+    uses: dict[tuple[int, int], int] = {}
+    for triangle in facets.tolist():
+        for k in range(3):
+            edge = (triangle[k], triangle[(k + 1) % 3])
+            uses[edge] = uses.get(edge, 0) + 1
+    return uses
+
+
+def enclosed_by_body(surface: MovingSurface, virtual: VirtualMesh) -> NDArray[np.float64]:
+    """Area or volume that the facets of each free body enclose (divergence theorem)."""
+    facets = surface.facets.rows[surface.used]
+    corners = surface.material.rows[facets]
+    if facets.shape[1] == 2:
+        share = 0.5 * (corners[:, 0, 0] * corners[:, 1, 1] - corners[:, 0, 1] * corners[:, 1, 0])
+    else:
+        share = np.linalg.det(corners) / 6.0
+    vertex = facets[:, 0]
+    heaviest = np.abs(surface.weights.rows[vertex]).argmax(axis=1)
+    node = surface.nodes.rows[vertex, heaviest]
+    return np.bincount(virtual.bodies[node], share, minlength=int(virtual.bodies.max()) + 1)
+
+
+def volume_by_body(virtual: VirtualMesh) -> NDArray[np.float64]:
+    """Sum of the volumes of the pieces of each free body."""
+    body = virtual.bodies[virtual.cells[:, 0]]
+    return np.bincount(body, virtual.volumes, minlength=int(virtual.bodies.max()) + 1)
