@@ -8,6 +8,7 @@ from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["MeshPatch", "PatchCutter"]
 
+_Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 
@@ -24,14 +25,20 @@ class MeshPatch(SimplexMesh):
     whole_nodes: _Ints
 
     def __init__(
-        self, mesh: SimplexMesh, cells: _Ints, nodes: _Ints, local: _Ints, across: _Ints
+        self,
+        points: _Floats,
+        extent: float,
+        cells: _Ints,
+        nodes: _Ints,
+        local: _Ints,
+        across: _Ints,
     ) -> None:
         # the whole mesh has been checked; its scale of round-off holds here too
         for name, value in (
-            ("points", mesh.points[nodes]),
+            ("points", points[nodes]),
             ("cells", local),
             ("neighbours", across),
-            ("extent", mesh.extent),
+            ("extent", extent),
             ("whole_cells", cells),
             ("whole_nodes", nodes),
         ):
@@ -66,7 +73,7 @@ class PatchCutter:
             self._cell_place,
             self._node_place,
         )
-        return MeshPatch(self.mesh, cells, nodes, local, across)
+        return MeshPatch(self.mesh.points, self.mesh.extent, cells, nodes, local, across)
 
 
 @njit(cache=True)

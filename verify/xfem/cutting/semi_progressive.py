@@ -69,6 +69,8 @@ class SemiProgressiveCutter:
     body : GrowingBody
         The pieces and unknowns as they are now.
     strokes : list of Stroke
+    interior : BoundingTree
+        Of the elements, in the material frame.
     """
 
     def __init__(self, mesh: SimplexMesh) -> None:
@@ -80,7 +82,7 @@ class SemiProgressiveCutter:
         others = np.array([np.delete(np.arange(mesh.dim + 1), k) for k in range(mesh.dim + 1)])
         self._skin_cell = cell
         self._skin = BoundingTree(mesh.points, mesh.cells[cell[:, None], others[corner]])
-        self._interior = BoundingTree(mesh.points, mesh.cells)
+        self.interior = BoundingTree(mesh.points, mesh.cells)
         self._strokes_near = np.zeros(len(mesh.cells), dtype=np.int64)
         self._records: list[tuple[_Ints, int, _Floats, _Floats, float]] = []
 
@@ -126,7 +128,7 @@ class SemiProgressiveCutter:
             None if no element was split.
         """
         found = [
-            stroke.advance(time, self._size, self._skin, self._skin_cell, self._interior)
+            stroke.advance(time, self._size, self._skin, self._skin_cell, self.interior)
             for stroke in self.strokes
         ]
         candidates = np.concatenate([np.empty(0, dtype=np.int64), *found])

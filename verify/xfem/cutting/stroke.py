@@ -70,6 +70,8 @@ class Stroke:
         infinite if it has not.
     near : (m,) bool array
         Cells near which the blade came.
+    values : (n,) float array
+        Nodal level sets, in metres; NaN where nobody has asked for them yet.
     recorded : (m,) bool array
         Cells whose crossing has been recorded.
     """
@@ -83,7 +85,7 @@ class Stroke:
         self.recorded = np.zeros(len(mesh.cells), dtype=bool)
         self._mesh, self._strokes_near = mesh, strokes_near
         self._snap = _ROUND_OFF * mesh.extent
-        self._values = np.full(len(mesh.points), np.nan)
+        self.values = np.full(len(mesh.points), np.nan)
         self._fixed = np.zeros(len(mesh.points), dtype=bool)
         self._settled = np.zeros(len(mesh.cells), dtype=bool)
         self._turns = np.zeros(len(mesh.cells), dtype=np.int64)
@@ -131,7 +133,7 @@ class Stroke:
             size,
             self._snap,
             sweep,
-            self._values,
+            self.values,
             self._turn,
             self._turns,
             self._settled,
@@ -152,7 +154,7 @@ class Stroke:
     def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
         """Add positions to the path; level sets of nodes already used for a cut stay."""
         self.path = self.path.extended(blades, times)
-        self._values[~self._fixed] = np.nan
+        self.values[~self._fixed] = np.nan
 
     def fix(self, nodes: _Ints) -> None:
         """From now on the level sets of these nodes do not change."""
@@ -160,11 +162,11 @@ class Stroke:
 
     def level_sets(self, nodes: _Ints) -> _Floats:
         """Level sets of mesh nodes, computed where they have not been, in metres."""
-        unknown = nodes[np.isnan(self._values[nodes])]
+        unknown = nodes[np.isnan(self.values[nodes])]
         if len(unknown):
             values = self.path.sweep.level_set(self._mesh.points[unknown])
-            self._values[unknown] = np.where(np.abs(values) <= self._snap, 0.0, values)
-        return self._values[nodes]
+            self.values[unknown] = np.where(np.abs(values) <= self._snap, 0.0, values)
+        return self.values[nodes]
 
     def seen_by(self, patch: MeshPatch) -> Cut:
         """Give the cut so far, as a patch sees it."""

@@ -1,0 +1,224 @@
+"""A surface that is not the mesh's own, carried by a cut body: what one sees, or collides with.
+
+Each vertex belongs to the piece that contains it. A facet is split where the cut crosses it
+through, that is where the elements on both its edges are split; which vertices are doubled follows
+from the pieces, so the surface opens where the material does, and nowhere else. Only facets near
+elements that a cut touched are looked at again (thesis 3.2.4, 4.4.2).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.cutting.growing_body import Increment
+from verify.xfem.cutting.patch import MeshPatch
+from verify.xfem.cutting.point_numbers import PointNumbers
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.errors import XfemError
+from verify.xfem.mapping.edge_points import EdgePoints
+from verify.xfem.mapping.locate_kernels import cut_at, embed_corners, locate_many
+from verify.xfem.mapping.moving_surface import MovingSurface
+from verify.xfem.split import split_cells
+
+__all__ = ["EmbeddedSurface"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class _Elements(NamedTuple):
+    """The elements of the body and the tree over them, as kernels take them."""
+
+    reach: float
+    low: _Floats
+    high: _Floats
+    order: _Ints
+    cells: _Ints
+    points: _Floats
+    gradients: _Floats
+
+
+class _SurfaceCut:
+    """A cut as a surface sees it: it is where the body is split."""
+
+    def __init__(self, nodes: _Floats, values: _Floats, cut: int, embedded: "EmbeddedSurface"):
+        self._nodes, self._values, self._cut, self._embedded = nodes, values, cut, embedded
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Realised level set at the vertices; zero points are on the cut by construction."""
+        return self._values if points is self._nodes else np.zeros(len(points))
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Infinite where the body is split, minus that where it is not."""
+        return np.where(self._embedded.is_cut(points, self._cut), np.inf, -np.inf)
+
+
+class EmbeddedSurface:
+    """A triangulated surface (in the plane: a polyline) in or near a body.
+
+    Parameters
+    ----------
+    cutter : SemiProgressiveCutter
+        Holds the body and its strokes; it may have been used already.
+    points : (v, s) array_like
+        In the material frame, in metres. A vertex outside the mesh moves with the element to
+        which it is nearest.
+    facets : (f, s) array_like of int
+        Triangles; segments in the plane.
+
+    Attributes
+    ----------
+    surface : MovingSurface
+        Its first v vertices are those given, as far as they have not been doubled.
+
+    Raises
+    ------
+    XfemError
+        If shapes, indices or numbers are wrong.
+    """
+
+    def __init__(self, cutter: SemiProgressiveCutter, points: ArrayLike, facets: ArrayLike) -> None:
+        mesh = cutter.mesh
+        self.points = np.ascontiguousarray(points, dtype=float)
+        self.facets = np.ascontiguousarray(facets, dtype=np.int64)
+        _check(self.points, self.facets, mesh.space)
+        self.surface = MovingSurface(mesh.dim + 1, mesh.space, self.facets.shape[1])
+        self._cutter = cutter
+        tree = cutter.interior
+        self._elements = _Elements(
+            1e-9 * mesh.extent, tree.low, tree.high, tree.order, mesh.cells, mesh.points,
+            mesh.gradients,
+        )  # fmt: skip
+        self._vertex_cell, self._vertex_at = locate_many(self.points, *self._elements)
+        self._numbers = PointNumbers(len(self.points), mesh.space)
+        self._edges = EdgePoints(self.points, self._numbers)
+        self._near = self._facets_near_cells()
+        self._parts: dict[int, _Ints] = {}
+        self._cover(np.arange(len(self.facets)))
+
+    def update(self, increment: Increment | None) -> None:
+        """Follow a cut."""
+        if increment is None:
+            return
+        starts, facets = self._near
+        ranges = zip(starts[increment.touched], starts[increment.touched + 1], strict=True)
+        near = [facets[a:b] for a, b in ranges if b > a]
+        if near:
+            self._cover(np.unique(np.concatenate(near)))
+
+    def is_cut(self, places: _Floats, cut: int) -> NDArray[np.bool_]:
+        """Whether the element at each material place (q, s) is split by a cut."""
+        body = self._cutter.body
+        return cut_at(
+            places, cut, *self._elements, body.piece_label.rows, body.first_piece,
+            body.next_piece.rows,
+        )  # fmt: skip
+
+    def _facets_near_cells(self) -> tuple[_Ints, _Ints]:
+        """Facets near each cell: those whose box meets its box, and those of its vertices."""
+        tree, slack = self._cutter.interior, self._elements.reach
+        cells, facets = [], []
+        corners = self.points[self.facets]
+        for f, (low, high) in enumerate(zip(corners.min(axis=1), corners.max(axis=1), strict=True)):
+            near = np.union1d(
+                tree.meeting_box(low - slack, high + slack), self._vertex_cell[self.facets[f]]
+            )
+            cells.append(near)
+            facets.append(np.full(len(near), f))
+        cell, facet = np.concatenate(cells), np.concatenate(facets)
+        order = np.argsort(cell, kind="stable")
+        counts = np.bincount(cell, minlength=len(self._cutter.mesh.cells))
+        return np.concatenate([[0], np.cumsum(counts)]), facet[order]
+
+    def _cover(self, facets: _Ints) -> None:
+        """Split and embed some facets anew."""
+        body = self._cutter.body
+        old = [self._parts.pop(f) for f in facets.tolist() if f in self._parts]
+        if old:
+            self.surface.retire(np.concatenate(old))
+        ids, source, at, label = self._fragments(facets)
+        given = self.points[self.facets[source]]
+        corners = at @ given
+        weights = np.empty((*ids.shape, body.mesh.dim + 1))
+        piece = embed_corners(
+            corners, label, self._level_sets(), *self._elements, body.piece_label.rows, body.first_piece,
+            body.next_piece.rows, weights,
+        )  # fmt: skip
+        vertex = self.surface.weld(
+            ids.ravel(),
+            corners.reshape(-1, corners.shape[2]),
+            body.piece_cells.rows[piece.ravel()],
+            weights.reshape(ids.size, -1),
+        )
+        numbers = self.surface.add(
+            vertex.reshape(ids.shape), piece[:, 0], np.zeros(len(ids), dtype=bool)
+        )
+        order = np.argsort(source, kind="stable")
+        starts = np.flatnonzero(np.diff(source[order], prepend=-1))
+        for begin, part in zip(starts, np.split(numbers[order], starts[1:]), strict=True):
+            self._parts[int(source[order[begin]])] = part
+
+    def _fragments(self, facets: _Ints) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8]]:
+        """Parts of facets: points (q, k), facet, barycentric corners in it, sides of cuts."""
+        patch = self._patch(facets)
+        numbers, values = self._values(facets, patch.whole_nodes)
+        cuts = [
+            _SurfaceCut(patch.points, values[:, k], int(cut), self) for k, cut in enumerate(numbers)
+        ]
+        parts = split_cells(patch, cuts)
+        solid = np.flatnonzero(parts.sub_fraction > 0.0)
+        whole = np.setdiff1d(np.arange(len(facets)), parts.parent)
+        size = self.facets.shape[1]
+        point = self._numbers.number(parts.points, patch.whole_nodes, numbers)
+        split_ids = point[parts.sub_points[solid]]
+        self._edges.add(split_ids.ravel())
+        ids = np.concatenate([self.facets[facets[whole]], split_ids])
+        eye = np.broadcast_to(np.eye(size), (len(whole), size, size))
+        at = np.concatenate([eye, parts.sub_barycentric[solid]])
+        source = np.concatenate([whole, parts.parent[parts.sub_piece[solid]]])
+        label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
+        label[len(whole) :, numbers] = parts.label[parts.sub_piece[solid]]
+        # sub-simplices come in the order of their numbers; facets keep their direction
+        wrong = np.linalg.det(at) < 0.0
+        ids[wrong, 0], ids[wrong, 1] = ids[wrong, 1], ids[wrong, 0].copy()
+        at[wrong, 0], at[wrong, 1] = at[wrong, 1], at[wrong, 0].copy()
+        ids, origin, share = self._edges.bisect(ids)
+        return ids, facets[source[origin]], share @ at[origin], label[origin]
+
+    def _patch(self, facets: _Ints) -> MeshPatch:
+        nodes, local = np.unique(self.facets[facets], return_inverse=True)
+        extent = self._cutter.mesh.extent
+        across = np.full((len(facets), self.facets.shape[1]), -1)
+        return MeshPatch(self.points, extent, facets, nodes, local.reshape(across.shape), across)
+
+    def _values(self, facets: _Ints, vertices: _Ints) -> tuple[_Ints, _Floats]:
+        """Cuts near facets, and their realised level sets (q, cuts) at vertices."""
+        mesh = self._cutter.mesh
+        cells = np.unique(self._vertex_cell[self.facets[facets]])
+        near = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
+        nodes = np.unique(mesh.cells[cells])
+        values = np.empty((len(vertices), len(near)))
+        for k, stroke in enumerate(near):
+            level = stroke.level_sets(nodes)
+            place = np.searchsorted(nodes, mesh.cells[self._vertex_cell[vertices]])
+            values[:, k] = (self._vertex_at[vertices] * level[place]).sum(axis=1)
+        return np.array([stroke.number for stroke in near], dtype=np.int64), values
+
+    def _level_sets(self) -> _Floats:
+        """Nodal level sets (n, cuts) as far as known: at least at the nodes of split cells."""
+        columns = [stroke.values for stroke in self._cutter.strokes]
+        if not columns:
+            return np.zeros((len(self._cutter.mesh.points), 0))
+        return np.stack(columns, axis=1)
+
+
+def _check(points: _Floats, facets: _Ints, space: int) -> None:
+    if points.ndim != 2 or points.shape[1] != space or not np.isfinite(points).all():
+        raise XfemError(f"surface points of shape {points.shape}; expected finite (v, {space})")
+    if facets.ndim != 2 or facets.shape[1] != space or len(facets) == 0:
+        raise XfemError(f"surface facets of shape {facets.shape}; expected (f, {space}), f > 0")
+    if facets.min() < 0 or facets.max() >= len(points):
+        raise XfemError(f"a surface facet has a vertex outside 0..{len(points) - 1}")
+    if (np.diff(np.sort(facets, axis=1), axis=1) == 0).any():
+        raise XfemError("a surface facet has a vertex twice")

@@ -1,0 +1,145 @@
+"""In which element, and in which piece of it, a material point lies.
+
+A point outside the mesh belongs to the element whose smallest barycentric coordinate at it is
+largest; on a common face several elements tie.
+"""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["barycentric", "cut_at", "embed_corners", "locate", "locate_many"]
+
+_DEEP = 128  # twice the height of any heap of boxes
+_TIE = 1e-9  # barycentric coordinates: closer than that to a face is on it
+_INWARDS = 1e-5  # how far from a corner to the centre of its facet its piece is looked up
+_SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on the face
+
+
+@njit(cache=True)
+def barycentric(x, cell, cells, points, gradients, out):
+    """Write the barycentric coordinates (d + 1,) of x; return the smallest."""
+    smallest, origin = np.inf, points[cells[cell, 0]]
+    for a in range(cells.shape[1]):
+        value = 1.0 if a == 0 else 0.0
+        for i in range(len(x)):
+            value += gradients[cell, a, i] * (x[i] - origin[i])
+        out[a] = value
+        smallest = min(smallest, value)
+    return smallest
+
+
+@njit(cache=True)
+def _cells_about(x, reach, low, high, order):
+    """Cells whose boxes come within reach of x; the reach grows until there are some."""
+    found, stack = [np.int64(0) for _ in range(0)], np.empty(_DEEP, dtype=np.int64)
+    while len(found) == 0:
+        stack[0], top = 1, 1
+        while top > 0:
+            top -= 1
+            node, apart = stack[top], False
+            for i in range(len(x)):
+                if x[i] < low[node, i] - reach or x[i] > high[node, i] + reach:
+                    apart = True
+            if apart:
+                continue
+            if node >= len(order):
+                found.append(order[node - len(order)])
+            else:
+                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+                top += 2
+        reach *= 2.0
+    return found
+
+
+@njit(cache=True)
+def locate(x, reach, low, high, order, cells, points, gradients):
+    """Give the cell of x."""
+    trial, best, at = np.empty(cells.shape[1]), -np.inf, -1
+    for cell in _cells_about(x, reach, low, high, order):
+        smallest = barycentric(x, cell, cells, points, gradients, trial)
+        if smallest > best:
+            best, at = smallest, cell
+    return at
+
+
+@njit(cache=True)
+def locate_many(places, reach, low, high, order, cells, points, gradients):
+    """Cells (q,), barycentric coordinates (q, d + 1)."""
+    found = np.empty(len(places), dtype=np.int64)
+    at = np.empty((len(places), cells.shape[1]))
+    for q in range(len(places)):
+        found[q] = locate(places[q], reach, low, high, order, cells, points, gradients)
+        barycentric(places[q], found[q], cells, points, gradients, at[q])
+    return found, at
+
+
+@njit(cache=True)
+def cut_at(
+    places, cut, reach, low, high, order, cells, points, gradients,
+    piece_label, first_piece, next_piece,
+):  # fmt: skip
+    """Whether a cell that holds each place (q, s) is split by a cut."""
+    found = np.zeros(len(places), dtype=np.bool_)
+    trial = np.empty(cells.shape[1])
+    for q in range(len(places)):
+        about = _cells_about(places[q], reach, low, high, order)
+        best = -np.inf
+        for cell in about:
+            best = max(best, barycentric(places[q], cell, cells, points, gradients, trial))
+        for cell in about:
+            smallest = barycentric(places[q], cell, cells, points, gradients, trial)
+            if smallest < min(best, 0.0) - _TIE:
+                continue
+            piece = first_piece[cell]
+            while piece >= 0:
+                found[q] = found[q] or piece_label[piece, cut] != 0
+                piece = next_piece[piece]
+    return found
+
+
+@njit(cache=True)
+def embed_corners(
+    corners, label, levels, reach, low, high, order, cells, points, gradients,
+    piece_label, first_piece, next_piece, weights,
+):  # fmt: skip
+    """Piece (q, k) of each corner of facets (q, k, s), and its weights (q, k, d + 1).
+
+    `label` (q, cuts) are the sides on which the cuts that split a facet have left it; on which
+    side of the others a corner is, the level sets (n, cuts) tell.
+    """
+    count, size, space = corners.shape
+    found = np.empty((count, size), dtype=np.int64)
+    inside, at = np.empty(space), np.empty(cells.shape[1])
+    for q in range(count):
+        for k in range(size):
+            for i in range(space):
+                centre = corners[q, :, i].sum() / size
+                inside[i] = corners[q, k, i] + _INWARDS * (centre - corners[q, k, i])
+            cell = locate(inside, reach, low, high, order, cells, points, gradients)
+            barycentric(inside, cell, cells, points, gradients, at)
+            best, best_agree, piece = -1, 0, first_piece[cell]
+            while piece >= 0:
+                agree = 0
+                for cut in range(piece_label.shape[1]):
+                    if piece_label[piece, cut] == 0:
+                        continue
+                    side = label[q, cut]
+                    if side == 0:
+                        level = 0.0
+                        for a in range(cells.shape[1]):
+                            level += at[a] * levels[cells[cell, a], cut]
+                        side = 1 if level >= 0.0 else -1
+                    # of all pieces the right one agrees with every cut; else the nearest to it
+                    agree += 1 if side == piece_label[piece, cut] else -1000
+                if best == -1 or agree > best_agree:
+                    best, best_agree = piece, agree
+                piece = next_piece[piece]
+            found[q, k] = best
+            barycentric(corners[q, k], cell, cells, points, gradients, weights[q, k])
+            total = 0.0
+            for a in range(cells.shape[1]):
+                if abs(weights[q, k, a]) <= _SNAP:
+                    weights[q, k, a] = 0.0
+                total += weights[q, k, a]
+            weights[q, k] /= total
+    return found
