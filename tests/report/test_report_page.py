@@ -86,7 +86,7 @@ def test_hostile_words_in_every_text_of_a_result_stay_text(tmp_path):
         "zero-volume piece dropped",
         "displacements × 2",
         "conforming P2, 3 levels, GCI",
-        "median of 3 repetitions",
+        "Median of 3 repetitions after a first call that is not counted",
         "0123456789abcdef",
         "it cannot be reproduced from it",
         "How to read this",

@@ -1,11 +1,11 @@
 """The section of one case: pictures, curves, numbers, reference, regularisations, failures."""
 
 from verify.report.colour_bar import colour_bar
-from verify.report.curves import Curve, error_curves, is_error, metric_names
+from verify.report.curves import Curve, error_curves, limits, metric_names
 from verify.report.figures_convergence import convergence_figure, error_range, required_slope
 from verify.report.figures_cost import time_figure, unknowns_figure
 from verify.report.markup import Markup, joined, tag
-from verify.report.notation import error_title, metric_title, number, number_text
+from verify.report.notation import error_title, number, number_text
 from verify.report.pictures import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
 from verify.report.summary import anchor, badge, verdict_of
@@ -108,7 +108,7 @@ def _diagrams(result: CaseResult, metric: str) -> Markup | None:
     y_range = error_range(curves, sloped=slope is not None)
     if y_range is None:
         return _undrawn(metric, curves)
-    title = error_title(metric, is_error(result, metric))
+    title = error_title(metric)
     panels = [
         convergence_figure(result, metric, curves, y_range, title),
         unknowns_figure(curves, y_range, title),
@@ -120,8 +120,8 @@ def _diagrams(result: CaseResult, metric: str) -> Markup | None:
     source = next(m.source for s in result.solves if (m := s.metric(metric)) is not None)
     said = [
         f"{title[:1].upper()}{title[1:]}, against {source or 'an unnamed reference'}.",
-        _floor_text(curves, y_range),
-        f"The triangle has the required order, {slope[1]}." if slope else "No order is required.",
+        _floor_text(curves),
+        f"The triangle has the required order, {slope[1]}." if slope else "",
     ]
     return tag(
         "figure",
@@ -133,17 +133,26 @@ def _diagrams(result: CaseResult, metric: str) -> Markup | None:
 def _undrawn(metric: str, curves: list[Curve]) -> Markup | None:
     if not curves:
         return None
-    said = f"{metric_title(metric)}: zero on every level, which a logarithmic axis cannot show."
+    title = error_title(metric)
+    said = f"{title[:1].upper()}{title[1:]}: zero on every level, so there is no logarithm to draw."
     return tag("p", said, class_="quiet")
 
 
-def _floor_text(curves: list[Curve], y_range: tuple[float, float]) -> str:
-    floor = max(point.uncertainty for curve in curves for point in curve.points)
+def _floor_text(curves: list[Curve]) -> str:
+    finest = max(point.level for curve in curves for point in curve.points)
+    points = [point for curve in curves for point in curve.points]
+    floor = max(point.uncertainty for point in points if point.level == finest)
     if floor <= 0:
-        return "No uncertainty of the reference is recorded."
-    if floor <= y_range[0]:
-        return f"The reference is uncertain by at most {number_text(floor, 2)}, below the axis."
-    return f"Grey band and bars: uncertainty of the reference, at most {number_text(floor, 2)}."
+        return "No uncertainty of the comparison is recorded."
+    where = f"at most {number_text(floor, 2)} on the finest level"
+    if any(limits(point) for point in points):
+        return f"Grey band and bars: uncertainty of reference and integration, {where}."
+    return f"Uncertainty of reference and integration: {where}, too small to matter here."
+
+
+def _phases(curve: Curve) -> list[str]:
+    times = [point.duration for point in curve.points if point.duration is not None]
+    return list(dict.fromkeys(name for time in times for name in time.phases))
 
 
 def _reservations(curves: list[Curve], result: CaseResult) -> list[str]:
@@ -155,11 +164,15 @@ def _reservations(curves: list[Curve], result: CaseResult) -> list[str]:
         said.append("× marks a level that did not finish: the curve ends there.")
     timed = [p.duration for c in curves for p in c.points if p.duration]
     if timed:
-        phases = ", ".join(dict.fromkeys(name for time in timed for name in time.phases))
+        phases = "; ".join(
+            f"{curve.label}: {', '.join(names)}"
+            for curve in {curve.label: curve for curve in curves}.values()
+            if (names := _phases(curve))
+        )
         counts = sorted({time.repetitions for time in timed})
         repeated = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
         said.append(
-            f"Timed: {phases}; median of {repeated} repetition{'s' if counts != [1] else ''} "
+            f"Timed: {phases}. Median of {repeated} repetition{'s' if counts != [1] else ''} "
             "after a first call that is not counted"
             + ("; dotted, the time with meshing." if any(t.meshing > 0 for t in timed) else ".")
         )

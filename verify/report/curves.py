@@ -2,13 +2,23 @@
 
 import json
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
 from verify.report.notation import solver_title
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 
-__all__ = ["Curve", "Duration", "Point", "duration", "error_curves", "is_error", "metric_names"]
+__all__ = [
+    "Curve",
+    "Duration",
+    "Point",
+    "duration",
+    "error_curves",
+    "floor",
+    "limits",
+    "metric_names",
+]
 
 MESHING = "meshing"
 # Beyond these a number is a symptom, and powers of ten around it overflow
@@ -73,10 +83,20 @@ def metric_names(result: CaseResult) -> list[str]:
     return list(dict.fromkeys(m.name for solve in result.solves for m in solve.metrics))
 
 
-def is_error(result: CaseResult, metric: str) -> bool:
-    """Whether `metric` is a relative error, rather than a quantity with a reference value."""
-    found = (solve.metric(metric) for solve in result.solves)
-    return all(m.unit == "1" and m.reference is None for m in found if m is not None)
+def limits(point: Point) -> bool:
+    """Whether the uncertainty of the comparison is near enough to the error to be drawn."""
+    return point.uncertainty > point.value / 30
+
+
+def floor(
+    curves: Sequence[Curve], abscissa: Callable[[Point], float | None]
+) -> list[tuple[float, float]]:
+    """Return (abscissa, uncertainty) of every point: the largest uncertainty on its level."""
+    points = [point for curve in curves for point in curve.points]
+    largest: dict[int, float] = {}
+    for point in points:
+        largest[point.level] = max(point.uncertainty, largest.get(point.level, 0.0))
+    return sorted((x, largest[p.level]) for p in points if (x := abscissa(p)) is not None)
 
 
 def error_curves(result: CaseResult, metric: str) -> list[Curve]:

@@ -1,7 +1,7 @@
 """Error against mesh size: curves, required slope, and the floor that the reference sets."""
 
 from verify.report.axes import Panel, log_range
-from verify.report.curves import Curve, Point
+from verify.report.curves import Curve, Point, floor, limits
 from verify.report.marks import (
     abandoned,
     band,
@@ -20,16 +20,14 @@ __all__ = ["convergence_figure", "error_range", "required_slope"]
 def error_range(curves: list[Curve], sloped: bool) -> tuple[float, float] | None:
     """Return the error axis that all figures of a metric share, or None if nothing is drawn.
 
-    It holds every error, the tops of their error bars, and the floor unless that lies more
-    than a decade and a half below the smallest error.
+    It holds every error, the tops of their error bars, and the floor where it `limits` them.
     """
     points = [point for curve in curves for point in curve.points if point.value > 0]
     if not points:
         return None
-    smallest = min(point.value for point in points)
     values = [p.value for p in points] + [p.value + p.uncertainty for p in points]
     # half of it as well, so that the band below it can be seen
-    values += [p.uncertainty / 2 for p in points if p.uncertainty > smallest / 30]
+    values += [p.uncertainty / 2 for p in points if limits(p)]
     low, high = log_range(values)
     return (low / 2.2 if sloped else low), high
 
@@ -64,7 +62,7 @@ def convergence_figure(
         title,
     )
     styles = style_of(curves)
-    content = [band(panel, _floor(curves))]
+    content = [band(panel, floor(curves, lambda point: point.size))]
     slope = required_slope(result, metric)
     if slope is not None and len(set(sizes)) > 1:
         content.append(_triangle(panel, curves, *slope))
@@ -99,15 +97,6 @@ def _places_of_ends(curve: Curve, curves: list[Curve]) -> list[tuple[float, floa
         guess = (nearest.size or 1.0) * 2.0 ** (nearest.level - level)
         places.append((sizes[0] if sizes else guess, nearest.value))
     return places
-
-
-def _floor(curves: list[Curve]) -> list[tuple[float, float]]:
-    """Return the largest uncertainty at each size."""
-    floor: dict[float, float] = {}
-    for point in (p for curve in curves for p in curve.points):
-        if point.size is not None:
-            floor[point.size] = max(point.uncertainty, floor.get(point.size, 0.0))
-    return sorted(floor.items())
 
 
 def _triangle(panel: Panel, curves: list[Curve], slope: float, name: str) -> Markup:

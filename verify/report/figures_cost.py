@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from verify.report.axes import Panel, log_range
-from verify.report.curves import Curve, Point
+from verify.report.curves import Curve, Point, floor
 from verify.report.marks import Style, band, curve_names, drawn_curve, style_of
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import number_text
@@ -50,8 +50,7 @@ def _figure(
     under: list[Markup],
 ) -> Markup:
     styles = style_of(curves)
-    floor = max(point.uncertainty for curve in curves for point in curve.points)
-    content = [band(panel, [(panel.x.low, floor), (panel.x.high, floor)]), *under]
+    content = [band(panel, floor(curves, abscissa)), *under]
     names, said = [], [f"{panel.y_title} against {panel.x_title}."]
     for curve in curves:
         content.append(drawn_curve(panel, curve, styles[curve.label], abscissa))

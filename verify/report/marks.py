@@ -107,18 +107,21 @@ def curve_names(
 
 
 def band(panel: Panel, floor: Sequence[tuple[float, float]]) -> Markup:
-    """Return the band below the reference's uncertainty, given as (x, uncertainty) values."""
-    inside = sorted((panel.x.at(x), panel.y.at(u)) for x, u in floor if u > panel.y.low)
-    if not inside:
+    """Return the band below the uncertainty of the comparison, given as (x, uncertainty)."""
+    if not any(u > panel.y.low for _, u in floor):
         return joined()
+    inside = [(panel.x.at(x), panel.y.at(u)) for x, u in sorted(floor)]
     nodes = [(panel.x.start, inside[0][1]), *inside, (panel.x.end, inside[-1][1])]
     line = "L".join(f"{x:.1f} {y:.1f}" for x, y in nodes)
-    name = "uncertainty of the reference"
-    y = min(max(inside[0][1], inside[-1][1]) + 12, panel.y.start - 4)
+    # the name stands where the band is higher, if it is high enough for it
+    left = inside[0][1] <= inside[-1][1]
+    top = inside[0][1] if left else inside[-1][1]
+    x, anchor = (panel.x.start + 5, "start") if left else (panel.x.end - 4, "end")
+    name = text(x, top + 12, "uncertainty of the comparison", class_="note", text_anchor=anchor)
     return joined(
         tag("path", d=f"M{line}V{panel.y.start}H{panel.x.start}Z", class_="floor"),
         tag("path", d=f"M{line}", class_="floor-edge"),
-        text(panel.x.start + 5, y, name, class_="note"),
+        name if panel.y.start - top > 14 else None,
     )
 
 

@@ -22,6 +22,7 @@ _METRICS = {
     "jump_l2": "relative L² error of the jump across the cut",
     "strain_energy": "strain energy",
 }
+_ERRORS = {"displacement_l2", "energy_norm", "jump_l2"}
 _SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference"}
 _MISSING = "–"
 
@@ -31,9 +32,9 @@ def metric_title(name: str) -> str:
     return _METRICS.get(name, name.replace("_", " "))
 
 
-def error_title(name: str, is_error: bool) -> str:
-    """Return what is drawn for a metric: itself if it is an error, else its deviation."""
-    return metric_title(name) if is_error else f"relative deviation of {metric_title(name)}"
+def error_title(name: str) -> str:
+    """Return what is judged of a metric: an error, or the relative error of a quantity."""
+    return metric_title(name) if name in _ERRORS else f"relative error of the {metric_title(name)}"
 
 
 def solver_title(name: str) -> str:

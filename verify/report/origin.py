@@ -25,7 +25,8 @@ _GUIDE = (
         "Convergence",
         "Both axes are logarithmic. An order is fitted to the finest levels and is stated only "
         "where it means something; otherwise its reason stands there. Inside the grey band an "
-        "error cannot be told from that of the reference.",
+        "error cannot be told from that of the comparison: of the reference, and of the "
+        "numerical integration that measures the difference.",
     ),
     (
         "Cost",

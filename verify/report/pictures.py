@@ -29,7 +29,7 @@ DISPLACEMENT_COLOURS, ERROR_COLOURS = "cividis", "YlOrBr"
 _VTK = [sys.executable, "-m", "verify.report.draw_with_vtk"]
 _SECONDS = 60.0  # to start VTK
 _SECONDS_EACH = 20.0
-_OPENING_SHOWN = 0.08  # of the body's diagonal: what the largest displacement is scaled to
+_OPENING_SHOWN = 0.15  # of the body's diagonal: what the largest displacement is scaled to
 
 
 @dataclass

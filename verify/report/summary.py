@@ -3,7 +3,7 @@
 from collections import Counter
 
 from verify.report.markup import Markup, joined, tag
-from verify.report.notation import metric_title, solver_title, with_interval
+from verify.report.notation import error_title, metric_title, solver_title, with_interval
 from verify.report.run_directory import CaseEntry, Run
 from verify.result import Status, Verdict, VerdictRecord
 
@@ -17,9 +17,8 @@ _SIGNS = {
 }
 _CHECKS = {
     "rate": "order of the",
-    "error": "finest-mesh",
-    "ratio": "ratio to another solver, on every level, of the",
-    "value": "value of the",
+    "error": "",
+    "ratio": "worst ratio of the",
 }
 _NAMED_IN_PARAGRAPH = 6
 
@@ -42,8 +41,9 @@ def verdict_of(entry: CaseEntry) -> Verdict:
 
 def check_text(record: VerdictRecord) -> str:
     """Return what a check looks at, in words."""
-    what = _CHECKS.get(record.check, record.check)
-    return f"{solver_title(record.solver)}: {what} {metric_title(record.metric)}"
+    name = metric_title(record.metric) if record.check == "value" else error_title(record.metric)
+    what = f"{_CHECKS.get(record.check, record.check)} {name}".strip()
+    return f"{solver_title(record.solver)}: {what}"
 
 
 def summary(run: Run) -> Markup:

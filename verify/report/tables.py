@@ -8,6 +8,7 @@ from verify.report.curves import duration, metric_names
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import (
     bytes_text,
+    error_title,
     metric_title,
     number,
     seconds_text,
@@ -44,18 +45,19 @@ def numbers_table(result: CaseResult) -> Markup | None:
     names = metric_names(result)
     if not result.solves:
         return None
-    head = ["solver", "level", "h (m)", "unknowns", *(metric_title(name) for name in names)]
+    titles = [joined(metric_title(name), _common_reference(result, name)) for name in names]
+    head = ["solver", "level", "h (m)", "unknowns", *titles]
     rows = [
         [
             solver_title(solve.solver),
             solve.level,
             number(solve.size),
             number(solve.unknowns),
-            *(_measured(solve, solve.metric(name)) for name in names),
+            *(_measured(solve, name, result) for name in names),
         ]
         for solve in _ordered(result)
     ]
-    return table(head, rows, "Numbers: value ± uncertainty, reference value below")
+    return table(head, rows, "Numbers: value ± uncertainty")
 
 
 def times_table(result: CaseResult) -> Markup | None:
@@ -92,36 +94,35 @@ def orders_table(result: CaseResult) -> Markup | None:
     rows = [
         [
             solver_title(rate.solver),
-            metric_title(rate.metric),
-            joined(number(rate.order, 3), " ± ", number(rate.uncertainty, 2))
-            if rate.order is not None
-            else "–",
+            error_title(rate.metric),
+            f"{rate.order:.3f} ± {rate.uncertainty:.3f}" if rate.order is not None else "–",
             ", ".join(f"{slope:.2f}" for slope in rate.pairwise) or "–",
             rate.reason or "–",
         ]
         for rate in result.rates
     ]
-    head = ["solver", "error", "order", "between successive levels", "why it means nothing"]
+    head = ["solver", "error", "order", "between successive levels", "reservation"]
     return table(head, rows, "Observed orders of convergence")
 
 
 def regularisations_table(result: CaseResult) -> Markup | None:
     """Return all that the solvers dropped, snapped, clamped, scaled or floored."""
-    rows = [
-        [
-            solver_title(solve.solver),
-            solve.level,
-            entry.get("kind", "–"),
-            number(entry.get("count")),
-            joined(number(entry.get("size")), " ", entry.get("unit", "")),
-        ]
-        for solve in _ordered(result)
-        for entry in solve.regularisations
-    ]
-    if not rows:
+    groups: dict[tuple[str, str], list[tuple[int, dict[str, Any]]]] = {}
+    for solve in _ordered(result):
+        for entry in solve.regularisations:
+            key = (solve.solver, str(entry.get("kind", "–")))
+            groups.setdefault(key, []).append((solve.level, entry))
+    if not groups:
         return None
-    head = ["solver", "level", "what was done", "how often", "largest contribution"]
-    return table(head, rows, "Regularisations")
+    rows = []
+    for (solver, kind), found in groups.items():
+        sizes = [e["size"] for _, e in found if isinstance(e.get("size"), int | float)]
+        unit = found[0][1].get("unit", "")
+        counts = _separated([joined(number(e.get("count")), f" (level {n})") for n, e in found])
+        largest = joined(number(float(max(sizes)), 2), " ", unit) if sizes else "–"
+        rows.append([solver_title(solver), kind, joined(*counts), largest])
+    head = ["solver", "what was done", "how often", "largest contribution"]
+    return table(head, rows, "Regularisations", class_="prose")
 
 
 def failures_table(solves: Sequence[SolveRecord]) -> Markup | None:
@@ -147,8 +148,9 @@ def reference_record(reference: dict[str, Any]) -> Markup | None:
     """Return what the case was judged against, whatever the record holds."""
     if not reference:
         return None
-    plain = {key: value for key, value in reference.items() if not isinstance(value, dict)}
-    nested = {key: value for key, value in reference.items() if isinstance(value, dict) and value}
+    said = {key: value for key, value in reference.items() if value not in ([], {}, None, "")}
+    plain = {key: value for key, value in said.items() if not isinstance(value, dict)}
+    nested = {key: value for key, value in said.items() if isinstance(value, dict)}
     parts: list[Markup] = []
     if plain:
         entries = [
@@ -205,16 +207,31 @@ def _ordered(result: CaseResult) -> list[SolveRecord]:
     return sorted(result.solves, key=lambda solve: (solvers.index(solve.solver), solve.level))
 
 
-def _measured(solve: SolveRecord, metric: Metric | None) -> Any:
+def _references(result: CaseResult, name: str) -> set[tuple[float, str]]:
+    found = [metric for solve in result.solves if (metric := solve.metric(name)) is not None]
+    return {(m.reference, m.unit) for m in found if m.reference is not None}
+
+
+def _common_reference(result: CaseResult, name: str) -> Markup | None:
+    """Return the reference value of a quantity, if all solves are held against the same one."""
+    if len(references := _references(result, name)) != 1:
+        return None
+    ((value, unit),) = references
+    words = ["reference ", number(value, 8), "" if unit == "1" else f" {unit}"]
+    return tag("div", words, class_="quiet")
+
+
+def _measured(solve: SolveRecord, name: str, result: CaseResult) -> Any:
+    metric: Metric | None = solve.metric(name)
     if metric is None:
         return "–" if solve.status is Status.SOLVED else str(solve.status)
     value = number(metric.value, 5 if metric.reference is None else 8)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
     plus = joined(" ± ", number(metric.uncertainty, 2)) if metric.uncertainty > 0 else None
-    below = None
-    if metric.reference is not None:
-        below = tag("div", "reference ", number(metric.reference, 8), unit, class_="quiet")
-    return joined(value, plus, unit, below)
+    own = None
+    if metric.reference is not None and len(_references(result, name)) > 1:
+        own = tag("div", "reference ", number(metric.reference, 8), unit, class_="quiet")
+    return joined(value, plus, unit, own)
 
 
 def _spread(values: Sequence[float]) -> str:
