@@ -106,16 +106,16 @@ def _facet_parts(virtual: VirtualMesh, cells: _Ints, local: int) -> tuple[_Ints,
     wanted = np.zeros(len(mesh.cells), dtype=bool)
     wanted[cells] = True
     piece, barycentric, _ = virtual.solid_simplices
-    here = np.flatnonzero(wanted[virtual.parent[piece]])
+    cell, in_cell = virtual.solid_places
+    here = np.flatnonzero(wanted[cell])
     found_piece, found_corners, found_area = [], [], []
     for opposite in range(mesh.dim + 1):
         rest = [k for k in range(mesh.dim + 1) if k != opposite]
-        on_facet = here[(barycentric[here][:, rest, local] == 0.0).all(axis=1)]
-        corners = barycentric[on_facet][:, rest]
-        share = np.abs(np.linalg.det(corners[:, :, others]))
+        on_facet = here[(in_cell[here][:, rest, local] == 0.0).all(axis=1)]
+        share = np.abs(np.linalg.det(in_cell[on_facet][:, rest][:, :, others]))
         found_piece.append(piece[on_facet])
-        found_corners.append(corners)
-        found_area.append(share * area[virtual.parent[piece[on_facet]]])
+        found_corners.append(barycentric[on_facet][:, rest])
+        found_area.append(share * area[cell[on_facet]])
     return tuple(np.concatenate(x) for x in (found_piece, found_corners, found_area))  # type: ignore[return-value]
 
 

@@ -49,14 +49,18 @@ class LinearStiffness:
         object.__setattr__(self, "mu", np.broadcast_to(material.mu, count).astype(float))
 
     def assemble(self, pattern: BlockPattern, out: _Floats | None = None) -> _Floats:
-        """(B, d, d) nodal blocks of the stiffness, in N/m (per metre of thickness in 2D)."""
+        """(B, d, d) nodal blocks of the stiffness, in N/m (per metre of thickness in 2D).
+
+        The first cells of the pattern must be those of the body.
+        """
         dim = self.virtual.mesh.dim
         blocks = np.zeros((len(pattern.columns), dim, dim)) if out is None else out
         if out is not None:
             blocks[:] = 0.0
         v = self.virtual
+        targets = pattern.targets[: len(v.cells)]
         add_stiffness(
-            pattern.targets, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, blocks
+            targets, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, blocks
         )
         return blocks
 

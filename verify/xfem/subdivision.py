@@ -52,14 +52,16 @@ class Subdivision:
 def subdivide(virtual: VirtualMesh) -> Subdivision:
     """Make the conforming sub-division of a cut mesh."""
     mesh, zero = virtual.mesh, virtual.sub_cells.zero_points
-    piece, barycentric, _ = virtual.solid_simplices
-    whole = len(piece) - len(virtual.sub_cells.piece)
-    ids = np.concatenate([mesh.cells[virtual.parent[piece[:whole]]], virtual.sub_cells.points])
-    piece, ids, barycentric = _bisect_hanging(virtual, piece, ids, barycentric)
+    solid, barycentric, _ = virtual.solid_simplices
+    whole = len(solid) - len(virtual.sub_cells.piece)
+    ids = np.concatenate([mesh.cells[virtual.parent[solid[:whole]]], virtual.sub_cells.points])
+    source, ids, barycentric = _bisect_hanging(virtual, np.arange(len(solid)), ids, barycentric)
+    piece = solid[source]
 
-    # a mesh node moves with one unknown, a point of the cut with those of its edge
+    # a mesh node moves with one unknown, a point of the cut with those of its edge, and a node
+    # of a neighbour that was absorbed with all unknowns of the piece
     unknowns = virtual.cells[piece]
-    row, corner = np.nonzero(ids >= len(mesh.points))
+    row, corner = np.nonzero((ids >= len(mesh.points)) | (barycentric.max(axis=2) != 1.0))
     node = np.take_along_axis(unknowns, barycentric.argmax(axis=2), axis=1)
     weights, columns = barycentric[row, corner], unknowns[row]
     support = np.sort(np.where(weights != 0.0, columns, -1), axis=1)
@@ -89,14 +91,14 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
         points=points,
         cells=_oriented(points, cells),
         cell_piece=piece,
-        cell_parent=virtual.parent[piece],
+        cell_parent=virtual.solid_places[0][source],
         interpolation=interpolation,
         cut_facets=_cut_facets(points, cells, ids),
     )
 
 
 def _bisect_hanging(
-    virtual: VirtualMesh, piece: _Ints, ids: _Ints, barycentric: _Floats
+    virtual: VirtualMesh, source: _Ints, ids: _Ints, barycentric: _Floats
 ) -> tuple[_Ints, _Ints, _Floats]:
     """Bisect simplices on whose edges a neighbour has a point that they do not have."""
     zero = virtual.sub_cells.zero_points
@@ -106,8 +108,8 @@ def _bisect_hanging(
     ends = np.zeros(len(zero.positions), dtype=bool)
     ends[zero.ends[used]] = True
     near = ends[ids].sum(axis=1) >= 2
-    rest = (piece[~near], ids[~near], barycentric[~near])
-    piece, ids, barycentric = piece[near], ids[near], barycentric[near]
+    rest = (source[~near], ids[~near], barycentric[~near])
+    source, ids, barycentric = source[near], ids[near], barycentric[near]
     edges = _edge_keys(ids)
     for point in _bisection_order(zero, used):
         plus, minus = zero.ends[point]
@@ -126,11 +128,11 @@ def _bisect_hanging(
             new_corners[np.arange(len(rows)), local] = s * at + r * to
             halves.append((new_ids, new_corners))
             edges |= _edge_keys(new_ids)
-        piece = np.concatenate([piece[~has], piece[rows], piece[rows]])
+        source = np.concatenate([source[~has], source[rows], source[rows]])
         ids = np.concatenate([ids[~has], halves[0][0], halves[1][0]])
         barycentric = np.concatenate([barycentric[~has], halves[0][1], halves[1][1]])
     return (
-        np.concatenate([rest[0], piece]),
+        np.concatenate([rest[0], source]),
         np.concatenate([rest[1], ids]),
         np.concatenate([rest[2], barycentric]),
     )

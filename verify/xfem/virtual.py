@@ -42,6 +42,12 @@ class SubCells:
         Share in the volume of the parent cell, positive.
     zero_points : ZeroPoints
         Positions of all numbered points, and the edges on which the new ones lie.
+    cell : (k,) int array, optional
+        Cell of the uncut mesh in which each lies, if a piece reaches out of its parent cell
+        because it has absorbed a neighbour; `barycentric` and `fraction` still count in the
+        parent cell.
+    in_cell : (k, d + 1, d + 1) float array, optional
+        Barycentric coordinates of the vertices in that cell.
     """
 
     piece: _Ints
@@ -49,6 +55,8 @@ class SubCells:
     barycentric: _Floats
     fraction: _Floats
     zero_points: ZeroPoints
+    cell: _Ints | None = None
+    in_cell: _Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ class VirtualMesh:
     parent : (p,) int array
         Cell of the uncut mesh.
     fraction : (p,) float array
-        V_piece / V_parent, in (0, 1].
+        V_piece / V_parent, in (0, 1]; above 1 if the piece has absorbed a neighbour.
     label : (p, cuts) int8 array
         Side of each cut that splits the parent; 0 where the cut does not split it.
     node_parent : (N,) int array
@@ -106,8 +114,8 @@ class VirtualMesh:
 
     @cached_property
     def split(self) -> NDArray[np.bool_]:
-        """(p,) whether a piece is part of a split cell."""
-        return (self.label != 0).any(axis=1)
+        """(p,) whether a piece is described by sub-simplices: it is not just its whole cell."""
+        return np.bincount(self.sub_cells.piece, minlength=len(self.cells)) > 0
 
     @cached_property
     def piece_side(self) -> NDArray[np.int8]:
@@ -166,6 +174,20 @@ class VirtualMesh:
             np.concatenate([whole, sub.piece]),
             np.concatenate([eye, sub.barycentric]),
             np.concatenate([np.ones(len(whole)), sub.fraction]),
+        )
+
+    @cached_property
+    def solid_places(self) -> tuple[_Ints, _Floats]:
+        """Cell of the uncut mesh and barycentric corners in it, of each of the simplices above."""
+        piece, barycentric, _ = self.solid_simplices
+        cell = self.parent[piece]
+        sub = self.sub_cells
+        if sub.cell is None or sub.in_cell is None:
+            return cell, barycentric
+        whole = len(piece) - len(sub.piece)
+        return (
+            np.concatenate([cell[:whole], sub.cell]),
+            np.concatenate([barycentric[:whole], sub.in_cell]),
         )
 
     @cached_property

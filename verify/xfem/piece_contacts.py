@@ -1,0 +1,101 @@
+"""Which pieces touch: across the faces of the mesh, and across a cut inside a cell."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Bridges", "face_contacts", "sibling_contacts"]
+
+_Ints = NDArray[np.int64]
+_Floats = NDArray[np.float64]
+
+
+def face_contacts(virtual: VirtualMesh) -> tuple[_Ints, _Ints]:
+    """Pairs of pieces (k,), (k,) of neighbouring cells that share all unknowns of their face."""
+    mesh = virtual.mesh
+    cell, local = np.nonzero(mesh.neighbours > np.arange(len(mesh.cells))[:, None])
+    across = mesh.neighbours[cell, local]
+    start = np.searchsorted(virtual.parent, np.arange(len(mesh.cells) + 1))
+    count = np.diff(start)
+    pairs = count[cell] * count[across]
+    face = np.repeat(np.arange(len(cell)), pairs)
+    within = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+    first = start[cell[face]] + within // count[across[face]]
+    second = start[across[face]] + within % count[across[face]]
+    simple = (count[cell] == 1) & (count[across] == 1)
+    check = np.flatnonzero(~simple[face])
+    mine = _face_unknowns(virtual, first[check], local[face[check]])
+    other_local = (mesh.neighbours[across[face[check]]] == cell[face[check], None]).argmax(axis=1)
+    theirs = _face_unknowns(virtual, second[check], other_local)
+    shared = np.ones(len(face), dtype=bool)
+    shared[check] = (mine == theirs).all(axis=1)
+    return first[shared], second[shared]
+
+
+def _face_unknowns(virtual: VirtualMesh, piece: _Ints, local: _Ints) -> _Ints:
+    """Unknowns (q, d) of the pieces on the face opposite to a corner, ascending."""
+    corners = virtual.cells.shape[1]
+    on_face = np.arange(corners) != local[:, None]
+    return np.sort(virtual.cells[piece][on_face].reshape(-1, corners - 1), axis=1)
+
+
+def sibling_contacts(virtual: VirtualMesh, cells: _Ints) -> tuple[_Ints, _Ints, _Floats]:
+    """Pairs of pieces inside the given cells, and the area of the cut between them.
+
+    Pieces with a piece without volume between them do not appear.
+    """
+    sub, corners = virtual.sub_cells, virtual.cells.shape[1]
+    wanted = np.zeros(len(virtual.mesh.cells), dtype=bool)
+    wanted[cells] = True
+    rows = np.flatnonzero(wanted[virtual.parent[sub.piece]])
+    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
+    facets = np.sort(sub.points[rows][:, keep].reshape(-1, corners - 1), axis=1)
+    piece = np.repeat(sub.piece[rows], corners)
+    parent = virtual.parent[piece]
+    order = np.lexsort([*facets.T[::-1], parent])
+    facets, piece, parent = facets[order], piece[order], parent[order]
+    met = (facets[1:] == facets[:-1]).all(axis=1) & (parent[1:] == parent[:-1])
+    met &= piece[1:] != piece[:-1]
+    first, second = piece[:-1][met], piece[1:][met]
+    at = sub.zero_points.positions[facets[:-1][met]]
+    edges = at[:, 1:] - at[:, :1]
+    area = np.sqrt(np.maximum(np.linalg.det(edges @ edges.transpose(0, 2, 1)), 0.0))
+    return np.concatenate([first, second]), np.concatenate([second, first]), np.tile(area, 2)
+
+
+class Bridges:
+    """Pieces whose removal would tear apart what they join, across faces.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    contacts : pair of (k,) int arrays
+        As `face_contacts` gives them.
+    """
+
+    def __init__(self, virtual: VirtualMesh, contacts: tuple[_Ints, _Ints]) -> None:
+        self._count = len(virtual.cells)
+        self._first, self._second = contacts
+
+    def among(self, removed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(p,) which of the removed pieces (p,) hold together several remaining parts.
+
+        Removed pieces in contact count as one, and parts that touch in a node or an edge only as
+        apart: they could turn about it.
+        """
+        first, second = self._first, self._second
+        same = removed[first] == removed[second]
+        graph = coo_array(
+            (np.ones(int(same.sum()), dtype=np.int8), (first[same], second[same])),
+            shape=(self._count, self._count),
+        )
+        part = connected_components(graph, directed=False)[1]
+        inner = np.where(removed[first], first, second)[~same]
+        outer = np.where(removed[first], second, first)[~same]
+        touched = np.unique(np.stack([part[inner], part[outer]]), axis=1)[0]
+        several = np.bincount(touched, minlength=part.max(initial=0) + 1) > 1
+        bridges: NDArray[np.bool_] = removed & several[part]
+        return bridges
