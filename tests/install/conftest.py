@@ -38,7 +38,8 @@ def checkout(tmp_path):
     """Return a directory with the set-up scripts, and the environment to run them in."""
     place = tmp_path / "a checkout"
     (place / ".ci").mkdir(parents=True)
-    for source in [*(ROOT / ".ci").iterdir(), ROOT / "pyproject.toml", ROOT / "Makefile"]:
+    scripts = [path for path in (ROOT / ".ci").iterdir() if path.is_file()]
+    for source in [*scripts, ROOT / "pyproject.toml", ROOT / "Makefile"]:
         copy = place / source.relative_to(ROOT)
         copy.write_bytes(source.read_bytes())
         copy.chmod(source.stat().st_mode)
