@@ -78,7 +78,7 @@ def test_force_is_the_gradient_of_the_energy_and_stiffness_the_gradient_of_the_f
     K = pattern.matrix(force.stiffness(pattern, u))
     product = (K @ direction.ravel()).reshape(u.shape)
     assert np.abs(product - change).max() < 1e-9 * np.abs(change).max()
-    assert np.abs((K - K.T)).max() <= 1e-14 * np.abs(K).max()
+    assert np.abs(K - K.T).max() <= 1e-14 * np.abs(K).max()
     assert force.left_out == 0
 
 
@@ -132,9 +132,7 @@ def test_rigid_separation_costs_no_energy_at_any_rotation(body, angle):
     assert np.abs(f).max() < 1e-11 * SOFT
 
 
-@pytest.mark.parametrize(
-    ("degrees", "energy"), [(30.0, 162.233085), (90.0, 9038.461538)]
-)
+@pytest.mark.parametrize(("degrees", "energy"), [(30.0, 162.233085), (90.0, 9038.461538)])
 def test_linear_kinematics_pays_for_the_same_rotation(degrees, energy):
     force = InternalForce(cut_square(), material(2), "linear")
     found = force.evaluate(_upper_half_turned(force.virtual, np.radians(degrees)))[1]

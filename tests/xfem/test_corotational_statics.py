@@ -73,7 +73,10 @@ def test_a_strip_peeled_into_half_circles_has_the_exact_energy_at_second_order()
     exact = 1.12698177e-4
     # odd numbers put the cut inside elements
     errors = [_peeled_strip(across).energy / exact - 1.0 for across in (5, 9, 17)]
-    rates = [np.log(a / b) / np.log(q) for a, b, q in zip(errors[:2], errors[1:], (9 / 5, 17 / 9), strict=True)]
+    rates = [
+        np.log(a / b) / np.log(q)
+        for a, b, q in zip(errors[:2], errors[1:], (9 / 5, 17 / 9), strict=True)
+    ]
     assert all(error > 0.0 for error in errors)
     assert all(1.95 < rate < 2.05 for rate in rates)
     extrapolated = errors[2] - (errors[1] - errors[2]) / ((17 / 9) ** 2 - 1.0)

@@ -130,9 +130,7 @@ def test_angular_momentum_is_kept_by_those_schemes_that_should(dim):
         assert drifts[scheme] > 1e-4
 
 
-@pytest.mark.parametrize(
-    ("share", "bound"), [(0.9, 1e-4), (0.5, 3e-5), (0.25, 1e-5)]
-)
+@pytest.mark.parametrize(("share", "bound"), [(0.9, 1e-4), (0.5, 3e-5), (0.25, 1e-5)])
 def test_central_differences_hold_the_energy_of_small_strains_over_ten_thousand_steps(share, bound):
     body = _free(cut_square(4))
     state = _moving(body, 1e-4)
@@ -178,6 +176,7 @@ def test_the_energy_momentum_scheme_conserves_at_large_amplitude_over_many_steps
     assert np.ptp(account.strain) > 0.1 * account.mechanical[0]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(("dim", "share"), [(2, 0.9), (2, 4.0), (3, 0.9)])
 def test_the_energy_momentum_scheme_conserves_over_ten_thousand_steps(dim, share):
     body = _free(cut_square(4) if dim == 2 else cut_cube(1, (0.5, 0.53, 0.47)))
@@ -242,9 +241,7 @@ def test_a_damped_mode_decays_as_rayleigh_says(scheme):
     values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
     mode = int(np.argmax(values > 1e-6 * values[-1]))
     omega = np.sqrt(values[mode])
-    body = DynamicBody(
-        body.force, body.mass, damping=RayleighDamping(0.1 * omega, 0.1 / omega)
-    )
+    body = DynamicBody(body.force, body.mass, damping=RayleighDamping(0.1 * omega, 0.1 / omega))
     shape = (vectors[:, mode] / root).reshape(body.shape)
     state = body.rest()
     state.displacement[:] = 1e-3 * shape

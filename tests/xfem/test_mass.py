@@ -82,11 +82,9 @@ def test_enrichment_lumping_is_diagonal_in_the_shifted_unknowns():
     T[extra, enriched] = 1.0
     M = T.T @ shifted_mass(v, DENSITY, "enrichment").matrix.toarray() @ T
     expected = np.zeros(v.node_count)
-    position = {node: row for node, row in zip(enriched, extra, strict=True)}
+    position = dict(zip(enriched, extra, strict=True))
     for cell, nodes in enumerate(mesh.cells):
-        above = sum(
-            v.fraction[p] for p in np.flatnonzero(v.parent == cell) if v.label[p, 0] >= 0
-        )
+        above = sum(v.fraction[p] for p in np.flatnonzero(v.parent == cell) if v.label[p, 0] >= 0)
         whole = not v.split[v.parent == cell].any()
         for node in nodes:
             share = DENSITY * mesh.measures[cell] / 3.0

@@ -39,9 +39,7 @@ def _gravity(dim):
 def test_a_free_cut_body_falls_by_the_discrete_parabola(scheme, dim):
     v = cut_body(dim)
     mass = side_wise_mass(v, DENSITY)
-    body = DynamicBody(
-        InternalForce(v, material(dim)), mass, weight=mass.weight(_gravity(dim))
-    )
+    body = DynamicBody(InternalForce(v, material(dim)), mass, weight=mass.weight(_gravity(dim)))
     state = body.rest()
     integrator = scheme(body, 0.01)
     for _ in range(50):

@@ -29,9 +29,7 @@ from verify.xfem.virtual import cut_mesh
 def _histories():
     """Cuts that grow, cross, branch and pass through nodes, one list after another."""
     plate = rectangle_mesh((6, 6))
-    grown = [
-        [Polyline([[-0.1, 0.45], [end, 0.47 + 0.2 * end]])] for end in (0.3, 0.7, 1.1)
-    ]
+    grown = [[Polyline([[-0.1, 0.45], [end, 0.47 + 0.2 * end]])] for end in (0.3, 0.7, 1.1)]
     crossing = Plane((0.47, 0.5), (1.0, 0.2))
     branch = Polyline([[0.6, 0.5], [0.9, 1.1]])
     flat = PolygonPatch([[-1, -1, 0.52], [0.6, -1, 0.52], [0.6, 2, 0.52], [-1, 2, 0.52]])

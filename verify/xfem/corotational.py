@@ -72,6 +72,7 @@ class InternalForce:
         self._quaternions = np.zeros((pieces, 4))
         self._quaternions[:, 0] = 1.0
         self._kernels = corotational_kernels(mesh.dim, space)
+        self._gradients = np.ascontiguousarray(mesh.gradients)
         self._normals = _unit_normals(virtual)
         self._shape = (virtual.node_count, space)
 
@@ -81,12 +82,18 @@ class InternalForce:
         return self.kinematics == "corotational"
 
     @property
-    def geometry(self) -> tuple[NDArray, ...]:
+    def geometry(self) -> tuple[_Floats, NDArray[np.int64], _Floats, _Floats, _Floats, _Floats]:
         """(gradients, parent, volumes, normals, λ, μ): what every kernel reads."""
         v = self.virtual
-        return v.mesh.gradients, v.parent, v.volumes, self._normals, self.lam, self.mu
+        return self._gradients, v.parent, v.volumes, self._normals, self.lam, self.mu
 
-    def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
+    def evaluate(
+        self,
+        displacement: _Floats,
+        out: _Floats | None = None,
+        velocity: _Floats | None = None,
+        scale: float = 0.0,
+    ) -> tuple[_Floats, float]:
         """Return internal force (N, d) in newtons and strain energy in joules; update rotations.
 
         Parameters
@@ -95,6 +102,8 @@ class InternalForce:
             Of the unknown nodes, in metres.
         out : (N, d) float array, optional
             Overwritten with the force.
+        velocity : (N, d) float array, optional
+            With a scale in seconds: `scale` K v, K with frozen rotations, is added to the force.
 
         Raises
         ------
@@ -105,9 +114,16 @@ class InternalForce:
             raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
         force = np.empty(self._shape) if out is None else out
         force[:] = 0.0
+        v = self.virtual
+        if self.turning:
+            self._kernels.turn(
+                v.cells, self._gradients, v.parent, self._normals, displacement,
+                self._quaternions, self.rotations,
+            )  # fmt: skip
+        moving = displacement if velocity is None else velocity
         energy = self._kernels.internal_force(
-            self.virtual.cells, *self.geometry, self.turning, displacement,
-            self._quaternions, self.rotations, force,
+            v.cells, *self.geometry, self.rotations, displacement,
+            moving, 0.0 if velocity is None else scale, force,
         )  # fmt: skip
         return force, float(energy)
 

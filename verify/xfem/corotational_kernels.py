@@ -15,11 +15,46 @@ from types import SimpleNamespace
 import numpy as np
 from numba import njit
 
-from verify.xfem.polar_kernels import nearest_rotation
+from verify.xfem.polar_kernels import (
+    LANES,
+    mend_lane,
+    nearest_rotation,
+    new_lanes,
+    rotation_matrix,
+    turn_lanes,
+)
 
 __all__ = ["corotational_kernels"]
 
 _SINGULAR = 1e-8  # of the trace of the stretch: a spin without stiffness of its own
+
+
+@njit(cache=True)
+def _deformation(nodes, b, displacement, normals, cell, F):
+    """Write the deformation gradient of a piece."""
+    space = F.shape[0]
+    for k in range(space):
+        for l in range(space):
+            F[k, l] = 1.0 if k == l else 0.0
+            if len(nodes) == space:
+                F[k, l] -= normals[cell, k] * normals[cell, l]
+    for i in range(len(nodes)):
+        node = nodes[i]
+        for k in range(space):
+            for l in range(space):
+                F[k, l] += displacement[node, k] * b[i, l]
+
+
+@njit(cache=True)
+def _project(D, R, normals, cell):
+    """Take from D what points across the turned plane of a membrane: nothing resists there."""
+    n = R @ normals[cell]
+    for l in range(3):
+        across = 0.0
+        for k in range(3):
+            across += n[k] * D[k, l]
+        for k in range(3):
+            D[k, l] -= n[k] * across
 
 
 @njit(cache=True)
@@ -69,18 +104,60 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
     Returns
     -------
     SimpleNamespace
-        ``internal_force``, ``frozen_product``, ``add_frozen_stiffness``, ``add_spin_stiffness``.
+        ``turn``, ``internal_force``, ``frozen_product``, ``add_frozen_stiffness``,
+        ``add_spin_stiffness``.
     """
     corners = dim + 1
     membrane = dim < space
     spins = 1 if space == 2 else 3
 
     @njit(cache=True)
+    def turn(cells, gradients, parent, normals, displacement, quaternions, rotations):
+        """Update the rotations (p, d, d), from and to the quaternions (p, 4) in space."""
+        F = np.empty((space, space))
+        if space == 2:
+            for piece in range(len(cells)):
+                cell = parent[piece]
+                _deformation(cells[piece], gradients[cell], displacement, normals, cell, F)
+                nearest_rotation(F, quaternions[piece], rotations[piece])
+            return
+        lanes = new_lanes()
+        for start in range(0, len(cells), LANES):
+            count = min(LANES, len(cells) - start)
+            for lane in range(count):
+                piece = start + lane
+                cell = parent[piece]
+                for k in range(space):
+                    for l in range(space):
+                        F[k, l] = 1.0 if k == l else 0.0
+                        if membrane:
+                            F[k, l] -= normals[cell, k] * normals[cell, l]
+                for i in range(corners):
+                    node = cells[piece, i]
+                    for k in range(space):
+                        for l in range(space):
+                            F[k, l] += displacement[node, k] * gradients[cell, i, l]
+                for k in range(space):
+                    for l in range(space):
+                        lanes[(3 * k + l) * LANES + lane] = F[k, l]
+                for k in range(4):
+                    lanes[(9 + k) * LANES + lane] = quaternions[piece, k]
+            solved = turn_lanes(lanes)
+            for lane in range(count):
+                piece = start + lane
+                for k in range(4):
+                    quaternions[piece, k] = lanes[(9 + k) * LANES + lane]
+                rotation_matrix(quaternions[piece], rotations[piece])
+            if not solved:
+                for lane in range(count):
+                    mend_lane(lanes, lane, quaternions[start + lane], rotations[start + lane])
+
+    @njit(cache=True)
     def internal_force(
-        cells, gradients, parent, volumes, normals, lam, mu, turning, displacement,
-        quaternions, rotations, force,
+        cells, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
+        velocity, scale, force,
     ):  # fmt: skip
-        """Add the internal force to `force`, update the rotations; return the strain energy.
+        """Add f_int(u) + `scale` K v, K with frozen rotations, to `force`; return the energy.
 
         Parameters
         ----------
@@ -90,13 +167,11 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         normals : (m, 3) float array
             Unit normals of membranes; not read otherwise.
         lam, mu : (m,) float array
-        turning : bool
-            False: rotations stay the identity (linear elasticity).
-        displacement : (N, d) float array
-        quaternions : (p, 4) float array
-            Warm start, updated.
         rotations : (p, d, d) float array
-            Overwritten.
+        displacement, velocity : (N, d) float array
+            The velocity is not read if the scale is zero.
+        scale : float
+            In seconds.
         force : (N, d) float array
         """
         F = np.empty((space, space))
@@ -116,23 +191,40 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                 for k in range(space):
                     for l in range(space):
                         F[k, l] += displacement[node, k] * gradients[cell, i, l]
-            if turning:
-                nearest_rotation(F, quaternions[piece], R)
             for k in range(space):
                 for l in range(space):
                     for m in range(space):
                         E[k, l] += R[m, k] * F[m, l]
-            trace = 0.0
+            trace = square = 0.0
             for k in range(space):
                 trace += E[k, k]
                 for l in range(k + 1, space):
                     E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])
-            square = 0.0
             for k in range(space):
                 for l in range(space):
                     square += E[k, l] * E[k, l]
             w, la, m2 = volumes[piece], lam[cell], 2.0 * mu[cell]
             energy += 0.5 * w * (m2 * square + la * trace * trace)
+            if scale != 0.0:
+                for k in range(space):
+                    for l in range(space):
+                        F[k, l] = 0.0
+                for i in range(corners):
+                    node = cells[piece, i]
+                    for k in range(space):
+                        for l in range(space):
+                            F[k, l] += velocity[node, k] * gradients[cell, i, l]
+                if membrane:
+                    _project(F, R, normals, cell)
+                for k in range(space):
+                    for l in range(space):
+                        for m in range(space):
+                            E[k, l] += scale * R[m, k] * F[m, l]
+                trace = 0.0
+                for k in range(space):
+                    trace += E[k, k]
+                    for l in range(k + 1, space):
+                        E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])
             # stress w R (2μE + λ tr E I), over F
             for k in range(space):
                 for l in range(space):
@@ -156,37 +248,30 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         """Add `scale` times the stiffness with frozen rotations times `vector` to `product`."""
         D = np.empty((space, space))
         E = np.empty((space, space))
-        normal = np.empty(space)
         for piece in range(len(cells)):
             cell = parent[piece]
             R = rotations[piece]
             for k in range(space):
                 for l in range(space):
                     D[k, l] = 0.0
+                    E[k, l] = 0.0
             for i in range(corners):
                 node = cells[piece, i]
                 for k in range(space):
                     for l in range(space):
                         D[k, l] += vector[node, k] * gradients[cell, i, l]
+            if membrane:
+                _project(D, R, normals, cell)
             for k in range(space):
                 for l in range(space):
-                    E[k, l] = 0.0
                     for m in range(space):
                         E[k, l] += R[m, k] * D[m, l]
-            if membrane:  # nothing resists across the plane
-                for l in range(space):
-                    normal[l] = 0.0
-                    for m in range(space):
-                        normal[l] += normals[cell, m] * E[m, l]
-                for k in range(space):
-                    for l in range(space):
-                        E[k, l] -= normals[cell, k] * normal[l]
-            w = scale * volumes[piece]
             trace = 0.0
             for k in range(space):
                 trace += E[k, k]
                 for l in range(k + 1, space):
                     E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])
+            w = scale * volumes[piece]
             wl, wm = w * lam[cell] * trace, 2.0 * w * mu[cell]
             for k in range(space):
                 for l in range(space):
@@ -262,17 +347,12 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         for piece in range(len(cells)):
             cell = parent[piece]
             R = rotations[piece]
-            for k in range(space):
-                for l in range(space):
-                    F[k, l] = 1.0 if k == l else 0.0
-                    if membrane:
-                        F[k, l] -= normals[cell, k] * normals[cell, l]
+            _deformation(cells[piece], gradients[cell], displacement, normals, cell, F)
             for i in range(corners):
                 for k in range(space):
                     g[i, k] = 0.0
                     for l in range(space):
                         g[i, k] += R[k, l] * gradients[cell, i, l]
-                        F[k, l] += displacement[cells[piece, i], k] * gradients[cell, i, l]
                 _spin_row(g[i], X[i])
             trace = -float(dim)
             for k in range(space):
@@ -308,6 +388,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         return left_out
 
     return SimpleNamespace(
+        turn=turn,
         internal_force=internal_force,
         frozen_product=frozen_product,
         add_frozen_stiffness=add_frozen_stiffness,

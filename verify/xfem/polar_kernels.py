@@ -5,13 +5,23 @@ det F, so a collapsed or inverted piece has a rotation too. In the plane R is cl
 tr(R(q)ᵀ F) is a quadratic form in the unit quaternion q; such a form has no local maximum on the
 sphere besides the global one, so Newton's method on SO(3) may start anywhere: where its Hessian
 tr(S) I − S is positive definite it has found the rotation, and where it is not, the eigenvector
-of the form (a Jacobi iteration, which cannot fail) is taken instead.
+of the form (a Jacobi iteration, which cannot fail) is taken instead. Newton's steps run on several
+deformation gradients in lockstep: one alone leaves the machine waiting for its divisions.
 """
 
 import numpy as np
 from numba import njit
 
-__all__ = ["nearest_rotation", "rotation_matrix"]
+__all__ = [
+    "LANES",
+    "mend_lane",
+    "nearest_rotation",
+    "new_lanes",
+    "rotation_matrix",
+    "turn_lanes",
+]
+
+LANES = 8  # rotations that are sought at once
 
 _NEWTON_STEPS = 12
 _PIVOT = 1e-4  # of the norm of F: a Hessian nearer to singular goes to the eigenvector
@@ -58,24 +68,76 @@ def nearest_rotation(F, q, R):
         R[1, 0] = sine
         R[1, 1] = cosine
         return
-    if not _newton(F, q):
-        _largest_eigenvector(F, q)
+    lanes = new_lanes()
+    for k in range(3):
+        for l in range(3):
+            lanes[(3 * k + l) * LANES] = F[k, l]
+    for k in range(4):
+        lanes[(9 + k) * LANES] = q[k]
+    solved = turn_lanes(lanes)
+    for k in range(4):
+        q[k] = lanes[(9 + k) * LANES]
+    rotation_matrix(q, R)
+    if not solved:
+        mend_lane(lanes, 0, q, R)
+
+
+@njit(cache=True)
+def new_lanes():
+    """Memory for `LANES` rotations that are sought at once, all at the identity.
+
+    Entry k of a lane is at k `LANES` + lane: F by rows, quaternion, square of the last turn
+    (infinite where the Hessian was not positive definite), smallest admissible pivot.
+    """
+    lanes = np.zeros(15 * LANES)
+    for lane in range(LANES):
+        for entry in (0, 4, 8, 9):
+            lanes[entry * LANES + lane] = 1.0
+    return lanes
+
+
+@njit(cache=True)
+def mend_lane(lanes, lane, q, R):
+    """Where Newton's method has failed, take the eigenvector; apart, to keep the loop short."""
+    if lanes[13 * LANES + lane] <= _SMALL_TURN:
+        return
+    F = np.empty((3, 3))
+    for k in range(3):
+        for l in range(3):
+            F[k, l] = lanes[(3 * k + l) * LANES + lane]
+    _largest_eigenvector(F, q)
     rotation_matrix(q, R)
 
 
 @njit(cache=True)
-def _newton(F, q):
-    """Newton's method on SO(3), on scalars throughout; whether it has converged."""
-    f00, f01, f02 = F[0, 0], F[0, 1], F[0, 2]
-    f10, f11, f12 = F[1, 0], F[1, 1], F[1, 2]
-    f20, f21, f22 = F[2, 0], F[2, 1], F[2, 2]
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    norm = np.sqrt(
-        f00 * f00 + f01 * f01 + f02 * f02 + f10 * f10 + f11 * f11 + f12 * f12
-        + f20 * f20 + f21 * f21 + f22 * f22
-    )  # fmt: skip
-    least = _PIVOT * norm
+def turn_lanes(lanes):
+    """Newton's method on SO(3) until each lane has converged or failed; whether none has failed."""
+    for lane in range(LANES):
+        square = 0.0
+        for entry in range(9):
+            square += lanes[entry * LANES + lane] ** 2
+        lanes[14 * LANES + lane] = _PIVOT * np.sqrt(square)
     for _ in range(_NEWTON_STEPS):
+        _newton_step(lanes)
+        going = failed = False
+        for lane in range(LANES):
+            turn = lanes[13 * LANES + lane]
+            going |= _SMALL_TURN < turn < np.inf
+            failed |= not turn < np.inf
+        if not going:
+            return not failed
+    return False
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _newton_step(v):
+    """One step for all lanes, without a branch, so that the lanes become those of the machine."""
+    for l in range(LANES):
+        f00, f01, f02 = v[l], v[LANES + l], v[2 * LANES + l]
+        f10, f11, f12 = v[3 * LANES + l], v[4 * LANES + l], v[5 * LANES + l]
+        f20, f21, f22 = v[6 * LANES + l], v[7 * LANES + l], v[8 * LANES + l]
+        w, x, y, z = v[9 * LANES + l], v[10 * LANES + l], v[11 * LANES + l], v[12 * LANES + l]
+        least = v[14 * LANES + l]
         r00, r01, r02 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
         r10, r11, r12 = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
         r20, r21, r22 = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
@@ -89,37 +151,32 @@ def _newton(F, q):
         a21 = r02 * f01 + r12 * f11 + r22 * f21
         a22 = r02 * f02 + r12 * f12 + r22 * f22
         # Hessian tr(S) I − S and its factorisation L D Lᵀ
-        d0 = a11 + a22
-        if not d0 > least:
-            return False
         h01, h02, h12 = -0.5 * (a01 + a10), -0.5 * (a02 + a20), -0.5 * (a12 + a21)
+        d0 = a11 + a22
         l10, l20 = h01 / d0, h02 / d0
         d1 = a00 + a22 - l10 * h01
-        if not d1 > least:
-            return False
         e21 = h12 - l20 * h01
         l21 = e21 / d1
         d2 = a00 + a11 - l20 * h02 - l21 * e21
-        if not d2 > least:
-            return False
         # turn that makes Rᵀ F symmetric to first order
         t0 = a21 - a12
         t1 = a02 - a20 - l10 * t0
         t2 = (a10 - a01 - l20 * t0 - l21 * t1) / d2
         t1 = t1 / d1 - l21 * t2
         t0 = t0 / d0 - l10 * t1 - l20 * t2
+        good = (d0 > least) & (d1 > least) & (d2 > least)
         turn = t0 * t0 + t1 * t1 + t2 * t2
+        v[13 * LANES + l] = turn if good else np.inf
         t0, t1, t2 = 0.5 * t0, 0.5 * t1, 0.5 * t2
         nw = w - x * t0 - y * t1 - z * t2
         nx = x + w * t0 + y * t2 - z * t1
         ny = y + w * t1 + z * t0 - x * t2
         nz = z + w * t2 + x * t1 - y * t0
         scale = 1.0 / np.sqrt(nw * nw + nx * nx + ny * ny + nz * nz)
-        w, x, y, z = nw * scale, nx * scale, ny * scale, nz * scale
-        if turn <= _SMALL_TURN:
-            q[0], q[1], q[2], q[3] = w, x, y, z
-            return True
-    return False
+        v[9 * LANES + l] = nw * scale if good else w
+        v[10 * LANES + l] = nx * scale if good else x
+        v[11 * LANES + l] = ny * scale if good else y
+        v[12 * LANES + l] = nz * scale if good else z
 
 
 @njit(cache=True)

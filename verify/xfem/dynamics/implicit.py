@@ -4,7 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.corotational import TangentKind
-from verify.xfem.dynamics.averaged_stress_kernels import averaged_stress_kernels
+from verify.xfem.dynamics.averaged_stress_kernels import (
+    add_averaged_stiffness,
+    averaged_force,
+)
 from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.dynamics.integrator import StepForces
 from verify.xfem.dynamics.linear_solver import LinearSolver, SparseLU
@@ -84,8 +87,6 @@ class EnergyMomentum(NewtonIntegrator):
         solver: LinearSolver | None = None,
     ) -> None:
         super().__init__(body, step_size, tolerance, iterations, solver)
-        mesh = body.force.virtual.mesh
-        self._kernels = averaged_stress_kernels(mesh.dim, mesh.space)
         self._first = body.force.rotations.copy()
         self._evaluations = 0
         self.substituted = np.zeros(len(self._first), dtype=bool)
@@ -108,7 +109,7 @@ class EnergyMomentum(NewtonIntegrator):
         if self._evaluations <= _FREE_EVALUATIONS:
             self.substituted[:] = False
         if force.turning:
-            self._kernels.averaged_force(
+            averaged_force(
                 force.virtual.cells, *force.geometry, self._first, force.rotations,
                 start.displacement, displacement, self.substituted, internal,
             )  # fmt: skip
@@ -123,7 +124,7 @@ class EnergyMomentum(NewtonIntegrator):
         if not force.turning:
             super()._add_stiffness(displacement, kind)
             return
-        self._kernels.add_averaged_stiffness(
+        add_averaged_stiffness(
             force.virtual.cells, self.body.pattern.targets[: len(force.virtual.cells)],
             *force.geometry, self._first, force.rotations,
             self._start.displacement, displacement, self.substituted, self._blocks,

@@ -53,11 +53,14 @@ class RealTimeEuler:
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
-        external = self.body.external(state.time + self.step_size).copy()
+        force, h = self.body.force, self.step_size
+        external = self.body.external(state.time + h).copy()
+        before = state.velocity.copy()
         self.advance(state)
         # rotations are still those at the start of the step, with which it was linearised
         internal = self._internal.copy()
-        self.body.force.add_frozen_product(state.velocity, self.step_size, internal)
+        force.add_frozen_product(before, -(h + self.body.damping.stiffness), internal)
+        force.add_frozen_product(state.velocity, h, internal)
         return StepForces(internal, external, self.body.viscous(state.velocity))
 
     def advance(self, state: MotionState) -> None:
@@ -86,9 +89,9 @@ class RealTimeEuler:
         """Evaluate rotations and forces, and the right-hand side into `load`."""
         body, h = self.body, self.step_size
         damping = body.damping
-        body.force.evaluate(state.displacement, self._internal)
+        implicit = h + damping.stiffness
+        body.force.evaluate(state.displacement, self._internal, state.velocity, implicit)
         np.subtract(body.external(state.time + h), self._internal, out=self.load)
-        body.force.add_frozen_product(state.velocity, -(h + damping.stiffness), self.load)
         if damping.mass > 0.0:
             self.load -= damping.mass * body.mass.apply(state.velocity)
         self.load *= h
