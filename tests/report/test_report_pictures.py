@@ -120,8 +120,9 @@ def test_missing_and_damaged_solutions_become_notes(tmp_path):
     shown = case_pictures(root, load_run(root).entries[0])
     assert not shown.all
     notes = " ".join(shown.notes)
-    assert "No picture of XFEM, level 3: the stored solution not a readable solution" in notes
-    assert "No picture of conforming P1, level 3: the stored solution no such file" in notes
+    # the rest of each sentence is that of verify.solution
+    assert "No picture of XFEM, level 3: " in notes
+    assert "No picture of conforming P1, level 3: " in notes
     assert "no error field is stored" in notes
 
 

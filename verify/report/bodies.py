@@ -48,7 +48,7 @@ def read_stored(root: Path, path: str) -> Solution:
     """
     target = (root / path).resolve()
     if not target.is_relative_to(root.resolve()):
-        raise InputError("lies outside the run directory", path)
+        raise InputError("the solution lies outside the run directory", path)
     # a record may name the file, its path without ending, or its folder
     target = target / "solution" if target.is_dir() else target
     if target.suffix not in (".json", ".vtu"):
@@ -56,7 +56,7 @@ def read_stored(root: Path, path: str) -> Solution:
     try:
         return read_solution(target)
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", path) from None
+        raise InputError(f"the solution cannot be read ({error.strerror})", path) from None
 
 
 def deformed_body(solution: Solution, scale: float) -> Body:
@@ -80,13 +80,13 @@ def error_body(path: Path) -> Body:
     try:
         mesh = meshio.read(path, file_format="vtu")
     except (Exception, SystemExit) as error:  # meshio exits on unreadable files
-        said = f"cannot be read ({type(error).__name__}: {error})"
+        said = f"the error field cannot be read ({type(error).__name__}: {error})"
         raise InputError(said, str(path)) from None
     for kind in ("tetra10", "tetra", "triangle6", "triangle"):
         if kind in mesh.cells_dict:
             break
     else:
-        raise InputError("no triangles or tetrahedra in it", str(path))
+        raise InputError("the error field has no triangles or tetrahedra", str(path))
     cells = np.asarray(mesh.cells_dict[kind], dtype=np.int64)
     dimension = 3 if kind.startswith("tetra") else 2
     points = np.asarray(mesh.points, dtype=float)[:, :dimension]
@@ -94,11 +94,11 @@ def error_body(path: Path) -> Body:
         values = np.asarray(mesh.point_data["error"], dtype=float)
         values = values if values.ndim == 1 else np.linalg.norm(values, axis=1)
         if len(values) != len(points) or not np.isfinite(values).all():
-            raise InputError("its error has values that are not finite", str(path))
+            raise InputError("the error field has values that are not finite", str(path))
         return _body(points, _straight(cells, kind), values, cells)
     per_cell = mesh.cell_data_dict.get("error", {}).get(kind)
     if per_cell is None or dimension == 3 or kind == "triangle6":
-        raise InputError("has no point data 'error'", str(path))
+        raise InputError("the error field has no point data 'error'", str(path))
     return _body(points, cells, np.asarray(per_cell, dtype=float).reshape(-1), cells)
 
 

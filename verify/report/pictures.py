@@ -78,7 +78,7 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
             shown.append((solve, read_stored(root, solve.solution or "")))
         except InputError as error:
             where = f"{solver_title(solve.solver)}, level {solve.level}"
-            pictures.notes.append(f"No picture of {where}: the stored solution {error.what}.")
+            pictures.notes.append(f"No picture of {where}: {error.what}.")
     dimensions = {solution.dimension for _, solution in shown}
     if len(dimensions) > 1:
         pictures.notes.append("No pictures side by side: the solutions differ in dimension.")
@@ -183,7 +183,7 @@ def _error(pictures: CasePictures, root: Path, entry: CaseEntry) -> None:
     try:
         body = error_body(path)
     except InputError as error:
-        pictures.notes.append(f"No picture of the error: the stored field {error.what}.")
+        pictures.notes.append(f"No picture of the error: {error.what}.")
         return
     largest = number_text(float(body.values.max()))
     description = f"Error of the displacement on the undeformed body; largest {largest} m."
