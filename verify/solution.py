@@ -9,9 +9,12 @@ Stored as one VTU file (mesh, fields) and one JSON file beside it (the rest). Th
 the file exchange for programs that are not written in Python.
 """
 
+import contextlib
+import io
 import json
 import os
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +34,11 @@ _CELL_TYPES = {
     (3, 1): "tetra",
     (3, 2): "tetra10",
 }
+_MANDATORY = ("schema", "files", "dimension", "order")
+_OPTIONAL = (
+    "times", "cut_facets", "ledger", "quantities", "unknowns", "size", "timings", "iterations",
+    "regularisations", "notes",
+)  # fmt: skip
 _NODES_PER_CELL = {"triangle": 3, "triangle6": 6, "tetra": 4, "tetra10": 10}
 
 
@@ -124,16 +132,19 @@ class Solution:
         n, d = self.points.shape
         t = len(self.times)
         if (d, self.order) not in _CELL_TYPES:
-            raise InputError(f"a solution of dimension {d} and order {self.order}; expected 2, 3 and 1, 2")
+            text = f"a solution of dimension {d} and order {self.order}"
+            raise InputError(f"{text}; expected 2 or 3, and 1 or 2")
         k = _NODES_PER_CELL[self.cell_type]
         if self.cells.ndim != 2 or self.cells.shape[1] != k:
-            raise InputError(f"cells of shape {self.cells.shape}; expected (m, {k}) for {self.cell_type}")
+            text = f"cells of shape {self.cells.shape}"
+            raise InputError(f"{text}; expected (m, {k}) for {self.cell_type}")
         if len(self.cells) == 0:
             raise InputError("a solution without cells")
         if self.cells.min() < 0 or self.cells.max() >= n:
             raise InputError(f"cell nodes outside 0..{n - 1}")
         if self.displacement.shape != (t, n, d):
-            raise InputError(f"displacement of shape {self.displacement.shape}; expected {(t, n, d)}")
+            shape = self.displacement.shape
+            raise InputError(f"displacement of shape {shape}; expected {(t, n, d)}")
         if not np.isfinite(self.displacement).all():
             raise InputError("displacement has values that are not finite")
         if self.velocity is not None and self.velocity.shape != (t, n, d):
@@ -187,10 +198,10 @@ def write_solution(solution: Solution, path: Path) -> None:
         "order": solution.order,
         "times": solution.times.tolist(),
         "cut_facets": solution.cut_facets.tolist(),
-        "ledger": {name: np.asarray(v, dtype=float).tolist() for name, v in solution.ledger.items()},
+        "ledger": {n: np.asarray(v, dtype=float).tolist() for n, v in solution.ledger.items()},
         "quantities": solution.quantities,
         "unknowns": int(solution.unknowns),
-        "size": solution.size,
+        "size": float(solution.size) if np.isfinite(solution.size) else None,
         "timings": solution.timings,
         "iterations": solution.iterations,
         "regularisations": [vars(entry) for entry in solution.regularisations],
@@ -204,6 +215,10 @@ def write_solution(solution: Solution, path: Path) -> None:
 
 def read_solution(path: Path) -> Solution:
     """Read what `write_solution`, or another program, wrote.
+
+    Of the JSON half only ``schema``, ``files``, ``dimension`` and ``order`` are mandatory, and
+    ``times`` if there are several files; the rest has the defaults of `Solution`. Of the VTU
+    half, points, cells and the point data ``displacement`` are.
 
     Parameters
     ----------
@@ -219,48 +234,123 @@ def read_solution(path: Path) -> Solution:
     InputError
         If a file is missing, damaged or not of this form.
     """
-    import meshio
-
     source = path.with_suffix(".json")
     try:
-        record: dict[str, Any] = json.loads(source.read_text(encoding="utf-8"))
+        record: Any = json.loads(source.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError("no such file; expected the JSON half of a solution", str(source)) from None
+        text = "no such file; expected the JSON half of a solution"
+        raise InputError(text, str(source)) from None
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"not a JSON file ({error})", str(source)) from None
-    if record.get("schema") != SCHEMA_VERSION:
-        raise InputError(f"schema {record.get('schema')!r}; expected {SCHEMA_VERSION}", str(source))
+    _check_record(record, str(source))
     try:
-        d, order = int(record["dimension"]), int(record["order"])
-        meshes = [meshio.read(path.parent / name) for name in record["files"]]
-        first = meshes[0]
-        cells = first.cells_dict[_CELL_TYPES[d, order]]
-        sides = first.cell_data_dict.get("side", {}).get(_CELL_TYPES[d, order])
-        velocity = [mesh.point_data.get("velocity") for mesh in meshes]
+        d, order, files = int(record["dimension"]), int(record["order"]), record["files"]
+        if (d, order) not in _CELL_TYPES:
+            raise InputError(f"dimension {d}, order {order}; expected 2 or 3, and 1 or 2")
+        cell_type = _CELL_TYPES[d, order]
+        meshes = [_read_vtu(path.parent / name, cell_type) for name in files]
+        first, times = meshes[0], record.get("times", [0.0] if len(files) == 1 else None)
+        if times is None or len(times) != len(files):
+            raise InputError(f"times {times} for {len(files)} files; expected one each")
+        _check_same_mesh(meshes, files, cell_type, str(source))
+        sides = first.cell_data_dict.get("side", {}).get(cell_type)
+        moving = all("velocity" in mesh.point_data for mesh in meshes)
+        size = record.get("size")
         return Solution(
             points=np.ascontiguousarray(first.points[:, :d], dtype=float),
-            cells=cells.astype(np.int64),
-            displacement=np.stack([m.point_data["displacement"][:, :d] for m in meshes]).astype(float),
-            times=np.asarray(record["times"], dtype=float),
+            cells=first.cells_dict[cell_type].astype(np.int64),
+            displacement=np.stack([_vectors(m, "displacement", d) for m in meshes]),
+            times=np.asarray(times, dtype=float),
             order=order,
-            cut_facets=np.asarray(record["cut_facets"], dtype=float).reshape(-1, d, d),
+            cut_facets=np.asarray(record.get("cut_facets", []), dtype=float).reshape(-1, d, d),
             cell_sides=None if sides is None else np.asarray(sides, dtype=np.int64),
-            velocity=None
-            if any(v is None for v in velocity)
-            else np.stack([v[:, :d] for v in velocity if v is not None]).astype(float),
-            ledger={name: np.asarray(v, dtype=float) for name, v in record["ledger"].items()},
-            quantities=record["quantities"],
-            unknowns=record["unknowns"],
-            size=record["size"],
-            timings=record["timings"],
-            iterations=record["iterations"],
-            regularisations=[Regularisation(**entry) for entry in record["regularisations"]],
-            notes=record["notes"],
+            velocity=np.stack([_vectors(m, "velocity", d) for m in meshes]) if moving else None,
+            ledger={n: np.asarray(v, dtype=float) for n, v in record.get("ledger", {}).items()},
+            quantities={n: float(v) for n, v in record.get("quantities", {}).items()},
+            unknowns=int(record.get("unknowns", 0)),
+            size=float("nan") if size is None else float(size),
+            timings={n: [float(t) for t in v] for n, v in record.get("timings", {}).items()},
+            iterations={n: int(v) for n, v in record.get("iterations", {}).items()},
+            regularisations=[Regularisation(**e) for e in record.get("regularisations", [])],
+            notes={n: str(v) for n, v in record.get("notes", {}).items()},
         )
-    except InputError:
-        raise
-    except (Exception, SystemExit) as error:  # meshio exits on unreadable files
-        raise InputError(f"not a readable solution ({type(error).__name__}: {error})", str(source)) from None
+    except InputError as error:
+        raise error if error.where else InputError(error.what, str(source)) from None
+    except Exception as error:
+        text = f"not a readable solution ({type(error).__name__}: {error})"
+        raise InputError(text, str(source)) from None
+
+
+def _check_record(record: Any, where: str) -> None:
+    """Refuse what is not of this schema, lacks a mandatory key or has an unknown one."""
+    if not isinstance(record, dict):
+        raise InputError("not a JSON object", where)
+    if record.get("schema") != SCHEMA_VERSION:
+        raise InputError(f"schema {record.get('schema')!r}; expected {SCHEMA_VERSION}", where)
+    if missing := [key for key in _MANDATORY if key not in record]:
+        text = f"'{missing[0]}' is missing; expected at least {', '.join(_MANDATORY)}"
+        raise InputError(text, where)
+    files = record["files"]
+    if not isinstance(files, list) or not files or not all(isinstance(f, str) for f in files):
+        raise InputError(f"files {files!r}; expected a list of VTU files, one per time", where)
+    known = (*_MANDATORY, *_OPTIONAL)
+    for key in record:
+        if key not in known:
+            raise InputError(f"unknown key '{key}'{_nearest(key, known)}", where)
+
+
+def _read_vtu(path: Path, cell_type: str) -> Any:
+    """Read a VTU file with cells of one type and a displacement at its points."""
+    import meshio
+
+    if not path.is_file():
+        raise InputError("no such file; expected the VTU half of a solution", str(path))
+    try:
+        # meshio reports some bad files by printing and leaving the interpreter
+        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+            mesh = meshio.read(path, file_format="vtu")
+    except (Exception, SystemExit) as error:
+        raise InputError(f"not a VTU file ({type(error).__name__}: {error})", str(path)) from None
+    found = sorted({block.type for block in mesh.cells if len(block.data)})
+    if cell_type not in mesh.cells_dict:
+        raise InputError(f"has {', '.join(found) or 'no cells'}; expected {cell_type}", str(path))
+    bulk = {2: ("triangle", "quad"), 3: ("tetra", "hexa", "wedge", "pyramid")}
+    dimension = 2 if cell_type.startswith("triangle") else 3
+    others = [f for f in found if f != cell_type and f.startswith(bulk[dimension])]
+    if others:
+        text = f"has {', '.join(others)} beside {cell_type}; expected one type"
+        raise InputError(text, str(path))
+    if "displacement" not in mesh.point_data:
+        has = ", ".join(mesh.point_data) or "none"
+        raise InputError(f"no point data 'displacement' (it has: {has})", str(path))
+    return mesh
+
+
+def _vectors(mesh: Any, name: str, dimension: int) -> NDArray[np.float64]:
+    """Point data (n, d) of a VTU file, whose vectors may have three components in 2D too."""
+    values = np.asarray(mesh.point_data[name], dtype=float)
+    if values.ndim != 2 or values.shape[1] < dimension:
+        raise InputError(f"{name} of shape {values.shape}; expected vectors")
+    return np.ascontiguousarray(values[:, :dimension])
+
+
+def _check_same_mesh(meshes: list[Any], files: list[str], cell_type: str, where: str) -> None:
+    """All times share points and cells: points are material, never moved by the displacement."""
+    first = meshes[0]
+    for name, mesh in zip(files[1:], meshes[1:], strict=True):
+        same = (
+            mesh.points.shape == first.points.shape
+            and np.array_equal(mesh.points, first.points)
+            and np.array_equal(mesh.cells_dict[cell_type], first.cells_dict[cell_type])
+        )
+        if not same:
+            text = f"points or cells of {name} are not those of {files[0]}; "
+            raise InputError(text + "expected the same material mesh at all times", where)
+
+
+def _nearest(key: str, known: tuple[str, ...]) -> str:
+    close = get_close_matches(key, known, n=1)
+    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(known)}"
 
 
 def _three(field_values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,25 @@
+"""``verify export``: a case as files for programs that are not written in Python."""
+
+import argparse
+import json
+
+from verify.exchange import export_case
+from verify.scene import load_scene
+
+__all__ = ["execute"]
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Write mesh, cuts, supports and loads of a case."""
+    scene = load_scene(arguments.case)
+    files = export_case(scene, arguments.out, arguments.levels or None, arguments.conforming)
+    if arguments.json:
+        print(json.dumps({"case": scene.name, "files": [str(file) for file in files]}, indent=2))
+        return 0
+    for file in files:
+        print(file)
+    print(
+        f"answer in {arguments.out}/level-<k>/solution.json and .vtu, then: "
+        f"verify import {arguments.case} {arguments.out} --solver NAME --out RUN"
+    )
+    return 0

@@ -1,0 +1,21 @@
+"""Exchange with solvers that are not part of the project: arrays, files, programs.
+
+`problem_of` turns a scene into arrays for a solver in Python, `export_case` writes them as files,
+`ProgramSolver` runs any program on those files, and `read_answers` reads what it answered.
+"""
+
+from verify.exchange.answers import Answers, read_answers
+from verify.exchange.export import export_case
+from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
+from verify.exchange.program import ProgramSolver
+
+__all__ = [
+    "Answers",
+    "HeldNodes",
+    "Load",
+    "Problem",
+    "ProgramSolver",
+    "export_case",
+    "problem_of",
+    "read_answers",
+]

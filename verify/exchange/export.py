@@ -1,0 +1,207 @@
+"""A case as files for programs that are not written in Python.
+
+::
+
+    DIR/case.json                 the case: material, cuts, quantities, levels (`EXPORT_SCHEMA`)
+    DIR/cuts.vtu                  the cuts as asked: polylines or polygons
+    DIR/level-0/mesh.vtu          background mesh, ignorant of the cuts
+    DIR/level-0/problem.json      held nodes and loads on that mesh
+    DIR/level-0/conforming.vtu    the same mesh with the cuts imprinted and opened, if asked for
+    DIR/level-0/conforming.json   held nodes and loads on it
+    DIR/level-0/solution.json     the answer of a program goes here, with its VTU
+
+Every field of the JSON files is described in ``docs/extending.md``.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.compare.hooke import hooke
+from verify.errors import InputError
+from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
+from verify.runner.fingerprint import physics_digest
+from verify.runner.storage import write_json
+from verify.scene import Scene
+
+__all__ = ["EXPORT_SCHEMA", "export_case", "level_folder"]
+
+EXPORT_SCHEMA = 1
+
+
+def level_folder(root: Path, level: int) -> Path:
+    """Folder of a mesh level below that of an exported case."""
+    return root / f"level-{level}"
+
+
+def export_case(
+    scene: Scene, out: Path, levels: Sequence[int] | None = None, conforming: bool = False
+) -> list[Path]:
+    """Write `scene` for other programs.
+
+    Parameters
+    ----------
+    scene : Scene
+    out : Path
+        A directory that does not exist, is empty, or holds an export of the same case; answers
+        in it stay.
+    levels : sequence of int, optional
+        Mesh levels; default all.
+    conforming : bool
+        Whether to write conforming meshes too.
+
+    Returns
+    -------
+    list of Path
+        The files written, ``case.json`` last: its presence means that the export is whole.
+
+    Raises
+    ------
+    InputError
+        If `out` holds something else, or a level is not one of the case.
+    UnsupportedSceneError
+        If a conforming mesh is asked for that is not offered.
+    """
+    chosen = list(range(scene.mesh.count) if levels is None else dict.fromkeys(levels))
+    for level in chosen:
+        if not 0 <= level < scene.mesh.count:
+            raise InputError(f"mesh level {level}; {scene.name} has 0..{scene.mesh.count - 1}")
+    _check_place(out)
+    files, entries = [], []
+    for level in chosen:
+        folder = level_folder(out, level)
+        problems = {"mesh": problem_of(scene, level)}
+        if conforming:
+            problems["conforming"] = problem_of(scene, level, conforming=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, problem in problems.items():
+            files += _write_problem(problem, folder, name)
+        background = problems["mesh"]
+        entries.append(
+            {
+                "level": level,
+                "folder": folder.name,
+                "size": background.size,
+                "nodes": len(background.points),
+                "cells": len(background.cells),
+            }
+        )
+    if scene.cuts:
+        _write_cuts(scene, out / "cuts.vtu")
+        files.append(out / "cuts.vtu")
+    write_json(_case(scene, entries), out / "case.json")
+    return [*files, out / "case.json"]
+
+
+def _check_place(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise InputError("is a file; expected a directory for the export", str(out))
+    if out.is_dir() and any(out.iterdir()) and not (out / "case.json").is_file():
+        raise InputError("not empty and not an export; give --out a new directory", str(out))
+    (out / "case.json").unlink(missing_ok=True)
+
+
+def _case(scene: Scene, levels: list[dict[str, Any]]) -> dict[str, Any]:
+    law = hooke(scene.material)
+    content = scene.model_dump(mode="json", by_alias=True)
+    return {
+        "schema": EXPORT_SCHEMA,
+        "case": scene.name,
+        "physics": physics_digest(scene),
+        "title": scene.title,
+        "requirement": scene.requirement,
+        "dimension": scene.dimension,
+        "material": {**content["material"], "lame": law.lame, "shear": law.shear},
+        "analysis": content["analysis"],
+        "cuts": [
+            {
+                "name": cut.name,
+                "kind": cut.kind,
+                "opens_at": cut.opens_at,
+                "points": _vertices(cut).tolist(),
+                "asked": asked,
+            }
+            for cut, asked in zip(scene.cuts, content["cuts"], strict=True)
+        ],
+        "quantities": content["quantities"],
+        "levels": levels,
+        "scene": content,
+    }
+
+
+def _vertices(cut: Any) -> NDArray[np.float64]:
+    given: Any = cut.points if cut.kind == "polygon" else cut.vertices()
+    return np.asarray(given, dtype=float)
+
+
+def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
+    import meshio
+
+    d = problem.scene.dimension
+    mesh, conditions = folder / f"{name}.vtu", folder / f"{name}.json"
+    if name == "mesh":
+        conditions = folder / "problem.json"
+    points = np.zeros((len(problem.points), 3))
+    points[:, :d] = problem.points
+    cell_type = {2: "triangle", 3: "tetra"}[d]
+    meshio.Mesh(points, [(cell_type, problem.cells)]).write(mesh, file_format="vtu")
+    content = {
+        "schema": EXPORT_SCHEMA,
+        "mesh": mesh.name,
+        "conforming": problem.conforming,
+        "size": problem.size,
+        "boundary": problem.boundary,
+        "cut_facets": problem.cut_facets,
+        "held": [_held(entry) for entry in problem.held],
+        "loads": [_load(load, d) for load in problem.loads],
+    }
+    if problem.conforming:  # on a background mesh they would ignore the cuts
+        content["nodal_forces"] = problem.nodal_forces()
+    write_json(content, conditions)
+    return [mesh, conditions]
+
+
+def _held(entry: HeldNodes) -> dict[str, Any]:
+    return {
+        "nodes": entry.nodes,
+        "components": entry.components,
+        "values": entry.values,
+        "across": [
+            {"node": node, "side_point": side, "values": values}
+            for node, side, values in entry.across
+        ],
+    }
+
+
+def _load(load: Load, dimension: int) -> dict[str, Any]:
+    on_cells = load.simplices.shape[1] == dimension + 1
+    content: dict[str, Any] = {"kind": "body_force" if on_cells else "traction"}
+    if not on_cells:
+        content["facets"] = load.simplices
+    if load.uniform is not None:
+        return {**content, "uniform": load.uniform}
+    return {**content, "points": load.points, "weights": load.weights, "values": load.values}
+
+
+def _write_cuts(scene: Scene, path: Path) -> None:
+    """Write each cut as lines or as a polygon, with its index as cell data ``cut``."""
+    import meshio
+
+    points, blocks, index, first = [], [], [], 0
+    for i, cut in enumerate(scene.cuts):
+        vertices = _vertices(cut)
+        nodes = first + np.arange(len(vertices))
+        if cut.kind == "polygon":
+            # a fan of triangles, which every reader knows; fit for pictures of a convex cut
+            block = [(nodes[0], a, b) for a, b in pairwise(nodes[1:])]
+            blocks.append(("triangle", np.array(block)))
+        else:
+            blocks.append(("line", np.column_stack([nodes[:-1], nodes[1:]])))
+        index.append(np.full(len(blocks[-1][1]), i, dtype=np.int32))
+        points.append(np.pad(vertices, ((0, 0), (0, 3 - vertices.shape[1]))))
+        first += len(vertices)
+    meshio.Mesh(np.vstack(points), blocks, cell_data={"cut": index}).write(path, file_format="vtu")

@@ -1,0 +1,306 @@
+"""A scene on one mesh level as arrays: mesh, boundary, held nodes, loads.
+
+Two meshes are offered. The *background* mesh ignores the cuts; it is the one that unfitted
+methods cut through. The *conforming* mesh is the background mesh with the cuts imprinted and
+opened (nodes doubled); any plain finite element program can solve on it.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.exchange.quadrature import simplex_rule
+from verify.scene import BodyForce, Gravity, PolylineCut, Scene, Support, Traction
+from verify.scene.parts import on_part
+from verify.solvers.xfem_scene import background_mesh
+
+__all__ = ["HeldNodes", "Load", "Problem", "problem_of"]
+
+Array = NDArray[np.float64]
+_POINTS_PER_DIRECTION = 4  # degree 7: an exact field's traction is smooth on a facet
+
+
+@dataclass(frozen=True)
+class HeldNodes:
+    """Prescribed displacements; where two supports hold the same node, the later one wins.
+
+    Attributes
+    ----------
+    nodes : (k,) int array
+    components : tuple of int
+        Indices of the components held.
+    values : (k, len(components)) array
+        m.
+    across : list of (node, side point (d,), values)
+        Background mesh only: for a node of a boundary facet that a cut crosses, the value of the
+        prescribed field on the other side of the cut, continued to the node.
+    """
+
+    nodes: NDArray[np.int64]
+    components: tuple[int, ...]
+    values: Array
+    across: list[tuple[int, Array, Array]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Load:
+    """A dead load on facets (Pa) or cells (N/m³).
+
+    Attributes
+    ----------
+    simplices : (k, d) or (k, d + 1) int array
+        Nodes of the facets or cells that are loaded.
+    uniform : (d,) array or None
+        Its value, if it is the same everywhere.
+    points, weights, values : (k, q, d), (k, q), (k, q, d) arrays
+        Its values at quadrature points; the weights contain the measure.
+    barycentric : (q, k) array
+        The quadrature points in each simplex.
+    """
+
+    simplices: NDArray[np.int64]
+    uniform: Array | None
+    points: Array
+    weights: Array
+    values: Array
+    barycentric: Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene on one mesh level.
+
+    Attributes
+    ----------
+    scene : Scene
+    level : int
+    size : float
+        Element size h of the level, m.
+    points : (n, d) array
+        m; doubled on the cuts if `conforming`.
+    cells : (m, d + 1) int array
+    boundary : (b, d) int array
+        Nodes of the facets on the outer boundary; the faces of a cut are not among them.
+    conforming : bool
+    cut_facets : (f, d, d) array
+        Corners of the facets along the cuts, if `conforming`.
+    held : list of HeldNodes
+    loads : list of Load
+    """
+
+    scene: Scene
+    level: int
+    size: float
+    points: Array
+    cells: NDArray[np.int64]
+    boundary: NDArray[np.int64]
+    conforming: bool
+    cut_facets: Array
+    held: list[HeldNodes]
+    loads: list[Load]
+
+    def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
+        """Which components (n, d) of which nodes are held, and their values (n, d), m."""
+        mark, value = np.zeros(self.points.shape, dtype=bool), np.zeros(self.points.shape)
+        for support in self.held:
+            at = np.ix_(support.nodes, support.components)
+            mark[at], value[at] = True, support.values
+        return mark, value
+
+    def nodal_forces(self) -> Array:
+        """Consistent forces (n, d) of all loads on linear elements, N (per metre in 2D)."""
+        force = np.zeros(self.points.shape)
+        for load in self.loads:
+            shares = np.einsum("kq,qi,kqc->kic", load.weights, load.barycentric, load.values)
+            np.add.at(force, load.simplices, shares)
+        return force
+
+    def lame(self) -> tuple[float, float]:
+        """Lamé constants λ, μ in Pa; in plane stress the λ of the plane problem."""
+        material = self.scene.material
+        mu = material.young / (2 * (1 + material.poisson))
+        lam = 2 * mu * material.poisson / (1 - 2 * material.poisson)
+        return (2 * lam * mu / (lam + 2 * mu) if material.plane == "stress" else lam), mu
+
+
+def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
+    """Lay out `scene` on mesh `level`.
+
+    Parameters
+    ----------
+    scene : Scene
+    level : int
+        0 is the coarsest.
+    conforming : bool
+        Whether the mesh shall conform to the cuts; plane scenes with polyline cuts only.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If a conforming mesh of the scene is not offered.
+    InputError
+        If a support or load acts nowhere, or a mesh file is bad.
+    """
+    background, size = background_mesh(scene, level)
+    points, cells, facet_cell = background.points, background.cells, background.boundary_facets
+    cut_facets = np.zeros((0, scene.dimension, scene.dimension))
+    if conforming:
+        points, cells, facet_cell, cut_facets = _opened(scene, points, cells)
+    exact = _exact(scene)
+    corners = np.ones((len(facet_cell), cells.shape[1]), dtype=bool)
+    corners[np.arange(len(facet_cell)), facet_cell[:, 1]] = False
+    boundary = cells[facet_cell[:, 0]][corners].reshape(len(facet_cell), -1)
+    mesh = _Mesh(points, cells, boundary, facet_cell[:, 0], conforming)
+    return Problem(
+        scene=scene,
+        level=level,
+        size=size,
+        points=points,
+        cells=cells,
+        boundary=boundary,
+        conforming=conforming,
+        cut_facets=cut_facets,
+        held=[_held(scene, mesh, i, support, exact) for i, support in enumerate(scene.supports)],
+        loads=[_load(scene, mesh, i, exact) for i in range(len(scene.loads))],
+    )
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    points: Array
+    cells: NDArray[np.int64]
+    boundary: NDArray[np.int64]
+    boundary_cell: NDArray[np.int64]
+    conforming: bool
+
+    def centroids(self, cells: NDArray[np.int64]) -> Array:
+        centroids: Array = self.points[self.cells[cells]].mean(axis=1)
+        return centroids
+
+    def on(self, scene: Scene, where: str, key: str) -> NDArray[np.bool_]:
+        """(n,) nodes of the boundary that lie on a part."""
+        nodes = np.unique(self.boundary)
+        mark = np.zeros(len(self.points), dtype=bool)
+        mark[nodes[on_part(scene, where, self.points[nodes], key)]] = True
+        return mark
+
+
+def _opened(
+    scene: Scene, points: Array, cells: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]:
+    from reference.meshing import imprint, open_cut
+
+    polylines = [cut.vertices() for cut in scene.cuts if isinstance(cut, PolylineCut)]
+    if scene.dimension != 2 or len(polylines) != len(scene.cuts):
+        raise UnsupportedSceneError(
+            "a conforming mesh is offered for plane scenes with polyline cuts only"
+        )
+    mesh = open_cut(*imprint(points, cells, polylines))
+    first = np.zeros(int(mesh.parent.max()) + 1, dtype=np.int64)
+    first[mesh.parent[::-1]] = np.arange(len(mesh.parent))[::-1]
+    return mesh.points, mesh.cells, mesh.boundary, mesh.points[first[mesh.cut_facets]]
+
+
+def _exact(scene: Scene) -> Any:
+    if scene.exact is None:
+        return None
+    from reference.exact import exact_solution
+
+    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+
+
+def _held(scene: Scene, mesh: _Mesh, i: int, support: Support, exact: Any) -> HeldNodes:
+    nodes = np.flatnonzero(mesh.on(scene, support.where, f"supports[{i}].where"))
+    components = support.held(scene.dimension)
+    if support.displacement != "exact":
+        values = np.tile(np.asarray(support.displacement, dtype=float), (len(nodes), 1))
+        return HeldNodes(nodes, components, values)
+    at = mesh.points[nodes]
+    columns = list(components)
+    if mesh.conforming:  # a node on the cut belongs to the side of its own cells
+        owner = np.zeros(len(mesh.points), dtype=np.int64)
+        owner[mesh.cells.ravel()] = np.repeat(np.arange(len(mesh.cells)), mesh.cells.shape[1])
+        values = exact.displacement(at, mesh.centroids(owner[nodes]))[:, columns]
+        return HeldNodes(nodes, components, values)
+    values = exact.displacement(at)[:, columns]
+    return HeldNodes(nodes, components, values, _across(mesh, nodes, columns, values, exact))
+
+
+def _across(
+    mesh: _Mesh, nodes: NDArray[np.int64], columns: list[int], values: Array, exact: Any
+) -> list[tuple[int, Array, Array]]:
+    """Values continued from the other side, for nodes of boundary facets that a cut crosses."""
+    row = np.full(len(mesh.points), -1, dtype=np.int64)
+    row[nodes] = np.arange(len(nodes))
+    d = mesh.boundary.shape[1]
+    pairs = np.vstack([mesh.boundary[:, [a, b]] for a in range(d) for b in range(d) if a != b])
+    pairs = np.unique(pairs[(row[pairs] >= 0).all(axis=1)], axis=0)
+    far = exact.displacement(mesh.points[pairs[:, 0]], mesh.points[pairs[:, 1]])[:, columns]
+    scale = float(np.abs(values).max(initial=0.0))
+    differs = np.abs(far - values[row[pairs[:, 0]]]).max(axis=1, initial=0.0) > 1e-12 * scale
+    return [
+        (int(node), mesh.points[other], value)
+        for (node, other), value in zip(pairs[differs], far[differs], strict=True)
+    ]
+
+
+def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
+    load = scene.loads[i]
+    if isinstance(load, Traction):
+        chosen = mesh.on(scene, load.where, f"loads[{i}].where")[mesh.boundary].all(axis=1)
+        simplices, cells = mesh.boundary[chosen], mesh.boundary_cell[chosen]
+        if not len(simplices):
+            text = f"loads[{i}].where: no boundary facet lies in '{load.where}'"
+            raise InputError(text, str(scene.file or ""))
+        given: Any = load.traction
+    else:
+        simplices, cells = mesh.cells, np.arange(len(mesh.cells))
+        given = load.force if isinstance(load, BodyForce) else _weight(scene, load)
+    barycentric, weights = simplex_rule(simplices.shape[1] - 1, _POINTS_PER_DIRECTION)
+    corners = mesh.points[simplices]
+    points = np.einsum("qi,kic->kqc", barycentric, corners)
+    measured = _measures(corners)[:, None] * weights
+    if given != "exact":
+        uniform = np.asarray(given, dtype=float)
+        values = np.broadcast_to(uniform, points.shape)
+        return Load(simplices, uniform, points, measured, values, barycentric)
+    # a point of a conforming mesh belongs to the side of its own cell; else to its own
+    near = np.repeat(mesh.centroids(cells), len(weights), axis=0) if mesh.conforming else None
+    flat = points.reshape(-1, points.shape[2])
+    if isinstance(load, Traction):
+        stress = exact.stress(flat, near).reshape(*points.shape, points.shape[2])
+        normals = _outward_normals(corners, mesh.centroids(cells))
+        values = np.einsum("kqij,kj->kqi", stress, normals)
+    else:
+        values = exact.body_force(flat, near).reshape(points.shape)
+    return Load(simplices, None, points, measured, values, barycentric)
+
+
+def _weight(scene: Scene, load: Gravity) -> Array:
+    assert scene.material.density is not None  # the scene has checked it
+    return scene.material.density * np.asarray(load.acceleration, dtype=float)
+
+
+def _measures(corners: Array) -> Array:
+    """Lengths, areas or volumes (k,) of simplices (k, i, d)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    gram = edges @ edges.transpose(0, 2, 1)
+    factorial = {1: 1.0, 2: 2.0, 3: 6.0}[edges.shape[1]]
+    measures: Array = np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / factorial
+    return measures
+
+
+def _outward_normals(corners: Array, inside: Array) -> Array:
+    """Return the unit normals (k, d) of facets (k, d, d), away from the points `inside` (k, d)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    if corners.shape[2] == 2:
+        normals = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
+    else:
+        normals = np.cross(edges[:, 0], edges[:, 1])
+    outward = np.einsum("kc,kc->k", normals, corners[:, 0] - inside)
+    normals = normals * np.sign(outward)[:, None]
+    unit: Array = normals / np.linalg.norm(normals, axis=1)[:, None]
+    return unit

@@ -1,0 +1,98 @@
+"""Any program as a solver: the case is exported, the program is run, its answer is read."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any, ClassVar
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.exchange.answers import read_answers
+from verify.exchange.export import export_case
+from verify.result import Status
+from verify.scene import Scene
+from verify.solution import Solution
+
+__all__ = ["ProgramSolver"]
+
+_TAIL = 300
+
+
+class ProgramSolver:
+    """A solver that is a program; subclass it and say how the program is called.
+
+    Attributes
+    ----------
+    name : str
+    command : sequence of str
+        The program and its arguments. ``{folder}`` becomes the exported case, ``{level}`` the
+        mesh level to solve; the program writes ``level-<k>/solution.json`` and its VTU there.
+    conforming : bool
+        Whether it wants the conforming meshes.
+
+    Notes
+    -----
+    A program that cannot do a case answers ``{"schema": 1, "refused": "why"}``. Its own
+    ``timings`` are used if it gives some; else its wall time, start-up included, is taken and
+    that is said in the notes.
+    """
+
+    name: ClassVar[str] = "program"
+    command: ClassVar[Sequence[str]] = ()
+    conforming: ClassVar[bool] = False
+
+    def refuses(self, scene: Scene) -> str | None:
+        """Refuse nothing; the program itself may, and a subclass that knows better."""
+        return None
+
+    def levels(self, scene: Scene) -> int:
+        """Return the number of mesh levels of the scene."""
+        return scene.mesh.count
+
+    def solve(self, scene: Scene, level: int, repetitions: int = 1, **parameters: Any) -> Solution:
+        """Export `scene`, run the program, read its answer.
+
+        Raises
+        ------
+        UnsupportedSceneError
+            If the program refuses the scene.
+        InputError
+            If the program is not there, or its answer is missing or bad.
+        RuntimeError
+            If the program fails; with the end of what it said.
+        """
+        if parameters:
+            raise InputError(f"'{self.name}' takes no parameters, got {', '.join(parameters)}")
+        with tempfile.TemporaryDirectory(prefix="verify-") as place:
+            folder = Path(place)
+            export_case(scene, folder, [level], self.conforming)
+            walls = [self._run(folder, level) for _ in range(repetitions)]
+            answers = read_answers(scene, folder)
+        if level in answers.missing:
+            status, why = answers.missing[level]
+            if status is Status.REFUSED:
+                raise UnsupportedSceneError(why)
+            raise InputError(f"'{self.name}': {why}")
+        solution = answers.solutions[level]
+        if not solution.timings:
+            solution.timings["program"] = walls
+            solution.notes["timed"] = "wall time of the program, its start-up included"
+        return solution
+
+    def _run(self, folder: Path, level: int) -> float:
+        words = [word.format(folder=folder, level=level) for word in self.command]
+        if not words or shutil.which(words[0]) is None:
+            raise InputError(f"'{self.name}': no program '{words[0] if words else ''}'")
+        start = perf_counter()
+        done = subprocess.run(
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, env=os.environ,
+            errors="replace",
+        )  # fmt: skip
+        wall = perf_counter() - start
+        if done.returncode:
+            said = (done.stderr or done.stdout).strip()[-_TAIL:] or "said nothing"
+            raise RuntimeError(f"{words[0]} ended with {done.returncode}: {said}")
+        return wall
