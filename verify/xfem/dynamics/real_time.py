@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
 from verify.xfem.cholesky import Cholesky
+from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.dynamics.body import DynamicBody, MotionState
 from verify.xfem.dynamics.integrator import (
     StepFailedError,
@@ -19,6 +20,7 @@ from verify.xfem.dynamics.integrator import (
     check_step,
 )
 from verify.xfem.dynamics.linear_solver import LinearSolver
+from verify.xfem.errors import XfemError
 
 __all__ = ["RealTimeEuler"]
 
@@ -49,6 +51,7 @@ class RealTimeEuler:
         self._places = body.mass.places(body.pattern)
         self._values = body.mass.entries[2]
         self._internal = np.empty(body.shape)
+        self._last: _Floats | None = None
         self._any_fixed = bool(body.fixed.any())
 
     def step(self, state: MotionState) -> StepForces:
@@ -69,21 +72,33 @@ class RealTimeEuler:
         Raises
         ------
         StepFailedError
-            If the result is not finite.
+            If the solver fails or the result is not finite; the state is left as it was.
         """
         check_state(state, self.body.shape)
         self.evaluate(state)
         self.assemble()
         if self._any_fixed:
             self._support(state)
-        self.solver.factorize(self.blocks)
-        change = self.solver.solve(self.load)
+        try:
+            self.solver.factorize(self.blocks)
+            change = self._solve()
+        except XfemError as failure:
+            raise StepFailedError(
+                f"RealTimeEuler at t = {state.time:.6g} s: {failure}"
+            ) from failure
         if not _advance(change, self.step_size, state.velocity, state.displacement):
             raise StepFailedError(
                 f"RealTimeEuler: not finite after t = {state.time:.6g} s with a step of "
                 f"{self.step_size:.6g} s"
             )
         state.time += self.step_size
+
+    def _solve(self) -> _Floats:
+        """Change of velocity; an iterative solver starts from the last one."""
+        if not isinstance(self.solver, ConjugateGradients):
+            return self.solver.solve(self.load)
+        self._last = self.solver.solve(self.load, self._last)
+        return self._last
 
     def evaluate(self, state: MotionState) -> None:
         """Evaluate rotations and forces, and the right-hand side into `load`."""
