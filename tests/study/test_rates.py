@@ -53,3 +53,12 @@ def test_an_error_of_exactly_zero_is_round_off_not_a_crash():
 
 def test_levels_of_equal_size_have_no_rate():
     assert "do not fall" in rate([0.1, 0.05, 0.02], sizes=[0.1, 0.1, 0.05]).reason
+
+
+def test_slopes_that_jump_by_half_their_size_are_no_order():
+    # a tip that lies elsewhere in its element on every level: 1.25, 1.99, 1.09 were seen
+    errors = [1.0, 2**-1.25, 2 ** -(1.25 + 1.99), 2 ** -(1.25 + 1.99 + 1.09)]
+    rate = observed_rate("xfem", "displacement_l2", [8, 4, 2, 1], errors, [0.0] * 4)
+    assert rate.order is None
+    assert rate.reason.startswith("oscillating")
+    assert len(rate.pairwise) == 3

@@ -66,4 +66,6 @@ def observed_rate(
     span = log(sizes[-2] / sizes[-1])
     allowed = sum(w / e for e, w in zip(errors[-2:], uncertainties[-2:], strict=True)) / span
     spread = SAFETY * abs(slopes[-1] - slopes[-2]) + allowed
+    if spread >= 0.5 * slopes[-1]:
+        return without(f"oscillating: slopes {shown}, so that the last says little about the next")
     return Rate(solver, metric, slopes[-1], spread, "", slopes)
