@@ -105,7 +105,9 @@ def _continued(virtual: VirtualMesh, cell: _Ints, into: _Ints) -> _Floats:
     """
     mesh = virtual.mesh
     corners = mesh.points[mesh.cells[cell]]
-    at = np.einsum("qcj,qij->qci", corners - mesh.points[mesh.cells[into, :1]], mesh.gradients[into])
+    at = np.einsum(
+        "qcj,qij->qci", corners - mesh.points[mesh.cells[into, :1]], mesh.gradients[into]
+    )
     at[:, :, 0] += 1.0
     same = mesh.cells[cell][:, :, None] == mesh.cells[into][:, None, :]
     common = same.any(axis=2)

@@ -121,7 +121,7 @@ def treat_slivers(
 
 
 def _largest_siblings(virtual: VirtualMesh) -> _Ints:
-    """The largest piece of each cell."""
+    """Return the largest piece of each cell."""
     order = np.lexsort([virtual.fraction, virtual.parent])
     last = np.diff(virtual.parent[order], append=-1) != 0
     largest: _Ints = order[last]

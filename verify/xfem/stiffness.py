@@ -59,9 +59,7 @@ class LinearStiffness:
             blocks[:] = 0.0
         v = self.virtual
         targets = pattern.targets[: len(v.cells)]
-        add_stiffness(
-            targets, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, blocks
-        )
+        add_stiffness(targets, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, blocks)
         return blocks
 
     def force(self, displacement: _Floats) -> tuple[_Floats, float]:

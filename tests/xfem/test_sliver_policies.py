@@ -1,0 +1,270 @@
+"""Sliver policies: nothing lost, halves separate, exact where it was, bounded where it was not."""
+
+from math import factorial
+
+import numpy as np
+import pytest
+import xfem_exact_fields as exact
+from test_slivers import SIZES, body, clamped
+from xfem_bodies import boundary_nodes, relative_l2_error
+
+from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import XfemError
+from verify.xfem.loads import body_force, traction
+from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.slivers import DEFAULT_POLICY, DEFAULT_THRESHOLD, treat_slivers
+from verify.xfem.static import solve_static
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+POLICIES = ["keep", "drop", "merge"]
+
+
+def shaken(mesh, seed, amount=0.2):
+    """Inner nodes moved at random: every element is cut in its own way."""
+    random = np.random.default_rng(seed)
+    points = mesh.points.copy()
+    inner = ((points > 1e-9) & (points < 1.0 - 1e-9)).all(axis=1)
+    size = np.linalg.norm(mesh.edge_vectors, axis=2).min()
+    points[inner] += amount * size * random.uniform(-1.0, 1.0, (inner.sum(), mesh.space))
+    return SimplexMesh(points, mesh.cells)
+
+
+def randomly_cut(dim, seed):
+    random = np.random.default_rng(1000 + seed)
+    mesh = shaken(rectangle_mesh((6, 6)) if dim == 2 else box_mesh((3, 3, 3)), seed)
+    cuts = [Plane(random.uniform(0.3, 0.7, dim), random.normal(size=dim)) for _ in range(2)]
+    return cut_mesh(mesh, cuts)
+
+
+@pytest.mark.parametrize("policy", ["drop", "merge"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_no_volume_mass_or_load_is_lost_and_points_stay_where_they_are(dim, policy):
+    """Two crossing planes at random; sums to round-off of as many terms."""
+    absorbed = 0
+    for seed in range(6):
+        virtual = randomly_cut(dim, seed)
+        treated, report = treat_slivers(virtual, policy)
+        absorbed += report.dropped + report.merged
+        assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-13)
+        assert treated.shape_integrals.sum() == pytest.approx(1.0, abs=1e-13)
+        assert side_wise_mass(treated, 3.0).weights.sum() == pytest.approx(3.0, abs=1e-12)
+        assert consistent_mass(treated, 3.0).matrix.sum() == pytest.approx(3.0, abs=1e-12)
+        pulled = traction(treated, treated.mesh.boundary_facets, np.ones(dim))
+        assert pulled.sum(axis=0) == pytest.approx(np.full(dim, 2.0 * dim), abs=1e-12)
+        divided = subdivide(treated)
+        corners = divided.points[divided.cells]
+        volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / factorial(dim)
+        assert volumes.min() > 0.0
+        assert volumes.sum() == pytest.approx(1.0, abs=1e-13)
+        # a linear field is continued exactly
+        assert divided.interpolation @ treated.node_points == pytest.approx(
+            divided.points, abs=1e-13
+        )
+        extended = report.absorption.extension @ treated.node_points
+        assert extended == pytest.approx(virtual.node_points, abs=1e-13)
+        # what is left is no sliver, unless it holds parts together
+        assert (treated.fraction < DEFAULT_THRESHOLD).sum() <= report.kept
+    assert absorbed > 10 * dim
+
+
+def test_first_moments_of_the_mass_stay_with_the_policy_that_continues_the_displacement():
+    """∫ρx over the body from consistent weights: exact for both policies, 2D and 3D."""
+    for dim in (2, 3):
+        for policy in ("drop", "merge"):
+            treated, _ = treat_slivers(randomly_cut(dim, 1), policy)
+            load = body_force(treated, np.eye(dim)[0])
+            moment = (load[:, :1] * treated.node_points).sum(axis=0)
+            assert moment == pytest.approx(np.full(dim, 0.5), abs=1e-13)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_halves_stay_separate(dim, size, policy):
+    """Two bodies; one half moves rigidly at no energy while the other is held."""
+    virtual, _ = treat_slivers(body(dim, size), policy)
+    assert virtual.bodies.max() == 1
+    last = virtual.mesh.points[:, -1]
+    lift = np.full(dim, 0.1)
+    supports = clamped(virtual).prescribe(virtual, last > 1.0 - 1e-9, lift)
+    solution = solve_static(virtual, isotropic(1.0, 0.3, "solid"), supports)
+    assert solution.strain_energy < 1e-25
+    assert solution.displacement[virtual.node_side[:, 0] > 0] == pytest.approx(
+        np.broadcast_to(lift, (np.sum(virtual.node_side[:, 0] > 0), dim)), abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("size", [s for s in SIZES if s != 0.0])
+def test_merging_keeps_the_patch_test_exact(size):
+    """Constant stress along the cut, another one on each side."""
+    treated, report = treat_slivers(body(2, size), "merge")
+    level = 0.5 + size / 8
+
+    def stretched(x, side):
+        strain = np.where(side[:, 0] > 0, 0.1, -0.05)
+        across = np.where(side[:, 0] > 0, 0.0, -0.02) - exact.ETA * strain * (x[:, 1] - level)
+        return np.stack([strain * (x[:, 0] - 0.5), across], axis=1)
+
+    supports = Supports.none(treated).prescribe(treated, boundary_nodes(treated.mesh), stretched)
+    solution = solve_static(treated, isotropic(1.0, 0.3, "plane strain"), supports)
+    want = stretched(treated.node_points, treated.node_side)
+    assert np.abs(solution.displacement - want).max() < 1e-13
+    plane = 1.0 / (1.0 - 0.3**2)
+    energy = 0.5 * plane * (0.1**2 * (1.0 - level) + 0.05**2 * level)
+    assert solution.strain_energy == pytest.approx(energy, rel=1e-12)
+    small = body(2, size).fraction < DEFAULT_THRESHOLD
+    assert report.merged == small.sum()
+
+
+def force_on_smallest_piece(virtual, report):
+    """Unit force at the centroid of the smallest piece before the policy, in its new unknowns."""
+    smallest = virtual.fraction.argmin()
+    rows = virtual.sub_cells.piece == smallest
+    weights = virtual.sub_cells.fraction[rows]
+    shape = weights @ virtual.sub_cells.barycentric[rows].mean(axis=1) / weights.sum()
+    force = np.zeros_like(virtual.node_points)
+    force[virtual.cells[smallest], -1] = shape
+    return report.absorption.extension.T @ force
+
+
+def compliance(dim, size, policy):
+    virtual = body(dim, size)
+    treated, report = treat_slivers(virtual, policy)
+    force = force_on_smallest_piece(virtual, report)
+    material = isotropic(1.0, 0.3, "solid")
+    solution = solve_static(treated, material, clamped(treated), force)
+    return (force * solution.displacement).sum()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_force_on_the_smallest_piece_does_not_see_how_small_it_is(dim):
+    """The piece moves with one that is not small: its response differs from the limit by as much
+    as the body has changed, of the order of ε.
+    """
+    sizes = np.array([4e-2, 1e-2, 1e-3, 1e-6, 1e-9, 1e-12])
+    response = np.array([compliance(dim, size, DEFAULT_POLICY) for size in sizes])
+    limit = response[-1]
+    assert (np.abs(response / limit - 1.0) <= 3.0 * sizes + 1e-9).all()
+
+
+def test_without_a_policy_the_response_in_space_grows_like_the_inverse_of_the_size():
+    kept = [compliance(3, size, "keep") for size in (1e-3, 1e-4, 1e-6)]
+    assert np.array(kept[1:]) / kept[:-1] == pytest.approx([10.0, 100.0], rel=0.05)
+
+
+def solved_f3(mesh, policy):
+    virtual = cut_mesh(mesh, [Plane([0.5] * mesh.dim, [-1.0, 3.0, 0.0][: mesh.dim])])
+    treated, report = treat_slivers(virtual, policy)
+
+    def field(points, sides):
+        plane = exact.f3(points[:, :2], sides)
+        return np.pad(plane, ((0, 0), (0, points.shape[1] - 2)))
+
+    supports = Supports.none(treated).prescribe(treated, boundary_nodes(mesh), field)
+    state = "plane strain" if mesh.dim == 2 else "solid"
+    solution = solve_static(treated, isotropic(1.0, 0.3, state), supports)
+    return relative_l2_error(treated, solution.displacement, field), report
+
+
+@pytest.mark.parametrize(
+    "dim,count,policy",
+    [(2, 16, "merge"), (2, 32, "merge"), (3, 6, "merge"), (2, 16, "drop"), (3, 6, "drop")],
+)
+def test_the_displacement_error_grows_by_less_than_two_percent(dim, count, policy):
+    """F3 (in space: as plane strain) with a cut askew to shaken elements: slivers of all sizes."""
+    absorbed = 0
+    for seed in range(3):
+        mesh = shaken(rectangle_mesh((count,) * 2) if dim == 2 else box_mesh((count,) * 3), seed)
+        kept, _ = solved_f3(mesh, "keep")
+        treated, report = solved_f3(mesh, policy)
+        absorbed += report.dropped + report.merged
+        assert treated <= 1.02 * kept
+    assert absorbed > 10
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_corner_cut_off_by_a_sliver_is_given_back(dim):
+    """It is a body of its own, without a neighbour on its side: the sibling takes it."""
+    mesh = rectangle_mesh((3, 3)) if dim == 2 else box_mesh((3, 3, 3))
+    for size in (1e-1, 1e-4, 1e-12):
+        corner = np.ones(dim) - size / 3.0 * np.eye(dim)[0]
+        virtual = cut_mesh(mesh, [Plane(corner, np.arange(1.0, dim + 1.0))])
+        assert virtual.bodies.max() == 1
+        for policy in ("drop", "merge"):
+            treated, report = treat_slivers(virtual, policy)
+            assert treated.bodies.max() == 0
+            assert report.merged == 0
+            assert report.dropped == (virtual.fraction < DEFAULT_THRESHOLD).sum()
+            # nothing is left of the cut: the uncut mesh again
+            assert treated.node_count == len(mesh.points)
+            assert len(subdivide(treated).cut_facets) == 0
+
+
+def test_a_strip_between_two_cuts_a_sliver_apart_is_taken_out():
+    cuts = [Plane([0.0, 0.53 + gap], [0.1, 1.0]) for gap in (0.0, 1e-6)]
+    virtual = cut_mesh(rectangle_mesh((8, 8)), cuts)
+    assert virtual.bodies.max() == 2
+    for policy in ("drop", "merge"):
+        treated, report = treat_slivers(virtual, policy)
+        assert treated.bodies.max() == 1
+        # the strip has sunk into its siblings: nothing moves but two halves
+        strip = np.bincount(virtual.bodies[virtual.cells[:, 0]], virtual.volumes).min()
+        assert report.volume_share >= strip
+
+
+@pytest.mark.parametrize("policy", ["drop", "merge"])
+def test_a_thin_neck_that_alone_holds_two_parts_together_is_kept(policy):
+    """A strip between two cuts, 2 % of an element thick in its middle and thick at both ends."""
+    lower = ImplicitCut(lambda x: x[:, 1] - 0.51)
+    upper = ImplicitCut(lambda x: x[:, 1] - 0.5125 - np.maximum(np.abs(x[:, 0] - 0.5) - 0.2, 0.0))
+    virtual = cut_mesh(rectangle_mesh((8, 8)), [lower, upper])
+    treated, report = treat_slivers(virtual, policy)
+    assert virtual.bodies.max() == treated.bodies.max() == 2
+    assert report.kept > 0
+    # what is no bridge is still treated
+    assert report.kept < (virtual.fraction < DEFAULT_THRESHOLD).sum()
+
+
+def test_pieces_in_a_chain_are_never_torn_apart():
+    """Closely spaced cuts: strips thick in some elements and thin in others stay in one piece."""
+    for seed in range(8):
+        random = np.random.default_rng(seed)
+        slope, level = random.uniform(-0.3, 0.3), random.uniform(0.4, 0.6)
+        cuts = [Plane([0.5, level + k * 0.02], [slope, 1.0]) for k in range(3)]
+        virtual = cut_mesh(shaken(rectangle_mesh((8, 8)), seed), cuts)
+        for policy in ("drop", "merge"):
+            treated, report = treat_slivers(virtual, policy)
+            origin = report.absorption.node
+            for number in range(treated.bodies.max() + 1):
+                nodes = np.flatnonzero((origin >= 0) & (treated.bodies[origin] == number))
+                assert len(np.unique(virtual.bodies[nodes])) == 1
+            assert treated.bodies.max() <= virtual.bodies.max()
+
+
+def test_the_report_counts_everything():
+    virtual = body(2, 1e-3)
+    small = virtual.fraction < DEFAULT_THRESHOLD
+    treated, report = treat_slivers(virtual)
+    assert (report.policy, report.threshold) == (DEFAULT_POLICY, DEFAULT_THRESHOLD)
+    assert (report.dropped, report.merged, report.kept) == (0, small.sum(), 0)
+    assert report.largest == virtual.fraction[small].max()
+    assert report.volume_share == pytest.approx(virtual.volumes[small].sum(), rel=1e-12)
+    kept, report = treat_slivers(virtual, "keep")
+    assert (report.dropped, report.merged, report.kept) == (0, 0, small.sum())
+    assert np.array_equal(kept.cells, virtual.cells)
+    again, report = treat_slivers(treated)
+    assert (report.dropped, report.merged) == (0, 0)
+    assert np.array_equal(again.cells, treated.cells)
+
+
+@pytest.mark.parametrize(
+    "policy,threshold", [("melt", 0.1), ("drop", 0.0), ("drop", 0.5), ("drop", np.nan)]
+)
+def test_unknown_policies_and_thresholds_are_refused(policy, threshold):
+    with pytest.raises(XfemError, match=r"expected"):
+        treat_slivers(body(2, 1e-3), policy, threshold)
