@@ -5,6 +5,7 @@ continuous integration begins with.
 """
 
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -63,6 +64,30 @@ def test_interrupted_setup_is_begun_again(checkout):
     recovered = set_up(checkout)
     assert recovered.returncode == 0, recovered.stderr
     assert "removing the unfinished" in recovered.stdout
+
+
+# Removes a little of the old environment and then kills the set-up that called it.
+DEADLY_RM = """#!/bin/bash
+[ -e "${@: -1}" ] || exit 0
+/bin/rm -f "${@: -1}/pyvenv.cfg" "${@: -1}/unfinished"
+kill -9 $PPID
+"""
+
+
+def test_setup_killed_while_it_removes_the_old_environment_is_begun_again(checkout, tmp_path):
+    place, environment = checkout
+    set_up(checkout)
+    (place / ".ci/requirements.lock").open("a").write("\n# changed\n")
+    (place / ".venv/stale").touch()
+    (tmp_path / "deadly").mkdir()
+    (tmp_path / "deadly/rm").write_text(DEADLY_RM)
+    (tmp_path / "deadly/rm").chmod(0o755)
+    killed = set_up(checkout, PATH=f"{tmp_path}/deadly:{environment['PATH']}")
+    assert killed.returncode == -signal.SIGKILL
+    recovered = set_up(checkout)
+    assert recovered.returncode == 0, recovered.stderr
+    assert not (place / ".venv/stale").exists()
+    assert not (place / ".venv.removed").exists()
 
 
 def test_changed_lock_rebuilds_and_changed_project_file_reinstalls_only_the_project(checkout):
