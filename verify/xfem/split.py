@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.bisection import Simplices, bisect_at
 from verify.xfem.clipping import staircase
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
@@ -157,7 +158,35 @@ def _split_by(
     )
     if not active.any():
         return partition
-    return _divide(partition, index, active, plus)
+    return _bisect_beside(_divide(partition, index, active, plus), index)
+
+
+def _bisect_beside(partition: Partition, index: int) -> Partition:
+    """Bisect what a cut leaves whole where it ends, so that later cuts find matching edges."""
+    zero = partition.points
+    plus = zero.values[partition.sub_points, index] >= 0.0
+    beside = plus.any(axis=1) & ~plus.all(axis=1)
+    beside &= partition.label[partition.sub_piece, index] == 0
+    if not beside.any():
+        return partition
+    nodes = len(zero.positions) - len(zero.ends)
+    used = np.unique(partition.sub_points[partition.label[partition.sub_piece, index] != 0])
+    numbers = used[used >= nodes] - nodes
+    numbers = numbers[zero.cut[numbers] == index]
+    simplices = Simplices(
+        partition.sub_piece,
+        partition.sub_points,
+        partition.sub_barycentric,
+        partition.sub_fraction,
+    )
+    parts = simplices.take(~beside).joined(bisect_at(zero, numbers, simplices.take(beside)))
+    return replace(
+        partition,
+        sub_piece=parts.source,
+        sub_points=parts.points,
+        sub_barycentric=parts.barycentric,
+        sub_fraction=parts.fraction,
+    )
 
 
 def _crossed_through(
@@ -206,6 +235,7 @@ def _divide(
         touched & ~plus.any(axis=1), below[partition.sub_piece], above[partition.sub_piece]
     )
     new = _clip(partition, index, clipped)
+    partition.points.divided(new["points"])
     source, side = new["source"], new["side"]
     piece = np.where(
         side > 0, above[partition.sub_piece[source]], below[partition.sub_piece[source]]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from verify.xfem.bisection import Simplices, bisect_at
 from verify.xfem.virtual import VirtualMesh
-from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["Subdivision", "subdivide"]
 
@@ -52,11 +52,9 @@ class Subdivision:
 def subdivide(virtual: VirtualMesh) -> Subdivision:
     """Make the conforming sub-division of a cut mesh."""
     mesh, zero = virtual.mesh, virtual.sub_cells.zero_points
-    solid, barycentric, _ = virtual.solid_simplices
-    whole = len(solid) - len(virtual.sub_cells.piece)
-    ids = np.concatenate([mesh.cells[virtual.parent[solid[:whole]]], virtual.sub_cells.points])
-    source, ids, barycentric = _bisect_hanging(virtual, np.arange(len(solid)), ids, barycentric)
-    piece = solid[source]
+    simplices = _conforming(virtual)
+    source, ids, barycentric = simplices.source, simplices.points, simplices.barycentric
+    piece = virtual.solid_simplices[0][source]
 
     # a mesh node moves with one unknown, a point of the cut with those of its edge, and a node
     # of a neighbour that was absorbed with all unknowns of the piece
@@ -97,59 +95,16 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
     )
 
 
-def _bisect_hanging(
-    virtual: VirtualMesh, source: _Ints, ids: _Ints, barycentric: _Floats
-) -> tuple[_Ints, _Ints, _Floats]:
-    """Bisect simplices on whose edges a neighbour has a point that they do not have."""
-    zero = virtual.sub_cells.zero_points
-    nodes = len(virtual.mesh.points)
-    used = np.unique(virtual.sub_cells.points)
-    used = used[used >= nodes] - nodes
-    ends = np.zeros(len(zero.positions), dtype=bool)
-    ends[zero.ends[used]] = True
-    near = ends[ids].sum(axis=1) >= 2
-    rest = (source[~near], ids[~near], barycentric[~near])
-    source, ids, barycentric = source[near], ids[near], barycentric[near]
-    edges = _edge_keys(ids)
-    for point in _bisection_order(zero, used):
-        plus, minus = zero.ends[point]
-        if (min(plus, minus) << 32 | max(plus, minus)) not in edges:
-            continue
-        has = (ids == plus).any(axis=1) & (ids == minus).any(axis=1)
-        rows = np.flatnonzero(has)
-        at = barycentric[rows, (ids[rows] == plus).argmax(axis=1)]
-        to = barycentric[rows, (ids[rows] == minus).argmax(axis=1)]
-        r, s = zero.shares(int(zero.cut[point]), np.array([plus]), np.array([minus]))
-        halves = []
-        for end in (plus, minus):
-            new_ids, new_corners = ids[rows].copy(), barycentric[rows].copy()
-            local = (ids[rows] == end).argmax(axis=1)
-            new_ids[np.arange(len(rows)), local] = nodes + point
-            new_corners[np.arange(len(rows)), local] = s * at + r * to
-            halves.append((new_ids, new_corners))
-            edges |= _edge_keys(new_ids)
-        source = np.concatenate([source[~has], source[rows], source[rows]])
-        ids = np.concatenate([ids[~has], halves[0][0], halves[1][0]])
-        barycentric = np.concatenate([barycentric[~has], halves[0][1], halves[1][1]])
-    return (
-        np.concatenate([rest[0], source]),
-        np.concatenate([rest[1], ids]),
-        np.concatenate([rest[2], barycentric]),
-    )
-
-
-def _edge_keys(ids: _Ints) -> set[int]:
-    """Each edge of the simplices (q, c) as one number."""
-    first, second = np.triu_indices(ids.shape[1], 1)
-    low = np.minimum(ids[:, first], ids[:, second])
-    high = np.maximum(ids[:, first], ids[:, second])
-    return set(np.unique(low << 32 | high).tolist())
-
-
-def _bisection_order(zero: ZeroPoints, used: _Ints) -> _Ints:
-    """Cut by cut, last ends first: on faces this gives the diagonals of the staircase."""
-    ends = zero.ends[used]
-    return used[np.lexsort([-ends[:, 1], -ends[:, 0], zero.cut[used]])]
+def _conforming(virtual: VirtualMesh) -> Simplices:
+    """Solid simplices, bisected where a neighbour has a point that they do not have."""
+    solid, barycentric, fraction = virtual.solid_simplices
+    sub = virtual.sub_cells
+    whole = virtual.parent[solid[: len(solid) - len(sub.piece)]]
+    points = np.concatenate([virtual.mesh.cells[whole], sub.points])
+    used = np.unique(sub.points)
+    hanging = used[used >= len(virtual.mesh.points)] - len(virtual.mesh.points)
+    simplices = Simplices(np.arange(len(solid)), points, barycentric, fraction)
+    return bisect_at(sub.zero_points, hanging, simplices)
 
 
 def _oriented(points: _Floats, cells: _Ints) -> _Ints:

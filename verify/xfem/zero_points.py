@@ -34,6 +34,8 @@ class ZeroPoints:
         Ends (plus, minus) of the edge of each zero point.
     cut : (k,) int array
         Cut of each zero point.
+    turn : (k,) int array
+        When a division of cells first used each zero point, counting `divided`.
     """
 
     def __init__(self, positions: _Floats, values: _Floats, snap: float) -> None:
@@ -41,6 +43,8 @@ class ZeroPoints:
         self.values = values
         self.ends = np.zeros((0, 2), dtype=np.int64)
         self.cut = np.zeros(0, dtype=np.int64)
+        self.turn = np.zeros(0, dtype=np.int64)
+        self._turns = 0
         self._snap = snap
         cuts = values.shape[1]
         self._keys = [np.zeros(0, dtype=np.int64) for _ in range(cuts)]
@@ -69,6 +73,23 @@ class ZeroPoints:
             at = np.searchsorted(self._keys[cut], wanted)
         return self._numbers[cut][at][back]
 
+    def divided(self, numbers: _Ints) -> None:
+        """Note that cells were divided at these points (mesh nodes among them do not count)."""
+        used = np.unique(numbers)
+        used = used[used >= len(self.positions) - len(self.ends)]
+        used -= len(self.positions) - len(self.ends)
+        self.turn[used] = np.minimum(self.turn[used], self._turns)
+        self._turns += 1
+
+    def in_order(self, numbers: _Ints) -> _Ints:
+        """Places (k,) of zero points in `ends`, as divisions used them, last ends first.
+
+        Bisecting edges in this order gives the diagonals of the staircase on faces.
+        """
+        ends = self.ends[numbers]
+        turn = self.turn if len(self.turn) == len(self.cut) else self.cut
+        return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], turn[numbers]])]
+
     def _append(self, cut: int, keys: _Ints) -> None:
         plus, minus = keys >> 32, keys & 0xFFFFFFFF
         r, s = self.shares(cut, plus, minus)
@@ -84,6 +105,7 @@ class ZeroPoints:
         )
         self.ends = np.concatenate([self.ends, np.stack([p, m], axis=1)])
         self.cut = np.concatenate([self.cut, np.full(len(p), cut)])
+        self.turn = np.concatenate([self.turn, np.full(len(p), np.iinfo(np.int64).max)])
         all_keys = np.concatenate([self._keys[cut], keys])
         order = np.argsort(all_keys)
         self._keys[cut] = all_keys[order]

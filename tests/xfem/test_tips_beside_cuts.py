@@ -1,0 +1,73 @@
+"""Ends of cuts beside other cuts, in any order: the sub-division is conforming, nothing hangs."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from test_sliver_policies import shaken
+
+from verify.xfem.cuts import PolygonPatch
+from verify.xfem.polyline import Polyline
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
+from verify.xfem.virtual import cut_mesh
+
+
+def facet_measures(corners):
+    edges = corners[:, 1:] - corners[:, :1]
+    gram = edges @ edges.transpose(0, 2, 1)
+    size = np.sqrt(np.maximum(np.linalg.det(gram), 0.0))
+    return size / (1.0 if corners.shape[1] == 2 else 2.0)
+
+
+def exterior(divided):
+    """Measure of all facets that belong to one cell only."""
+    cells = divided.cells
+    corners = cells.shape[1]
+    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
+    facets = np.sort(cells[:, keep].reshape(-1, corners - 1), axis=1)
+    distinct, count = np.unique(facets, axis=0, return_counts=True)
+    assert count.max() <= 2
+    return facet_measures(divided.points[distinct[count == 1]]).sum()
+
+
+def assert_conforming(mesh, cuts):
+    """Outside are the boundary of the body and both faces of the cut: no other facet."""
+    divided = subdivide(cut_mesh(mesh, cuts))
+    torn = facet_measures(divided.cut_facets).sum()
+    assert torn > 0.0
+    boundary = 4.0 if mesh.dim == 2 else 6.0
+    assert exterior(divided) == pytest.approx(boundary + 2.0 * torn, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_tip_beside_other_cuts_leaves_no_hanging_nodes_in_the_plane(seed):
+    random = np.random.default_rng(seed)
+    mesh = shaken(rectangle_mesh((4, 4)), seed)
+    tip = random.uniform(0.35, 0.65, 2)
+    turn = random.uniform(0.0, 2.0 * np.pi)
+    towards = np.array([np.cos(turn), np.sin(turn)])
+    slit = Polyline([tip + 2.0 * towards, tip])
+    aside = tip + random.uniform(-0.1, 0.1, 2)
+    along = random.normal(size=2)
+    along *= 3.0 / np.linalg.norm(along)
+    line = Polyline([aside - along, aside + along])
+    other = Polyline([aside + 0.05, aside + 0.05 + 0.5 * along])
+    for cuts in permutations([slit, line, other]):
+        assert_conforming(mesh, cuts)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_front_beside_other_cuts_leaves_no_hanging_nodes_in_space(seed):
+    random = np.random.default_rng(seed)
+    mesh = shaken(box_mesh((3, 3, 3)), seed)
+
+    def patch(centre, reach):
+        frame = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        corners = np.array([[-2.0, -2.0], [reach, -2.0], [reach, 2.0], [-2.0, 2.0]])
+        return PolygonPatch(centre + corners @ frame[:2])
+
+    slit = patch(random.uniform(0.4, 0.6, 3), 0.0)
+    others = [patch(random.uniform(0.4, 0.6, 3), reach) for reach in (2.0, 0.1)]
+    for cuts in permutations([slit, *others]):
+        assert_conforming(mesh, cuts)
