@@ -19,7 +19,7 @@ from verify.solvers.xfem_scene import (
     material_of,
     supports_of,
 )
-from verify.xfem.errors import XfemError
+from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.static import solve_static
 from verify.xfem.subdivision import Subdivision, subdivide
@@ -96,6 +96,8 @@ class XfemSolver:
             mesh, size = background_mesh(scene, level)
             meshing = perf_counter() - start
             runs = [_run(scene, mesh, size, exact, basis, tip) for _ in range(1 + repetitions)]
+        except BasisError as error:  # another basis can do the scene
+            raise UnsupportedSceneError(str(error)) from None
         except XfemError as error:
             raise InputError(str(error), str(scene.file or scene.name)) from None
         timings = {phase: [run.timings[phase] for run in runs[1:]] for phase in runs[0].timings}

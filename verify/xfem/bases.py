@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, identity, kron
 
-from verify.xfem.errors import XfemError
+from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Basis", "from_sidewise", "sidewise_from", "transformation", "transformed_matrix"]
@@ -80,7 +80,7 @@ def _pairs(virtual: VirtualMesh) -> tuple[_Ints, _Ints, _Floats]:
     """Enriched nodes: the unknown on the node's own side, the other, and H of the node."""
     counts = np.bincount(virtual.node_parent)
     if (counts > 2).any():
-        raise XfemError(
+        raise BasisError(
             f"node {int(np.argmax(counts > 2))} has {counts.max()} unknowns; the shifted and "
             "Heaviside bases need one cut per element, use the side-wise one"
         )
@@ -91,6 +91,8 @@ def _pairs(virtual: VirtualMesh) -> tuple[_Ints, _Ints, _Floats]:
     apart = virtual.node_side[own] != virtual.node_side[other]
     if not (apart.sum(axis=1) == 1).all():
         at = own[int(np.argmax(apart.sum(axis=1) != 1))]
-        raise XfemError(f"no single cut separates the two unknowns of node {at}")
+        raise BasisError(f"no single cut separates the two unknowns of node {at}")
+    if not len(own):  # nothing is cut
+        return own, other, np.zeros(0)
     cut = apart.argmax(axis=1)
     return own, other, virtual.node_side[own, cut].astype(float)

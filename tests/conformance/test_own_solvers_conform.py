@@ -1,0 +1,62 @@
+"""The solvers that come with the project keep every check that they do not refuse."""
+
+import json
+from importlib.util import find_spec
+
+import pytest
+
+from verify.cli import main
+from verify.conformance import State, conform, exit_code_of
+from verify.errors import InputError
+
+
+@pytest.mark.parametrize("basis", ["sidewise", "shifted", "heaviside"])
+def test_the_compact_solver_conforms_in_every_basis(basis):
+    results = conform("xfem", {"basis": basis})
+    assert exit_code_of(results) == 0, [r for r in results if r.state is not State.KEPT]
+    kept = {result.name for result in results if result.state is State.KEPT}
+    # the three bases share the mesh; none may hide behind refusals
+    assert {"cut-patch", "rigid-rotation-3d", "renumbering", "mirrored-cut"} <= kept
+
+
+@pytest.mark.fenicsx
+@pytest.mark.skipif(find_spec("dolfinx") is None, reason="needs DOLFINx")
+def test_the_conforming_solver_conforms():
+    results = conform("conforming")
+    assert exit_code_of(results) == 0, [r for r in results if r.state is not State.KEPT]
+    kept = {result.name for result in results if result.state is State.KEPT}
+    assert {"cut-patch", "energy-account", "traction", "weight", "mirrored-cut"} <= kept
+
+
+def test_the_command_prints_the_checks_as_a_table_and_as_json(capsys):
+    command = ["conform", "xfem", "--check", "uncut-2d", "--check", "repeatability"]
+    assert main(command) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert [line.split()[:2] for line in table] == [["uncut-2d", "kept"], ["repeatability", "kept"]]
+    assert main([*command, "--set", "basis=shifted", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["parameters"] == {"basis": "shifted"}
+    assert [check["state"] for check in said["checks"]] == ["kept", "kept"]
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["no_such_module:Solver"], "needs 'no_such_module'"),
+        (["xfme"], "no solver 'xfme'; did you mean 'xfem'?"),
+        (["xfem", "--check", "uncut"], "no check 'uncut'; did you mean 'uncut-"),
+        (["xfem", "--set", "basis"], "expected NAME=VALUE"),
+    ],
+)
+def test_what_cannot_be_checked_is_bad_input_in_one_line(capsys, arguments, said):
+    assert main(["conform", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_a_solver_that_cannot_be_loaded_is_bad_input_and_not_a_finding(tmp_path, monkeypatch):
+    (tmp_path / "brittle.py").write_text("raise RuntimeError('no licence')\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="could not be loaded: RuntimeError: no licence"):
+        conform("brittle:Solver", only=["uncut-2d"])

@@ -1,0 +1,158 @@
+"""Solvers made wrong on purpose, each in one way, from the compact one."""
+
+import os
+import signal
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from verify.solvers.xfem import XfemSolver
+
+
+class Stating(XfemSolver):
+    """Right, and states its strain energy."""
+
+    factor = 1.0
+
+    def solve(self, scene, level, repetitions=1):
+        from verify.compare.hooke import hooke
+        from verify.compare.strain_energy import strain_energy
+
+        solution = super().solve(scene, level, repetitions)
+        energy = strain_energy(solution, hooke(scene.material))
+        return replace(solution, ledger={"strain": np.array([self.factor * energy])})
+
+
+class WrongEnergy(Stating):
+    factor = 1.001
+
+
+class IgnoresTheCut(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        return super().solve(changed(scene, cuts=[]), level, repetitions)
+
+
+class SwapsTheSides(XfemSolver):
+    """Gives each of the two nodes at a place on the cut what the other has."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        keys = {}
+        for node, point in enumerate(np.round(solution.points, 12)):
+            keys.setdefault(tuple(point), []).append(node)
+        order = np.arange(len(solution.points))
+        for pair in keys.values():
+            order[pair] = pair[::-1]
+        return replace(solution, displacement=solution.displacement[:, order])
+
+
+class HalfAsStiff(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        soft = scene.material.model_copy(update={"young": 0.5 * scene.material.young})
+        return super().solve(changed(scene, material=soft), level, repetitions)
+
+
+class TakesTheWrongDensity(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        heavy = scene.material.model_copy(update={"density": 1.2 * (scene.material.density or 1)})
+        return super().solve(changed(scene, material=heavy), level, repetitions)
+
+
+class SpinsFreely(XfemSolver):
+    """Adds a tiny stretch to what turns."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        return replace(solution, displacement=solution.displacement + 1e-5 * solution.points)
+
+
+class KnowsOnlyUpright(XfemSolver):
+    """Loses the horizontal part of tractions."""
+
+    def solve(self, scene, level, repetitions=1):
+        loads = [
+            load.model_copy(update={"traction": [0.0, load.traction[1]]})
+            if load.kind == "traction"
+            else load
+            for load in scene.loads
+        ]
+        return super().solve(changed(scene, loads=loads), level, repetitions)
+
+
+class DependsOnNumbers(XfemSolver):
+    """What sits at the first node of the mesh decides."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        factor = 1 + 1e-4 * solution.points[0].sum()
+        return replace(solution, displacement=factor * solution.displacement)
+
+
+class Noisy(XfemSolver):
+    """Differs by a billionth from call to call."""
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        noise = 1e-9 * np.random.default_rng().standard_normal(solution.displacement.shape)
+        return replace(solution, displacement=solution.displacement + noise)
+
+
+class Remembers(XfemSolver):
+    """Is right only the first time in a process."""
+
+    calls = 0
+
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        Remembers.calls += 1
+        factor = 1 + 1e-9 * (Remembers.calls - 1)
+        return replace(solution, displacement=factor * solution.displacement)
+
+
+class LosesAPiece(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        return replace(solution, cells=solution.cells[:-1], cell_sides=None)
+
+
+class CrashesOnCuts(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        if scene.cuts:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return super().solve(scene, level, repetitions)
+
+
+class RaisesInSpace(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        if scene.dimension == 3:
+            raise IndexError("index 2 is out of bounds for axis 1 with size 2")
+        return super().solve(scene, level, repetitions)
+
+
+class AnswersAnything(XfemSolver):
+    """Finds a minimum-norm answer where there is none, as a pseudo-inverse would."""
+
+    def solve(self, scene, level, repetitions=1):
+        if scene.name == "free-piece":
+            scene = changed(scene, cuts=[])
+        return super().solve(scene, level, repetitions)
+
+
+class Hangs(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        if scene.name == "uncut-2d":
+            time.sleep(600)
+        return super().solve(scene, level, repetitions)
+
+
+class DoesNothing(XfemSolver):
+    def refuses(self, scene):
+        return "it only does beams"
+
+
+def changed(scene, **parts):
+    """A copy of the scene with other parts."""
+    copy = scene.model_copy(update=parts)
+    copy._name, copy._file = scene.name, scene.file
+    return copy

@@ -1,0 +1,6 @@
+"""What every right solver keeps, whatever its method; asked before any ranking."""
+
+from verify.conformance.check import CheckResult, State
+from verify.conformance.suite import conform, exit_code_of
+
+__all__ = ["CheckResult", "State", "conform", "exit_code_of"]

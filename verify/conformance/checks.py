@@ -1,0 +1,235 @@
+"""The checks of the suite, each with the argument for its limit.
+
+`EXACT`, 1e-7: answers that lie in the solver's space are found up to the residual at which its
+linear solver stops. Direct solvers reach 1e-13 on these meshes; an iterative one that stops at a
+relative residual of 1e-9 loses up to two digits to the condition number (about 1e2 for 5 × 4
+cells). What is wrong in the method shows at 1e-3 and more: half an element of a wrong side, a
+missing factor, a swapped sign.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from verify.compare.hooke import hooke
+from verify.compare.realised import cut_deviation
+from verify.compare.strain_energy import strain_energy
+from verify.conformance import scenes
+from verify.conformance.check import Check, Finding
+from verify.conformance.measures import covered, distance, nodal_deviation, weight_imbalance
+from verify.conformance.scenes import Field
+from verify.conformance.trials import Outcome, Trial
+from verify.result import Status
+from verify.scene import Scene
+from verify.solution import Solution
+
+__all__ = ["EXACT", "checks"]
+
+EXACT = 1e-7
+Solutions = Mapping[str, Solution]
+
+
+def checks(folder: Path) -> list[Check]:
+    """Return all checks; mesh files are written into `folder`."""
+    return [
+        _uncut_linear(2),
+        _uncut_linear(3),
+        _rigid("translation", 2),
+        _rigid("rotation", 2),
+        _rigid("translation", 3),
+        _rigid("rotation", 3),
+        _strained_sides(),
+        _energy_account(),
+        _closed_cut(),
+        _pulled_halves(),
+        _hanging_halves(),
+        _mirrored_cut(),
+        _renumbering(folder),
+        _repeatability(),
+        _free_piece(),
+        _refusals(),
+    ]
+
+
+def _is_field(scene: Scene, field: Field, energy: float | None = None) -> Check:
+    """Make a check that an answer is `field`; the strain energy of the answer is `energy`."""
+    law = hooke(scene.material)
+
+    def judge(solutions: Solutions) -> Finding:
+        (solution,) = solutions.values()
+        if (gap := covered(solution)) > EXACT:
+            return Finding(gap, EXACT, "the cells do not cover the body once")
+        off = nodal_deviation(solution, field)
+        if not off <= EXACT:
+            return Finding(off, EXACT, f"displacement off by {off:.2e}{_moved(scene, solution)}")
+        found = strain_energy(solution, law)
+        if energy is None:
+            return Finding(off, EXACT)
+        # E·(u/L)² is the energy of strains as large as the displacements; an error of EXACT in
+        # the displacements is one of EXACT · u / h in the strains, and its square in the energy
+        largest = float(np.abs(solution.displacement).max())
+        allowed = 2 * EXACT * energy + 400 * EXACT**2 * scenes.YOUNG * largest**2
+        note = f"strain energy {found:.6g}, expected {energy:.6g}"
+        if not abs(found - energy) <= allowed:
+            return Finding(abs(found - energy), allowed, note)
+        return Finding(off, EXACT)
+
+    return Check(scene.name, "", [Trial(scene.name, scene)], judge)
+
+
+def _named(check: Check, name: str, claim: str) -> Check:
+    return Check(name, claim, check.trials, check.judge)
+
+
+def _moved(scene: Scene, solution: Solution) -> str:
+    """Say by how much the realised cut deviates from the one asked for, if it does."""
+    from verify.compare.body import body_of
+
+    if scene.dimension != 2 or not scene.cuts:
+        return ""
+    off = cut_deviation(solution, body_of(scene))
+    return f"; its realised cut is off by {off:.2e} m" if off > EXACT else ""
+
+
+def _uncut_linear(dimension: int) -> Check:
+    scene, field = scenes.uncut_linear(dimension)
+    gradient = field(np.eye(dimension), np.eye(dimension)).T[None]
+    energy = float(hooke(scene.material).energy_density(gradient)[0])
+    claim = f"without a cut a linear field is reproduced ({dimension}D)"
+    return _named(_is_field(scene, field, energy), f"uncut-{dimension}d", claim)
+
+
+def _rigid(kind: str, dimension: int) -> Check:
+    words = {"translation": "a translation", "rotation": "an infinitesimal rotation"}[kind]
+    claim = f"{words} of a cut body costs no energy ({dimension}D)"
+    check = _is_field(*scenes.rigid(kind, dimension), 0.0)
+    return _named(check, f"rigid-{kind}-{dimension}d", claim)
+
+
+def _strained_sides() -> Check:
+    claim = "each side of a cut takes its own strain (patch test on a cut)"
+    return _named(_is_field(*scenes.strained_sides()), "cut-patch", claim)
+
+
+def _pulled_halves() -> Check:
+    claim = "two halves under a traction contract each for itself, with the material's constants"
+    return _named(_is_field(*scenes.pulled_halves()), "traction", claim)
+
+
+def _energy_account() -> Check:
+    scene, _, energy = scenes.strained_sides()
+
+    def judge(solutions: Solutions) -> Finding:
+        (solution,) = solutions.values()
+        own = {"ledger": solution.ledger.get("strain"), "quantity": None}
+        if "strain_energy" in solution.quantities:
+            own["quantity"] = np.array([solution.quantities["strain_energy"]])
+        given = {name: float(np.ravel(v)[-1]) for name, v in own.items() if v is not None}
+        if not given:
+            return Finding(0.0, None, "the solver states no strain energy")
+        worst = max(abs(value - energy) for value in given.values()) / energy
+        said = ", ".join(f"{name} {value:.6g}" for name, value in given.items())
+        return Finding(worst, 2 * EXACT, f"{said}; the field's is {energy:.6g}")
+
+    claim = "the strain energy that the solver states is that of its field"
+    return Check("energy-account", claim, [Trial("account", scene)], judge)
+
+
+def _closed_cut() -> Check:
+    cut, uncut = scenes.closed_cut()
+
+    def judge(solutions: Solutions) -> Finding:
+        return Finding(distance(solutions["closed-cut"], solutions["no-cut"], cut), EXACT)
+
+    trials = [Trial("closed-cut", cut), Trial("no-cut", uncut)]
+    return Check("closed-cut", "a cut along the load changes nothing", trials, judge)
+
+
+def _hanging_halves() -> Check:
+    scene, weight = scenes.hanging_halves()
+    law = hooke(scene.material)
+
+    def judge(solutions: Solutions) -> Finding:
+        # Galerkin: round-off. A stabilised method may put some energy elsewhere: of the order of
+        # the squared error in the energy norm, below 5 % here (P1: 20 % of error at 5 × 4 cells)
+        observed = weight_imbalance(solutions["hanging"], weight, law)
+        return Finding(observed, 0.05, "" if observed <= EXACT else "not a Galerkin solution")
+
+    claim = "the weight of a cut body does twice the work that is stored (Clapeyron)"
+    return Check("weight", claim, [Trial("hanging", scene)], judge)
+
+
+def _mirrored_cut() -> Check:
+    scene, mirrored = scenes.sheared_halves(False), scenes.sheared_halves(True)
+
+    def judge(solutions: Solutions) -> Finding:
+        observed = distance(solutions["as-it-is"], solutions["mirrored"], scene, swap=True)
+        # on the mesh of the scene, which is symmetric: round-off. A solver with a mesh of its own
+        # errs differently on both; each error e is at most twice the change u_h − u_{h/2} that
+        # the next level makes (rates ≥ 1 in L2), so that both together stay below four changes
+        change = distance(solutions["as-it-is"], solutions["finer"], scene)
+        note = "" if observed <= EXACT else "equal up to the discretisation only"
+        return Finding(observed, max(EXACT, 4 * change), note)
+
+    trials = [
+        Trial("as-it-is", scene), Trial("mirrored", mirrored), Trial("finer", scene, 1),
+    ]  # fmt: skip
+    return Check("mirrored-cut", "a mirrored cut gives the mirrored answer", trials, judge)
+
+
+def _renumbering(folder: Path) -> Check:
+    given, shuffled = scenes.given_mesh(folder, False), scenes.given_mesh(folder, True)
+
+    def judge(solutions: Solutions) -> Finding:
+        return Finding(distance(solutions["given"], solutions["shuffled"], given), EXACT)
+
+    trials = [Trial("given", given), Trial("shuffled", shuffled)]
+    return Check("renumbering", "numbers of nodes and cells do not matter", trials, judge)
+
+
+def _repeatability() -> Check:
+    scene = scenes.sheared_halves(False)
+    names = ("first", "again", "elsewhere")
+
+    def judge(solutions: Solutions) -> Finding:
+        first = solutions["first"].displacement
+        worst = 0.0
+        for name in names[1:]:
+            other = solutions[name].displacement
+            if other.shape != first.shape:
+                return Finding(float("inf"), 1e-12, f"'{name}' has another number of nodes")
+            worst = max(worst, float(np.abs(other - first).max() / np.abs(first).max()))
+        # sums in another order (threads) may differ in the last digits
+        return Finding(worst, 1e-12, "" if worst == 0.0 else "not equal bit by bit")
+
+    claim = "the same call gives the same numbers, also after other calls and in another process"
+    trials = [Trial(name, scene) for name in names]
+    return Check("repeatability", claim, trials, judge, separate=("elsewhere",))
+
+
+def _free_piece() -> Check:
+    def judge(outcomes: Mapping[str, Outcome]) -> str:
+        outcome = outcomes["free-piece"]
+        if outcome.status is Status.SOLVED:
+            return "answered a static scene in which nothing holds a piece"
+        return f"the process died: {outcome.reason}" if outcome.crashed else ""
+
+    claim = "a piece that nothing holds is reported, not answered"
+    return Check("free-piece", claim, [Trial("free-piece", scenes.free_piece())], None, judge)
+
+
+def _refusals() -> Check:
+    unusual = scenes.unusual()
+
+    def judge(outcomes: Mapping[str, Outcome]) -> str:
+        fine = (Status.SOLVED, Status.REFUSED)
+        return "; ".join(
+            f"{name}: {outcome.reason}"
+            for name, outcome in outcomes.items()
+            if outcome.status not in fine
+        )
+
+    claim = "what the solver cannot do it refuses; it does not crash"
+    trials = [Trial(f"unusual-{scene.name}", scene) for scene in unusual]
+    return Check("refusals", claim, trials, None, judge)

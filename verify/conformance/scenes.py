@@ -1,0 +1,294 @@
+"""Small scenes whose answers are known without any reference, in closed form.
+
+All bodies are unit squares (or cubes) of a few cells, whose mesh lines no cut follows, so that a
+case takes a few milliseconds. The linear answers lie in every finite element space that is cut
+along straight lines; they are found to round-off or not at all.
+"""
+
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.scene import Scene, restore_scene
+
+__all__ = [
+    "DENSITY",
+    "POISSON",
+    "YOUNG",
+    "Field",
+    "closed_cut",
+    "free_piece",
+    "given_mesh",
+    "hanging_halves",
+    "pulled_halves",
+    "rigid",
+    "sheared_halves",
+    "strained_sides",
+    "uncut_linear",
+    "unusual",
+]
+
+Array = NDArray[np.float64]
+# displacement (n, d) at points (n, d), on the side of the points `near` (n, d)
+Field = Callable[[Array, Array], Array]
+
+YOUNG, POISSON, DENSITY = 2.5, 0.3, 3.0
+
+_SQUARE = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
+_CUBE = {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]}
+_MIDDLE, _SLOPE = (0.5, 0.47), 0.24
+_INCLINED = {"kind": "polyline", "points": [[-0.1, 0.326], [1.1, 0.614]]}
+_UPRIGHT_AT = 0.37
+_UPRIGHT = {"kind": "polyline", "points": [[_UPRIGHT_AT, -0.1], [_UPRIGHT_AT, 1.1]]}
+_TILTED_PLANE = {
+    "kind": "polygon",
+    "points": [[-0.1, -0.1, 0.37], [1.1, -0.1, 0.37], [1.1, 1.1, 0.61], [-0.1, 1.1, 0.61]],
+}
+_BOUNDARY_EXACT = [{"where": "boundary", "displacement": "exact"}]
+
+
+def _scene(name: str, file: Path | None = None, **parts: Any) -> Scene:
+    """Make a scene of a unit square, in which `parts` replace the defaults."""
+    content: dict[str, Any] = {
+        "title": name,
+        "requirement": "A right solver shall answer as the closed form does.",
+        "geometry": _SQUARE,
+        "mesh": {"cells": [[5, 4], [10, 8]]},
+        "material": {"young": YOUNG, "poisson": POISSON, "plane": "strain", "density": DENSITY},
+        **parts,
+    }
+    return restore_scene({"name": name, "file": str(file) if file else None, "scene": content})
+
+
+def _in_space(cuts: list[Mapping[str, Any]]) -> dict[str, Any]:
+    return {
+        "geometry": _CUBE,
+        "mesh": {"cells": [[3, 3, 3]]},
+        "material": {"young": YOUNG, "poisson": POISSON, "density": DENSITY},
+        "cuts": cuts,
+    }
+
+
+def uncut_linear(dimension: int = 2) -> tuple[Scene, Field]:
+    """Prescribe a linear field on the boundary of an uncut body."""
+    matrix = np.array([[0.03, 0.05, -0.02], [-0.01, 0.02, 0.04], [0.01, -0.03, 0.05]])
+    matrix = matrix[:dimension, :dimension]
+    parts = _in_space([]) if dimension == 3 else {}
+    scene = _scene(
+        f"uncut-{dimension}d",
+        supports=_BOUNDARY_EXACT,
+        exact={"solution": "linear", "parameters": {"matrix": matrix.tolist()}},
+        **parts,
+    )
+    return scene, lambda points, near: points @ matrix.T
+
+
+def rigid(kind: str, dimension: int = 2) -> tuple[Scene, Field]:
+    """Move the whole boundary of a cut body rigidly: ``translation`` or ``rotation``."""
+    parts = _in_space([_TILTED_PLANE]) if dimension == 3 else {"cuts": [_INCLINED]}
+    name = f"{kind}-{dimension}d"
+    if kind == "translation":
+        shift = np.array([0.3, -0.2, 0.1])[:dimension]
+        supports = [{"where": "boundary", "displacement": shift.tolist()}]
+        scene = _scene(name, supports=supports, **parts)
+        return scene, lambda points, near: np.tile(shift, (len(points), 1))
+    spin = np.array([[0.0, -0.1, 0.05], [0.1, 0.0, -0.07], [-0.05, 0.07, 0.0]])
+    spin = spin[:dimension, :dimension]
+    exact = {"solution": "linear", "parameters": {"matrix": spin.tolist()}}
+    scene = _scene(name, supports=_BOUNDARY_EXACT, exact=exact, **parts)
+    return scene, lambda points, near: points @ spin.T
+
+
+def strained_sides() -> tuple[Scene, Field, float]:
+    """Strain the two sides of an inclined cut differently and move them apart.
+
+    Each side is in uniaxial stress along the cut, so that the cut is free of traction.
+
+    Returns
+    -------
+    scene : Scene
+    field : callable
+    energy : float
+        E'/2 · Σ area · strain², J/m.
+    """
+    strain, shift = (0.1, -0.05), (0.03, -0.02)  # above, below
+    scene = _scene(
+        "strained-sides", supports=_BOUNDARY_EXACT, cuts=[_INCLINED], exact=_patch(strain, shift)
+    )
+    direction = np.array([1.0, _SLOPE]) / np.hypot(1.0, _SLOPE)
+    normal = np.array([-direction[1], direction[0]])
+    contraction = POISSON / (1 - POISSON)
+
+    def field(points: Array, near: Array) -> Array:
+        above = (near - _MIDDLE) @ normal > 0
+        s, t = (points - _MIDDLE) @ direction, (points - _MIDDLE) @ normal
+        e = np.where(above, *strain)
+        along, across = e * s, -contraction * e * t + np.where(above, *shift)
+        return along[:, None] * direction + across[:, None] * normal
+
+    # the line passes through (1/2, 0.47): 0.53 of the square lies above it
+    area = 1 - _MIDDLE[1], _MIDDLE[1]
+    stiffness = YOUNG / (1 - POISSON**2)
+    energy = 0.5 * stiffness * sum(a * e * e for a, e in zip(area, strain, strict=True))
+    return scene, field, energy
+
+
+def _patch(strain: tuple[float, float], shift: tuple[float, float]) -> dict[str, Any]:
+    parameters = {"point": list(_MIDDLE), "slope": _SLOPE}
+    return {
+        "solution": "patch",
+        "parameters": {**parameters, "strain": list(strain), "shift": list(shift)},
+    }
+
+
+def closed_cut() -> tuple[Scene, Scene]:
+    """Pull a body along its cut, and the same body without the cut: the cut bears nothing."""
+    exact = _patch((0.1, 0.1), (0.0, 0.0))
+    return (
+        _scene("closed-cut", supports=_BOUNDARY_EXACT, cuts=[_INCLINED], exact=exact),
+        _scene("no-cut", supports=_BOUNDARY_EXACT, exact=exact),
+    )
+
+
+def pulled_halves() -> tuple[Scene, Field]:
+    """Pull two halves, cut apart lengthwise, by a traction: each contracts for itself.
+
+    Plane stress. The outer sides are on rollers, so that the cut opens by ν t / E everywhere.
+    """
+    traction = 0.2
+    scene = _scene(
+        "pulled-halves",
+        material={"young": YOUNG, "poisson": POISSON, "plane": "stress"},
+        cuts=[_UPRIGHT],
+        supports=[
+            {"where": "bottom", "displacement": [0.0], "components": ["y"]},
+            {"where": "left", "displacement": [0.0], "components": ["x"]},
+            {"where": "right", "displacement": [0.0], "components": ["x"]},
+        ],
+        loads=[{"kind": "traction", "where": "top", "traction": [0.0, traction]}],
+    )
+
+    def field(points: Array, near: Array) -> Array:
+        fixed = np.where(near[:, 0] < _UPRIGHT_AT, 0.0, 1.0)
+        strain = traction / YOUNG
+        return np.column_stack([-POISSON * strain * (points[:, 0] - fixed), strain * points[:, 1]])
+
+    return scene, field
+
+
+def hanging_halves() -> tuple[Scene, Array]:
+    """Hang two halves, cut apart lengthwise, under their weight (N/m³, second value)."""
+    gravity = np.array([0.5, -2.0])
+    scene = _scene(
+        "hanging-halves",
+        cuts=[_UPRIGHT],
+        supports=[{"where": "top", "displacement": [0.0, 0.0]}],
+        loads=[{"kind": "gravity", "acceleration": gravity.tolist()}],
+    )
+    return scene, DENSITY * gravity
+
+
+def sheared_halves(mirrored: bool) -> Scene:
+    """Move and load two halves; or that scene mirrored at the diagonal y = x.
+
+    Squares split along their rising diagonal are symmetric to that diagonal.
+    """
+    order = slice(None, None, -1) if mirrored else slice(None)
+    lower, upper, side = ("left", "right", "top") if mirrored else ("bottom", "top", "right")
+    ends = [[-0.1, 0.47], [1.1, 0.62]]
+    return _scene(
+        "mirrored" if mirrored else "sheared-halves",
+        mesh={"cells": [[6, 6], [12, 12]]},
+        cuts=[{"kind": "polyline", "points": [end[order] for end in ends]}],
+        supports=[
+            {"where": lower, "displacement": [0.0, 0.0]},
+            {"where": upper, "displacement": [0.02, 0.05][order]},
+        ],
+        loads=[{"kind": "traction", "where": side, "traction": [0.1, 0.3][order]}],
+    )
+
+
+def free_piece() -> Scene:
+    """Cut a piece off that nothing holds: there is no static answer."""
+    return _scene(
+        "free-piece",
+        cuts=[_INCLINED],
+        supports=[{"where": "bottom", "displacement": [0.0, 0.0]}],
+        loads=[{"kind": "gravity", "acceleration": [0.0, -1.0]}],
+    )
+
+
+def given_mesh(folder: Path, shuffled: bool) -> Scene:
+    """Solve on a mesh file, whose nodes and cells are numbered at random if `shuffled`."""
+    import meshio
+
+    n, rng = 7, np.random.default_rng(20)
+    x, y = np.meshgrid(*[np.linspace(0, 1, n + 1)] * 2)
+    points = np.column_stack([x.ravel(), y.ravel()])
+    inner = (np.abs(points - 0.5) < 0.49).all(axis=1)
+    points[inner] += rng.uniform(-0.2, 0.2, (inner.sum(), 2)) / n
+    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    far = first + n + 2
+    cells = np.vstack(
+        [np.column_stack([first, first + 1, far]), np.column_stack([first, far, far - 1])]
+    )
+    if shuffled:
+        order = rng.permutation(len(points))
+        place = np.argsort(order)  # new number of each old node
+        points, cells = points[order], place[cells][rng.permutation(len(cells))]
+        cells = np.roll(cells, 1, axis=1)
+    name = "shuffled" if shuffled else "given"
+    file = folder / f"{name}.vtu"
+    spatial = np.pad(points, ((0, 0), (0, 1)))
+    meshio.Mesh(spatial, [("triangle", cells)]).write(file, file_format="vtu")
+    return _scene(
+        f"{name}-mesh",
+        file=folder / f"{name}.toml",
+        geometry={"kind": "file", "file": file.name, "dimension": 2},
+        mesh={"pattern": "given"},
+        cuts=[{"kind": "polyline", "points": [[-0.1, 0.42], [0.6, 0.57]]}],
+        supports=[{"where": "y < 1e-9", "displacement": [0.0, 0.0]}],
+        loads=[{"kind": "gravity", "acceleration": [0.3, -1.0]}],
+    )
+
+
+def unusual() -> list[Scene]:
+    """Return valid scenes that a solver may not be able to do."""
+    held: dict[str, Any] = {"supports": [{"where": "boundary", "displacement": [0.0, 0.0]}]}
+    loads = [{"kind": "gravity", "acceleration": [0.3, -1.0]}]
+    arc = {"kind": "arc", "centre": [0.5, 0.5], "radius": 0.21, "start": 10.0, "sweep": 200.0}
+    inner = {"kind": "polyline", "points": [[0.23, 0.31], [0.68, 0.57]]}
+    kinked = {"kind": "polyline", "points": [[0.23, 0.31], [0.51, 0.33], [0.68, 0.77]]}
+    crossing = [
+        {"kind": "polyline", "name": "one", "points": [[0.13, 0.31], [0.88, 0.77]]},
+        {"kind": "polyline", "name": "two", "points": [[0.13, 0.72], [0.88, 0.24]]},
+    ]
+    dynamic = {"kind": "dynamic", "duration": 0.01, "time_step": 0.005}
+    through_nodes = {"kind": "polyline", "points": [[-0.1, 0.5], [0.6, 0.5]]}
+    space = {**held["supports"][0], "displacement": [0.0, 0.0, 0.0]}
+    cases: dict[str, dict[str, Any]] = {
+        "dynamics": {"analysis": dynamic, "cuts": [inner]},
+        "finite-rotations": {"analysis": {"kinematics": "corotational"}, "cuts": [inner]},
+        "inner-cut": {"cuts": [inner]},
+        "kinked-cut": {"cuts": [kinked]},
+        "arc": {"cuts": [arc]},
+        "crossing-cuts": {"cuts": crossing},
+        "cut-along-mesh-lines": {"cuts": [through_nodes]},
+        "polygon": {
+            "geometry": {"kind": "polygon", "corners": [[0.0, 0.0], [1.0, 0.0], [0.4, 0.9]]},
+            "mesh": {"pattern": "unstructured", "sizes": [0.2]},
+            "cuts": [{"kind": "polyline", "points": [[0.3, 0.2], [0.6, 0.3]]}],
+        },
+        "space": {
+            **_in_space([_TILTED_PLANE]),
+            "supports": [space],
+            "loads": [{"kind": "gravity", "acceleration": [0.0, 0.3, -1.0]}],
+        },
+    }
+    if find_spec("gmsh") is None:  # a mesh generator that is not there is no fault of a solver
+        del cases["polygon"]
+    return [_scene(name, **{**held, "loads": loads, **parts}) for name, parts in cases.items()]

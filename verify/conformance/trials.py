@@ -1,0 +1,146 @@
+"""Trials of a solver: scenes solved in processes of their own, so that a crash is a finding."""
+
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from verify.errors import InputError
+from verify.result import Status
+from verify.runner.child import POLL_SECONDS, Child
+from verify.runner.log import telling_line
+from verify.runner.storage import read_json, write_json
+from verify.scene import Scene, scene_content
+from verify.solution import Solution, read_solution
+
+__all__ = ["Outcome", "Trial", "solve_trials"]
+
+_START_SECONDS = 120.0  # importing a solver may start MPI or compile
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Solve `scene` on mesh `level`; `name` tells trials of the same scene apart."""
+
+    name: str
+    scene: Scene
+    level: int = 0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a trial ended.
+
+    `crashed` tells a process that died or was killed from an exception that was raised.
+    """
+
+    status: Status
+    reason: str = ""
+    solution: Solution | None = None
+    crashed: bool = False
+
+
+def solve_trials(
+    solver: str,
+    parameters: Mapping[str, Any],
+    trials: Sequence[Trial],
+    folder: Path,
+    timeout: float,
+    label: str = "batch",
+) -> dict[str, Outcome]:
+    """Solve `trials` one after the other in one process; begin a new one after a death.
+
+    Parameters
+    ----------
+    solver : str
+        Name, or ``module:Class``.
+    parameters : mapping
+        Parameters of its `solve`.
+    trials : sequence of Trial
+        With distinct names.
+    folder : Path
+        Where to work; a folder per trial is made in it.
+    timeout : float
+        Wall seconds for each trial.
+    label : str
+        Tells the batches in `folder` apart.
+
+    Returns
+    -------
+    dict of str to Outcome
+        By the name of the trial.
+
+    Raises
+    ------
+    InputError
+        If there is no such solver, or it cannot be loaded.
+    """
+    for trial in trials:
+        (folder / trial.name).mkdir()
+        job = {
+            "scene": scene_content(trial.scene),
+            "solver": solver,
+            "level": trial.level,
+            "repetitions": 1,
+            "parameters": dict(parameters),
+        }
+        write_json(job, folder / trial.name / "job.json")
+    waiting = [trial.name for trial in trials]
+    outcomes: dict[str, Outcome] = {}
+    while waiting:
+        child = _start(solver, waiting, folder, f"{label}-{len(waiting)}")
+        why, how = _watch(child, [folder / name for name in waiting], timeout)
+        while waiting and (folder / waiting[0] / "outcome.json").is_file():
+            name = waiting.pop(0)
+            outcomes[name] = _outcome(folder / name)
+        if waiting:  # the first without an outcome killed the process
+            outcomes[waiting.pop(0)] = Outcome(how, why, crashed=True)
+    return outcomes
+
+
+def _start(solver: str, names: list[str], folder: Path, label: str) -> Child:
+    batch = folder / f"{label}.json"
+    write_json({"solver": solver, "trials": names}, batch)
+    log = folder / f"{label}.txt"
+    return Child("verify.conformance.worker", batch, log, _START_SECONDS, float("inf"))
+
+
+def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[str, Status]:
+    """Wait for the end of a batch, and explain it as if it had been a death."""
+    ready, done, began = child.log.with_suffix(".ready"), -1, False
+    try:
+        while (ending := child.poll()) is None:
+            if not began and ready.exists():
+                began = True
+            count = sum((folder / "outcome.json").is_file() for folder in folders) if began else -1
+            if count > done:
+                done, child.timeout = count, time.monotonic() - child.start + timeout
+            time.sleep(POLL_SECONDS)
+    except BaseException:
+        child.kill()
+        raise
+    if (refused := child.log.with_suffix(".refused")).exists():
+        raise InputError(read_json(refused)["error"])
+    if not ready.exists():
+        raise InputError(f"the solver could not be loaded: {telling_line(child.log)}")
+    if ending.killed_for == "timeout":
+        return f"no answer after {timeout:g} s", Status.TIMEOUT
+    code = ending.returncode
+    how = f"signal {-code}" if code < 0 else f"exit code {code}"
+    return f"{telling_line(child.log)} ({how})", Status.FAILED
+
+
+def _outcome(folder: Path) -> Outcome:
+    content = read_json(folder / "outcome.json")
+    status, reason = Status(content["status"]), str(content["reason"])
+    if status is not Status.SOLVED:
+        return Outcome(status, reason)
+    try:
+        return Outcome(status, solution=read_solution(folder / "solution"))
+    except InputError as error:
+        return Outcome(Status.FAILED, f"its solution cannot be read back ({error.what})")
+    finally:
+        for file in folder.glob("solution*"):
+            os.unlink(file)
