@@ -12,6 +12,8 @@ from verify.scene.parts import on_part
 
 __all__ = ["constrained_values"]
 
+_HELD = 1e-9  # lever of the supports over the size of the piece, below which it may turn
+
 
 def constrained_values(
     scene: Scene, space: ConformingSpace, exact: Any
@@ -31,7 +33,7 @@ def constrained_values(
     Raises
     ------
     InputError
-        If a support holds no node, or a piece of the body is held by none.
+        If a support holds no node, or a piece of the body is left a rigid motion.
     """
     nodes, owner = space.boundary_nodes()
     points = space.node_points[nodes]
@@ -53,16 +55,39 @@ def constrained_values(
 def _check_every_piece_is_held(
     scene: Scene, space: ConformingSpace, value: NDArray[np.float64]
 ) -> None:
+    """Refuse a piece that its supports leave a rigid motion, naming the piece and the motion."""
     pieces = space.mesh.pieces
-    held = np.zeros(pieces.max() + 1, dtype=np.int64)
     owner = np.zeros(len(value), dtype=np.int64)
     owner[space.cell_nodes.ravel()] = np.repeat(pieces, space.cell_nodes.shape[1])
-    np.add.at(held, owner, np.count_nonzero(~np.isnan(value), axis=1))
-    loose = np.flatnonzero(held < 3)
-    if loose.size:
-        where = space.centroids[pieces == loose[0]].mean(axis=0)
-        raise InputError(
-            f"supports: the cut frees the piece around ({where[0]:.4g}, {where[1]:.4g}), which no "
-            "support holds; a static scene needs every piece held",
-            str(scene.file or ""),
-        )
+    node, component = np.nonzero(~np.isnan(value))
+    for piece in range(pieces.max() + 1):
+        corners = space.mesh.points[np.unique(space.mesh.cells[pieces == piece])]
+        centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        size = float(np.ptp(corners, axis=0).max())
+        mine = owner[node] == piece
+        free = _free_motion(space.node_points[node[mine]] - centre, component[mine], size)
+        if free:
+            raise InputError(
+                f"supports: the piece around ({centre[0]:.4g}, {centre[1]:.4g}) {free}; "
+                "a static scene needs every piece held",
+                str(scene.file or ""),
+            )
+
+
+def _free_motion(points: NDArray[np.float64], component: NDArray[np.int64], size: float) -> str:
+    """Say which rigid motion is left when `component` (k,) is held at `points` (k, 2)."""
+    if not len(points):
+        return "is held by no support (the cut frees it)"
+    modes = np.zeros((len(points), 3))
+    modes[np.arange(len(points)), component] = 1.0
+    x, y = (points / size).T
+    modes[:, 2] = np.where(component == 0, -y, x)
+    _, values, rows = np.linalg.svd(modes, full_matrices=len(points) < 3)
+    rank = int(np.count_nonzero(values > _HELD * values[0]))
+    if rank == 3:
+        return ""
+    left = rows[rank:]
+    if np.abs(left[:, 2]).max() > 1e-6:
+        return "can still turn: its supports hold too few points or components"
+    axis = "x" if np.abs(left[:, 0]).max() > np.abs(left[:, 1]).max() else "y"
+    return f"can still move in {axis}: its supports do not hold that component"

@@ -27,7 +27,7 @@ def import_dolfinx() -> ModuleType:
 
 
 def create_triangle_mesh(points: NDArray[np.float64], cells: NDArray[np.int64]) -> Any:
-    """A serial DOLFINx mesh of straight triangles.
+    """Make a serial DOLFINx mesh of straight triangles.
 
     ``mesh.topology.original_cell_index`` maps its cells to rows of `cells`.
     """
@@ -41,7 +41,8 @@ def create_triangle_mesh(points: NDArray[np.float64], cells: NDArray[np.int64]) 
     major, minor = _version()
     if (major, minor) >= (0, 10):
         return mesh.create_mesh(MPI.COMM_SELF, cells, domain, points)
-    return mesh.create_mesh(MPI.COMM_SELF, cells, points, domain)
+    create: Any = mesh.create_mesh  # its last arguments were the other way round before
+    return create(MPI.COMM_SELF, cells, points, domain)
 
 
 def _version() -> tuple[int, int]:

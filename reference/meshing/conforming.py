@@ -1,12 +1,16 @@
 """Meshes of a scene that conform to its cuts (gmsh, OpenCASCADE kernel)."""
 
+from itertools import pairwise
 from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.meshing.features import Feature, close_pairs, plane_features
 from reference.meshing.grading import Grading
 from reference.meshing.opening import ConformingMesh, open_cut
+from reference.meshing.outline import divided_outline
+from reference.meshing.separation import TOUCHING, check_separation, check_strips
 from reference.meshing.session import gmsh_session, plane_triangles
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
@@ -43,16 +47,20 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         raise UnsupportedSceneError(
             f"a conforming mesh of a '{geometry.kind}' geometry is not offered yet"
         )
-    outline = geometry.outline()
+    outline = divided_outline(scene)
     # gmsh's tolerances are absolute: mesh a body of size one
     origin, scale = outline.min(axis=0), float(np.ptp(outline, axis=0).max())
     where = str(scene.file or "")
+    features = plane_features(scene)
+    check_separation(features, scale, where)
+    if grading.strip is not None:
+        check_strips(features, scale, grading.strip, where)
     try:
         with gmsh_session() as gmsh:
             surface = _add_outline(gmsh, (outline - origin) / scale)
             curves = [tag for cut in scene.cuts for tag in _add_cut(gmsh, cut, origin, scale)]
             cut_curves = _fragment(gmsh, surface, curves)
-            _set_sizes(gmsh, grading, origin, scale)
+            _set_sizes(gmsh, grading, features, origin, scale)
             gmsh.option.setNumber("Mesh.Algorithm", 5 if len(grading.points) else 6)
             gmsh.model.mesh.generate(2)
             points, cells, number = plane_triangles(gmsh)
@@ -97,7 +105,7 @@ def _add_cut(gmsh: ModuleType, cut: object, origin: Array, scale: float) -> list
     tags = [occ.addPoint(x, y, 0.0) for x, y in (vertices[:-1] if closed else vertices)]
     if closed:
         tags.append(tags[0])
-    return [int(occ.addLine(a, b)) for a, b in zip(tags, tags[1:], strict=False)]
+    return [int(occ.addLine(a, b)) for a, b in pairwise(tags)]
 
 
 def _fragment(gmsh: ModuleType, surface: int, curves: list[int]) -> list[int]:
@@ -123,7 +131,9 @@ def _fragment(gmsh: ModuleType, surface: int, curves: list[int]) -> list[int]:
     return inside
 
 
-def _set_sizes(gmsh: ModuleType, grading: Grading, origin: Array, scale: float) -> None:
+def _set_sizes(
+    gmsh: ModuleType, grading: Grading, features: list[Feature], origin: Array, scale: float
+) -> None:
     size, radius, smallest = (
         value / scale for value in (grading.size, grading.radius, grading.smallest)
     )
@@ -135,6 +145,15 @@ def _set_sizes(gmsh: ModuleType, grading: Grading, origin: Array, scale: float) 
         graded = f"{size:.17g}*({squared}/{radius**2:.17g})^{grading.exponent / 2:.17g}"
         field.setString(tag, "F", f"{graded} + {smallest:.17g}")
         terms.append(tag)
+    if grading.strip is not None:
+        close = close_pairs(features, TOUCHING * scale, grading.size / grading.strip)
+        for i, j in close:
+            tag = field.add("MathEval")
+            apart = " + ".join(_distance(features[k], origin, scale) for k in (i, j))
+            field.setString(tag, "F", f"{grading.strip:.17g}*({apart})")
+            terms.append(tag)
+            gap = grading.strip * features[i].gap(features[j]) / scale
+            smallest = min(smallest, gap)
     far = field.add("MathEval")
     field.setString(far, "F", f"{size:.17g}")
     least = field.add("Min")
@@ -142,6 +161,18 @@ def _set_sizes(gmsh: ModuleType, grading: Grading, origin: Array, scale: float) 
     field.setAsBackgroundMesh(least)
     gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+
+
+def _distance(feature: Feature, origin: Array, scale: float) -> str:
+    """Write the distance to a feature as a gmsh expression; an arc stands for its circle."""
+    if feature.centre is not None:
+        x, y = (feature.centre - origin) / scale
+        return f"abs(sqrt((x-({x:.17g}))^2+(y-({y:.17g}))^2)-{feature.radius / scale:.17g})"
+    x, y = (feature.start - origin) / scale
+    u, v = (feature.end - feature.start) / scale
+    along = f"(((x-({x:.17g}))*({u:.17g})+(y-({y:.17g}))*({v:.17g}))/{u * u + v * v:.17g})"
+    share = f"(0.5*(1+abs({along})-abs({along}-1)))"  # clipped to 0…1
+    return f"sqrt((x-({x:.17g})-{share}*({u:.17g}))^2+(y-({y:.17g})-{share}*({v:.17g}))^2)"
 
 
 def _curve_facets(

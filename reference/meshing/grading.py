@@ -1,18 +1,22 @@
 """Element sizes: uniform, or graded to the singular points of the scene."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.meshing.features import Feature, crossing_points, plane_features
+from reference.meshing.outline import divided_outline, load_jumps, supported_edges
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
+from verify.scene.cuts import Cut
 from verify.scene.planar import distance_to_outline, inside_polygon
-from verify.scene.regions import parse_region
 
 __all__ = ["Grading", "singular_points"]
 
 Array = NDArray[np.float64]
-_SMALLEST = 1e-6  # of the grading radius: below it the tip's energy is beyond double precision
+_SMALLEST = 3e-9  # of the grading radius: nearer to a point, gmsh runs out of digits
+_KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matter
 
 
 @dataclass(frozen=True)
@@ -32,12 +36,16 @@ class Grading:
         Distance at which the grading starts, m.
     exponent : float
         β.
+    strip : float, optional
+        Element size over the width of the strip between two features that come close to each
+        other; none leaves such strips to the other sizes.
     """
 
     size: float
     points: Array
     radius: float = 1.0
     exponent: float = 0.8
+    strip: float | None = None
 
     @property
     def smallest(self) -> float:
@@ -46,84 +54,77 @@ class Grading:
         return float(self.radius * max(ratio ** (1 / (1 - self.exponent)), _SMALLEST))
 
     def halved(self, level: int) -> "Grading":
-        """The same grading with all sizes divided by 2^level."""
-        return Grading(self.size / 2**level, self.points, self.radius, self.exponent)
+        """Divide all sizes by 2^level."""
+        strip = None if self.strip is None else self.strip / 2**level
+        return replace(self, size=self.size / 2**level, strip=strip)
 
 
 def singular_points(scene: Scene) -> Array:
     """Points (k, 2) where the gradient of the solution may be unbounded.
 
-    Tips, kinks, junctions and crossings of cuts; corners of the body at which a clamped part
-    of the boundary ends, and re-entrant corners. None of the body's corners where the supports
-    prescribe an exact field, which is smooth there.
+    Tips, kinks of more than 15°, junctions and crossings of cuts; points of the outline at which
+    a support ends or a traction jumps, and re-entrant corners. None of the outline's where the
+    supports prescribe an exact field, which is smooth there.
     """
     geometry = scene.geometry
     assert isinstance(geometry, Rectangle | Polygon)
     outline = geometry.outline()
+    cuts = [feature for feature in plane_features(scene) if feature.name != "the boundary"]
     found = [_tips_and_kinks(cut, outline) for cut in scene.cuts]
-    found.append(_crossings([c for c in scene.cuts if isinstance(c, PolylineCut)]))
+    if len(scene.cuts) > 1:
+        found.append(_inner(_junctions(cuts), outline))
     if not any(support.displacement == "exact" for support in scene.supports):
-        found.append(_corners(scene, outline))
+        found.append(_corners(scene))
     points = np.concatenate([f.reshape(-1, 2) for f in found])
     scale = float(np.ptp(outline, axis=0).max())
-    return np.unique(np.round(points / scale, 12), axis=0) * scale if len(points) else points
+    _, first = np.unique(np.round(points / scale, 9), axis=0, return_index=True)
+    return points[first]
 
 
-def _tips_and_kinks(cut: object, outline: Array) -> Array:
-    if isinstance(cut, ArcCut):
-        if cut.sweep == 360.0:
-            return np.zeros((0, 2))
-        candidates = cut.vertices()[[0, -1]]
-    else:
-        assert isinstance(cut, PolylineCut)
-        candidates = cut.vertices()
-        if np.array_equal(candidates[0], candidates[-1]):
-            candidates = candidates[:-1]
+def _inner(points: Array, outline: Array) -> Array:
     scale = float(np.ptp(outline, axis=0).max())
-    inner = inside_polygon(candidates, outline) & (
-        distance_to_outline(candidates, outline) > 1e-9 * scale
+    away = distance_to_outline(points, outline) > 1e-9 * scale
+    return points[inside_polygon(points, outline) & away]
+
+
+def _tips_and_kinks(cut: Cut, outline: Array) -> Array:
+    assert isinstance(cut, ArcCut | PolylineCut)
+    vertices = cut.vertices()
+    closed = bool(np.array_equal(vertices[0], vertices[-1]))
+    if isinstance(cut, ArcCut):
+        return _inner(vertices[[0, -1]][: 0 if closed else 2], outline)
+    if closed:
+        vertices = np.vstack([vertices[-2], vertices])
+    along = np.diff(vertices, axis=0)
+    turn = np.abs(
+        np.arctan2(
+            along[:-1, 0] * along[1:, 1] - along[:-1, 1] * along[1:, 0],
+            np.sum(along[:-1] * along[1:], axis=1),
+        )
     )
-    return candidates[inner]
+    kinks = vertices[1:-1][turn > _KINK]
+    return _inner(kinks if closed else np.vstack([vertices[[0, -1]], kinks]), outline)
 
 
-def _crossings(cuts: list[PolylineCut]) -> Array:
-    found = []
-    for i, first in enumerate(cuts):
-        for second in cuts[i + 1 :]:
-            p, q = first.vertices(), second.vertices()
-            for a, b in zip(p, p[1:], strict=False):
-                for c, d in zip(q, q[1:], strict=False):
-                    u, v = b - a, d - c
-                    det = u[0] * v[1] - u[1] * v[0]
-                    if abs(det) < 1e-14 * np.hypot(*u) * np.hypot(*v):
-                        continue
-                    s = ((c - a)[0] * v[1] - (c - a)[1] * v[0]) / det
-                    t = ((c - a)[0] * u[1] - (c - a)[1] * u[0]) / det
-                    if -1e-9 <= s <= 1 + 1e-9 and -1e-9 <= t <= 1 + 1e-9:
-                        found.append(a + s * u)
-    return np.array(found).reshape(-1, 2)
+def _junctions(features: list[Feature]) -> Array:
+    """Points where different cuts meet."""
+    pairs = [(a, b) for a, b in combinations(features, 2) if a.name != b.name]
+    return np.concatenate([np.zeros((0, 2)), *(crossing_points([a, b]) for a, b in pairs)])
 
 
-def _corners(scene: Scene, outline: Array) -> Array:
-    """Corners between a held and a free edge, and re-entrant ones."""
-    geometry = scene.geometry
-    names = geometry.parts()
-    middle = 0.5 * (outline + np.roll(outline, -1, axis=0))
-    held = np.zeros(len(outline), dtype=bool)
-    for support in scene.supports:
-        if support.where == "boundary":
-            held[:] = True
-        elif support.where in names:
-            held |= np.array(names) == support.where
-        else:
-            held |= parse_region(support.where, 2)(middle)
-    following = np.roll(outline, -1, axis=0) - outline
+def _corners(scene: Scene) -> Array:
+    """Where a support ends or a traction jumps, and re-entrant corners."""
+    corners = divided_outline(scene)
+    held = supported_edges(scene, corners)
+    following = np.roll(corners, -1, axis=0) - corners
     before = np.roll(following, 1, axis=0)
     turn = before[:, 0] * following[:, 1] - before[:, 1] * following[:, 0]
-    orientation = _orientation(outline)
-    return outline[(held != np.roll(held, 1)) | (turn * orientation < 0)]
+    sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(following, axis=1)
+    reentrant = turn * _orientation(corners) < -1e-9 * sizes
+    free = ~held & ~np.roll(held, 1)
+    return corners[(held != np.roll(held, 1)) | reentrant | (free & load_jumps(scene, corners))]
 
 
 def _orientation(outline: Array) -> float:
-    x, y = outline.T
+    x, y = (outline - outline[0]).T
     return float(np.sign(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))

@@ -5,6 +5,8 @@ conforming mesh is had that differs from an unfitted one by nothing but the cut 
 peer of a method that cuts through its elements. Slivers are left as they come.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +24,9 @@ def structured_triangles(
 ) -> tuple[Array, Cells]:
     """Rectangles split along their rising diagonals."""
     n, m = counts
-    x, y = np.meshgrid(np.linspace(lower[0], upper[0], n + 1), np.linspace(lower[1], upper[1], m + 1))
+    x, y = np.meshgrid(
+        np.linspace(lower[0], upper[0], n + 1), np.linspace(lower[1], upper[1], m + 1)
+    )
     i, j = np.meshgrid(np.arange(n), np.arange(m))
     a = (j * (n + 1) + i).ravel()
     b, c, d = a + 1, a + n + 1, a + n + 2
@@ -54,11 +58,7 @@ def imprint(points: Array, cells: Cells, polylines: list[Array]) -> tuple[Array,
         If no part of the polylines lies inside the mesh.
     """
     box = points.min(axis=0), points.max(axis=0)
-    segments = [
-        (a, b)
-        for polyline in polylines
-        for a, b in zip(polyline, polyline[1:], strict=False)
-    ]
+    segments = [(a, b) for polyline in polylines for a, b in pairwise(polyline)]
     ends = []
     for a, b in segments:
         for end in (a, b):
@@ -91,7 +91,9 @@ def _insert(points: Array, cells: Cells, end: Array) -> tuple[Array, Cells]:
         k = int(np.argmin(share[cell]))
         edge = {int(cells[cell, (k + 1) % 3]), int(cells[cell, (k + 2) % 3])}
         around = [c for c in inside if edge <= set(cells[c].tolist())]
-        return points, _replace(cells, around, [_halves(cells[c], edge, new) for c in around])
+        return points, _replace(
+            cells, [int(c) for c in around], [_halves(cells[c], edge, new) for c in around]
+        )
     cell = int(inside[0])
     a, b, c = cells[cell]
     return points, _replace(cells, [cell], [[[a, b, new], [b, c, new], [c, a, new]]])
@@ -118,7 +120,9 @@ def _split_crossed(points: Array, cells: Cells, a: Array, b: Array) -> tuple[Arr
         return points, cells
     number = np.full(len(edges), -1, dtype=np.int64)
     number[chosen] = len(points) + np.arange(len(chosen))
-    points = np.vstack([points, points[p[chosen]] + t[chosen, None] * (points[q] - points[p])[chosen]])
+    points = np.vstack(
+        [points, points[p[chosen]] + t[chosen, None] * (points[q] - points[p])[chosen]]
+    )
     on_edge = number[owner]  # (m, 3): new node on the edge opposite each corner, or −1
     touched = np.flatnonzero((on_edge >= 0).any(axis=1))
     pieces = [_parts(points, cells[c], on_edge[c]) for c in touched]

@@ -1,18 +1,23 @@
-"""Parts of the boundary of a mesh, as a scene names them."""
+"""Parts of the boundary of a body, as a scene names them."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.scene.geometry import Box, Polygon, Rectangle
+from verify.scene.geometry import Box, Geometry, Polygon, Rectangle
 from verify.scene.regions import parse_region
 from verify.scene.scene import Scene
 
-__all__ = ["on_part"]
+__all__ = ["on_edges", "on_part"]
+
+_TOLERANCE = 1e-9  # of the body's size: a point closer than that to a part is on it
 
 
 def on_part(scene: Scene, where: str, points: NDArray[np.float64], key: str) -> NDArray[np.bool_]:
-    """Tell which boundary points lie on the part `where`.
+    """Tell which boundary points lie on the part `where`, its ends included.
+
+    A point within 1e-9 of the body's size of a part is on it; so the node at the end of
+    ``x < 0.3`` is, whichever way it was rounded.
 
     Parameters
     ----------
@@ -33,19 +38,37 @@ def on_part(scene: Scene, where: str, points: NDArray[np.float64], key: str) -> 
     InputError
         If there is none.
     """
-    if where == "boundary":
-        return np.ones(len(points), dtype=bool)
-    if where in scene.geometry.parts():
-        found = _on_named(scene.geometry, where, points)
-    else:
-        found = parse_region(where, scene.dimension)(points)
+    found = _found(scene.geometry, where, points)
     if not found.any():
         raise InputError(f"{key}: no node of the boundary lies in '{where}'", str(scene.file or ""))
     return found
 
 
-def _on_named(geometry: object, where: str, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    tolerance = 1e-9 * float(np.ptp(points, axis=0).max())
+def on_edges(scene: Scene, where: str, corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which edges (k,) of a closed polyline `corners` (k, 2) lie on the part `where`.
+
+    Each is judged by its middle: meant for an outline that has corners where parts end.
+    """
+    return _found(scene.geometry, where, 0.5 * (corners + np.roll(corners, -1, axis=0)))
+
+
+def _found(geometry: Geometry, where: str, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    if where == "boundary":
+        return np.ones(len(points), dtype=bool)
+    tolerance = _TOLERANCE * float(np.ptp(points, axis=0).max(initial=0.0))
+    if where in geometry.parts():
+        return _on_named(geometry, where, points, tolerance)
+    dimension = geometry.dimension
+    region = parse_region(where, dimension)
+    found = region(points)
+    for step in tolerance * np.vstack([np.eye(dimension), -np.eye(dimension)]):
+        found |= region(points + step)
+    return found
+
+
+def _on_named(
+    geometry: Geometry, where: str, points: NDArray[np.float64], tolerance: float
+) -> NDArray[np.bool_]:
     if isinstance(geometry, Box):
         axis = {"left": 0, "right": 0, "front": 1, "back": 1, "bottom": 2, "top": 2}[where]
         end = geometry.lower if where in ("left", "front", "bottom") else geometry.upper

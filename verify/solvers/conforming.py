@@ -107,7 +107,7 @@ class ReferenceSolver:
         x, y = outline.T
         extent = np.sqrt(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
         size = scene.reference.size or extent / 12
-        grading = Grading(size, singular_points(scene), extent / 2).halved(level)
+        grading = Grading(size, singular_points(scene), extent / 2, strip=1.0).halved(level)
         return _solve(
             scene,
             lambda: conforming_mesh(scene, grading),
@@ -118,7 +118,7 @@ class ReferenceSolver:
 
 
 def _imprinted(scene: Scene, counts: tuple[int, int] | None, size: float) -> ConformingMesh:
-    """The background mesh of the scene with its polylines imprinted and opened."""
+    """Imprint the polylines of the scene on its background mesh, and open them."""
     geometry = scene.geometry
     assert isinstance(geometry, Rectangle | Polygon)
     if counts is None:
@@ -189,6 +189,6 @@ def _solution(
             "linear solver": "PETSc, MUMPS Cholesky",
             "element": f"P{space.degree}",
             "cells": str(len(mesh.cells)),
-            "residual": f"{result.residual:.1e}",
+            "round-off": f"{result.round_off:.1e}",
         },
     )

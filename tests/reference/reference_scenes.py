@@ -1,0 +1,54 @@
+"""Scenes that the tests of the FEniCSx side share."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from verify.scene import Scene
+
+# looked up and not imported: the DOLFINx wheel loads only behind `dolfinx_solver`
+_MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
+needs_fenicsx = [
+    pytest.mark.fenicsx,
+    pytest.mark.skipif(bool(_MISSING), reason=f"needs {' and '.join(_MISSING)}"),
+]
+
+
+def polyline(name, *points):
+    return {"kind": "polyline", "name": name, "points": [list(p) for p in points]}
+
+
+def square(cuts=(), **changes):
+    """Give a unit square, clamped all around, under its weight."""
+    content = {
+        "title": "square",
+        "requirement": "none",
+        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
+        "mesh": {"cells": [[8, 8]]},
+        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
+        "supports": [{"where": "boundary", "displacement": [0, 0]}],
+        "loads": [{"kind": "gravity", "acceleration": [0, -1]}],
+        "cuts": list(cuts),
+    }
+    return Scene.model_validate(content | changes)
+
+
+def areas(mesh):
+    """Areas (m,) of the cells of a conforming mesh."""
+    a, b, c = (mesh.points[mesh.cells[:, k]] for k in range(3))
+    return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+
+
+def exterior_facets(mesh):
+    """Count the facets that belong to one cell only."""
+    facets = np.sort(mesh.cells[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
+    return int((np.unique(facets, axis=0, return_counts=True)[1] == 1).sum())
+
+
+def energy_of(scene, solver="reference", level=0, **parameters):
+    """Strain energy that a solver of the FEniCSx side adds up, J/m."""
+    from verify.solvers import find_solver
+
+    solution = find_solver(solver).solve(scene, level, repetitions=0, **parameters)
+    return float(solution.ledger["strain"][0])

@@ -1,0 +1,82 @@
+"""Features that come close: touching, too close to mesh apart, or apart and resolved."""
+
+import numpy as np
+import pytest
+from reference_scenes import areas, energy_of, needs_fenicsx, polyline, square
+
+from verify.errors import InputError
+from verify.study.richardson import extrapolate
+
+pytestmark = needs_fenicsx
+
+
+def graded(scene, level=0):
+    from reference.meshing import Grading, conforming_mesh, singular_points
+
+    grading = Grading(1 / 12, singular_points(scene), 0.5, strip=1.0)
+    return conforming_mesh(scene, grading.halved(level))
+
+
+def two_cuts(apart, **changes):
+    upper = polyline("b", (0.3, 0.5 + apart), (0.7, 0.5 + apart))
+    return square([polyline("a", (0.2, 0.5), (0.8, 0.5)), upper], **changes)
+
+
+CLOSE = {
+    "two cuts": (two_cuts(1e-8).cuts, "cut 'a' and cut 'b'", "1e-08"),
+    "a tip and the boundary": ([polyline("a", (0.4, 0.5), (1 - 1e-8, 0.5))], "boundary", "1e-08"),
+    "a tip and another cut": (
+        [polyline("a", (0.2, 0.5), (0.8, 0.5)), polyline("b", (0.5, 0.5 + 1e-7), (0.5, 0.8))],
+        "cut 'a' and cut 'b'",
+        "1e-07",
+    ),
+    "a crossing and a tip": (
+        [polyline("a", (0.2, 0.5), (0.5 + 1e-8, 0.5)), polyline("b", (0.5, 0.2), (0.5, 0.8))],
+        "cut 'a'",
+        "1e-08",
+    ),
+    "an arc and a line": (
+        [
+            {"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2, "sweep": 180.0},
+            polyline("b", (0.5, 0.7 + 1e-8), (0.5, 0.9)),
+        ],
+        "cut 'a' and cut 'b'",
+        "1e-08",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", CLOSE)
+def test_what_is_too_close_to_mesh_apart_is_refused_with_its_distance(what):
+    cuts, names, distance = CLOSE[what]
+    with pytest.raises(InputError) as caught:
+        graded(square([cut if isinstance(cut, dict) else cut.model_dump() for cut in cuts]))
+    assert names in str(caught.value)
+    assert f"within {distance} m" in str(caught.value)
+    assert "resolves 1e-06 m" in str(caught.value)
+
+
+def test_a_strip_that_would_take_millions_of_cells_is_refused_before_it_is_meshed():
+    with pytest.raises(InputError, match=r"take about \de\+06 cells"):
+        graded(two_cuts(1e-5), level=2)
+
+
+@pytest.mark.parametrize("apart", [1e-2, 1e-3])
+def test_a_strip_between_two_cuts_is_as_many_cells_wide_as_the_level_says(apart):
+    for level, rows in ((0, 1), (1, 2)):
+        mesh = graded(two_cuts(apart), level)
+        middle = mesh.points[mesh.cells].mean(axis=1)
+        strip = (np.abs(middle - [0.5, 0.5 + apart / 2]) < [0.15, apart / 2]).all(axis=1)
+        area = areas(mesh)[strip].mean()
+        # triangles of side gap/rows, up to a third more: gmsh keeps sizes on average only
+        assert area < 1.3 * np.sqrt(3) / 4 * (apart / rows) ** 2
+        assert areas(mesh).sum() == pytest.approx(1.0, rel=1e-12)
+
+
+def test_the_reference_of_a_narrow_strip_knows_its_error():
+    # the strip is a bar of its own: levels must approach each other at the energy's order
+    scene = two_cuts(1e-2, reference={"size": 0.25})
+    values = [energy_of(scene, level=level) for level in range(4)]
+    known = extrapolate(values[:3], [4.0, 2.0, 1.0], theoretical=2, best=4)
+    assert abs(values[3] - values[2]) <= known.half_width
+    assert known.half_width < 1e-4 * values[3]

@@ -1,0 +1,40 @@
+"""A static body, or piece, that can still move as a rigid one is refused by name."""
+
+import pytest
+from reference_scenes import energy_of, needs_fenicsx, polyline, square
+
+from verify.errors import InputError
+
+pytestmark = needs_fenicsx
+
+THROUGH = polyline("a", (-0.1, 0.5), (1.1, 0.5))
+CLAMPED = {"where": "bottom", "displacement": [0, 0]}
+ROLLERS = {"where": "top", "displacement": [0], "components": ["y"]}
+CORNER = {"where": "x < 1e-6 and y > 0.999999", "displacement": [0, 0]}
+LEFT = {"where": "x < 1e-6 and y > 0.999999", "displacement": [0], "components": ["x"]}
+
+
+@pytest.mark.parametrize(
+    "supports, words",
+    [
+        ([CLAMPED], "is held by no support"),
+        ([CLAMPED, ROLLERS], "can still move in x"),
+        ([CLAMPED, CORNER | {"where": "x < 1e-13 and y > 1 - 1e-13"}], "can still turn"),
+    ],
+    ids=["nothing", "rollers", "a single node"],
+)
+def test_a_piece_left_a_rigid_motion_is_named_with_the_motion(supports, words):
+    scene = square([THROUGH], supports=supports)
+    for solver in ("conforming", "reference"):
+        with pytest.raises(InputError, match=rf"the piece around \(0\.5, 0\.75\) {words}"):
+            energy_of(scene, solver)
+
+
+def test_a_piece_held_just_enough_is_solved():
+    scene = square([THROUGH], supports=[CLAMPED, ROLLERS, LEFT])
+    assert energy_of(scene, "conforming") > 0
+
+
+def test_a_body_on_rollers_only_is_refused_without_any_cut():
+    with pytest.raises(InputError, match="can still move in x"):
+        energy_of(square(supports=[ROLLERS]), "conforming")
