@@ -54,7 +54,7 @@ class GhostPenalty:
         if not (np.isfinite(factor) and factor > 0.0):
             raise XfemError(f"ghost penalty with factor {factor:g}; expected a positive one")
         self.virtual, self.factor = virtual, factor
-        pieces = np.stack(face_contacts(virtual))
+        pieces = np.stack(face_contacts(virtual, near=True))
         pieces = pieces[:, virtual.split[pieces].any(axis=0)]
         mesh, cells = virtual.mesh, virtual.parent[pieces]
         local = (mesh.neighbours[cells[0]] == cells[1][:, None]).argmax(axis=1)

@@ -13,11 +13,25 @@ _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]
 
 
-def face_contacts(virtual: VirtualMesh) -> tuple[_Ints, _Ints]:
-    """Pairs of pieces (k,), (k,) of neighbouring cells that share all unknowns of their face."""
+def face_contacts(virtual: VirtualMesh, near: bool = False) -> tuple[_Ints, _Ints]:
+    """Pairs of pieces (k,), (k,) of neighbouring cells that share all unknowns of their face.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    near : bool
+        Leave out cells that have no node in common with a split one.
+    """
     mesh = virtual.mesh
-    cell, local = np.nonzero(mesh.neighbours > np.arange(len(mesh.cells))[:, None])
-    across = mesh.neighbours[cell, local]
+    chosen = np.ones(len(mesh.cells), dtype=bool)
+    if near:
+        around = np.zeros(len(mesh.points), dtype=bool)
+        around[mesh.cells[virtual.parent[virtual.split]]] = True
+        chosen = around[mesh.cells].any(axis=1)
+    cells = np.flatnonzero(chosen)
+    across = mesh.neighbours[cells]
+    row, local = np.nonzero((across > cells[:, None]) & chosen[across])
+    cell, across = cells[row], across[row, local]
     start = np.searchsorted(virtual.parent, np.arange(len(mesh.cells) + 1))
     count = np.diff(start)
     pairs = count[cell] * count[across]

@@ -100,8 +100,8 @@ def treat_slivers(
     into = np.arange(len(virtual.cells))
     crosswise = np.zeros(len(into), dtype=bool)
     if policy != "keep" and small.any():
-        contacts = face_contacts(virtual)
-        absorbed = small & ~Bridges(virtual, contacts).among(small)
+        contacts = face_contacts(virtual, near=True)
+        absorbed = small & ~_bridges(virtual, contacts, small)
         if policy == "merge":
             into = _neighbours(virtual, contacts, absorbed)
         crosswise = absorbed & (into == np.arange(len(into)))
@@ -118,6 +118,16 @@ def treat_slivers(
         volume_share=float(virtual.volumes[gone].sum() / virtual.volumes.sum()),
         absorption=absorption,
     )
+
+
+def _bridges(
+    virtual: VirtualMesh, contacts: tuple[_Ints, _Ints], small: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Which small pieces hold parts of the body together; the whole body only if need be."""
+    suspects = Bridges(virtual, contacts).among(small)
+    if not suspects.any():
+        return suspects
+    return Bridges(virtual, face_contacts(virtual)).among(small)
 
 
 def _largest_siblings(virtual: VirtualMesh) -> _Ints:

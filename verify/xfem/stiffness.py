@@ -9,6 +9,7 @@ from verify.xfem.assembly_kernels import add_stiffness, linear_force
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["LinearStiffness"]
@@ -23,28 +24,30 @@ class LinearStiffness:
     Parameters
     ----------
     virtual : VirtualMesh
+        Of triangles in space (a membrane) only the stiffness in its plane is meant: across a flat
+        membrane there is none, and supports must hold it.
     material : Material
+        Of a membrane in plane stress, times the thickness.
 
     Raises
     ------
     XfemError
-        If the material has neither one value nor one per cell of the uncut mesh, or the mesh is
-        a membrane.
+        If the material has neither one value nor one per cell of the uncut mesh.
     """
 
     virtual: VirtualMesh
     lam: _Floats
     mu: _Floats
+    normals: _Floats
 
     def __init__(self, virtual: VirtualMesh, material: Material) -> None:
         mesh = virtual.mesh
-        if mesh.dim != mesh.space:
-            raise XfemError("linear stiffness of a membrane in space: it has none across itself")
         count = len(mesh.cells)
         for name, values in (("λ", material.lam), ("μ", material.mu)):
             if np.shape(values) not in ((), (count,)):
                 raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
         object.__setattr__(self, "virtual", virtual)
+        object.__setattr__(self, "normals", _unit_normals(mesh))
         object.__setattr__(self, "lam", np.broadcast_to(material.lam, count).astype(float))
         object.__setattr__(self, "mu", np.broadcast_to(material.mu, count).astype(float))
 
@@ -53,13 +56,15 @@ class LinearStiffness:
 
         The first cells of the pattern must be those of the body.
         """
-        dim = self.virtual.mesh.dim
+        dim = self.virtual.mesh.space
         blocks = np.zeros((len(pattern.columns), dim, dim)) if out is None else out
         if out is not None:
             blocks[:] = 0.0
         v = self.virtual
         targets = pattern.targets[: len(v.cells)]
-        add_stiffness(targets, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, blocks)
+        add_stiffness(
+            targets, v.mesh.gradients, self.normals, v.parent, v.volumes, self.lam, self.mu, blocks
+        )
         return blocks
 
     def force(self, displacement: _Floats) -> tuple[_Floats, float]:
@@ -67,6 +72,24 @@ class LinearStiffness:
         v = self.virtual
         force = np.zeros_like(displacement)
         energy = linear_force(
-            v.cells, v.mesh.gradients, v.parent, v.volumes, self.lam, self.mu, displacement, force
+            v.cells,
+            v.mesh.gradients,
+            self.normals,
+            v.parent,
+            v.volumes,
+            self.lam,
+            self.mu,
+            displacement,
+            force,
         )
         return force, float(energy)
+
+
+def _unit_normals(mesh: SimplexMesh) -> _Floats:
+    """(m, 3) unit normals of a membrane; zeros (1, d) for a solid."""
+    if mesh.dim == mesh.space:
+        return np.zeros((1, mesh.space))
+    edges = mesh.edge_vectors
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    unit: _Floats = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return unit

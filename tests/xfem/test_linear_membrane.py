@@ -1,0 +1,95 @@
+"""Linear stiffness of triangles in space: the plane-stress plate in its plane, nothing across."""
+
+import numpy as np
+import pytest
+from cut_bodies import rotation
+from xfem_bodies import boundary_nodes
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.loads import body_force
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.static import solve_static
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+MATERIAL = isotropic(1e4, 0.3, "plane stress")
+TURN = rotation(3, 0.8)
+
+
+def plate(turn=None):
+    """The same cut plate in the plane, or in space and turned."""
+    flat = rectangle_mesh((6, 5))
+    point, normal = np.array([0.5, 0.53]), np.array([-0.3, 1.0])
+    if turn is None:
+        return cut_mesh(flat, [Plane(point, normal)])
+    points = np.pad(flat.points, ((0, 0), (0, 1))) @ turn.T
+    cut = Plane(turn @ np.append(point, 0.0), turn @ np.append(normal, 0.0))
+    return cut_mesh(SimplexMesh(points, flat.cells), [cut])
+
+
+def dense(virtual):
+    pattern = block_pattern(virtual.cells, virtual.node_count)
+    return pattern.matrix(LinearStiffness(virtual, MATERIAL).assemble(pattern)).toarray()
+
+
+def test_a_turned_membrane_has_the_turned_stiffness_of_the_plate_and_none_across():
+    flat, membrane = plate(), plate(TURN)
+    nodes = flat.node_count
+    plane = dense(flat).reshape(nodes, 2, nodes, 2)
+    space = np.einsum("ki,aibj,lj->akbl", TURN[:, :2], plane, TURN[:, :2])
+    got = dense(membrane).reshape(nodes, 3, nodes, 3)
+    assert got == pytest.approx(space, abs=1e-11 * np.abs(plane).max())
+
+
+def test_the_force_of_a_membrane_is_its_stiffness_times_the_displacement():
+    membrane = plate(TURN)
+    displacement = np.random.default_rng(1).normal(size=(membrane.node_count, 3))
+    force, energy = LinearStiffness(membrane, MATERIAL).force(displacement)
+    want = (dense(membrane) @ displacement.ravel()).reshape(force.shape)
+    assert force == pytest.approx(want, abs=1e-11 * np.abs(want).max())
+    assert energy == pytest.approx(0.5 * (want * displacement).sum(), rel=1e-12)
+
+
+def test_a_flat_membrane_held_across_itself_solves_the_plane_stress_plate():
+    flat, membrane = plate(), plate(np.eye(3))
+    ends = (flat.mesh.points[:, 1] < 1e-9) | (flat.mesh.points[:, 1] > 1.0 - 1e-9)
+    held = Supports.none(flat).prescribe(flat, ends)
+    solution = solve_static(flat, MATERIAL, held, body_force(flat, [3.0, -2.0]))
+    everywhere = np.ones(len(flat.mesh.points), dtype=bool)
+    in_space = Supports.none(membrane).prescribe(membrane, ends)
+    in_space = in_space.prescribe(membrane, everywhere, components=(2,))
+    for solver in ("direct", "iterative"):
+        other = solve_static(
+            membrane, MATERIAL, in_space, body_force(membrane, [3.0, -2.0, 0.0]), solver=solver
+        )
+        scale = np.abs(solution.displacement).max()
+        assert other.displacement[:, :2] == pytest.approx(solution.displacement, abs=1e-8 * scale)
+        assert other.strain_energy == pytest.approx(solution.strain_energy, rel=1e-8)
+
+
+def test_each_half_of_a_cut_membrane_passes_the_patch_test_in_its_plane():
+    """Constant strain along the cut, another one per half, free contraction across."""
+    membrane = plate(np.eye(3))
+    along = np.array([1.0, 0.3, 0.0]) / np.hypot(1.0, 0.3)
+    across = np.array([-0.3, 1.0, 0.0]) / np.hypot(1.0, 0.3)
+
+    def stretched(x, side):
+        local = x - np.array([0.5, 0.53, 0.0])
+        strain = np.where(side[:, 0] > 0, 0.1, -0.05)
+        return (strain * (local @ along))[:, None] * along - (0.3 * strain * (local @ across))[
+            :, None
+        ] * across
+
+    supports = Supports.none(membrane).prescribe(membrane, boundary_nodes(membrane.mesh), stretched)
+    everywhere = np.ones(len(membrane.mesh.points), dtype=bool)
+    supports = supports.prescribe(membrane, everywhere, components=(2,))
+    solution = solve_static(membrane, MATERIAL, supports)
+    want = stretched(membrane.node_points, membrane.node_side)
+    assert solution.displacement == pytest.approx(want, abs=1e-14)
+    area = 0.47  # above the cut, which passes through (.5, .53)
+    energy = 0.5 * 1e4 * (0.1**2 * area + 0.05**2 * (1.0 - area))
+    assert solution.strain_energy == pytest.approx(energy, rel=1e-12)
