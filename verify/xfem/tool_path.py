@@ -160,7 +160,7 @@ class Sweep:
     def _probe(self, points: _Floats) -> _Floats:
         if self.path.length == 0.0:
             # nothing is swept: one side everywhere, and no point of the cut anywhere
-            return np.tile([np.finfo(float).max, -np.inf, 0.0], (len(points), 1))
+            return np.tile([1.0, -np.inf, 0.0], (len(points), 1))
         return probe_points(np.ascontiguousarray(points, dtype=float), self.path.surface.arrays)
 
 

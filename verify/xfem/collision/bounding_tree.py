@@ -68,9 +68,4 @@ class BoundingTree:
     def meeting_box(self, low: _Floats, high: _Floats) -> _Ints:
         """Simplices whose boxes meet a box, in no particular order."""
         nowhere = np.zeros(len(low))
-        return items_near_plane(self.low, self.high, self.order, low, high, nowhere, nowhere)
-
-    def meeting_facet(self, corners: _Floats, normal: _Floats) -> _Ints:
-        """Simplices whose boxes meet the box and the plane of a facet (k, s)."""
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        return items_near_plane(self.low, self.high, self.order, low, high, normal, corners[0])
+        return items_near_plane(self.low, self.high, self.order, low, high, nowhere, nowhere, 0.0)

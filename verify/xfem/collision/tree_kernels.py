@@ -72,21 +72,20 @@ def merge_boxes(low, high):
 
 
 @njit(cache=True)
-def items_near_plane(low, high, order, box_low, box_high, normal, point):
-    """Items whose boxes meet a box and the plane through `point` (normal 0: no plane)."""
+def items_near_plane(low, high, order, box_low, box_high, normal, point, margin):
+    """Items whose boxes meet a box, and come within a margin of a plane (normal 0: no plane)."""
     count = len(order)
     found, stack = [np.int64(0) for _ in range(0)], np.empty(_DEEP, dtype=np.int64)
     stack[0], top = 1, 1
     while top > 0 and count > 0:
         top -= 1
         node = stack[top]
-        away, reach, apart = 0.0, 0.0, False
+        away, reach, apart = 0.0, margin, False
         for i in range(len(point)):
             if low[node, i] > box_high[i] or high[node, i] < box_low[i]:
                 apart = True
             away += normal[i] * (0.5 * (low[node, i] + high[node, i]) - point[i])
             reach += abs(normal[i]) * 0.5 * (high[node, i] - low[node, i])
-            reach += abs(normal[i]) * 1e-9 * (box_high[i] - box_low[i])
         if apart or abs(away) > reach:
             continue
         if node >= count:

@@ -181,16 +181,13 @@ class GrowingBody:
         cell = patch.whole_cells[partition.parent]
         old = np.empty(len(solid), dtype=np.int64)
         changed = np.zeros(len(solid), dtype=bool)
-        orphan = match_pieces(
-            cell,
-            label,
-            solid,
-            self.piece_label.rows,
-            self.first_piece,
-            self.next_piece.rows,
-            old,
-            changed,
-        )
+        store = (self.piece_label.rows, self.first_piece, self.next_piece.rows)
+        orphan = match_pieces(cell, label, label, solid, *store, old, changed)
+        if orphan >= 0:
+            # a piece on one side of a cut that does not split it is part of what is on that side
+            side = label.copy()
+            side[:, numbers] = _sides(partition)
+            orphan = match_pieces(cell, label, side, solid, *store, old, changed)
         if orphan >= 0:
             raise XfemError(f"a cut would join parts of cell {cell[orphan]} that are separate")
         return _Comparison(cell, label, fraction, solid, old, changed)
@@ -339,3 +336,15 @@ class _Comparison:
     def changed_cells(self) -> _Ints:
         """Cells of the pieces whose labels are new, ascending."""
         return np.unique(self.cell[self.changed & self.solid])
+
+
+def _sides(partition: Partition) -> NDArray[np.int8]:
+    """(p, cuts) side of each cut on which a piece lies, 0 if it lies on both."""
+    side = partition.label.copy()
+    plus = partition.points.values[partition.sub_points] >= 0.0
+    for cut in range(side.shape[1]):
+        above = np.bincount(partition.sub_piece, plus[:, :, cut].any(axis=1), len(side)) > 0
+        below = np.bincount(partition.sub_piece, ~plus[:, :, cut].all(axis=1), len(side)) > 0
+        whole = partition.label[:, cut] == 0
+        side[whole, cut] = above[whole].astype(np.int8) - below[whole].astype(np.int8)
+    return side

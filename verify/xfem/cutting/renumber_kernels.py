@@ -7,11 +7,11 @@ __all__ = ["labelled", "match_pieces", "number_unknowns", "retire", "write_piece
 
 
 @njit(cache=True)
-def match_pieces(parent, label, solid, piece_label, first_piece, next_piece, old, changed):
+def match_pieces(parent, label, side, solid, piece_label, first_piece, next_piece, old, changed):
     """Write the stored piece (p,) of which each piece of a patch is a part.
 
     A piece is part of another of the same cell if every cut that made the other has it on the
-    same side. `changed` (p,) tells whether its labels differ. Returns the first piece that is
+    same `side`. `changed` (p,) tells whether its labels differ. Returns the first piece that is
     part of none, or -1.
     """
     orphan = -1
@@ -21,9 +21,8 @@ def match_pieces(parent, label, solid, piece_label, first_piece, next_piece, old
         while stored >= 0:
             fits, same = True, True
             for k in range(label.shape[1]):
-                differs = piece_label[stored, k] != label[p, k]
-                same = same and not differs
-                if differs and piece_label[stored, k] != 0:
+                same = same and piece_label[stored, k] == label[p, k]
+                if piece_label[stored, k] != 0 and piece_label[stored, k] != side[p, k]:
                     fits = False
             if fits:
                 old[p], changed[p] = stored, not same

@@ -2,8 +2,9 @@
 
 The algorithm of the thesis (section 3.2.3) with its listing corrected: the element tested is the
 neighbour, not the one the tool was in; it is split when *all* edges that the cut crosses have been
-passed (three or four in a tetrahedron, two in a triangle), each counted once; and the first
-element of a stroke is found through the bounding boxes of the surface, all others by walking.
+passed (three or four in a tetrahedron, two in a triangle), each counted once. Where the tool comes
+in, it is found through the tree of bounding boxes, asked for what was swept since the last frame;
+from there, and from the elements in which the tool was, the walk goes on to neighbours.
 """
 
 from dataclasses import dataclass
@@ -78,10 +79,6 @@ class SemiProgressiveCutter:
         self.body = GrowingBody(mesh)
         self.strokes: list[Stroke] = []
         self._size = np.linalg.norm(mesh.edge_vectors, axis=2).max(axis=1)
-        cell, corner = mesh.boundary_facets.T
-        others = np.array([np.delete(np.arange(mesh.dim + 1), k) for k in range(mesh.dim + 1)])
-        self._skin_cell = cell
-        self._skin = BoundingTree(mesh.points, mesh.cells[cell[:, None], others[corner]])
         self.interior = BoundingTree(mesh.points, mesh.cells)
         self._strokes_near = np.zeros(len(mesh.cells), dtype=np.int64)
         self._records: list[tuple[_Ints, int, _Floats, _Floats, float]] = []
@@ -98,7 +95,7 @@ class SemiProgressiveCutter:
             raise XfemError(
                 f"tool path in {path.blades.shape[2]}D; the mesh has points in {self.mesh.space}D"
             )
-        stroke = Stroke(self.mesh, path, self.body.add_cut(), self._strokes_near)
+        stroke = Stroke(self.mesh, path, self.body.add_cut(), self._strokes_near, self._size)
         self.strokes.append(stroke)
         return stroke
 
@@ -127,10 +124,7 @@ class SemiProgressiveCutter:
         Increment or None
             None if no element was split.
         """
-        found = [
-            stroke.advance(time, self._size, self._skin, self._skin_cell, self.interior)
-            for stroke in self.strokes
-        ]
+        found = [stroke.advance(time, self.interior) for stroke in self.strokes]
         candidates = np.concatenate([np.empty(0, dtype=np.int64), *found])
         if len(candidates) == 0:
             return None

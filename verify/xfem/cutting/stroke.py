@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.collision.bounding_tree import BoundingTree
 from verify.xfem.cuts import Cut
 from verify.xfem.cutting.patch import MeshPatch
-from verify.xfem.cutting.walk_kernels import cells_hit, walk
+from verify.xfem.cutting.walk_kernels import REACH, cells_hit, walk
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import Sweep, ToolPath
 
@@ -60,6 +60,8 @@ class Stroke:
         Of the cut.
     strokes_near : (m,) int array
         Shared by all strokes: how many of them came near a cell.
+    size : (m,) float array
+        Longest edge from the first node of each cell, in metres.
 
     Attributes
     ----------
@@ -76,14 +78,17 @@ class Stroke:
         Cells whose crossing has been recorded.
     """
 
-    def __init__(self, mesh: SimplexMesh, path: ToolPath, number: int, strokes_near: _Ints) -> None:
+    def __init__(
+        self, mesh: SimplexMesh, path: ToolPath, number: int, strokes_near: _Ints, size: _Floats
+    ) -> None:
         self.path, self.number = path, number
         self.front = -1.0
         self.near = np.zeros(len(mesh.cells), dtype=bool)
         self.entry = np.full(len(mesh.cells), np.inf)
         self.leave = np.full(len(mesh.cells), np.inf)
         self.recorded = np.zeros(len(mesh.cells), dtype=bool)
-        self._mesh, self._strokes_near = mesh, strokes_near
+        self._mesh, self._strokes_near, self._size = mesh, strokes_near, size
+        self._margin = REACH * float(size.max())
         self._snap = _ROUND_OFF * mesh.extent
         self.values = np.full(len(mesh.points), np.nan)
         self._fixed = np.zeros(len(mesh.points), dtype=bool)
@@ -92,36 +97,29 @@ class Stroke:
         self._turn = 0
         self._frontier = np.empty(0, dtype=np.int64)
 
-    def advance(
-        self,
-        time: float,
-        size: _Floats,
-        skin: BoundingTree,
-        skin_cell: _Ints,
-        interior: BoundingTree,
-    ) -> _Ints:
+    def advance(self, time: float, elements: BoundingTree) -> _Ints:
         """Move the blade to where it is at that time; cells that may have to be split.
 
         Parameters
         ----------
         time : float
             In seconds.
-        size : (m,) float array
-            Longest edge from the first node of each cell, in metres.
-        skin : BoundingTree
-            Of the boundary facets: where the blade comes in.
-        skin_cell : int array
-            Cell of each of these.
-        interior : BoundingTree
-            Of the cells: where it starts.
+        elements : BoundingTree
+            Of the cells: where the blade comes in.
         """
         front = self.path.travel_at(time)
         if front <= self.front or self.path.length == 0.0:
             return np.empty(0, dtype=np.int64)
         sweep = self.path.surface.arrays
-        hit = skin_cell[cells_hit(sweep, self.front, front, skin.low, skin.high, skin.order)]
-        if self.front < 0.0:
-            hit = np.concatenate([hit, self._start(interior)])
+        hit = cells_hit(
+            sweep,
+            self.front,
+            front,
+            self._margin,
+            elements.low,
+            elements.high,
+            elements.order,
+        )
         self.front = front
         self._turn += 1
         candidates, self._frontier = walk(
@@ -130,7 +128,7 @@ class Stroke:
             self._mesh.cells,
             self._mesh.neighbours,
             self._mesh.points,
-            size,
+            self._size,
             self._snap,
             sweep,
             self.values,
@@ -143,13 +141,6 @@ class Stroke:
             self.leave,
         )
         return candidates
-
-    def _start(self, interior: BoundingTree) -> _Ints:
-        """Cells in which the blade is when the stroke begins."""
-        blade = self.path.blades[0]
-        ends = np.stack([blade[:-1], blade[1:]], axis=1) if len(blade) > 1 else blade[None]
-        found = [interior.meeting_box(end.min(axis=0), end.max(axis=0)) for end in ends]
-        return np.concatenate(found)
 
     def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
         """Add positions to the path; level sets of nodes already used for a cut stay."""

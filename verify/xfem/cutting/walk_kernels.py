@@ -18,7 +18,7 @@ REACH = 0.5  # element sizes: a zero point farther from the sweep than that is n
 
 
 @njit(cache=True)
-def cells_hit(sweep, after, front, low, high, order):
+def cells_hit(sweep, after, front, margin, low, high, order):
     """Items of a tree near the facets swept between two travels; may hold doubles."""
     found = [np.int64(0) for _ in range(0)]
     corners = sweep.corners
@@ -30,7 +30,10 @@ def cells_hit(sweep, after, front, low, high, order):
             for i in range(corners.shape[2]):
                 floor[i] = min(floor[i], corners[t, k, i])
                 ceiling[i] = max(ceiling[i], corners[t, k, i])
-        items = items_near_plane(low, high, order, floor, ceiling, sweep.normals[t], corners[t, 0])
+        items = items_near_plane(
+            low, high, order, floor - margin, ceiling + margin, sweep.normals[t], corners[t, 0],
+            margin,
+        )  # fmt: skip
         found.extend(items)
     return np.array(found, dtype=np.int64)
 
@@ -45,13 +48,13 @@ def _level(node, points, snap, sweep, phi):
 
 @njit(cache=True)
 def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave):
-    """(near the sweep, entered, crossed through, latest travel) of a cell.
+    """(near the sweep, crossed through, latest travel) of a cell.
 
     Writes the travel at which the blade entered it, and crossed it through.
     """
     corners, space = cells.shape[1], points.shape[1]
     place = np.empty(space)
-    near, entered, through, any_zero, latest = False, False, True, False, 0.0
+    near, through, any_zero, latest = False, True, False, 0.0
     for a in range(corners):
         for b in range(a + 1, corners):
             p, m = cells[cell, a], cells[cell, b]
@@ -69,13 +72,12 @@ def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave):
                 latest = max(latest, travel)
             on = abs(level) <= REACH * size[cell] and beyond <= AT_END * size[cell]
             if on and travel <= front + AT_END * size[cell]:
-                entered = True
                 entry[cell] = min(entry[cell], travel)
             else:
                 through = False
     if any_zero and through:
         leave[cell] = latest
-    return near, entered, any_zero and through, latest
+    return near, any_zero and through, latest
 
 
 @njit(cache=True)
@@ -114,7 +116,7 @@ def walk(
         at += 1
         if settled[cell]:
             continue
-        near, entered, through, latest = _cross(
+        near, through, latest = _cross(
             cell, front, cells, points, size, snap, sweep, phi, entry, leave
         )
         if not near:
@@ -122,7 +124,7 @@ def walk(
         if not near_cell[cell]:
             near_cell[cell] = True
             strokes_near[cell] += 1
-        if through or (entered and strokes_near[cell] > 1):
+        if through or strokes_near[cell] > 1:
             candidates.append(cell)
         if through or latest < front - size[cell]:
             settled[cell] = True

@@ -23,7 +23,7 @@ _NODES, _CUTS = 4, 3  # as `PointNumbers.supports` lists them
 _FACE = 3  # corners of a face
 _WIDTH = _FACE + 1  # a line: the nodes of an edge or a face, and the cut that crosses it
 _NONE = np.iinfo(np.int64).max
-_OFF_LINE = 1e-20  # squared distance from a line, over its squared length, that is on it
+_ALIGNED = 1.0 - 1e-15  # squared cosine between an edge and the line on which it lies
 
 
 class EdgePoints:
@@ -41,6 +41,7 @@ class EdgePoints:
         self._nodes, self._points = nodes, points
         self._lines = RowNumbers(_WIDTH)
         self._first = GrowingArray(np.empty(0, dtype=np.int64))
+        self._directions = GrowingArray(np.empty((0, nodes.shape[1])))
         self._entries = GrowingArray(np.empty((0, 2), dtype=np.int64))
         self._recorded = GrowingArray(np.empty(0, dtype=bool))
 
@@ -62,6 +63,8 @@ class EdgePoints:
         )  # fmt: skip
         self._lines.close(lines)
         self._first.rows = self._first.rows[:lines]
+        known_lines = self._directions.extend(lines - len(self._directions))
+        self._directions.rows[known_lines:] = 0.0
         self._entries.rows = self._entries.rows[:used]
 
     def bisect(self, facets: _Ints) -> tuple[_Ints, _Ints, _Floats]:
@@ -96,6 +99,7 @@ class EdgePoints:
             known,
             self._first.rows,
             self._entries.rows,
+            self._directions.rows,
         )
 
 
@@ -129,7 +133,7 @@ def _place(number, nodes, node_points, positions, out):
 
 @njit(cache=True)
 def _join(number, nodes, supports, row):
-    """Insert the mesh nodes of a point into the ascending list row[:3]; False if there is no room."""
+    """Insert the mesh nodes of a point into the ascending row[:3]; False if there is no room."""
     for k in range(_NODES):
         value = number if number < nodes else supports[number - nodes, k]
         if value == _NONE:
@@ -148,33 +152,51 @@ def _join(number, nodes, supports, row):
 
 
 @njit(cache=True)
-def _between(x, y, nodes, node_points, positions, first, entries, line, straight):
-    """(a point of the line's list strictly between x and y or -1, its share from x to y)."""
+def _after(at, number, than, other):
+    """Whether a point comes after another on a line; equal places are ordered by number."""
+    return at > than or (at == than and number > other)
+
+
+@njit(cache=True)
+def _between(x, y, nodes, node_points, positions, first, entries, directions, line, straight):
+    """Give (a point of the line's list strictly between x and y or -1, its share from x to y).
+
+    The order on a line is that of projections on one direction, taken when the line is first
+    asked for: points that nearly coincide are in the same order for every facet.
+    """
     space = node_points.shape[1]
     a, b, c = np.empty(space), np.empty(space), np.empty(space)
     _place(x, nodes, node_points, positions, a)
     _place(y, nodes, node_points, positions, b)
+    direction, total = directions[line], ((b - a) ** 2).sum()
+    length = (direction**2).sum()
+    if straight and length == 0.0:
+        direction[:] = b - a
+    aligned = ((b - a) * direction).sum() ** 2
+    if not straight and (length == 0.0 or aligned < _ALIGNED * length * total):
+        return -1, 0.0
+    start, end = (a * direction).sum(), (b * direction).sum()
+    forward = _after(end, y, start, x)
     entry = first[line]
     while entry >= 0:
         z = nodes + entries[entry, 0]
         entry = entries[entry, 1]
-        if z == x or z == y:
+        if z in (x, y):
             continue
         _place(z, nodes, node_points, positions, c)
-        along, total, square = 0.0, 0.0, 0.0
-        for i in range(space):
-            along += (c[i] - a[i]) * (b[i] - a[i])
-            total += (b[i] - a[i]) ** 2
-            square += (c[i] - a[i]) ** 2
-        off = square * total - along * along
-        if 0.0 < along < total and (straight or off <= _OFF_LINE * total * total):
-            return z, along / total
+        at = (c * direction).sum()
+        if _after(at, z, start, x) != forward or _after(end, y, at, z) != forward:
+            continue
+        share = ((c - a) * (b - a)).sum() / total if total > 0.0 else 0.5
+        return z, min(max(share, 0.0), 1.0)
     return -1, 0.0
 
 
 @njit(cache=True)
-def _inner_point(x, y, nodes, node_points, positions, supports, table, known, first, entries):
-    """(a recorded point strictly between x and y or -1, its share from x to y)."""
+def _inner_point(
+    x, y, nodes, node_points, positions, supports, table, known, first, entries, directions
+):
+    """Give (a recorded point strictly between x and y or -1, its share from x to y)."""
     row = np.full(_WIDTH, _NONE, dtype=np.int64)
     if not (_join(x, nodes, supports, row) and _join(y, nodes, supports, row)):
         return -1, 0.0
@@ -182,7 +204,7 @@ def _inner_point(x, y, nodes, node_points, positions, supports, table, known, fi
         line = find_row(row, table, known)
         if line < 0:
             return -1, 0.0
-        return _between(x, y, nodes, node_points, positions, first, entries, line, True)
+        return _between(x, y, nodes, node_points, positions, first, entries, directions, line, True)
     for number, other in ((x, y), (y, x)):
         if number < nodes:
             continue
@@ -198,14 +220,18 @@ def _inner_point(x, y, nodes, node_points, positions, supports, table, known, fi
             # a mesh node may lie on the line of a cut without being told so
             if not straight and other >= nodes:
                 continue
-            z, share = _between(x, y, nodes, node_points, positions, first, entries, line, straight)
+            z, share = _between(
+                x, y, nodes, node_points, positions, first, entries, directions, line, straight
+            )
             if z >= 0:
                 return z, share
     return -1, 0.0
 
 
 @njit(cache=True)
-def _bisect(facets, nodes, node_points, positions, supports, table, known, first, entries):
+def _bisect(
+    facets, nodes, node_points, positions, supports, table, known, first, entries, directions
+):
     stack_ids = [facets[0].copy() for _ in range(0)]
     stack_weights = [np.eye(3) for _ in range(0)]
     ids, sources, weights = (
@@ -222,7 +248,7 @@ def _bisect(facets, nodes, node_points, positions, supports, table, known, first
             for j in range(3):
                 at, share = _inner_point(
                     facet[j], facet[(j + 1) % 3], nodes, node_points, positions, supports,
-                    table, known, first, entries,
+                    table, known, first, entries, directions,
                 )  # fmt: skip
                 if at >= 0:
                     k = j
@@ -237,6 +263,8 @@ def _bisect(facets, nodes, node_points, positions, supports, table, known, first
                 half, half_corner = facet.copy(), corner.copy()
                 half[end] = at
                 half_corner[end] = middle
+                if half[0] == half[1] or half[1] == half[2] or half[2] == half[0]:
+                    continue  # all three on one line: nothing is left of it
                 stack_ids.append(half)
                 stack_weights.append(half_corner)
     count = len(ids)

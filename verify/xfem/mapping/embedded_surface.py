@@ -142,8 +142,8 @@ class EmbeddedSurface:
         corners = at @ given
         weights = np.empty((*ids.shape, body.mesh.dim + 1))
         piece = embed_corners(
-            corners, label, self._level_sets(), *self._elements, body.piece_label.rows, body.first_piece,
-            body.next_piece.rows, weights,
+            corners, label, self._level_sets(), *self._elements, body.piece_label.rows,
+            body.first_piece, body.next_piece.rows, weights,
         )  # fmt: skip
         vertex = self.surface.weld(
             ids.ravel(),

@@ -3,27 +3,9 @@
 import numpy as np
 from numba import njit
 
+from verify.xfem.mapping.partner_kernels import partner
+
 __all__ = ["exposed_facets"]
-
-
-@njit(cache=True)
-def _has_partner(piece, cell, opposite, cells, neighbours, piece_cells, first_piece, next_piece):
-    """Whether a piece across a face of the cell moves with the same unknowns on that face."""
-    other = neighbours[cell, opposite]
-    partner = first_piece[other] if other >= 0 else -1
-    corners = cells.shape[1]
-    while partner >= 0:
-        same = True
-        for a in range(corners):
-            if a == opposite:
-                continue
-            for b in range(corners):
-                if cells[other, b] == cells[cell, a]:
-                    same = same and piece_cells[partner, b] == piece_cells[piece, a]
-        if same:
-            return True
-        partner = next_piece[partner]
-    return False
 
 
 @njit(cache=True)
@@ -75,9 +57,10 @@ def exposed_facets(
         if not split[cell]:
             piece = first_piece[cell]
             for a in range(corners):
-                if _has_partner(
+                other = partner(
                     piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
-                ):
+                )
+                if other >= 0:
                     continue
                 k = 0
                 for b in range(corners):
@@ -101,10 +84,13 @@ def exposed_facets(
                 if not lonely:
                     continue
                 face = _face_of(sub_barycentric[s], skip)
-                if face >= 0 and _has_partner(
-                    sub_piece[s], cell, face, cells, neighbours, piece_cells, first_piece,
-                    next_piece,
-                ):  # fmt: skip
+                other = -1
+                if face >= 0:
+                    other = partner(
+                        sub_piece[s], cell, face, cells, neighbours, piece_cells, first_piece,
+                        next_piece,
+                    )  # fmt: skip
+                if other >= 0:
                     continue
                 k = 0
                 for b in range(corners):

@@ -42,6 +42,8 @@ class MovingSurface:
         (f,) piece on whose surface it lies.
     inner : GrowingArray
         (f,) whether it lies on a cut.
+    retired : int
+        How many facets have been taken out of use.
     """
 
     def __init__(self, corners: int, space: int, facet_corners: int) -> None:
@@ -51,6 +53,7 @@ class MovingSurface:
         self.facets = GrowingArray(np.empty((0, facet_corners), dtype=np.int64))
         self.facet_piece = GrowingArray(np.empty(0, dtype=np.int64))
         self.inner = GrowingArray(np.empty(0, dtype=bool))
+        self.retired: int = 0
         self._keys = RowNumbers(corners + 1)
 
     def weld(self, point: _Ints, material: _Floats, nodes: _Ints, weights: _Floats) -> _Ints:
@@ -88,6 +91,7 @@ class MovingSurface:
     def retire(self, facets: _Ints) -> None:
         """Take facets out of use."""
         self.facets.rows[facets, 0] = -1
+        self.retired += len(facets)
 
     @property
     def used(self) -> _Ints:
@@ -116,13 +120,13 @@ class MovingSurface:
         return out
 
     def nodal_forces(self, forces: _Floats, out: _Floats) -> _Floats:
-        """Add forces (v, s) on the vertices to the forces `out` (N, s) on the unknown nodes: Wᵀf."""
+        """Add forces (v, s) on the vertices to those on the unknown nodes, `out` (N, s): Wᵀf."""
         self._check(out)
         _spread(self.nodes.rows, self.weights.rows, forces, out)
         return out
 
     def facet_force(self, facet: int, at: _Floats, force: _Floats, out: _Floats) -> _Floats:
-        """Add a force (s,) at a point of a facet to the forces `out` (N, s).
+        """Add a force at a point of a facet to the forces on the unknown nodes.
 
         Parameters
         ----------

@@ -1,0 +1,220 @@
+"""Semi-progressive cutting: a cut grows with the tool and ends as the cut made at once."""
+
+import numpy as np
+import pytest
+from cut_comparison import assert_same_cut
+
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.tool_path import ToolPath
+from verify.xfem.virtual import cut_mesh
+
+PLANE_STROKES = [
+    ToolPath.of_tip([[-0.1, 0.43], [0.4, 0.51], [0.8, 0.3]], [0.0, 1.0, 2.0]),
+    ToolPath.of_tip([[0.3, 1.1], [0.33, 0.1]], [3.0, 4.0]),
+    ToolPath.of_tip([[-0.1, 0.43], [0.4, 0.51], [0.8, 0.3]], [5.0, 6.0, 7.0]),
+]
+SPACE_STROKES = [
+    ToolPath.of_tip(
+        [[-0.1, 0.43, 1.1], [0.4, 0.51, 1.1], [0.8, 0.3, 1.1]], [0.0, 1.0, 2.0], [0.0, 0.1, -0.7]
+    ),
+    ToolPath.of_tip([[0.3, 1.1, 1.1], [0.33, 0.1, 1.2]], [3.0, 4.0], [0.1, 0.0, -0.7]),
+    ToolPath.of_tip([[-0.1, -0.2, 0.48], [1.1, -0.2, 0.55]], [5.0, 6.0], [0.0, 1.4, 0.05]),
+]
+
+
+@pytest.mark.parametrize(
+    ("mesh", "paths"),
+    [
+        (rectangle_mesh((12, 11), diagonal="alternating"), PLANE_STROKES),
+        (box_mesh((5, 6, 5)), SPACE_STROKES),
+    ],
+)
+def test_at_every_moment_the_growing_cut_is_the_cut_made_at_once(mesh, paths) -> None:
+    cutter = SemiProgressiveCutter(mesh)
+    split = 0
+    for path in paths:
+        cutter.begin(path)
+        for time in np.linspace(path.times[0], path.times[-1], 9):
+            increment = cutter.advance(time)
+            split += increment is not None
+            assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, cutter.cuts))
+    assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, [path.sweep for path in paths]))
+    assert split > len(paths)
+
+
+def test_the_number_of_frames_does_not_matter() -> None:
+    mesh = box_mesh((4, 4, 4))
+    ends = []
+    for frames in (1, 2, 37):
+        cutter = SemiProgressiveCutter(mesh)
+        cutter.begin(SPACE_STROKES[0])
+        for time in np.linspace(0.0, 2.0, frames + 1)[1:]:
+            cutter.advance(time)
+        ends.append(cutter.virtual_mesh())
+    for end in ends[1:]:
+        assert_same_cut(ends[0], end)
+
+
+def test_energy_and_momentum_are_continuous_when_an_element_splits() -> None:
+    mesh = box_mesh((4, 4, 4))
+    cutter = SemiProgressiveCutter(mesh)
+    rng = np.random.default_rng(4)
+    velocity = rng.normal(size=(len(mesh.points), 3))
+    for path in SPACE_STROKES:
+        cutter.begin(path)
+        for time in np.linspace(path.times[0], path.times[-1], 5):
+            before = cutter.virtual_mesh()
+            increment = cutter.advance(time)
+            if increment is None:
+                continue
+            after = cutter.virtual_mesh()
+            inherited = increment.inherit(velocity)
+            for moment in (_momentum, _kinetic_energy, _strain_energy):
+                # sums of some 1e3 terms of both signs
+                np.testing.assert_allclose(
+                    moment(after, inherited), moment(before, velocity), rtol=1e-12, atol=1e-12
+                )
+            velocity = inherited + 0.1 * rng.normal(size=inherited.shape)
+    assert len(velocity) > len(mesh.points) + 50
+
+
+def _momentum(virtual, velocity):
+    mass = virtual.volumes[:, None] / 4.0
+    return (mass[:, :, None] * velocity[virtual.cells]).sum(axis=(0, 1))
+
+
+def _kinetic_energy(virtual, velocity):
+    return 0.5 * (virtual.volumes[:, None, None] / 4.0 * velocity[virtual.cells] ** 2).sum()
+
+
+def _strain_energy(virtual, displacement):
+    gradient = np.einsum(
+        "pai,paj->pij", displacement[virtual.cells], virtual.mesh.gradients[virtual.parent]
+    )
+    strain = 0.5 * (gradient + gradient.transpose(0, 2, 1))
+    return (virtual.volumes * (strain**2).sum(axis=(1, 2))).sum()
+
+
+def test_delay_is_element_size_over_tool_speed() -> None:
+    # crossing elements of size h at speed v takes a time in proportion to h / v (Table 4.6): a
+    # horizontal cut through the middle of a row of right triangles passes h / 2 in each
+    speeds = (0.05, 0.1, 0.4)
+    for divisions in (8, 16):
+        mesh = rectangle_mesh((divisions, divisions))
+        height = 0.5 + 0.5 / divisions
+        for speed in speeds:
+            cutter = SemiProgressiveCutter(mesh)
+            cutter.begin(ToolPath.of_tip([[-0.1, height], [1.1, height]], [0.0, 1.2 / speed]))
+            cutter.advance(1e3)
+            crossings = cutter.crossings
+            assert len(crossings.cell) == 2 * divisions
+            np.testing.assert_allclose(
+                crossings.delay, 0.5 / divisions / speed, rtol=1e-12, atol=1e-13
+            )
+            assert (crossings.seen == 1e3).all()
+
+
+def test_an_element_is_split_in_the_frame_in_which_the_tool_has_left_it() -> None:
+    mesh = box_mesh((4, 4, 4))
+    cutter = SemiProgressiveCutter(mesh)
+    cutter.begin(SPACE_STROKES[0])
+    frames = np.linspace(0.0, 2.0, 41)
+    for time in frames:
+        cutter.advance(time)
+    crossings = cutter.crossings
+    assert (crossings.entry <= crossings.leave).all()
+    frame = frames[np.searchsorted(frames, crossings.leave - 1e-9)]
+    np.testing.assert_allclose(crossings.seen, frame)
+
+
+def test_a_live_tool_whose_path_is_told_bit_by_bit_cuts_what_is_recorded_of_it() -> None:
+    mesh = rectangle_mesh((15, 14))
+    cutter = SemiProgressiveCutter(mesh)
+    with pytest.raises(XfemError, match="begin one first"):
+        cutter.extend([[[0.0, 0.0]]], [0.0])
+    angle = np.linspace(0.0, 2.2, 60)
+    tips = np.stack([-0.05 + 0.45 * angle, 0.5 + 0.2 * np.sin(3.0 * angle)], axis=1)
+    cutter.begin(ToolPath.of_tip(tips[:1], [0.0]))
+    for k in range(1, 60):
+        cutter.extend(tips[k : k + 1, None], [float(k)])
+        cutter.advance(float(k))
+    grown = cutter.virtual_mesh()
+    assert_same_cut(grown, cut_mesh(mesh, cutter.cuts))
+    # where the tool has long been, the path known in advance gives the same but for kinks
+    known = cut_mesh(mesh, [ToolPath.of_tip(tips, np.arange(60)).sweep])
+    assert abs(grown.node_count - known.node_count) <= 4
+    assert len(np.unique(grown.bodies)) == len(np.unique(known.bodies))
+
+
+def test_a_tool_that_leaves_and_comes_back_goes_on_cutting() -> None:
+    # a body in the form of a comb: the path crosses its two teeth and the gap between
+    mesh = rectangle_mesh((9, 6))
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    gap = (abs(centre[:, 0] - 0.5) < 0.2) & (centre[:, 1] > 0.4)
+    used, cells = np.unique(mesh.cells[~gap], return_inverse=True)
+    comb = SimplexMesh(mesh.points[used], cells.reshape(-1, 3))
+    path = ToolPath.of_tip([[-0.1, 0.83], [1.1, 0.77]], [0.0, 1.0])
+    cutter = SemiProgressiveCutter(comb)
+    cutter.begin(path)
+    for time in np.linspace(0.0, 1.0, 12):
+        cutter.advance(time)
+    assert_same_cut(cutter.virtual_mesh(), cut_mesh(comb, [path.sweep]))
+    assert len(np.unique(cutter.virtual_mesh().bodies)) == 3
+
+
+def test_a_stroke_that_begins_inside_is_found() -> None:
+    mesh = box_mesh((5, 5, 5))
+    path = ToolPath.of_tip([[0.23, 0.2, 0.35], [0.77, 0.25, 0.35]], [0.0, 1.0], [0.0, 0.62, 0.03])
+    cutter = SemiProgressiveCutter(mesh)
+    cutter.begin(path)
+    assert cutter.advance(0.7) is not None
+    cutter.advance(1.0)
+    assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, [path.sweep]))
+
+
+@pytest.mark.parametrize(
+    ("tips", "splits"),
+    [
+        ([[0.2, 0.2], [0.2, 0.2]], False),  # without length
+        ([[1.5, 0.2], [2.0, 0.8]], False),  # beside the body
+        ([[0.43, 0.45], [0.47, 0.46]], False),  # within one element
+        ([[-0.1, 0.5], [1.1, 0.5]], True),  # along edges
+        ([[0.0, 0.0], [1.0, 1.0]], True),  # along diagonals, ends at corners
+        ([[-0.25, 0.0], [1.0, 0.625]], True),  # through vertices
+        ([[-0.1, 0.5 + 1e-12], [1.1, 0.5 + 1e-12]], True),  # slivers
+        ([[-0.1, 0.0], [1.1, 0.0]], False),  # along the boundary
+    ],
+)
+def test_a_degenerate_stroke_cuts_what_the_cut_at_once_does(tips, splits) -> None:
+    mesh = rectangle_mesh((8, 8))
+    path = ToolPath.of_tip(tips, [0.0, 1.0])
+    cutter = SemiProgressiveCutter(mesh)
+    cutter.begin(path)
+    changed = [cutter.advance(time) is not None for time in np.linspace(0.0, 1.0, 6)]
+    virtual = cutter.virtual_mesh()
+    assert_same_cut(virtual, cut_mesh(mesh, [path.sweep]))
+    np.testing.assert_allclose(virtual.volumes.sum(), 1.0, rtol=1e-13)
+    assert any(changed) is splits
+
+
+def test_cutting_again_in_the_same_place_changes_nothing_that_moves() -> None:
+    mesh = box_mesh((4, 4, 4))
+    cutter = SemiProgressiveCutter(mesh)
+    for _ in range(3):
+        cutter.begin(SPACE_STROKES[0])
+        cutter.advance(2.0)
+    assert cutter.body.node_count == cut_mesh(mesh, [SPACE_STROKES[0].sweep]).node_count
+    assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, cutter.cuts))
+
+
+def test_bad_input_is_refused_with_its_reason() -> None:
+    cutter = SemiProgressiveCutter(rectangle_mesh((3, 3)))
+    with pytest.raises(XfemError, match="tool path in 3D"):
+        cutter.begin(SPACE_STROKES[0])
+    cutter.begin(PLANE_STROKES[0])
+    increment = cutter.advance(2.0)
+    with pytest.raises(XfemError, match="3 nodal values; expected 16"):
+        increment.inherit(np.zeros((3, 2)))

@@ -1,0 +1,90 @@
+"""Tool paths: the swept surface is the cut that an independent triangulation gives."""
+
+import numpy as np
+import pytest
+
+from verify.xfem.errors import XfemError
+from verify.xfem.polyline import Polyline
+from verify.xfem.surface_cut import TriangulatedSurface
+from verify.xfem.tool_path import ToolPath
+
+
+def test_a_sweep_in_the_plane_has_the_level_set_of_its_polyline() -> None:
+    tips = [[0.0, 0.0], [0.5, 0.1], [0.9, 0.6], [1.0, 1.2]]
+    points = np.random.default_rng(1).uniform(-0.5, 1.5, (400, 2))
+    sweep = ToolPath.of_tip(tips, range(4)).sweep
+    np.testing.assert_allclose(
+        sweep.level_set(points), Polyline(tips).level_set(points), atol=1e-14
+    )
+
+
+def test_a_sweep_in_space_has_the_level_set_of_its_triangulation() -> None:
+    # a bent blade of three points on a bent path
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, 6), np.linspace(0.0, 1.0, 3), indexing="ij")
+    blades = np.stack([x, y, 0.3 * np.sin(2.0 * x) + 0.2 * y**2], axis=2)
+    number = np.arange(18).reshape(6, 3)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    triangles = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
+    surface = TriangulatedSurface(blades.reshape(-1, 3), triangles)
+    points = np.random.default_rng(2).uniform(-0.3, 1.3, (500, 3))
+    sweep = ToolPath(blades, np.arange(6)).sweep
+    np.testing.assert_allclose(sweep.level_set(points), surface.level_set(points), atol=1e-13)
+    # both call a point past the rim the same, and by the same distance
+    past = surface.depth(points) < -1e-12
+    np.testing.assert_allclose(
+        sweep.depth(points)[past], surface.depth(points)[past], atol=1e-13
+    )
+    assert (sweep.depth(points)[~past] >= -1e-12).all()
+
+
+def test_the_blade_passes_points_in_proportion_to_its_travel() -> None:
+    # 0.6 m in 2 s, 3 s of rest, 0.4 m in 1 s
+    path = ToolPath.of_tip([[0.0, 0.0], [0.6, 0.0], [0.6, 0.0], [1.0, 0.0]], [0.0, 2.0, 5.0, 6.0])
+    x = np.array([0.0, 0.15, 0.6, 0.8, 1.0])
+    travel = path.sweep.travel(np.stack([x, np.zeros(5)], axis=1))
+    np.testing.assert_allclose(travel, x, atol=1e-15)
+    np.testing.assert_allclose(path.time_at(travel), [0.0, 0.5, 2.0, 5.5, 6.0], atol=1e-14)
+    assert path.travel_at(3.0) == pytest.approx(0.6)
+    assert path.travel_at(-1.0) < 0.0
+    part = path.sweep.until(path.travel_at(5.5))
+    np.testing.assert_array_equal(
+        part.depth(np.stack([x, np.zeros(5)], axis=1)) >= 0.0, [True, True, True, True, False]
+    )
+
+
+def test_a_blade_that_turns_about_its_end_sweeps_a_connected_fan() -> None:
+    angle = np.linspace(0.0, 1.2, 7)
+    far = np.stack([np.cos(angle), np.sin(angle), np.zeros(7)], axis=1)
+    path = ToolPath(np.stack([np.zeros((7, 3)), far], axis=1), angle)
+    facets = path.surface.facets
+    assert len(facets) == 6
+    inner_edges = (~path.surface.arrays.edge_rim).sum()
+    assert inner_edges == 2 * 5
+
+
+def test_a_path_without_length_sweeps_nothing() -> None:
+    path = ToolPath.of_tip([[0.2, 0.3], [0.2, 0.3]], [0.0, 1.0])
+    points = np.random.default_rng(3).uniform(0.0, 1.0, (20, 2))
+    assert (path.sweep.depth(points) < 0.0).all()
+    assert (path.sweep.level_set(points) > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("tips", "times", "depth", "message"),
+    [
+        ([[0, 0], [1, 0]], [1.0, 0.0], None, "time runs backwards"),
+        ([[0, 0], [1, 0]], [0.0], None, "times of shape"),
+        ([[0, 0], [1, 0], [0.5, 0]], [0, 1, 2], None, "turns back"),
+        ([[0, 0], [1, 0], [1, 1], [0.5, -1]], [0, 1, 2, 3], None, "intersect"),
+        ([[0, 0, 0], [1, 0, 0]], [0, 1], [0.0, 0.0, 0.0], "in one place"),
+        ([[0, 0, 0], [1, 0, 0]], [0, 1], None, "blade of one point"),
+        ([[0, 0, 0], [1, 0, 0], [0.2, 0, 0]], [0, 1, 2], [0, 0, 1.0], "turns back"),
+        ([[0, np.nan], [1, 0]], [0, 1], None, "not finite"),
+        ([[0, 0, 0, 0]], [0], None, "blades of shape"),
+    ],
+)
+def test_a_wrong_path_is_refused_with_its_reason(tips, times, depth, message) -> None:
+    with pytest.raises(XfemError, match=message):
+        ToolPath.of_tip(tips, times, depth)
