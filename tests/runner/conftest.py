@@ -30,7 +30,7 @@ where = "boundary"
 displacement = "exact"
 [exact]
 solution = "linear"
-parameters = { gradient = [[0.1, 0.0], [0.0, 0.0]] }
+parameters = { matrix = [[0.1, 0.0], [0.0, 0.0]] }
 """
 
 

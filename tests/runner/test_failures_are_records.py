@@ -33,8 +33,8 @@ def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(ver
 def test_a_solve_that_hangs_is_killed_with_its_children_after_the_timeout(verify):
     mark = verify.folder / "mark"
     start = time.monotonic()
-    verify("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "1.5", "--out", "out",
-           HANG_MARK=str(mark))  # fmt: skip
+    command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "1.5")
+    verify(*command, "--out", "out", HANG_MARK=str(mark))
     assert time.monotonic() - start < 60
     record = verify.records()["Hanging", 0]
     assert (record["status"], record["reason"]) == ("timeout", "killed after 1.5 s")
@@ -52,7 +52,9 @@ def test_a_solve_that_eats_memory_is_killed_and_its_peak_recorded(verify):
 
 
 def test_memory_time_threads_and_repetitions_are_recorded(verify):
-    verify("run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "4", "--out", "out")
+    verify(
+        "run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "4", "--out", "out"
+    )
     record = verify.records()["Instant", 1]
     assert record["timings"] == {"solve": [1e-3] * 4}
     assert 0 < record["wall"] < 60
