@@ -1,0 +1,28 @@
+"""A finding: one sentence with its numbers, what was expected, and whether it came out so."""
+
+from dataclasses import dataclass
+
+from verify.result import Verdict
+
+__all__ = ["Finding"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a study has to say.
+
+    Attributes
+    ----------
+    topic : str
+    sentence : str
+        With the numbers.
+    expected : str
+        The stated limit or the known result against which it is held.
+    verdict : Verdict
+        PASS if it came out as expected, FAIL if not, UNDECIDED if the numbers do not tell.
+    """
+
+    topic: str
+    sentence: str
+    expected: str
+    verdict: Verdict

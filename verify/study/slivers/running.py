@@ -1,0 +1,117 @@
+"""What only a run can tell: where it becomes unstable, when it blows up, what turns inside out."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+
+from verify.study.slivers.bodies import SweptBody, swept_body, uncut_body
+from verify.study.slivers.explicit_step import (
+    LUMPINGS,
+    estimated_step,
+    linear_course,
+    mass_of,
+    step_by_running,
+)
+from verify.study.slivers.inversion import swing
+from verify.study.slivers.measurement import Measurement
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    EnergyMomentum,
+    ImplicitEuler,
+    Integrator,
+    RealTimeEuler,
+    Trapezoidal,
+)
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+
+__all__ = ["EXPLICIT_SHARE", "IMPLICIT_MULTIPLE", "run_measurements"]
+
+EXPLICIT_SHARE = 0.9  # of the uncut step
+IMPLICIT_MULTIPLE = 10.0  # of the uncut step
+_SHARES = (0.9, 0.7)  # of the body's own linear step, at large strain
+_SIZES = (0.5, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-12, 0.0)
+_QUICK_SIZES = (0.5, 1e-3, 1e-7, 0.0)
+_RUN = {True: 500, False: 2000}  # steps, quick or not
+_SWING = {True: 1000, False: 4000}
+_IMPLICIT_RUN = {True: 10, False: 100}
+_IMPLICIT: dict[str, Callable[..., Integrator]] = {
+    "linearised implicit Euler": RealTimeEuler,
+    "implicit Euler": ImplicitEuler,
+    "trapezoidal": Trapezoidal,
+    "energy–momentum": EnergyMomentum,
+}
+
+
+def run_measurements(mesh: SimplexMesh, quick: bool) -> Iterator[Measurement]:
+    """Run bodies with the cut along faces: linear and explicit, at large strain, implicit."""
+    whole = uncut_body(mesh)
+    uncut = estimated_step(whole, mass_of(whole, "side-wise"))
+    for treatment in ("keep",) if quick else ("keep", "drop", "merge"):
+        for size in _QUICK_SIZES if quick else _SIZES:
+            body = swept_body(mesh, "along faces", size, treatment)
+            yield from _explicit(body, uncut, quick)
+    for treatment in ("keep", "drop", "merge"):
+        for size in (1e-1, 1e-3) if quick else (0.5, 1e-1, 1e-2, 1e-3, 1e-6, 1e-12, 0.0):
+            body = swept_body(mesh, "along faces", size, treatment)
+            yield from _at_large_strain(body, quick)
+            if treatment != "drop":
+                yield from _implicit(body, uncut, quick)
+
+
+def _base(body: SweptBody, variant: str, quantity: str, unit: str = "") -> Measurement:
+    return Measurement(
+        body.dimension, body.placement, body.size, body.treatment, variant, quantity, None, unit
+    )
+
+
+def _explicit(body: SweptBody, uncut: float, quick: bool) -> Iterator[Measurement]:
+    for lumping in LUMPINGS:
+        blow_up = _base(body, lumping, "steps to blow-up, explicit", "steps")
+        by_running = _base(body, lumping, "stable step found by running", "s")
+        try:
+            mass = mass_of(body, lumping)
+            estimate = estimated_step(body, mass)
+        except XfemError as problem:
+            yield replace(blow_up, reason=str(problem))
+            continue
+        course = linear_course(body, mass, EXPLICIT_SHARE * uncut, _RUN[quick])
+        yield replace(
+            blow_up, value=float(course.steps) if course.blown_up else None, reason=course.reason
+        )
+        if quick and body.size not in (0.5, 1e-3):
+            continue
+        try:
+            low, high = step_by_running(body, mass, estimate)
+        except ValueError as problem:
+            yield replace(by_running, reason=str(problem))
+            continue
+        text = f"between {low:.5g} and {high:.5g} s; estimate {estimate:.5g} s"
+        yield replace(by_running, value=0.5 * (low + high), reason=text)
+
+
+def _at_large_strain(body: SweptBody, quick: bool) -> Iterator[Measurement]:
+    for lumping in ("side-wise",) if quick else ("side-wise", "thesis"):
+        mass = mass_of(body, lumping)
+        step = estimated_step(body, mass)
+        for share in _SHARES:
+            scheme = partial(CentralDifferences, step_size=share * step)
+            end = swing(body, mass, scheme, _SWING[quick])
+            variant = f"{lumping}, {share:g} of its step"
+            text = f"{end.reason}; largest energy {end.energy:.4g} times that at the start"
+            inverted = _base(body, variant, "inverted pieces", "pieces")
+            yield replace(inverted, value=float(end.inverted), reason=text)
+            blow_up = _base(body, variant, "steps to blow-up, large strain", "steps")
+            value = float(end.steps) if end.blown_up else None
+            yield replace(blow_up, value=value, reason=text)
+
+
+def _implicit(body: SweptBody, uncut: float, quick: bool) -> Iterator[Measurement]:
+    mass = mass_of(body, "side-wise")
+    step = IMPLICIT_MULTIPLE * uncut
+    for name, scheme in _IMPLICIT.items():
+        start = partial(scheme, step_size=step)
+        end = swing(body, mass, start, _IMPLICIT_RUN[quick], every=1)
+        text = f"{end.reason}; largest energy {end.energy:.4g} times that at the start"
+        blow_up = _base(body, name, "steps to blow-up, implicit", "steps")
+        yield replace(blow_up, value=float(end.steps) if end.blown_up else None, reason=text)

@@ -1,0 +1,185 @@
+"""The sweep: every sliver size × treatment × basis or lumping, one measurement each."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import groupby
+from time import perf_counter
+from typing import Any
+
+from verify.study.slivers.accuracy import displacement_error
+from verify.study.slivers.bodies import (
+    DENSITY,
+    TREATMENTS,
+    Placement,
+    SweptBody,
+    background,
+    soft,
+    swept_body,
+    uncut_body,
+)
+from verify.study.slivers.conditioning import BASES, SCALINGS, HeldStiffness
+from verify.study.slivers.explicit_step import LUMPINGS, estimated_step, mass_of
+from verify.study.slivers.findings import Finding, findings
+from verify.study.slivers.growth import growth
+from verify.study.slivers.measurement import Measurement
+from verify.study.slivers.running import run_measurements
+from verify.xfem.critical_step import element_critical_steps
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+
+__all__ = ["SIZES", "SliverStudy", "sliver_study"]
+
+SIZES = (0.5, 1e-1, *(10.0**-k for k in range(2, 13)), 0.0)
+_QUICK_SIZES = (0.5, 1e-1, 1e-3, 1e-4, 1e-6, 1e-12, 0.0)
+_FITTED = ("condition number", "CG iterations", "compliance", "displacement error", "critical step")
+_PLACEMENTS: dict[int, tuple[Placement, ...]] = {  # in the plane, faces are edges
+    2: ("along faces", "through vertices"),
+    3: ("along faces", "along edges", "through vertices"),
+}
+
+
+@dataclass(frozen=True)
+class SliverStudy:
+    """What the sweep found.
+
+    Attributes
+    ----------
+    quick : bool
+    dimensions : tuple of int
+    measurements : list of Measurement
+    growths : list of dict
+        Exponent of each series over small sizes, with its uncertainty and reason.
+    findings : list of Finding
+    seconds : float
+        Wall time of the sweep.
+    """
+
+    quick: bool
+    dimensions: tuple[int, ...]
+    measurements: list[Measurement]
+    growths: list[dict[str, Any]]
+    findings: list[Finding]
+    seconds: float
+
+    def as_record(self) -> dict[str, Any]:
+        """Return all of it as plain data."""
+        return asdict(self)
+
+
+def sliver_study(
+    dimensions: Sequence[int] = (2, 3),
+    quick: bool = False,
+    announce: Callable[[str], None] = lambda text: None,
+) -> SliverStudy:
+    """Run the sweep.
+
+    Parameters
+    ----------
+    dimensions : sequence of {2, 3}
+    quick : bool
+        Fewer sizes and shorter runs.
+    announce : callable, optional
+        Told what is being done.
+
+    Raises
+    ------
+    ValueError
+        If a dimension is neither 2 nor 3, or there is none.
+    """
+    if not dimensions or any(d not in (2, 3) for d in dimensions):
+        raise ValueError(f"dimensions {list(dimensions)}; expected 2, 3 or both")
+    start = perf_counter()
+    found: list[Measurement] = []
+    for dimension in dimensions:
+        mesh = background(dimension, quick)
+        found += _uncut(mesh)
+        for placement in _PLACEMENTS[dimension]:
+            announce(f"{dimension}D, cut {placement}: conditioning, steps, errors, compliance")
+            found += _swept(mesh, placement, quick)
+        announce(f"{dimension}D: runs at and around the critical step, motion at large strain")
+        found += run_measurements(mesh, quick)
+    growths = _growths(found)
+    seconds = perf_counter() - start
+    return SliverStudy(
+        quick, tuple(dimensions), found, growths, findings(found, growths, dimensions), seconds
+    )
+
+
+def _uncut(mesh: SimplexMesh) -> list[Measurement]:
+    body = uncut_body(mesh)
+    template = Measurement(mesh.dim, "uncut", 0.0, "uncut", "side-wise", "", None, "s")
+    whole = estimated_step(body, mass_of(body, "side-wise"))
+    element = float(element_critical_steps(mesh, soft(mesh.dim), DENSITY).min())
+    return [
+        replace(template, quantity="critical step", value=whole),
+        replace(template, quantity="critical step of the smallest element", value=element),
+    ]
+
+
+def _swept(mesh: SimplexMesh, placement: Placement, quick: bool) -> Iterator[Measurement]:
+    treatments: tuple[str, ...] = TREATMENTS
+    if quick and placement != "along faces":
+        treatments = ("keep", "conforming")
+    for treatment in treatments:
+        for size in _QUICK_SIZES if quick else SIZES:
+            base = Measurement(mesh.dim, placement, size, treatment, "", "", None)
+            try:
+                body = swept_body(mesh, placement, size, treatment)
+            except ValueError as problem:
+                # such meshes are a result: a generator without snapping makes or refuses them
+                yield replace(base, quantity="mesh", reason=str(problem))
+                continue
+            yield from _static(body, base)
+            yield from _steps(body, base)
+
+
+def _static(body: SweptBody, base: Measurement) -> Iterator[Measurement]:
+    stiffness = HeldStiffness(body)
+    for basis in BASES if not body.treatment.startswith("conforming") else BASES[:1]:
+        for scaling in SCALINGS:
+            base = replace(base, variant=f"{basis}, {scaling}")
+            try:
+                condition = stiffness.condition_number(basis, scaling)
+                count, residual = stiffness.iterations(basis, scaling)
+            except XfemError as problem:  # a basis that this body does not have
+                yield replace(base, quantity="condition number", reason=str(problem))
+                continue
+            yield replace(base, quantity="condition number", value=condition)
+            text = "" if residual <= 1e-10 else f"residual {residual:.1e} after {count} iterations"
+            yield replace(
+                base, quantity="CG iterations", value=None if text else float(count), reason=text
+            )
+    base = replace(base, variant="")
+    yield replace(base, quantity="compliance", value=stiffness.compliance, unit="m/N")
+    if body.placement == "along faces":
+        yield replace(base, quantity="displacement error", value=displacement_error(body))
+
+
+def _steps(body: SweptBody, base: Measurement) -> Iterator[Measurement]:
+    base = replace(base, quantity="critical step", unit="s")
+    names = list(LUMPINGS)
+    if body.treatment.startswith("conforming"):
+        names = ["side-wise", "consistent"]  # without a cut, lumping is lumping
+    for lumping in names:
+        base = replace(base, variant=lumping, value=None, reason="")
+        try:
+            yield replace(base, value=estimated_step(body, mass_of(body, lumping)))
+        except XfemError as problem:
+            yield replace(base, reason=str(problem))
+    if body.ghost is not None:
+        mass = mass_of(body, "side-wise", with_ghost=False)
+        yield replace(base, variant="without the ghost mass", value=estimated_step(body, mass))
+
+
+def _growths(found: list[Measurement]) -> list[dict[str, Any]]:
+    def key(m: Measurement) -> tuple[int, str, str, str, str]:
+        return (m.dimension, m.placement, m.treatment, m.variant, m.quantity)
+
+    chosen = sorted((m for m in found if m.quantity in _FITTED and m.placement != "uncut"), key=key)
+    growths = []
+    for name, group in groupby(chosen, key):
+        series = list(group)
+        law = growth([m.size for m in series], [m.value for m in series])
+        fields = ("dimension", "placement", "treatment", "variant", "quantity")
+        growths.append(dict(zip(fields, name, strict=True)) | asdict(law))
+    return growths

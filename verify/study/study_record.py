@@ -1,0 +1,85 @@
+"""What a study leaves on disk: a versioned JSON record and the same numbers as CSV."""
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from verify.errors import InputError
+from verify.provenance import provenance
+
+__all__ = ["SCHEMA", "write_study"]
+
+SCHEMA = 1
+
+
+def write_study(
+    directory: Path,
+    kind: str,
+    record: Mapping[str, Any],
+    rows: Iterable[Mapping[str, Any]],
+    command: str,
+) -> Path:
+    """Write ``<kind>.json`` and ``<kind>.csv``; each file is replaced in one step.
+
+    Parameters
+    ----------
+    directory : Path
+        Made if it is not there.
+    kind : str
+        Name of the study, ``slivers`` or ``energy``.
+    record : mapping
+        Plain data. Numbers that are not finite, for which JSON has no word, become null.
+    rows : iterable of mapping
+        Lines of the CSV; all with the keys of the first.
+    command : str
+        What was typed.
+
+    Returns
+    -------
+    Path
+        Of the JSON record.
+
+    Raises
+    ------
+    InputError
+        If the directory cannot be made because a file is in its place.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError("is a file; expected a directory to write into", str(directory)) from None
+    document = {
+        "schema": SCHEMA,
+        "kind": f"{kind} study",
+        "command": command,
+        "provenance": provenance(),
+        **record,
+    }
+    target = directory / f"{kind}.json"
+    _replace(target, json.dumps(_finite(document), indent=1, allow_nan=False) + "\n")
+    buffer = io.StringIO()
+    listed = list(rows)
+    writer = csv.DictWriter(buffer, list(listed[0]) if listed else [], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(listed)
+    _replace(directory / f"{kind}.csv", buffer.getvalue())
+    return target
+
+
+def _replace(path: Path, text: str) -> None:
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, path)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    return [_finite(entry) for entry in value] if isinstance(value, list | tuple) else value
