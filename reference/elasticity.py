@@ -107,6 +107,13 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
 
     domain = space.function_space.mesh
     form = ufl.inner(fem.Constant(domain, np.zeros(2)), v) * ufl.dx
+    tractions = {
+        i: _facets(scene, space, load, f"loads[{i}].where")
+        for i, load in enumerate(scene.loads)
+        if isinstance(load, Traction)
+    }
+    # all parts in one measure: DOLFINx takes one set of subdomains per form
+    ds = ufl.Measure("ds", domain=domain, subdomain_data=list(tractions.items()))
     for i, load in enumerate(scene.loads):
         if isinstance(load, Gravity):
             assert scene.material.density is not None  # the scene has checked it
@@ -119,32 +126,26 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
                 else fem.Constant(domain, np.asarray(load.force, dtype=float))
             )
             form += ufl.inner(force, v) * ufl.dx
+        elif load.traction == "exact":
+            stress = _sided_function(space, exact.stress, (2, 2))
+            form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
         else:
-            form += _traction(scene, space, v, load, exact, f"loads[{i}].where")
+            traction = fem.Constant(domain, np.asarray(load.traction, dtype=float))
+            form += ufl.inner(traction, v) * ds(i)
     return form
 
 
-def _traction(
-    scene: Scene, space: ConformingSpace, v: Any, load: Traction, exact: Any, key: str
-) -> Any:
-    import ufl
-    from dolfinx import fem
-
-    domain = space.function_space.mesh
+def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> NDArray[np.int32]:
+    """Find the facets that a traction acts on, as DOLFINx's pairs of cell and local facet."""
     cell, opposite = space.mesh.boundary.T
     ends = space.mesh.cells[cell[:, None], (opposite[:, None] + [1, 2]) % 3]
     corners = np.unique(ends)
     mark = np.zeros(len(space.mesh.points), dtype=bool)
     mark[corners[on_part(scene, load.where, space.mesh.points[corners], key)]] = True
     chosen = mark[ends].all(axis=1)
-    # integration entities are pairs (cell, local facet); facet i lies opposite corner i
+    # facet i lies opposite corner i
     pairs = np.column_stack([space.dolfinx_cell[cell[chosen]], opposite[chosen]])
-    entities = pairs[np.argsort(pairs[:, 0], kind="stable")].astype(np.int32).ravel()
-    ds = ufl.Measure("ds", domain=domain, subdomain_data=[(1, entities)])
-    if load.traction == "exact":
-        stress = _sided_function(space, exact.stress, (2, 2))
-        return ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(1)
-    return ufl.inner(fem.Constant(domain, np.asarray(load.traction, dtype=float)), v) * ds(1)
+    return pairs[np.argsort(pairs[:, 0], kind="stable")].astype(np.int32).ravel()
 
 
 def _sided_function(space: ConformingSpace, values: Any, shape: tuple[int, ...]) -> Any:

@@ -1,0 +1,178 @@
+"""Linear elasticity of the FEniCSx side against closed forms, each load and support in turn."""
+
+import numpy as np
+import pytest
+from reference_scenes import energy_of, needs_fenicsx, polyline, square
+
+from reference.exact import exact_solution
+from verify.scene import Scene, load_scene
+
+pytestmark = needs_fenicsx
+
+INCLINED = {"point": [0.5, 0.5], "slope": 1 / 3}
+ACROSS = polyline("cut", (-0.1, 0.3), (1.1, 0.7))
+SMOOTH = {
+    **INCLINED,
+    "above": [[0.1, np.pi, 0.0], [0.05, np.pi, 90.0]],
+    "below": [[-0.05, 2 * np.pi, 0.0], [-0.05, 2 * np.pi, 90.0]],
+}
+AIRY = {**INCLINED, "above": [0.1, 0.2, 2.0], "below": [-0.2, 0.1, 3.0]}
+EXACT = [{"where": "boundary", "displacement": "exact"}]
+
+
+def with_exact(name, parameters, plane="strain", cut=ACROSS, **changes):
+    return square(
+        [cut],
+        material={"young": 1.0, "poisson": 0.3, "plane": plane},
+        exact={"solution": name, "parameters": parameters},
+        **({"supports": EXACT, "loads": []} | changes),
+    )
+
+
+def exact_energy(scene):
+    known = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    return known.strain_energy(scene)
+
+
+def energy_errors(scene, levels=3, **parameters):
+    values = [energy_of(scene, "conforming", level, **parameters) for level in range(levels)]
+    return np.array(values) / exact_energy(scene) - 1
+
+
+UNIFORM = {"mesh": {"cells": [[8, 8], [16, 16], [32, 32], [64, 64]]}}
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_quadratic_elements_converge_in_energy_with_order_four(plane):
+    errors = energy_errors(with_exact("airy", AIRY, plane, **UNIFORM), degree=2)
+    assert np.log2(errors[-2] / errors[-1]) >= 3.9
+    assert abs(errors[-1]) < 1e-5
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_an_exact_body_force_is_applied_on_each_side_of_the_cut(plane):
+    force = [{"kind": "body_force", "force": "exact"}]
+    scene = with_exact("smooth", SMOOTH, plane, loads=force, **UNIFORM)
+    errors = energy_errors(scene, levels=4, degree=2)
+    # order 4 over the whole sequence; from level to level the cut crosses other cells
+    assert np.log2(np.abs(errors[0] / errors[-1])) / 3 >= 3.8
+    assert abs(errors[-1]) < 1e-7
+    # without the force the same boundary values give another energy
+    assert abs(energy_errors(with_exact("smooth", SMOOTH, plane), levels=1)[0]) > 0.05
+
+
+def test_an_exact_traction_does_the_work_of_an_exact_support():
+    # bending is quadratic on each side: P2 on a straight cut has no error at all
+    bending = {**INCLINED, "stress_gradient": [1.0, -0.5], "shift": [0.02, 0.0]}
+    supports = [{"where": where, "displacement": "exact"} for where in ("top", "bottom")]
+    loads = [{"kind": "traction", "where": w, "traction": "exact"} for w in ("left", "right")]
+    scene = with_exact("bending", bending, supports=supports, loads=loads)
+    # off by round-off, times the condition of the slender cells that an inclined cut leaves
+    assert energy_of(scene, "conforming", degree=2) == pytest.approx(exact_energy(scene), rel=1e-10)
+
+
+@pytest.mark.parametrize("plane, stiffness", [("strain", 1 / (1 - 0.3**2)), ("stress", 1.0)])
+@pytest.mark.parametrize("solver", ["conforming", "reference"])
+def test_a_uniform_traction_on_a_bar_gives_uniaxial_stress(plane, stiffness, solver):
+    # rollers below, one node held in x: σ_yy = 3 everywhere, energy ½ σ²/E' per area
+    scene = square(
+        material={"young": 1.0, "poisson": 0.3, "plane": plane},
+        supports=[
+            {"where": "bottom", "displacement": [0], "components": ["y"]},
+            {"where": "x < 1e-13 and y < 1e-13", "displacement": [0, 0]},
+        ],
+        loads=[{"kind": "traction", "where": "top", "traction": [0, 3.0]}],
+    )
+    assert energy_of(scene, solver) == pytest.approx(4.5 / stiffness, rel=1e-10)
+
+
+def test_a_bar_that_hangs_under_its_weight_stretches_like_a_parabola():
+    from verify.solvers import find_solver
+
+    # without lateral contraction u_y = −ρg (Ly − y²/2)/E from the held end down: in P2's space
+    rho, g, length = 1000.0, 9.8, 2.0
+    scene = Scene.model_validate(
+        {
+            "title": "bar",
+            "requirement": "none",
+            "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [0.5, length]},
+            "mesh": {"cells": [[2, 8]]},
+            "material": {"young": 1e4, "poisson": 0.0, "plane": "strain", "density": rho},
+            "supports": [{"where": "top", "displacement": [0, 0]}],
+            "loads": [{"kind": "gravity", "acceleration": [0, -g]}],
+        }
+    )
+    for solution in (
+        find_solver("conforming").solve(scene, 0, repetitions=0, degree=2),
+        find_solver("reference").solve(scene, 0, repetitions=0),
+    ):
+        below = length - solution.points[:, 1]
+        expected = -rho * g * (length * below - below**2 / 2) / 1e4
+        assert solution.displacement[0, :, 1] == pytest.approx(expected, abs=1e-9)
+        assert np.abs(solution.displacement[0, :, 0]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "intensity, value", [([1.0, 0.0], 0.474129375227), ([0.0, 1.0], 1.203559183268)]
+)
+def test_tip_fields_of_both_modes_have_the_known_energy(intensity, value):
+    scene = with_exact(
+        "tip",
+        {"tip": [0.0, 0.0], "intensity": intensity},
+        cut=polyline("cut", (-1.1, 0.0), (0.0, 0.0)),
+        geometry={"kind": "rectangle", "lower": [-1, -1], "upper": [1, 1]},
+    )
+    # P2 with h ∝ r^0.8: order 4 in energy; the constant is that of a twelfth of the body
+    assert energy_of(scene, level=1) == pytest.approx(value, rel=1e-5)
+
+
+def test_the_graded_reference_converges_with_order_two_in_the_number_of_unknowns():
+    from verify.solvers import find_solver
+
+    scene, found = load_scene("statics/griffith_inside"), find_solver("reference")
+    levels = [found.solve(scene, level, repetitions=0) for level in range(2)]
+    errors = [abs(one.ledger["strain"][0] / exact_energy(scene) - 1) for one in levels]
+    growth = np.log(levels[1].unknowns / levels[0].unknowns)
+    assert np.log(errors[0] / errors[1]) / growth >= 1.9
+
+
+def test_remeshing_the_cut_body_is_as_good_as_imprinting_the_cut():
+    scene = with_exact("airy", AIRY, **UNIFORM)
+    imprinted, remeshed = (energy_errors(scene, mesh=mesh) for mesh in ("imprinted", "remeshed"))
+    # over the whole sequence: meshes made anew vary
+    assert np.log2(remeshed[0] / remeshed[-1]) / 2 == pytest.approx(2.0, abs=0.2)
+    # equal mean cell area; well-shaped cells are somewhat better, never twice as bad
+    assert (remeshed < 2 * imprinted).all()
+
+
+@pytest.mark.parametrize("mesh", ["imprinted", "remeshed"])
+def test_an_unstructured_background_gives_the_exact_energy_of_a_patch(mesh):
+    patch = {**INCLINED, "strain": [0.1, -0.05], "shift": [0.0, -0.02]}
+    scene = with_exact("patch", patch, mesh={"pattern": "unstructured", "sizes": [0.2]})
+    found = energy_of(scene, "conforming", mesh=mesh)
+    assert found == pytest.approx(exact_energy(scene), rel=1e-10)
+
+
+def test_a_griffith_crack_opens_by_the_area_of_its_ellipse():
+    from verify.solvers import find_solver
+
+    # ∫ 4σ/E' √(a² − x²) dx = 2π σ a²/E'; the mesh has nodes on both faces
+    scene = load_scene("statics/griffith_edges")
+    solution = find_solver("reference").solve(scene, 1, repetitions=0)
+    assert opening_area(solution) == pytest.approx(2 * np.pi * (1 - 0.3**2), rel=1e-5)
+
+
+def opening_area(solution):
+    """∫ of the jump across a horizontal cut at y = 0, m²: upper faces minus lower ones."""
+    area = 0.0
+    u, points = solution.displacement[0], solution.points
+    for facet in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
+        nodes = solution.cells[:, facet]
+        on_line = (np.abs(points[nodes][:, :, 1]) < 1e-12).all(axis=1)
+        inside = np.abs(points[nodes[:, 2], 0]) < 1
+        nodes = nodes[on_line & inside]
+        # a positive cell lies left of its edges: above if the edge runs to the right
+        run = points[nodes[:, 1], 0] - points[nodes[:, 0], 0]
+        mean = (u[nodes[:, 0], 1] + u[nodes[:, 1], 1] + 4 * u[nodes[:, 2], 1]) / 6
+        area += float(np.sum(run * mean))
+    return area
