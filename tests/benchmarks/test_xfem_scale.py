@@ -92,7 +92,7 @@ def test_treating_slivers_costs_less_than_cutting(benchmark):
 
 
 def test_the_product_with_the_matrix_runs_at_half_the_memory_bandwidth_or_more(benchmark):
-    virtual, pattern, _, blocks, load = system()
+    _, pattern, _, blocks, load = system()
     out = np.empty_like(load)
     benchmark(multiply, pattern.starts, pattern.columns, blocks, load, out)
     traffic = blocks.nbytes + pattern.columns.nbytes + 2 * load.nbytes

@@ -8,6 +8,8 @@ geometry of a cut
 what a cut does to a mesh
     `clipping`, `zero_points`, `split` (pieces), `joining` (which share unknowns), `virtual` (the
     result: standard finite elements with weights), `subdivision` (a conforming mesh of it)
+slivers
+    `slivers` (policies), `piece_contacts`, `absorption`; `ghost_penalty`
 mechanics
     `elasticity`, `stiffness`, `loads`, `supports`, `static`; `bases`, `thesis_blocks`
 linear algebra
