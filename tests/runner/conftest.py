@@ -42,6 +42,8 @@ class CommandLine:
     environment: dict[str, str]
 
     def start(self, *arguments, **environment):
+        if arguments[0] == "run":
+            arguments = (*arguments, "--no-report")
         return subprocess.Popen(
             [sys.executable, "-m", "verify", *map(str, arguments)],
             cwd=self.folder,

@@ -33,7 +33,7 @@ def description(scene: Scene) -> str:
         ("analysis", [_keys(scene.analysis, "damping")]),
         ("measured", [_keys(quantity) for quantity in scene.quantities]),
         ("judged by", [_judge(scene)]),
-        ("accepted if", [_keys(check) for check in scene.acceptance] or ["no acceptance"]),
+        ("accepted if", [_demand(check) for check in scene.acceptance] or ["nothing is judged"]),
         ("hash", [scene_hash(scene)]),
     ]
     lines = [scene.name, scene.title, "", textwrap.fill(scene.requirement, 92), ""]
@@ -48,6 +48,26 @@ def description(scene: Scene) -> str:
                 )
             )
     return "\n".join(lines)
+
+
+def _demand(check: Any) -> str:
+    """Say an acceptance check as the end of "accepted if …"."""
+    what = f"{check.metric} of {check.solver}"
+    match check.check:
+        case "value":
+            within = f"within {check.relative_tolerance:g} relative"
+            return f"{what} is {check.equals:.10g} {within} ({check.source})"
+        case "error":
+            return f"error in {what} is at most {check.at_most:g} on the finest mesh"
+        case "rate" if check.equals is not None:
+            return f"order of {what} is {check.equals:g} within {check.within:g}"
+        case "rate":
+            return f"order of {what} is at least {check.at_least:g}"
+        case "ratio" if check.within is not None:
+            return f"{what} over that of {check.to} is 1 within {check.within:g} on every mesh"
+        case "ratio":
+            return f"{what} over that of {check.to} is at most {check.at_most:g} on every mesh"
+    return _keys(check)
 
 
 def _keys(part: Any, *without: str) -> str:

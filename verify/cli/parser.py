@@ -163,6 +163,9 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--strict", action="store_true", help="undecided verdicts and refusals: exit code 5"
     )
+    command.add_argument(
+        "--no-report", action="store_true", help="leave the report to `verify report DIR`"
+    )
     command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
 
 

@@ -5,6 +5,7 @@ import json
 import shlex
 import sys
 from dataclasses import asdict
+from pathlib import Path
 
 from verify.cli.progress import progress_on
 from verify.cli.verdict_text import verdict_lines
@@ -45,9 +46,7 @@ def execute(arguments: argparse.Namespace) -> int:
                 file=sys.stderr,
             )
             return 128 + stop.signum
-    from verify.report import render
-
-    report = render(arguments.out)
+    report = None if arguments.no_report else _rendered(arguments.out)
     code = exit_code(summary.results, arguments.strict)
     if arguments.json:
         cases = [
@@ -62,11 +61,18 @@ def execute(arguments: argparse.Namespace) -> int:
             }
             for result in summary.results
         ]
-        print(json.dumps({"exit": code, "report": str(report), "cases": cases}, indent=2))
+        print(json.dumps({"exit": code, "report": report, "cases": cases}, indent=2))
         return code
     for line in verdict_lines(summary.results):
         print(line)
     if summary.reused:
         print(f"{summary.reused} finished solves were taken over from before")
-    print(f"report: {report}")
+    if report:
+        print(f"report: {report}")
     return code
+
+
+def _rendered(directory: Path) -> str:
+    from verify.report import render
+
+    return str(render(directory))
