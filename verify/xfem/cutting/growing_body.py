@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.cuts import Cut
 from verify.xfem.cutting.growing_array import GrowingArray
+from verify.xfem.cutting.orientation_kernels import simplex_signs
 from verify.xfem.cutting.patch import MeshPatch, PatchCutter
 from verify.xfem.cutting.point_numbers import PointNumbers
 from verify.xfem.cutting.renumber_kernels import (
@@ -94,6 +95,8 @@ class GrowingBody:
         Points where cuts meet the mesh.
     sub_piece, sub_points, sub_barycentric, sub_fraction : GrowingArray
         Sub-simplices as in `SubCells`; piece -1 if no longer in use.
+    sub_sign : GrowingArray
+        (k,) orientation of the sub-simplices in their cells, +1 or -1.
     sub_range : (m, 2) int array
         First sub-simplex of each cell, and one past the last.
     split_cells : (m,) bool array
@@ -116,6 +119,7 @@ class GrowingBody:
         self.sub_points = GrowingArray(np.empty((0, corners), dtype=np.int64))
         self.sub_barycentric = GrowingArray(np.empty((0, corners, corners)))
         self.sub_fraction = GrowingArray(np.empty(0))
+        self.sub_sign = GrowingArray(np.empty(0, dtype=np.int8))
         self.sub_range = np.zeros((cells, 2), dtype=np.int64)
         self.cut_count = 0
         self.split_cells = np.zeros(cells, dtype=bool)
@@ -314,6 +318,13 @@ class GrowingBody:
         self.sub_points.append(ids[partition.sub_points[rows]])
         self.sub_barycentric.append(partition.sub_barycentric[rows])
         self.sub_fraction.append(partition.sub_fraction[rows])
+        sub_cell = partition.parent[partition.sub_piece[rows]]
+        nodes = len(patch.whole_nodes)
+        self.sub_sign.append(
+            simplex_signs(
+                partition.sub_points[rows], sub_cell, patch.cells, nodes, partition.points.ends
+            )
+        )
         edges = (
             np.searchsorted(cell[rows], cells, side="left"),
             np.searchsorted(cell[rows], cells, side="right"),

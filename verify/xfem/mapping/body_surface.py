@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
+from verify.xfem.errors import XfemError
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.exposed_kernels import exposed_facets
 from verify.xfem.mapping.moving_surface import MovingSurface
@@ -27,6 +28,11 @@ class BodySurface:
     body : GrowingBody
         Of triangles in the plane or tetrahedra.
 
+    Raises
+    ------
+    XfemError
+        If the body is a membrane.
+
     Attributes
     ----------
     surface : MovingSurface
@@ -34,9 +40,12 @@ class BodySurface:
 
     def __init__(self, body: GrowingBody) -> None:
         mesh = body.mesh
+        if mesh.dim != mesh.space:
+            raise XfemError("a membrane has no surface that encloses it")
         self._body = body
         self.surface = MovingSurface(mesh.dim + 1, mesh.space, mesh.dim)
         self._edges = EdgePoints(mesh.points, body.points)
+        self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
         self._facets_of_cell: dict[int, _Ints] = {}
         boundary = np.unique(mesh.boundary_facets[:, 0])
         split = np.flatnonzero(body.split_cells)
@@ -61,7 +70,7 @@ class BodySurface:
         ]
         if old:
             self.surface.retire(np.concatenate(old))
-        ids, at, piece, cell, inner, inside = exposed_facets(
+        ids, at, piece, cell, inner = exposed_facets(
             cells,
             body.split_cells,
             mesh.cells,
@@ -73,8 +82,9 @@ class BodySurface:
             body.sub_piece.rows,
             body.sub_points.rows,
             body.sub_barycentric.rows,
+            body.sub_sign.rows,
+            self._orientation,
         )
-        ids, at = _outwards(mesh.points[mesh.cells[cell]], ids, at, inside)
         ids, source, share = self._edges.bisect(ids)
         at = share @ at[source]
         piece, cell = piece[source], cell[source]
@@ -90,18 +100,3 @@ class BodySurface:
         starts = np.flatnonzero(np.diff(cell, prepend=-1))
         for begin, part in zip(starts, np.split(numbers, starts[1:]), strict=True):
             self._facets_of_cell[int(cell[begin])] = part
-
-
-def _outwards(elements: _Floats, ids: _Ints, at: _Floats, inside: _Floats) -> tuple[_Ints, _Floats]:
-    """Turn facets so that a point inside their (convex) piece is behind them."""
-    corners = at @ elements
-    away = corners[:, 0] - np.einsum("qc,qcs->qs", inside, elements)
-    along = corners[:, 1:] - corners[:, :1]
-    if ids.shape[1] == 2:
-        normal = np.stack([along[:, 0, 1], -along[:, 0, 0]], axis=1)
-    else:
-        normal = np.cross(along[:, 0], along[:, 1])
-    wrong = (normal * away).sum(axis=1) < 0.0
-    ids[wrong, 0], ids[wrong, 1] = ids[wrong, 1], ids[wrong, 0].copy()
-    at[wrong, 0], at[wrong, 1] = at[wrong, 1], at[wrong, 0].copy()
-    return ids, at

@@ -36,12 +36,12 @@ def _face_of(barycentric, skip):
 @njit(cache=True)
 def exposed_facets(
     wanted, split, cells, neighbours, piece_cells, first_piece, next_piece,
-    sub_range, sub_piece, sub_points, sub_barycentric,
+    sub_range, sub_piece, sub_points, sub_barycentric, sub_sign, orientation,
 ):  # fmt: skip
     """Facets of these cells on the surface of the material.
 
     Returns for each: point numbers (q, d), barycentric corners (q, d, d + 1), piece, cell,
-    whether it lies on a cut, and a point (q, d + 1) inside its piece.
+    and whether it lies on a cut. Facets are oriented outwards.
     """
     corners = cells.shape[1]
     room = 0
@@ -50,7 +50,7 @@ def exposed_facets(
     ids = np.empty((room, corners - 1), dtype=np.int64)
     at = np.zeros((room, corners - 1, corners))
     piece_of, cell_of = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
-    inner, inside = np.empty(room, dtype=np.bool_), np.empty((room, corners))
+    inner = np.empty(room, dtype=np.bool_)
     count = 0
     for cell in wanted:
         begin, end = sub_range[cell]
@@ -69,7 +69,7 @@ def exposed_facets(
                         k += 1
                 piece_of[count], cell_of[count] = piece, cell
                 inner[count] = neighbours[cell, a] >= 0
-                inside[count] = 1.0 / corners
+                _turn(ids[count], at[count], orientation[cell], a)
                 count += 1
             continue
         for s in range(begin, end):
@@ -100,21 +100,16 @@ def exposed_facets(
                         k += 1
                 piece_of[count], cell_of[count] = sub_piece[s], cell
                 inner[count] = face < 0 or neighbours[cell, face] >= 0
-                _mean_of_piece(sub_piece, sub_barycentric, begin, end, sub_piece[s], inside[count])
+                _turn(ids[count], at[count], orientation[cell] * sub_sign[s], skip)
                 count += 1
-    return (
-        ids[:count], at[:count], piece_of[:count], cell_of[:count], inner[:count], inside[:count]
-    )  # fmt: skip
+    return ids[:count], at[:count], piece_of[:count], cell_of[:count], inner[:count]
 
 
 @njit(cache=True)
-def _mean_of_piece(sub_piece, sub_barycentric, begin, end, piece, out):
-    """Write the mean of the corners of a (convex) piece."""
-    out[:] = 0.0
-    seen = 0
-    for s in range(begin, end):
-        if sub_piece[s] == piece:
-            for k in range(sub_barycentric.shape[1]):
-                out += sub_barycentric[s, k]
-            seen += sub_barycentric.shape[1]
-    out /= seen
+def _turn(ids, at, sign, skipped):
+    """Orient the facet opposite to a corner of a simplex of that orientation outwards."""
+    if (sign > 0) == (skipped % 2 == 0):
+        return
+    ids[0], ids[1] = ids[1], ids[0]
+    for a in range(at.shape[1]):
+        at[0, a], at[1, a] = at[1, a], at[0, a]
