@@ -307,8 +307,8 @@ def _conforming(r: _Results) -> Iterator[Finding]:
         f"Without snapping the exponent of its lumped explicit step is {_exponent_text(step)} "
         f"and that of its Jacobi-scaled condition number {_exponent_text(scaled)}; unlike "
         f"XFEM's, its slivers are badly shaped elements. {refused} meshes of the sweep do not "
-        f"exist. With nodes snapped within a quarter element the step is at worst {least:.3f} of the "
-        "uncut one.",
+        f"exist. With nodes snapped within a quarter element the step is at worst {least:.3f} "
+        "of the uncut one.",
         "step exponent 1; bounded when snapped",
         _worst([_expects(step, 0.95, 1.05), Verdict.PASS if least > 0.1 else Verdict.FAIL]),
     )
