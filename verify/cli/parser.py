@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from verify import __version__
+from verify.cli.extension_parser import add_extension_commands
 
 __all__ = ["build_parser"]
 
@@ -79,6 +80,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     _add_reading_commands(add)
     _add_run(add("run", "solve, compare and judge cases, and render the report", _RUN))
+    add_extension_commands(add)
     return parser
 
 

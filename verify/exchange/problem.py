@@ -263,7 +263,7 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
     corners = mesh.points[simplices]
     points = np.einsum("qi,kic->kqc", barycentric, corners)
     measured = _measures(corners)[:, None] * weights
-    if given != "exact":
+    if not isinstance(given, str):
         uniform = np.asarray(given, dtype=float)
         values = np.broadcast_to(uniform, points.shape)
         return Load(simplices, uniform, points, measured, values, barycentric)

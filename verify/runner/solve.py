@@ -49,6 +49,7 @@ def solve_job(job: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _solved(job: dict[str, Any], folder: Path) -> dict[str, Any]:
+    from verify.calibration import calibration_note
     from verify.scene import restore_scene
     from verify.solution import write_solution
     from verify.solvers import find_solver
@@ -71,7 +72,7 @@ def _solved(job: dict[str, Any], folder: Path) -> dict[str, Any]:
         "timings": solution.timings,
         "iterations": solution.iterations,
         "regularisations": [vars(entry) for entry in solution.regularisations],
-        "notes": solution.notes,
+        "notes": {**solution.notes, "calibration": calibration_note()},
     }
 
 

@@ -1,0 +1,95 @@
+"""Finished runs made by hand, so that what changed between two of them is known."""
+
+import json
+from dataclasses import replace
+
+from verify.result import (
+    CaseResult,
+    Metric,
+    SolveRecord,
+    Status,
+    Verdict,
+    VerdictRecord,
+    write_result,
+)
+from verify.scene import Scene
+
+SCENE = {
+    "title": "a test",
+    "requirement": "it shall hold",
+    "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]},
+    "mesh": {"cells": [[4, 4], [8, 8]]},
+    "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
+    "supports": [{"where": "boundary", "displacement": [0.0, 0.0]}],
+    "quantities": [
+        {"kind": "strain_energy"},
+        {"kind": "displacement", "name": "sag", "point": [0.5, 0.2], "component": "y"},
+    ],
+    "acceptance": [
+        {"check": "value", "metric": "strain_energy", "equals": 2.0, "relative_tolerance": 0.01,
+         "source": "a book"},
+        {"check": "error", "metric": "sag", "at_most": 0.05},
+        {"check": "error", "metric": "displacement_l2", "at_most": 0.02},
+    ],
+}  # fmt: skip
+
+QUIET = "kernel 1: 0.0100 0.0101 0.0100 0.0101 0.0100"
+
+
+def metrics(energy=2.001, sag=-0.52, error=0.01, reference=-0.5, width=0.001):
+    source = "conforming P2, 3 levels, GCI"
+    return [
+        Metric("displacement_l2", error, "1", None, 0.001, source),
+        Metric("strain_energy", energy, "J/m", 2.0005, 0.0005, source),
+        Metric("sag", sag, "m", reference, width, source),
+    ]
+
+
+def solve(level=1, seconds=(0.100, 0.101, 0.102), calibration=QUIET, **values):
+    return SolveRecord(
+        "a/case",
+        "xfem",
+        level,
+        Status.SOLVED,
+        size=0.25 / 2**level,
+        metrics=metrics(**values),
+        timings={"assembly": [0.5 * s for s in seconds], "solve": [0.5 * s for s in seconds]},
+        notes={"calibration": calibration},
+    )
+
+
+def result(*solves, scene=None, verdicts=()):
+    content = Scene.model_validate({**SCENE, **(scene or {})}).model_dump(
+        mode="json", by_alias=True
+    )
+    return CaseResult(
+        case="a/case",
+        title="a test",
+        requirement="it shall hold",
+        scene_hash="0123",
+        scene=content,
+        reference={},
+        solves=list(solves) or [solve(0), solve(1)],
+        rates=[],
+        verdicts=list(verdicts),
+    )
+
+
+def verdict(check, metric, what, observed=1.0):
+    return VerdictRecord(check, "xfem", metric, Verdict(what), observed, 0.0, 2.0, "≤ 2", "so")
+
+
+def run(folder, *results, cpu="a CPU", finished="2026-01-02", date="2026-01-01", commit="c0ffee"):
+    """Write the directory of a run."""
+    results = list(results) or [result()]
+    for one in results:
+        write_result(replace(one), folder / "cases" / one.case.replace("/", "__") / "result.json")
+    origin = {"commit": commit, "dirty": False, "date": date, "cpu": cpu}
+    record = {
+        "schema": 1,
+        "cases": [one.case for one in results],
+        "finished": finished,
+        "provenance": origin,
+    }
+    (folder / "run.json").write_text(json.dumps(record))
+    return folder

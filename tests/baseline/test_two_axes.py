@@ -1,0 +1,213 @@
+"""The last own value and the independent value are two axes, and only the first ever moves."""
+
+import json
+
+import pytest
+import runs
+
+from verify.cli import main
+
+
+def rows(answer, axis=None):
+    return {
+        (row["quantity"], row["axis"]): row["verdict"]
+        for row in answer["rows"]
+        if axis in (None, row["axis"])
+    }
+
+
+def stored(baseline):
+    return json.loads(baseline.file.read_text())["cases"]["a/case"]
+
+
+def test_the_same_run_again_is_within_every_tolerance(baseline, tmp_path):
+    code, answer = baseline("save", runs.run(tmp_path / "old"))
+    assert (code, answer["added"]) == (0, 4)  # three metrics of the finest level and a speed
+    code, answer = baseline("check", tmp_path / "old")
+    assert code == 0
+    assert set(rows(answer).values()) == {"PASS"}
+    assert len(answer["rows"]) == 3 + 3 + 1
+
+
+def test_independent_values_and_tolerances_come_from_the_case_never_from_what_was_measured(
+    baseline, tmp_path
+):
+    baseline("save", runs.run(tmp_path / "old"))
+    quantities = stored(baseline)["quantities"]
+    energy = quantities["xfem/1/strain_energy"]["independent"]
+    assert (energy["value"], energy["tolerance"], energy["source"]) == (2.0, 0.01, "a book")
+    sag = quantities["xfem/1/sag"]["independent"]
+    assert (sag["value"], sag["uncertainty"], sag["tolerance"]) == (-0.5, 0.001, 0.05)
+    error = quantities["xfem/1/displacement_l2"]["independent"]
+    assert (error["value"], error["tolerance"]) == (0.0, 0.02)
+    assert quantities["xfem/1/sag"]["own"]["commit"] == "c0ffee"
+
+
+def test_a_value_that_moves_within_its_accuracy_fails_on_the_own_axis_only(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    new = runs.run(tmp_path / "new", runs.result(runs.solve(energy=2.002)))
+    code, answer = baseline("check", new)
+    assert code == 1
+    found = rows(answer)
+    assert found["xfem/1/strain_energy", "own"] == "FAIL"
+    assert found["xfem/1/strain_energy", "independent"] == "PASS"
+    assert found["xfem/1/sag", "own"] == "PASS"
+
+
+@pytest.mark.parametrize(
+    "sag, verdict",
+    # allowed is 5 % of 0.5, known to 0.001
+    [(-0.523, "PASS"), (-0.5245, "UNDECIDED"), (-0.5255, "UNDECIDED"), (-0.527, "FAIL")],
+)
+def test_the_independent_axis_knows_how_well_its_value_is_known(baseline, tmp_path, sag, verdict):
+    baseline("save", runs.run(tmp_path / "old"))
+    _, answer = baseline("check", runs.run(tmp_path / "new", runs.result(runs.solve(sag=sag))))
+    assert rows(answer)["xfem/1/sag", "independent"] == verdict
+
+
+def test_a_reference_that_contradicts_the_stored_one_is_found(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    within = runs.result(runs.solve(reference=-0.5015))  # uncertainties of 0.001 each
+    _, answer = baseline("check", runs.run(tmp_path / "near", within))
+    assert rows(answer, "reference") == {}
+    beyond = runs.result(runs.solve(reference=-0.5025))
+    code, answer = baseline("check", runs.run(tmp_path / "far", beyond))
+    assert code == 1
+    assert rows(answer, "reference") == {("xfem/1/sag", "reference"): "FAIL"}
+
+
+def test_round_off_may_change_by_any_factor(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old", runs.result(runs.solve(error=1e-15))))
+    new = runs.run(tmp_path / "new", runs.result(runs.solve(error=7e-14)))
+    _, answer = baseline("check", new)
+    assert rows(answer)["xfem/1/displacement_l2", "own"] == "PASS"
+
+
+def test_update_without_a_name_shows_the_difference_and_moves_nothing(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    before = baseline.file.read_bytes()
+    new = runs.run(tmp_path / "new", runs.result(runs.solve(energy=2.002, sag=-0.521)))
+    code, answer = baseline("update", new)
+    assert code == 0
+    assert {(m["quantity"], m["state"]) for m in answer["moves"]} == {
+        ("xfem/1/strain_energy", "differs"),
+        ("xfem/1/sag", "differs"),
+    }
+    assert baseline.file.read_bytes() == before
+
+
+def test_update_moves_the_own_value_of_what_is_named_and_nothing_else(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    before = stored(baseline)
+    changed = runs.solve(energy=2.002, sag=-0.521, reference=-0.5005)
+    new = runs.run(tmp_path / "new", runs.result(changed), commit="beef")
+    code, answer = baseline("update", new, "--only", "a/case:strain_energy")
+    assert (code, answer["moved"]) == (0, 1)
+    after = stored(baseline)
+    own = after["quantities"]["xfem/1/strain_energy"]["own"]
+    assert (own["value"], own["commit"]) == (2.002, "beef")
+    # put the one moved axis back: all else is as it was, to the last character
+    after["quantities"]["xfem/1/strain_energy"]["own"] = before["quantities"][
+        "xfem/1/strain_energy"
+    ]["own"]
+    assert after == before
+
+
+def test_update_refuses_a_value_that_contradicts_the_independent_one(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    before = baseline.file.read_bytes()
+    new = runs.run(tmp_path / "new", runs.result(runs.solve(energy=2.2)))
+    code, answer = baseline("update", new, "--only", "a/case:xfem/1/strain_energy")
+    assert code == 1
+    assert answer["moves"][0]["state"] == "refused"
+    assert "contradicts the independent value" in answer["moves"][0]["reason"]
+    assert baseline.file.read_bytes() == before
+
+
+def test_saving_again_adds_what_is_new_and_keeps_what_is_there(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    before = stored(baseline)
+    other = runs.result(runs.solve(energy=2.005), scene={"title": "other words"})
+    _, answer = baseline("save", runs.run(tmp_path / "new", other))
+    assert answer["added"] == 0
+    assert stored(baseline) == before
+
+
+def test_a_value_that_contradicts_the_independent_one_is_said_when_it_is_saved(baseline, tmp_path):
+    code, answer = baseline("save", runs.run(tmp_path / "a", runs.result(runs.solve(energy=2.2))))
+    assert code == 1
+    assert rows(answer) == {("xfem/1/strain_energy", "independent"): "FAIL"}
+
+
+def test_another_scene_is_not_compared_and_never_passes(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    soft = {"material": {"young": 0.9, "poisson": 0.3, "plane": "strain"}}
+    new = runs.run(tmp_path / "new", runs.result(scene=soft))
+    code, answer = baseline("check", new)
+    assert code == 3
+    assert "its scene is another one now" in answer["rows"][0]["reason"]
+    assert baseline("save", new)[0] == 2
+    code, answer = baseline("update", new, "--only", "a/case:sag")
+    assert (code, answer["moved"], answer["moves"][0]["state"]) == (1, 0, "refused")
+
+
+def test_what_was_not_looked_at_is_not_right(baseline, tmp_path):
+    baseline("save", runs.run(tmp_path / "old"))
+    failed = runs.SolveRecord("a/case", "xfem", 1, runs.Status.FAILED, "zero pivot")
+    code, answer = baseline("check", runs.run(tmp_path / "new", runs.result(failed)))
+    assert code == 3
+    assert {row["verdict"] for row in answer["rows"] if row["axis"] == "own"} == {"ERROR"}
+    assert "failed: zero pivot" in answer["rows"][0]["reason"]
+    other = runs.result()
+    object.__setattr__(other, "case", "another/case")
+    elsewhere = runs.run(tmp_path / "elsewhere", other)
+    code, answer = baseline("check", elsewhere)
+    assert code == 3
+    assert answer["rows"][0]["reason"] == "not in this run"
+    assert baseline("check", elsewhere, "--partial")[0] == 0
+    assert baseline("check", elsewhere, "--partial", "--strict")[0] == 5  # its values are new
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (lambda case: case["quantities"]["xfem/1/sag"]["own"].update(valeu=1.0), "valeu"),
+        (lambda case: case["quantities"]["xfem/1/sag"]["own"].update(value="1"), "value"),
+        (lambda case: case["quantities"]["xfem/1/sag"].pop("own"), "own: missing"),
+        (lambda case: case["speed"]["xfem/1"].update(slower_at_most=0.5), "slower_at_most"),
+    ],
+)
+def test_a_slip_of_the_hand_in_the_file_is_named(baseline, tmp_path, change, said):
+    old = runs.run(tmp_path / "old")
+    baseline("save", old)
+    content = json.loads(baseline.file.read_text())
+    change(content["cases"]["a/case"])
+    baseline.file.write_text(json.dumps(content))
+    code, error = baseline("check", old)
+    assert code == 2
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_bad_input_is_one_line(baseline, tmp_path):
+    old = runs.run(tmp_path / "old")
+    assert "no such file" in baseline("check", old)[1]
+    baseline("save", old)
+    code, error = baseline("update", old, "--only", "a/case:strain_enrgy")
+    assert code == 2
+    assert "did you mean 'a/case:strain_energy'?" in error
+    assert "not a run" in baseline("check", tmp_path)[1]
+    going_on = runs.run(tmp_path / "going-on", finished=None)
+    assert "has not finished" in baseline("check", going_on)[1]
+
+
+def test_a_person_reads_what_changed_and_by_how_much(baseline, tmp_path, capsys):
+    baseline("save", runs.run(tmp_path / "old"))
+    new = runs.run(tmp_path / "new", runs.result(runs.solve(energy=2.2)))
+    assert main(["baseline", "check", str(new), "--file", str(baseline.file)]) == 1
+    said = capsys.readouterr().out
+    assert (
+        "FAIL      own         a/case:xfem/1/strain_energy: 2.2, stored 2.001: changed by" in said
+    )
+    assert "allowed 0.02; a book" in said
+    assert "own          2 PASS, 1 FAIL" in said

@@ -1,0 +1,52 @@
+"""Two runs side by side: which verdicts changed, the worse first."""
+
+import runs
+from runs import verdict
+
+from verify.cli import main
+
+OLD = [
+    verdict("error", "sag", "PASS", 0.01),
+    verdict("rate", "energy_norm", "UNDECIDED"),
+    verdict("value", "strain_energy", "FAIL"),
+    verdict("value", "strain_energy", "PASS"),
+    verdict("ratio", "jump_l2", "PASS"),
+]
+
+
+def test_changed_verdicts_are_listed_with_what_was_observed(baseline, tmp_path):
+    new = [
+        verdict("error", "sag", "FAIL", 0.09),
+        verdict("rate", "energy_norm", "PASS"),
+        verdict("value", "strain_energy", "FAIL"),
+        verdict("value", "strain_energy", "PASS"),
+        verdict("error", "jump_l2", "PASS"),
+    ]
+    old_run = runs.run(tmp_path / "old", runs.result(verdicts=OLD))
+    new_run = runs.run(tmp_path / "new", runs.result(verdicts=new))
+    code, answer = baseline("diff", old_run, new_run)
+    assert code == 1
+    said = [(c["check"], c["old"], c["new"], c["direction"]) for c in answer["changes"]]
+    assert said == [
+        ("error of sag (xfem)", "PASS", "FAIL", "worse"),
+        ("ratio of jump_l2 (xfem)", "PASS", None, "gone"),
+        ("error of jump_l2 (xfem)", None, "PASS", "new"),
+        ("rate of energy_norm (xfem)", "UNDECIDED", "PASS", "better"),
+    ]
+    assert [answer["changes"][0][k] for k in ("old_observed", "new_observed")] == [0.01, 0.09]
+
+
+def test_the_second_of_two_equal_checks_is_told_from_the_first(baseline, tmp_path):
+    new = [*OLD[:3], verdict("value", "strain_energy", "ERROR", None), OLD[4]]
+    old_run = runs.run(tmp_path / "old", runs.result(verdicts=OLD))
+    new_run = runs.run(tmp_path / "new", runs.result(verdicts=new))
+    (change,) = baseline("diff", old_run, new_run)[1]["changes"]
+    assert change["check"] == "value of strain_energy (xfem) #2"
+
+
+def test_runs_without_a_change_say_so(baseline, tmp_path, capsys):
+    old = runs.run(tmp_path / "old", runs.result(verdicts=OLD))
+    assert main(["baseline", "diff", str(old), str(old)]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[-1] == "no verdict changed"
+    assert "c0ffee" in out

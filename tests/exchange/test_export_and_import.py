@@ -1,0 +1,192 @@
+"""Cases go out as files, answers come back, and are judged as those of the own solvers are."""
+
+import json
+import stat
+import sys
+
+import meshio
+import numpy as np
+import pytest
+
+from verify.cli import main
+from verify.errors import InputError, UnsupportedSceneError
+from verify.exchange import ProgramSolver, export_case, problem_of, read_answers
+from verify.result import Status, Verdict, read_result
+from verify.scene import load_scene
+
+CASE = "statics/f1_patch"
+
+
+def answer(folder, level, factor=1.0):
+    """Answer the patch test exactly, by the field itself at the nodes of the conforming mesh."""
+    from reference.exact import exact_solution
+
+    scene = load_scene(CASE)
+    problem = problem_of(scene, level, conforming=True)
+    exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    near = np.zeros_like(problem.points)
+    near[problem.cells] = problem.points[problem.cells].mean(axis=1)[:, None]
+    u = factor * exact.displacement(problem.points, near)
+    place = folder / f"level-{level}"
+    place.mkdir(parents=True, exist_ok=True)
+    points, values = (np.pad(a, ((0, 0), (0, 1))) for a in (problem.points, u))
+    mesh = meshio.Mesh(points, [("triangle", problem.cells)], {"displacement": values})
+    mesh.write(place / "solution.vtu")
+    record = {"schema": 1, "files": ["solution.vtu"], "dimension": 2, "order": 1}
+    (place / "solution.json").write_text(json.dumps(record | {"size": problem.size}))
+
+
+def test_an_exported_case_holds_mesh_cuts_supports_and_material(tmp_path):
+    scene = load_scene(CASE)
+    files = export_case(scene, tmp_path / "f1", conforming=True)
+    assert all(file.is_file() for file in files)
+    case = json.loads((tmp_path / "f1/case.json").read_text())
+    assert case["cuts"][0]["points"] == [[-0.1, 0.3], [1.1, 0.7]]
+    assert case["material"]["shear"] == pytest.approx(1 / 2.6)
+    assert [level["nodes"] for level in case["levels"]] == [81, 289]
+    assert case["scene"]["requirement"] == scene.requirement
+    mesh = meshio.read(tmp_path / "f1/level-0/mesh.vtu")
+    assert len(mesh.cells_dict["triangle"]) == 128
+    opened = json.loads((tmp_path / "f1/level-0/conforming.json").read_text())
+    points = meshio.read(tmp_path / "f1/level-0" / opened["mesh"]).points
+    expected = problem_of(scene, 0, conforming=True)
+    np.testing.assert_array_equal(points[:, :2], expected.points)
+    np.testing.assert_array_equal(opened["held"][0]["values"], expected.held[0].values)
+    cut = meshio.read(tmp_path / "f1/cuts.vtu")
+    np.testing.assert_array_equal(cut.points[:, :2], [[-0.1, 0.3], [1.1, 0.7]])
+
+
+def test_an_export_goes_nowhere_where_something_else_is(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="not an export"):
+        export_case(load_scene(CASE), tmp_path)
+    with pytest.raises(InputError, match="is a file"):
+        export_case(load_scene(CASE), tmp_path / "notes.txt")
+    with pytest.raises(InputError, match=r"mesh level 2; .* has 0\.\.1"):
+        export_case(load_scene(CASE), tmp_path / "new", [2])
+    assert not (tmp_path / "new").exists()
+
+
+def test_exporting_again_leaves_answers_alone(tmp_path):
+    export_case(load_scene(CASE), tmp_path / "f1")
+    answer(tmp_path / "f1", 0)
+    export_case(load_scene(CASE), tmp_path / "f1")
+    assert (tmp_path / "f1/level-0/solution.vtu").is_file()
+
+
+def test_right_answers_pass_and_wrong_ones_fail_the_checks_that_the_case_makes(tmp_path, capsys):
+    for factor, name in ((1.0, "right"), (1.01, "wrong")):
+        for level in (0, 1):
+            answer(tmp_path / name, level, factor)
+    out = ["--out", str(tmp_path / "run")]
+    right = main(["import", CASE, str(tmp_path / "right"), "--solver", "right", *out, "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert (right, {v["verdict"] for v in said["verdicts"]}) == (0, {"PASS"})
+    assert {v["solver"] for v in said["verdicts"]} == {"right"}
+    # the second program joins the first in the report
+    wrong = main(["import", CASE, str(tmp_path / "wrong"), "--solver", "wrong", *out])
+    assert wrong == 1
+    result = read_result(next((tmp_path / "run").glob("cases/*/result.json")))
+    by_solver = {(v.solver, v.metric): v for v in result.verdicts}
+    assert by_solver["right", "displacement_l2"].verdict is Verdict.PASS
+    assert by_solver["wrong", "displacement_l2"].verdict is Verdict.FAIL
+    # a field that is 1 % too large errs by 1 % and has 2.01 % too much energy
+    assert by_solver["wrong", "displacement_l2"].observed == pytest.approx(0.01, rel=1e-9)
+    energy = by_solver["wrong", "strain_energy"].observed
+    assert energy == pytest.approx(1.01**2 * 3.434065934e-3, rel=1e-9)
+    assert (tmp_path / "run/report.html").is_file()
+
+
+def test_an_answer_that_is_missing_refused_or_damaged_is_a_record_of_its_own(tmp_path):
+    scene = load_scene("statics/f3_inclined")
+    for level in range(3):
+        (tmp_path / f"level-{level}").mkdir()
+    (tmp_path / "level-0/solution.json").write_text('{"schema": 1, "refused": "too coarse"}')
+    (tmp_path / "level-1/solution.json").write_text("{")
+    answers = read_answers(scene, tmp_path)
+    assert answers.missing[0] == (Status.REFUSED, "too coarse")
+    assert answers.missing[1][0] is Status.FAILED
+    assert "not a JSON file" in answers.missing[1][1]
+    assert "no answer for level 2" in answers.missing[2][1]
+    assert not answers.solutions
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["--solver", "xfem"], "'xfem' cannot name a program"),
+        (["--solver", "a b"], "'a b' cannot name a program"),
+        (["--solver", "mine", "--judged-as", "xfme"], "makes no check of 'xfme'"),
+        (["--solver", "mine", "--beside", "xfme"], "did you mean 'xfem'?"),
+    ],
+)
+def test_a_bad_import_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, said):
+    answer(tmp_path / "mine", 0)
+    run = tmp_path / "run"
+    assert main(["import", CASE, str(tmp_path / "mine"), "--out", str(run), *arguments]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not run.exists()
+
+
+def test_answers_to_another_case_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no such directory"):
+        read_answers(load_scene(CASE), tmp_path / "nothing")
+    export_case(load_scene("statics/f3_inclined"), tmp_path / "f3", [0])
+    with pytest.raises(InputError, match="exported from 'statics/f3_inclined', which is another"):
+        read_answers(load_scene(CASE), tmp_path / "f3")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="holds no answer"):
+        read_answers(load_scene(CASE), tmp_path / "empty")
+
+
+def program(tmp_path, body, wants_conforming=False):
+    script = tmp_path / "program"
+    script.write_text(f"#!{sys.executable}\nimport json, pathlib, sys\n{body}")
+    script.chmod(script.stat().st_mode | stat.S_IXUSR)
+
+    class Program(ProgramSolver):
+        name = "program"
+        command = (str(script), "{folder}", "{level}")
+        conforming = wants_conforming
+
+    return Program()
+
+
+COPY = """
+import meshio, numpy
+folder = pathlib.Path(sys.argv[1], "level-" + sys.argv[2])
+mesh = meshio.read(folder / "mesh.vtu")
+mesh.point_data["displacement"] = 0.0 * mesh.points
+mesh.write(folder / "solution.vtu")
+answer = {"schema": 1, "files": ["solution.vtu"], "dimension": 2, "order": 1}
+(folder / "solution.json").write_text(json.dumps(answer))
+"""
+
+
+def test_a_program_is_a_solver_with_its_wall_time(tmp_path):
+    solution = program(tmp_path, COPY).solve(load_scene(CASE), 1, repetitions=2)
+    assert len(solution.points) == 289
+    assert len(solution.timings["program"]) == 2
+    assert "start-up included" in solution.notes["timed"]
+
+
+def test_a_program_may_refuse_and_its_failure_says_what_it_said(tmp_path):
+    scene = load_scene(CASE)
+    refusing = (
+        "pathlib.Path(sys.argv[1], 'level-0/solution.json')"
+        '.write_text(\'{"schema": 1, "refused": "no cuts"}\')'
+    )
+    with pytest.raises(UnsupportedSceneError, match="no cuts"):
+        program(tmp_path, refusing).solve(scene, 0)
+    with pytest.raises(RuntimeError, match="ended with 3: the pivot is zero"):
+        program(tmp_path, "print('the pivot is zero', file=sys.stderr); sys.exit(3)").solve(
+            scene, 0
+        )
+    with pytest.raises(InputError, match="holds no answer"):
+        program(tmp_path, "pass").solve(scene, 0)
+    missing = program(tmp_path, "pass")
+    type(missing).command = ("no-such-program",)
+    with pytest.raises(InputError, match="no program 'no-such-program'"):
+        missing.solve(scene, 0)

@@ -1,0 +1,131 @@
+"""A scene as arrays carries the scene's physics: forces sum up, values lie on the right side."""
+
+import numpy as np
+import pytest
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.exchange import problem_of
+from verify.exchange.quadrature import simplex_rule
+from verify.scene import Scene, load_scene
+
+
+def scene(**parts):
+    content = {
+        "title": "a test",
+        "requirement": "it shall hold",
+        "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [2.0, 1.0]},
+        "mesh": {"cells": [[5, 4]]},
+        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 3.0},
+        "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
+        "cuts": [{"kind": "polyline", "points": [[-0.1, 0.37], [2.1, 0.61]]}],
+    }
+    return Scene.model_validate({**content, **parts})
+
+
+BOX = {
+    "geometry": {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [2.0, 1.0, 0.5]},
+    "mesh": {"cells": [[3, 2, 2]]},
+    "material": {"young": 1.0, "poisson": 0.3, "density": 3.0},
+    "supports": [{"where": "left", "displacement": [0.0, 0.0, 0.0]}],
+    "cuts": [],
+}
+
+
+@pytest.mark.parametrize("conforming", [False, True])
+def test_consistent_forces_sum_to_weight_and_traction(conforming):
+    loads = [
+        {"kind": "gravity", "acceleration": [0.5, -2.0]},
+        {"kind": "body_force", "force": [0.1, 0.2]},
+        {"kind": "traction", "where": "top", "traction": [0.7, -0.3]},
+    ]
+    forces = problem_of(scene(loads=loads), 0, conforming).nodal_forces()
+    # area 2 times (density · g + f), and 2 m of upper side
+    expected = 2 * (3 * np.array([0.5, -2.0]) + [0.1, 0.2]) + 2 * np.array([0.7, -0.3])
+    np.testing.assert_allclose(forces.sum(axis=0), expected, rtol=1e-13)
+
+
+def test_consistent_forces_in_space_sum_to_weight_and_traction():
+    loads = [
+        {"kind": "gravity", "acceleration": [0.0, 0.0, -2.0]},
+        {"kind": "traction", "where": "right", "traction": [0.4, 0.0, 0.0]},
+    ]
+    forces = problem_of(scene(**BOX, loads=loads), 0).nodal_forces()
+    np.testing.assert_allclose(forces.sum(axis=0), [0.5 * 0.4, 0, -6.0], rtol=1e-13, atol=1e-14)
+
+
+def test_each_doubled_node_gets_the_value_of_its_own_side():
+    problem = problem_of(load_scene("statics/f1_patch"), 0, conforming=True)
+    held, value = problem.prescribed()
+    _, first, twins = np.unique(problem.points, axis=0, return_index=True, return_counts=True)
+    mouths = np.flatnonzero(twins == 2)
+    at_mouth = [i for i in first[mouths] if held[i].all()]
+    assert len(at_mouth) == 2  # left and right end of the cut
+    for node in at_mouth:
+        pair = np.flatnonzero((problem.points == problem.points[node]).all(axis=1))
+        height = [
+            problem.points[problem.cells[(problem.cells == i).any(axis=1)]].mean(axis=(0, 1))[1]
+            for i in pair
+        ]
+        above, below = value[pair[np.argsort(height)[::-1]]]
+        # F1: the jump at distance s from the middle is (ε₊ − ε₋) s along, 0.02 across
+        s = (problem.points[node] - 0.5) @ [3, 1] / np.sqrt(10)
+        jump = 0.15 * s * np.array([3, 1]) / np.sqrt(10) + 0.02 * np.array([-1, 3]) / np.sqrt(10)
+        np.testing.assert_allclose(above - below, jump, atol=1e-14)
+
+
+def test_a_background_mesh_says_the_value_across_the_cut_at_each_facet_that_it_crosses():
+    case = load_scene("statics/f1_patch")
+    problem = problem_of(case, 0)
+    (held,) = problem.held
+    # the cut crosses one facet on the left and one on the right: two nodes each
+    assert len(held.across) == 4
+    conforming = problem_of(case, 0, conforming=True)
+    assert all(not entry.across for entry in conforming.held)
+    row = {node: i for i, node in enumerate(held.nodes)}
+    for node, side_point, value in held.across:
+        assert np.abs(value - held.values[row[node]]).max() > 0.01
+        assert (problem.points[node] == side_point).any()  # its neighbour on the same side
+
+
+def test_the_later_of_two_supports_wins():
+    supports = [
+        {"where": "boundary", "displacement": [0.1, 0.2]},
+        {"where": "left", "displacement": [0.5], "components": ["y"]},
+    ]
+    problem = problem_of(scene(supports=supports), 0)
+    held, value = problem.prescribed()
+    left = problem.points[:, 0] == 0
+    assert held[left].all()
+    np.testing.assert_array_equal(value[left], np.tile([0.1, 0.5], (left.sum(), 1)))
+
+
+def test_lame_constants_of_plane_stress_are_those_of_the_plane_problem():
+    stress = scene(material={"young": 2.0, "poisson": 0.25, "plane": "stress"})
+    lam, mu = problem_of(stress, 0).lame()
+    # uniaxial tension: σ = E ε needs λ + 2μ − λ²/(λ + 2μ) = E in the plane
+    assert lam + 2 * mu - lam**2 / (lam + 2 * mu) == pytest.approx(2.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("dimension, volume", [(1, 1.0), (2, 0.5), (3, 1 / 6)])
+def test_the_rule_is_exact_to_degree_seven(dimension, volume):
+    barycentric, weights = simplex_rule(dimension, 4)
+    for powers in [(7,), (4, 3), (2, 2, 3)][:dimension]:
+        term = np.prod([barycentric[:, i] ** p for i, p in enumerate(powers)], axis=0)
+        factorials = np.array([1, 1, 2, 6, 24, 120, 720, 5040, 40320, 362880, 3628800.0])
+        # ∫ Π λ_i^p_i over a simplex: d! V Π p_i! / (Σ p_i + d)!
+        exact = np.prod(factorials[list(powers)]) / factorials[sum(powers) + dimension]
+        assert volume * weights @ term == pytest.approx(exact, rel=1e-13)
+
+
+def test_conforming_meshes_are_refused_where_there_are_none():
+    with pytest.raises(UnsupportedSceneError, match="plane scenes with polyline cuts only"):
+        problem_of(scene(**BOX), 0, conforming=True)
+    arc = {"kind": "arc", "centre": [1.0, 0.5], "radius": 0.2}
+    with pytest.raises(UnsupportedSceneError, match="polyline"):
+        problem_of(scene(cuts=[arc]), 0, conforming=True)
+
+
+def test_a_traction_on_no_facet_is_refused():
+    loads = [{"kind": "traction", "where": "x < 1e-9 and y < 1e-9", "traction": [1.0, 0.0]}]
+    with pytest.raises(InputError, match="no boundary facet lies in"):
+        problem_of(scene(loads=loads), 0)

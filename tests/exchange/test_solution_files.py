@@ -1,0 +1,125 @@
+"""What another program must write is little, and what it gets wrong is named."""
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+
+from verify.errors import InputError
+from verify.solution import Solution, read_solution, write_solution
+
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+CELLS = np.array([[0, 1, 2], [0, 2, 3]])
+LEAST = {"schema": 1, "files": ["u.vtu"], "dimension": 2, "order": 1}
+
+
+@pytest.fixture
+def answer(tmp_path):
+    """Write a JSON half and a VTU half; returns the path that `read_solution` takes."""
+
+    def write(record, points=POINTS, cells=(("triangle", CELLS),), name="displacement", file="u"):
+        values = {name: 0.1 * points} if name else {}
+        meshio.Mesh(points, list(cells), values).write(tmp_path / f"{file}.vtu")
+        (tmp_path / "solution.json").write_text(json.dumps(record))
+        return tmp_path / "solution"
+
+    return write
+
+
+def test_four_keys_and_a_displacement_are_enough(answer):
+    solution = read_solution(answer(LEAST))
+    assert solution.points.shape == (4, 2)
+    np.testing.assert_array_equal(solution.displacement, 0.1 * POINTS[None, :, :2])
+    assert solution.times.tolist() == [0.0]
+    assert solution.cut_facets.shape == (0, 2, 2)
+    assert (solution.ledger, solution.timings, solution.unknowns) == ({}, {}, 0)
+    assert np.isnan(solution.size)
+
+
+def test_nothing_is_lost_on_the_way_through_files(tmp_path):
+    rng = np.random.default_rng(3)
+    one = Solution(
+        points=POINTS[:, :2].copy(),
+        cells=CELLS,
+        displacement=rng.standard_normal((2, 4, 2)),
+        velocity=rng.standard_normal((2, 4, 2)),
+        times=np.array([0.0, 0.25]),
+        ledger={"strain": np.array([0.1, 0.2])},
+        quantities={"opening": 0.3},
+        timings={"solve": [0.1, 0.2]},
+        cut_facets=rng.standard_normal((3, 2, 2)),
+    )
+    write_solution(one, tmp_path / "solution")
+    # strict JSON: other programs' readers know no NaN, and the size is not known here
+    json.loads((tmp_path / "solution.json").read_text(), parse_constant=pytest.fail)
+    other = read_solution(tmp_path / "solution")
+    for name in ("points", "cells", "displacement", "velocity", "times", "cut_facets"):
+        np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+    assert other.ledger["strain"].tolist() == [0.1, 0.2]
+    assert (other.quantities, other.timings) == (one.quantities, one.timings)
+    assert np.isnan(other.size)
+
+
+@pytest.mark.parametrize("key", list(LEAST))
+def test_each_of_the_four_keys_is_mandatory(answer, key):
+    record = {k: v for k, v in LEAST.items() if k != key}
+    with pytest.raises(InputError, match=f"{'schema None' if key == 'schema' else key}"):
+        read_solution(answer(record))
+
+
+@pytest.mark.parametrize(
+    "record, said",
+    [
+        ({"tiems": [0.0]}, "unknown key 'tiems'; did you mean 'times'"),
+        ({"schema": 2}, "schema 2; expected 1"),
+        ({"order": 3}, "dimension 2, order 3; expected 2 or 3, and 1 or 2"),
+        ({"dimension": 3}, "u.vtu: has triangle; expected tetra"),
+        ({"files": "u.vtu"}, "expected a list of VTU files"),
+        ({"files": []}, "expected a list of VTU files"),
+        ({"files": ["v.vtu"]}, "v.vtu: no such file; expected the VTU half"),
+        ({"files": ["u.vtu", "u.vtu"]}, "times None for 2 files"),
+        ({"files": ["u.vtu"], "times": [0.0, 1.0]}, "for 1 files; expected one each"),
+        ({"timings": {"solve": "fast"}}, "not a readable solution"),
+        ({"regularisations": [{"kind": "snapped"}]}, "not a readable solution"),
+    ],
+)
+def test_a_fault_in_the_json_half_is_named(answer, record, said):
+    with pytest.raises(InputError) as caught:
+        read_solution(answer(LEAST | record))
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "vtu, said",
+    [
+        ({"name": "U"}, "no point data 'displacement' (it has: U)"),
+        ({"name": ""}, "no point data 'displacement' (it has: none)"),
+        ({"cells": [("triangle", CELLS), ("quad", [[0, 1, 2, 3]])]}, "has quad beside triangle"),
+        ({"cells": [("triangle6", [[0, 1, 2, 3, 3, 3]])]}, "has triangle6; expected triangle"),
+        ({"points": POINTS + np.inf}, "not finite"),
+    ],
+)
+def test_a_fault_in_the_vtu_half_is_named(answer, vtu, said):
+    with pytest.raises(InputError) as caught:
+        read_solution(answer(LEAST, **vtu))
+    assert said in str(caught.value)
+
+
+def test_a_file_that_is_no_vtu_is_an_error_and_does_not_leave_the_interpreter(answer, tmp_path):
+    path = answer(LEAST)
+    (tmp_path / "u.vtu").write_text("not a mesh")
+    with pytest.raises(InputError, match=r"u\.vtu: not a VTU file"):
+        read_solution(path)
+
+
+def test_points_that_move_with_the_displacement_are_refused(answer):
+    answer(LEAST, points=POINTS * 1.1, file="v")
+    record = LEAST | {"files": ["u.vtu", "v.vtu"], "times": [0.0, 1.0]}
+    with pytest.raises(InputError, match="the same material mesh at all times"):
+        read_solution(answer(record))
+
+
+def test_lines_and_points_beside_the_cells_do_no_harm(answer):
+    cells = [("line", [[0, 1]]), ("triangle", CELLS), ("vertex", [[0]])]
+    assert len(read_solution(answer(LEAST, cells=cells)).cells) == 2

@@ -1,0 +1,160 @@
+"""The plugin, in pytest sessions of its own: a test per acceptance check of a case."""
+
+import os
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+pytest_plugins = ["pytester"]
+
+CASE = """
+title = "A strained square"
+requirement = "It shall be strained."
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+[mesh]
+cells = [[2, 2]]
+[material]
+young = 1.0
+poisson = 0.0
+plane = "strain"
+[[supports]]
+where = "boundary"
+displacement = "exact"
+[exact]
+solution = "linear"
+parameters = { matrix = [[0.1, 0.0], [0.0, 0.0]] }
+"""
+
+
+def check(equals, solver="xfem"):
+    return f"""
+[[acceptance]]
+check = "value"
+solver = "{solver}"
+metric = "strain_energy"
+equals = {equals}
+relative_tolerance = 1e-9
+source = "half of E times strain squared"
+"""
+
+
+# a slope over one level means nothing: undecided
+RATIO = """
+[[acceptance]]
+check = "ratio"
+metric = "displacement_l2"
+to = "xfem"
+at_most = 1.0
+"""
+
+
+@pytest.fixture
+def session(pytester, monkeypatch):
+    """Run a session of its own on files made here; the cases run in processes of their own."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    installed = {point.value for point in entry_points(group="pytest11")}
+    plugin = [] if "verify.pytest_plugin" in installed else ["-p", "verify.pytest_plugin"]
+
+    def run(*arguments):
+        return pytester.runpytest_inprocess(
+            *plugin, "-p", "no:cacheprovider", "-p", "no:xdist", "-rs", *arguments
+        )
+
+    return run
+
+
+def write(pytester, text):
+    (pytester.path / "strain.verify.toml").write_text(text)
+
+
+def test_each_acceptance_check_of_a_case_file_is_a_test_that_passes_or_fails(pytester, session):
+    checks = check(0.005) + check(0.006) + RATIO
+    write(pytester, CASE + checks)
+    pytester.makefile(".toml", not_a_case="a = 1")
+    result = session("-v", "--verify-out", "runs")
+    result.assert_outcomes(passed=1, failed=1, skipped=1)
+    result.stdout.fnmatch_lines(
+        [
+            "*strain.verify.toml::value-strain_energy-xfem PASSED*",
+            "*strain.verify.toml::value-strain_energy-xfem-#2 FAILED*",
+            "*strain.verify.toml::ratio-displacement_l2-xfem SKIPPED*",
+            "FAIL: strain_energy (xfem): 0.005, wanted 0.006 ± 1e-09 (relative)*",
+            "SKIPPED*UNDECIDED: displacement_l2*round-off*",
+        ]
+    )
+    assert (pytester.path / "runs/strain.verify/run.json").is_file()
+    # what is finished is taken over; strict: what nobody knows is not good enough
+    strict = session("--verify-strict", "--verify-out", "runs")
+    strict.assert_outcomes(passed=1, failed=2)
+
+
+def test_a_marked_function_is_a_test_per_check_and_its_body_sees_the_result(pytester, session):
+    pytester.makefile(".toml", strain=CASE + check(0.005) + check(0.006))
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.verify("strain.toml")
+        def test_strain():
+            pass
+
+        @pytest.mark.verify("strain.toml")
+        def test_body(verify_check, verify_result):
+            assert verify_check.observed == pytest.approx(0.005)
+            assert verify_result.solves[0].unknowns == 18
+            raise AssertionError("the body ran")
+
+        def test_plain():
+            pass
+        """
+    )
+    result = session("-v")
+    result.assert_outcomes(passed=2, failed=3)
+    result.stdout.fnmatch_lines(
+        [
+            "*::test_strain[[]value-strain_energy-xfem] PASSED*",
+            "*::test_strain[[]value-strain_energy-xfem-#2] FAILED*",
+            "*AssertionError: the body ran*",
+        ]
+    )
+    assert str(result.stdout).count("E       AssertionError: the body ran") == 1
+
+
+def test_a_solver_that_is_not_there_fails_its_checks_and_no_others(pytester, session):
+    checks = check(0.005) + check(0.005, solver="no_such_module:Solver")
+    write(pytester, CASE + checks)
+    result = session()
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(["ERROR: strain_energy*needs 'no_such_module'*"])
+
+
+def test_the_ini_option_names_further_case_files_and_one_without_checks_is_skipped(
+    pytester, session
+):
+    pytester.mkdir("cases")
+    (pytester.path / "cases/empty.toml").write_text(CASE)
+    (pytester.path / "elsewhere.toml").write_text(CASE)
+    pytester.makeini("[pytest]\nverify_cases = cases/*.toml")
+    result = session()
+    result.assert_outcomes(skipped=1)
+    result.stdout.fnmatch_lines(["SKIPPED*makes no acceptance check*"])
+
+
+def test_a_bad_case_file_is_an_error_of_collection_in_one_line(pytester, session):
+    write(pytester, CASE.replace("young", "yuong"))
+    pytester.makepyfile("def test_plain(): pass")
+    result = session()
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(
+        ["*strain.verify.toml: material.yuong: unknown key; did you mean 'young'?*"]
+    )
+    marked = '@__import__("pytest").mark.verify("statics/f1_pach")\ndef test_it(): pass'
+    pytester.makepyfile(test_marked=marked)
+    result = session("test_marked.py")
+    assert result.ret != 0
+    result.stdout.fnmatch_lines(["*no case 'statics/f1_pach'; did you mean 'statics/f1_patch'?*"])

@@ -1,0 +1,168 @@
+"""A run held against a baseline: a row per quantity and axis."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from verify.baseline.finished_run import FinishedRun, physics_of
+from verify.baseline.measured import finest, metric_of, quantities_of, speed_of
+from verify.baseline.record import Baseline, CaseBaseline, Independent, Quantity, Speed
+from verify.result import CaseResult, Metric, Verdict
+from verify.runner.ending import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
+
+__all__ = ["Row", "check_run", "exit_code_of", "independent_row", "own_row"]
+
+# below this an exact reference that is computed anew may differ by its own quadrature
+_SAME_REFERENCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Row:
+    """One axis of one quantity.
+
+    Attributes
+    ----------
+    case, quantity : str
+    axis : str
+        ``own``, ``independent``, ``reference`` (did the reference itself move?), ``speed``, or
+        ``case`` (the case as a whole).
+    verdict : Verdict
+        ERROR: it could not be checked.
+    now, stored : float or None
+    reason : str
+    """
+
+    case: str
+    quantity: str
+    axis: str
+    verdict: Verdict
+    now: float | None = None
+    stored: float | None = None
+    reason: str = ""
+
+
+def check_run(baseline: Baseline, run: FinishedRun, partial: bool = False) -> list[Row]:
+    """Compare everything that `baseline` knows with `run`.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    run : FinishedRun
+    partial : bool
+        Whether cases that the run was not asked for are left out. Else each is a row ERROR:
+        what was not looked at has not been found to be right.
+    """
+    cpu = str(run.provenance.get("cpu", ""))
+    rows: list[Row] = []
+    for name, case in baseline.cases.items():
+        if name not in run.results:
+            if not partial:
+                rows.append(Row(name, "", "case", Verdict.ERROR, reason="not in this run"))
+            continue
+        rows += _case_rows(name, case, run.results[name], cpu)
+    for name, result in run.results.items():
+        known = baseline.cases.get(name)
+        new = set(quantities_of(result, {})) - set(known.quantities if known else ())
+        if new:
+            text = f"{len(new)} quantities are not in the baseline; `save` adds them"
+            rows.append(Row(name, "", "case", Verdict.UNDECIDED, reason=text))
+    return rows
+
+
+def _case_rows(name: str, case: CaseBaseline, result: CaseResult, cpu: str) -> Iterator[Row]:
+    if physics_of(result) != case.physics:
+        text = "its scene is another one now; remove its entry from the file and save it again"
+        yield Row(name, "", "case", Verdict.ERROR, reason=text)
+        return
+    for key, quantity in case.quantities.items():
+        metric, why = metric_of(result, key)
+        if metric is None:
+            yield Row(name, key, "own", Verdict.ERROR, None, quantity.own.value, why)
+            continue
+        yield own_row(name, key, quantity, metric)
+        if quantity.independent is not None:
+            if quantity.independent.tolerance is not None:
+                yield independent_row(name, key, quantity.independent, metric)
+            yield from _reference_rows(name, key, quantity.independent, metric)
+    for key, speed in case.speed.items():
+        yield _speed_row(name, key, speed, result, cpu)
+
+
+def own_row(case: str, key: str, quantity: Quantity, metric: Metric) -> Row:
+    """Hold a metric against the last own value."""
+    own = quantity.own
+    change = metric.value - own.value
+    allowed = own.tolerance * abs(own.value) + own.absolute
+    within = abs(change) <= allowed
+    if within:
+        text = ""
+    elif own.value:
+        text = f"changed by {change / abs(own.value):+.3g} (relative), allowed {own.tolerance:g}"
+    else:
+        text = f"changed by {change:+.3g}, allowed {allowed:g}"
+    verdict = Verdict.PASS if within else Verdict.FAIL
+    return Row(case, key, "own", verdict, metric.value, own.value, text)
+
+
+def independent_row(case: str, key: str, known: Independent, metric: Metric) -> Row:
+    """Hold a metric against the independent value, given how well that is known."""
+    assert known.tolerance is not None
+    off = abs(metric.value - known.value)
+    # an error is as uncertain as the reference it was measured with
+    width = known.uncertainty if known.value else metric.uncertainty
+    allowed = known.tolerance * (abs(known.value) or 1.0)
+    text = f"off by {off:.3g} ± {width:.1g}, allowed {allowed:.3g}; {known.source}"
+    if off + width <= allowed:
+        verdict, text = Verdict.PASS, ""
+    elif off - width > allowed:
+        verdict = Verdict.FAIL
+    else:
+        verdict = Verdict.UNDECIDED
+    return Row(case, key, "independent", verdict, metric.value, known.value, text)
+
+
+def _reference_rows(case: str, key: str, known: Independent, metric: Metric) -> Iterator[Row]:
+    """Complain if the reference of this run contradicts the stored one; silent otherwise."""
+    if metric.reference is None or not known.value:
+        return
+    apart = abs(metric.reference - known.value)
+    if known.source == metric.source:
+        allowed = known.uncertainty + metric.uncertainty + _SAME_REFERENCE * abs(known.value)
+    else:  # a stated value with its tolerance
+        allowed = metric.uncertainty + (known.tolerance or 0.0) * abs(known.value)
+    if apart > allowed:
+        text = (
+            f"the reference of this run ({metric.source}) contradicts the stored one "
+            f"({known.source}): {apart:.3g} apart, {allowed:.3g} allowed by their uncertainties"
+        )
+        yield Row(case, key, "reference", Verdict.FAIL, metric.reference, known.value, text)
+
+
+def _speed_row(case: str, key: str, stored: Speed, result: CaseResult, cpu: str) -> Row:
+    solve = next((s for s in finest(result) if f"{s.solver}/{s.level}" == key), None)
+    if solve is None:
+        return Row(case, key, "speed", Verdict.ERROR, None, stored.ratio, "was not run")
+    now = speed_of(solve)
+    if now.reason:
+        return Row(case, key, "speed", Verdict.UNDECIDED, None, stored.ratio, now.reason)
+    factor, width = now.ratio / stored.ratio, now.spread + stored.spread
+    low, high = factor * max(0.0, 1 - width), factor * (1 + width)
+    text = f"takes {factor:.2f} times as long ({low:.2f}–{high:.2f})"
+    if cpu != stored.cpu:
+        verdict, text = Verdict.UNDECIDED, f"{text}, on another CPU than '{stored.cpu}'"
+    elif high <= stored.slower_at_most:
+        verdict, text = Verdict.PASS, ""
+    elif low > stored.slower_at_most:
+        verdict, text = Verdict.FAIL, f"{text}; allowed {stored.slower_at_most:g}"
+    else:
+        verdict, text = Verdict.UNDECIDED, f"{text}: too noisy to tell"
+    return Row(case, key, "speed", verdict, now.ratio, stored.ratio, text)
+
+
+def exit_code_of(rows: Sequence[Row], strict: bool = False) -> int:
+    """Return 1 after a FAIL, else 3 after an ERROR, else 5 if strict and undecided, else 0."""
+    verdicts = {row.verdict for row in rows}
+    if Verdict.FAIL in verdicts:
+        return VERDICT_FAILED
+    if Verdict.ERROR in verdicts:
+        return SOLVER_FAILED
+    return ONLY_WARNINGS if strict and Verdict.UNDECIDED in verdicts else ALL_PASS

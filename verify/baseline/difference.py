@@ -1,0 +1,83 @@
+"""Two runs side by side: which verdicts changed."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from verify.baseline.finished_run import FinishedRun
+from verify.result import CaseResult, Verdict, VerdictRecord
+
+__all__ = ["VerdictChange", "any_worse", "verdict_changes"]
+
+# from good to bad
+_ORDER = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
+
+
+@dataclass(frozen=True)
+class VerdictChange:
+    """A check whose verdict differs between two runs; None where a run does not have it.
+
+    `direction` is ``better``, ``worse``, ``gone`` or ``new``.
+    """
+
+    case: str
+    check: str
+    old: Verdict | None
+    new: Verdict | None
+    old_observed: float | None
+    new_observed: float | None
+    direction: str
+    reason: str
+
+
+def verdict_changes(old: FinishedRun, new: FinishedRun) -> list[VerdictChange]:
+    """Return the checks whose verdicts differ, those that became worse first."""
+    changes = []
+    for case in dict.fromkeys([*old.results, *new.results]):
+        before, after = _checks(old.results.get(case)), _checks(new.results.get(case))
+        for check in dict.fromkeys([*before, *after]):
+            a, b = before.get(check), after.get(check)
+            if a is None or b is None or a.verdict is not b.verdict:
+                changes.append(_change(case, check, a, b))
+    order = ["worse", "gone", "new", "better"]
+    return sorted(changes, key=lambda change: order.index(change.direction))
+
+
+def any_worse(changes: Sequence[VerdictChange]) -> bool:
+    """Whether a verdict became worse, or a check that passed is gone."""
+    return any(
+        change.direction == "worse" or (change.direction == "gone" and change.old is Verdict.PASS)
+        for change in changes
+    )
+
+
+def _checks(result: CaseResult | None) -> dict[str, VerdictRecord]:
+    """Verdicts by what is checked; a check that a case makes twice is numbered."""
+    if result is None:
+        return {}
+    found, times = {}, Counter[str]()
+    for record in result.verdicts:
+        name = f"{record.check} of {record.metric} ({record.solver})"
+        times[name] += 1
+        found[name if times[name] == 1 else f"{name} #{times[name]}"] = record
+    return found
+
+
+def _change(
+    case: str, check: str, old: VerdictRecord | None, new: VerdictRecord | None
+) -> VerdictChange:
+    if old is None or new is None:
+        direction = "new" if old is None else "gone"
+    else:
+        worse = _ORDER.index(new.verdict) > _ORDER.index(old.verdict)
+        direction = "worse" if worse else "better"
+    return VerdictChange(
+        case=case,
+        check=check,
+        old=old.verdict if old else None,
+        new=new.verdict if new else None,
+        old_observed=old.observed if old else None,
+        new_observed=new.observed if new else None,
+        direction=direction,
+        reason=new.reason if new else "not in the new run",
+    )

@@ -1,0 +1,58 @@
+"""A fixed piece of work, timed beside every solve: the unit in which slow-downs are measured.
+
+Seconds of two runs differ because the machine does (another clock, a neighbour, a laptop on
+battery). The ratio of a solve to this kernel, both timed in the same process a moment apart,
+differs much less. The kernel is half arithmetic in cache, half memory traffic, as the solvers are.
+"""
+
+from time import perf_counter
+
+import numpy as np
+
+__all__ = ["KERNEL", "calibration_note", "kernel_seconds", "seconds_of_note"]
+
+KERNEL = 1  # another number when the work changes: ratios of different kernels do not compare
+_REPETITIONS = 5
+
+
+def kernel_seconds(repetitions: int = _REPETITIONS) -> list[float]:
+    """Time the kernel, after one call that is not counted.
+
+    Returns
+    -------
+    list of float
+        Seconds, about 0.01 each.
+    """
+    rng = np.random.default_rng(0)
+    matrix = rng.standard_normal((128, 128)) / 128
+    values = rng.standard_normal(200_000)
+    places = rng.permutation(len(values))
+    seconds = []
+    for repetition in range(repetitions + 1):
+        start = perf_counter()
+        product = matrix
+        for _ in range(20):
+            product = product @ matrix
+        total = values
+        for _ in range(6):
+            total = total[places] + 0.5 * values
+        np.sort(total + product[0, 0])
+        if repetition:
+            seconds.append(perf_counter() - start)
+    return seconds
+
+
+def calibration_note() -> str:
+    """Time the kernel and write that down as a note of a solve."""
+    return f"kernel {KERNEL}: {' '.join(f'{seconds:.6g}' for seconds in kernel_seconds())}"
+
+
+def seconds_of_note(note: str) -> list[float] | None:
+    """Read what `calibration_note` wrote; None if it is of another kernel or unreadable."""
+    head, _, rest = note.partition(": ")
+    if head != f"kernel {KERNEL}":
+        return None
+    try:
+        return [float(word) for word in rest.split()] or None
+    except ValueError:
+        return None
