@@ -1,0 +1,101 @@
+"""The neutral solution: what is written is read, a wrong shape fails where it arises."""
+
+import json
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from verify.errors import InputError
+from verify.solution import Regularisation, Solution, read_solution, write_solution
+
+# a corner list of the unit simplex, and its mid-edge nodes in VTK's order
+EDGES = {2: [(0, 1), (1, 2), (2, 0)], 3: [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]}
+
+
+def simplex(dimension, order, times=1):
+    corners = np.vstack([np.zeros(dimension), np.eye(dimension)]) * np.pi
+    middles = [0.5 * (corners[a] + corners[b]) for a, b in EDGES[dimension]]
+    points = np.vstack([corners, middles]) if order == 2 else corners
+    generator = np.random.default_rng(7)
+    return Solution(
+        points=points,
+        cells=np.arange(len(points))[None],
+        displacement=generator.normal(size=(times, len(points), dimension)),
+        velocity=generator.normal(size=(times, len(points), dimension)),
+        times=np.linspace(0.0, 1.0, times),
+        order=order,
+        cut_facets=generator.normal(size=(3, dimension, dimension)),
+        cell_sides=np.array([2]),
+        ledger={"strain": generator.normal(size=times)},
+        quantities={"opening": 1 / 3},
+        unknowns=7,
+        size=0.1,
+        timings={"solve": [0.1, 0.3]},
+        iterations={"newton": 4},
+        regularisations=[Regularisation("piece dropped", 2, 1e-14, "volume fraction")],
+        notes={"solver": "by hand"},
+    )
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("times", [1, 3])
+def test_a_solution_is_read_as_it_was_written_to_the_last_bit(tmp_path, dimension, order, times):
+    written = simplex(dimension, order, times)
+    write_solution(written, tmp_path / "a" / "solution")
+    read = read_solution(tmp_path / "a" / "solution")
+    for field in fields(Solution):
+        one, other = getattr(written, field.name), getattr(read, field.name)
+        if isinstance(one, np.ndarray):
+            np.testing.assert_array_equal(one, other)
+        elif field.name == "ledger":
+            np.testing.assert_array_equal(one["strain"], other["strain"])
+        else:
+            assert one == other
+
+
+def test_a_size_that_is_not_known_stays_so_and_the_file_stays_json(tmp_path):
+    plain = Solution(np.eye(3, 2), np.array([[0, 1, 2]]), np.zeros((1, 3, 2)))
+    write_solution(plain, tmp_path / "solution")
+    text = (tmp_path / "solution.json").read_text()
+    json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
+    assert np.isnan(read_solution(tmp_path / "solution").size)
+
+
+def test_the_json_half_comes_last(tmp_path, monkeypatch):
+    """Its presence says that the solution is whole."""
+    import meshio
+
+    def full_disk(*arguments, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(meshio.Mesh, "write", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        write_solution(simplex(2, 1), tmp_path / "solution")
+    assert not (tmp_path / "solution.json").exists()
+
+
+@pytest.mark.parametrize(
+    "change, fault",
+    [
+        ({"cells": np.array([[0, 1, 3]])}, r"cell nodes outside 0\.\.2"),
+        ({"cells": np.array([[0, 1, -1]])}, r"cell nodes outside 0\.\.2"),
+        ({"cells": np.zeros((0, 3), int)}, "without cells"),
+        ({"cells": np.array([[0, 1]])}, r"cells of shape \(1, 2\); expected \(m, 3\)"),
+        ({"order": 2}, r"expected \(m, 6\) for triangle6"),
+        ({"order": 3}, "order 3; expected 2 or 3, and 1 or 2"),
+        ({"displacement": np.zeros((3, 2))}, r"expected \(1, 3, 2\)"),
+        ({"displacement": np.full((1, 3, 2), np.nan)}, "not finite"),
+        ({"velocity": np.zeros((2, 3, 2))}, "velocity of shape"),
+        ({"times": np.zeros(2)}, r"expected \(2, 3, 2\)"),
+    ],
+)
+def test_a_wrong_shape_is_refused_where_the_solver_hands_over(change, fault):
+    whole = {
+        "points": np.eye(3, 2),
+        "cells": np.array([[0, 1, 2]]),
+        "displacement": np.zeros((1, 3, 2)),
+    }
+    with pytest.raises(InputError, match=fault):
+        Solution(**{**whole, **change})
