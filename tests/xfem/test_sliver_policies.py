@@ -268,3 +268,44 @@ def test_the_report_counts_everything():
 def test_unknown_policies_and_thresholds_are_refused(policy, threshold):
     with pytest.raises(XfemError, match=r"expected"):
         treat_slivers(body(2, 1e-3), policy, threshold)
+
+
+def degenerate_cuts(mesh, seed):
+    """Up to four planes at random, many through nodes, along faces, or off them by 1e-13 … 1e-2."""
+    random = np.random.default_rng(seed)
+    dim, cuts = mesh.dim, []
+    for _ in range(random.integers(1, 5)):
+        at_node = random.random() < 0.5
+        point = (
+            mesh.points[random.integers(len(mesh.points))]
+            if at_node
+            else random.uniform(0.2, 0.8, dim)
+        )
+        along = random.random() < 0.4
+        normal = np.eye(dim)[random.integers(dim)] if along else random.normal(size=dim)
+        off = 10.0 ** -random.integers(2, 14) * (random.random() < 0.7)
+        cuts.append(Plane(point + off * normal, normal))
+    return cuts
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_any_crossing_and_degenerate_cuts_keep_volume_points_and_bodies(seed):
+    """Slivers beside slivers, in parallelograms too, with thresholds up to 0.4."""
+    mesh = rectangle_mesh((5, 5)) if seed % 2 else box_mesh((3, 3, 3))
+    mesh = shaken(mesh, seed) if seed % 3 else mesh
+    virtual = cut_mesh(mesh, degenerate_cuts(mesh, seed))
+    for policy in ("drop", "merge"):
+        for threshold in (0.02, 0.1, 0.4):
+            treated, report = treat_slivers(virtual, policy, threshold)
+            divided = subdivide(treated)
+            corners = divided.points[divided.cells]
+            volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / factorial(mesh.dim)
+            assert volumes.min() >= 0.0
+            assert volumes.sum() == pytest.approx(1.0, abs=1e-12)
+            assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-12)
+            moved = divided.interpolation @ treated.node_points
+            assert np.abs(moved - divided.points).max() < 1e-12
+            extended = report.absorption.extension @ treated.node_points
+            assert np.abs(extended - virtual.node_points).max() < 1e-12
+            assert np.bincount(treated.cells.ravel(), minlength=treated.node_count).min() > 0
+            assert treated.bodies.max() <= virtual.bodies.max()

@@ -106,6 +106,7 @@ def treat_slivers(
             into = _neighbours(virtual, contacts, absorbed)
         crosswise = absorbed & (into == np.arange(len(into)))
         into[crosswise] = _siblings(virtual, crosswise)[crosswise]
+        into = _roots(into)  # a sibling may itself have gone to its neighbour
     gone = into != np.arange(len(into))
     treated, absorption = absorb(virtual, into)
     return treated, SliverReport(
@@ -153,7 +154,7 @@ def _siblings(virtual: VirtualMesh, small: NDArray[np.bool_]) -> _Ints:
     order = np.lexsort([total, pairs[0]])
     last = np.diff(pairs[0][order], append=-1) != 0
     into[pairs[0][order[last]]] = pairs[1][order[last]]
-    return _roots(into)
+    return into
 
 
 def _neighbours(
@@ -167,7 +168,7 @@ def _neighbours(
         meets = open_[first] & ~open_[second]
         one, other = first[meets], second[meets]
         if len(one) == 0:
-            return _roots(into)
+            return into
         order = np.lexsort([virtual.volumes[other], one])
         last = np.diff(one[order], append=-1) != 0
         into[one[order[last]]] = other[order[last]]

@@ -59,7 +59,7 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
     # a mesh node moves with one unknown, a point of the cut with those of its edge, and a node
     # of a neighbour that was absorbed with all unknowns of the piece
     unknowns = virtual.cells[piece]
-    row, corner = np.nonzero((ids >= len(mesh.points)) | (barycentric.max(axis=2) != 1.0))
+    row, corner = np.nonzero((ids >= len(mesh.points)) | ((barycentric != 0.0).sum(axis=2) > 1))
     node = np.take_along_axis(unknowns, barycentric.argmax(axis=2), axis=1)
     weights, columns = barycentric[row, corner], unknowns[row]
     support = np.sort(np.where(weights != 0.0, columns, -1), axis=1)
