@@ -9,6 +9,7 @@ from typing import NoReturn
 
 from verify import __version__
 from verify.cli.extension_parser import add_extension_commands
+from verify.cli.study_parser import add_study_command
 
 __all__ = ["build_parser"]
 
@@ -81,6 +82,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_reading_commands(add)
     _add_run(add("run", "solve, compare and judge cases, and render the report", _RUN))
     add_extension_commands(add)
+    add_study_command(add)
     return parser
 
 

@@ -21,6 +21,7 @@ __all__ = ["Drift", "secular_drift"]
 _Floats = NDArray[np.float64]
 _FEWEST = 5  # periods: a slope and its scatter from fewer means little
 _CONFIDENCE = 0.95
+_TREND = 2.58  # standard deviations of Kendall's statistic: 1 % of trends are chance
 _ROUND_OFF = 1e-10  # of the scale: what Newton's tolerance and round-off may leave
 
 
@@ -39,8 +40,8 @@ class Drift:
     periods : int
         Whole periods fitted.
     kind : {"kept", "bounded oscillation", "secular loss", "secular gain"}
-        Secular if zero lies outside the interval of the slope; kept if slope and oscillation are
-        round-off.
+        Secular if zero lies outside the interval of the slope, or if the period means rise or
+        fall in a row (a decay that is not a line); kept if slope and oscillation are round-off.
     """
 
     per_period: float
@@ -88,11 +89,20 @@ def secular_drift(stages: Sequence[tuple[_Floats, _Floats]], period: float, scal
     )
     if max(abs(slope), oscillation) <= _ROUND_OFF:
         kind = "kept"
-    elif abs(slope) > width:
+    elif abs(slope) > width or abs(_trend([means for _, means in parts])) > _TREND:
         kind = "secular gain" if slope > 0.0 else "secular loss"
     else:
         kind = "bounded oscillation"
     return Drift(slope, width, oscillation, count, kind)
+
+
+def _trend(stages: Sequence[_Floats]) -> float:
+    """Kendall's statistic of a trend within the stages, in standard deviations of chance."""
+    signs = [np.sign(means[None, :] - means[:, None]) for means in stages]
+    rising = sum(float(np.triu(sign).sum()) for sign in signs)
+    counts = np.array([len(means) for means in stages])
+    spread = np.sqrt(np.sum(counts * (counts - 1) * (2 * counts + 5)) / 18.0)
+    return float(np.sign(rising) * max(abs(rising) - 1.0, 0.0) / spread)
 
 
 def _period_means(time: _Floats, share: _Floats, period: float) -> tuple[_Floats, _Floats]:
