@@ -46,7 +46,16 @@ def imported(*folders):
 
 
 def test_framework_imports_only_its_base_dependencies():
-    assert imported("verify") <= declared(None)
+    assert imported("verify") - {"pytest"} <= declared(None)
+
+
+def test_only_the_pytest_plugin_imports_pytest():
+    # pytest loads it, so who needs it has it; nothing else may.
+    files = (ROOT / "verify").rglob("*.py")
+    importing = [
+        f.name for f in files if re.search(r"^\s*(import|from) pytest", f.read_text(), re.M)
+    ]
+    assert importing == ["pytest_plugin.py"]
 
 
 def test_reference_imports_only_the_base_and_the_fenicsx_extra():
