@@ -60,7 +60,9 @@ class ComplexCrack(ExactSolution):
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Displacement (n, 2), m; see `ExactSolution`."""
         z, f = self._evaluate(points, near)
-        w = self.law.kolosov * f.phi - f.omega - (z - z.conj()) * f.phi_1.conj()
+        # at a tip φ' is infinite, but its factor is zero there
+        slope = np.where(z.imag == 0.0, 0.0, f.phi_1)
+        w = self.law.kolosov * f.phi - f.omega - (z - z.conj()) * slope.conj()
         w = w / (2 * self.law.shear)
         return np.column_stack([w.real, w.imag]) @ self._axes
 

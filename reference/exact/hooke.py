@@ -47,11 +47,11 @@ class Hooke:
         return (self.lame + 3 * self.shear) / (self.lame + self.shear)
 
     def stress(self, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Stress (n, d, d) in Pa of displacement gradients (n, d, d)."""
-        strain = 0.5 * (gradient + gradient.transpose(0, 2, 1))
-        trace = np.trace(strain, axis1=1, axis2=2)
+        """Stress (…, d, d) in Pa of displacement gradients (…, d, d)."""
+        strain = 0.5 * (gradient + gradient.swapaxes(-1, -2))
+        trace = np.trace(strain, axis1=-2, axis2=-1)
         stress: NDArray[np.float64] = 2 * self.shear * strain
-        stress += self.lame * trace[:, None, None] * np.eye(self.dimension)
+        stress += self.lame * trace[..., None, None] * np.eye(self.dimension)
         return stress
 
 

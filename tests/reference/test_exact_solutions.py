@@ -172,6 +172,15 @@ def test_the_field_next_to_a_griffith_tip_is_the_tip_field():
     assert np.abs(crack.stress(ring) - tip.stress(ring)).max() < 3e-3 * scale
 
 
+@pytest.mark.parametrize("name", ["tip", "griffith"])
+def test_the_displacement_is_finite_and_continuous_at_a_tip(name):
+    u = solution(name)
+    for tip in u.singular_points:
+        at = u.displacement(tip[None])
+        # √r: 1e-8 away it has changed by 1e-4 of K/μ
+        assert at == pytest.approx(u.displacement(tip[None] + [[0.0, 1e-8]]), abs=1e-3)
+
+
 @pytest.mark.parametrize("name", ["patch", "airy", "griffith", "tip"])
 @settings(max_examples=40, deadline=None)
 @given(x=st.floats(-0.25, 0.05), off=st.floats(-1e-14, 1e-14), side=st.sampled_from([1.0, -1.0]))
