@@ -1,0 +1,138 @@
+"""Commands that only read: quick, complete, and honest about what they do not know."""
+
+import json
+import re
+import statistics
+import subprocess
+import sys
+import time
+
+import pytest
+
+from verify.cli import main
+from verify.cli.parser import build_parser
+from verify.scene import list_cases, load_scene
+
+COMMANDS = ("list", "describe", "run", "report", "check", "schema")
+HEAVY = ("dolfinx", "gmsh", "pyvista", "vtk", "numba", "matplotlib", "scipy", "meshio", "petsc4py")
+
+
+@pytest.mark.parametrize("command", [[], *[[name] for name in COMMANDS]])
+def test_help_teaches_by_examples_that_parse(command, capsys):
+    with pytest.raises(SystemExit) as leaving:
+        main([*command, "--help"])
+    assert leaving.value.code == 0
+    text = capsys.readouterr().out
+    examples = re.findall(r"^  verify (\S.*?)(?:   .*)?$", text.partition("examples:")[2], re.M)
+    assert examples
+    for example in examples:
+        words = re.findall(r'"[^"]*"|\S+', example.partition(" > ")[0])
+        build_parser().parse_args([word.strip('"') for word in words])
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    from verify import __version__
+
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert capsys.readouterr().out == f"verify {__version__}\n"
+
+
+def test_list_names_every_case_with_its_title(capsys):
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(list_cases())
+    assert main(["list", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert {row["name"]: row["title"] for row in rows} == {
+        name: load_scene(path).title for name, path in list_cases().items()
+    }
+
+
+def test_list_takes_an_expression(capsys):
+    assert main(["list", "-k", "patch and demo", "--json"]) == 0
+    assert [row["name"] for row in json.loads(capsys.readouterr().out)] == ["statics/f1_patch"]
+
+
+def test_list_shows_a_broken_case_and_the_others(capsys, monkeypatch, tmp_path):
+    from verify.cli import list_command
+
+    (tmp_path / "bad.toml").write_text("title = 3")
+    cases = {"bad": tmp_path / "bad.toml", **list_cases()}
+    monkeypatch.setattr(list_command, "list_cases", lambda: cases)
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(cases)
+    assert "BROKEN" in lines[0]
+
+
+def test_list_names_the_exact_solutions(capsys):
+    assert main(["list", "--exact"]) == 0
+    names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert {"patch", "airy", "griffith", "tip"} <= set(names)
+
+
+@pytest.mark.parametrize("case", list_cases())
+def test_describe_says_the_requirement_and_every_check(case, capsys):
+    assert main(["describe", case]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    scene = load_scene(case)
+    assert scene.requirement in text
+    for check in scene.acceptance:
+        assert f"{check.metric} of {check.solver}" in text
+    assert main(["describe", case, "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    # all defaults are written out, nothing is lost
+    assert type(scene).model_validate(content).model_dump() == scene.model_dump()
+
+
+def test_schema_is_that_of_the_scene(capsys):
+    from verify.scene import scene_schema
+
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == scene_schema()
+
+
+def loaded_by(code):
+    probe = f"{code}\nimport sys; print(*sorted({{n.partition('.')[0] for n in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import verify.cli",
+        "from verify.cli import main; main(['list'])",
+        "from verify.cli import main; main(['describe', 'statics/f1_patch'])",
+        "from verify.cli import main; main(['schema'])",
+    ],
+)
+def test_reading_commands_load_no_solver_and_no_graphics(code):
+    assert loaded_by(code).isdisjoint(HEAVY)
+
+
+def test_importing_the_command_line_loads_nothing_but_the_standard_library():
+    assert loaded_by("import verify.cli").isdisjoint(("numpy", "pydantic", "rich", *HEAVY))
+
+
+@pytest.mark.timing
+def test_list_takes_little_more_than_the_import_of_what_reads_case_files():
+    """1.6 times numpy and pydantic was seen; one solver's import would make it above 5."""
+
+    def seconds(*command):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, *command], capture_output=True, check=True)
+        return time.perf_counter() - start
+
+    ratios = [
+        seconds("-m", "verify", "list") / seconds("-c", "import numpy, pydantic.main")
+        for _ in range(7)
+    ]
+    assert statistics.median(ratios) < 3.0
+
+
+def test_a_reader_that_stops_reading_is_no_error():
+    command = f"{sys.executable} -m verify schema | head -1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
