@@ -6,7 +6,7 @@ import numpy as np
 import skfem
 from skfem.models.elasticity import linear_elasticity
 
-from verify.errors import UnsupportedSceneError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange import problem_of
 from verify.solution import Solution
 
@@ -27,6 +27,8 @@ class SkfemSolver:
         if refusal := self.refuses(scene):
             raise UnsupportedSceneError(refusal)
         problem, seconds = problem_of(scene, level, conforming=True), []
+        if len(problem.free_pieces()):
+            raise InputError(f"nothing holds the piece around {problem.free_pieces()[0]}")
         held, values = (array.ravel() for array in problem.prescribed())
         for _ in range(repetitions):
             start = perf_counter()

@@ -129,3 +129,12 @@ def test_a_traction_on_no_facet_is_refused():
     loads = [{"kind": "traction", "where": "x < 1e-9 and y < 1e-9", "traction": [1.0, 0.0]}]
     with pytest.raises(InputError, match="no boundary facet lies in"):
         problem_of(scene(loads=loads), 0)
+
+
+def test_a_piece_that_too_little_holds_is_found_where_it_is():
+    bottom = [{"where": "bottom", "displacement": [0.0, 0.0]}]
+    (free,) = problem_of(scene(supports=bottom), 0, conforming=True).free_pieces()
+    assert free[1] > 0.61 or free[1] > 0.37 + 0.2 * free[0]  # above the cut
+    both = [*bottom, {"where": "top", "displacement": [0.0], "components": ["y"]}]
+    assert len(problem_of(scene(supports=both), 0, conforming=True).free_pieces()) == 0
+    assert len(problem_of(scene(**BOX), 0).free_pieces()) == 0

@@ -161,6 +161,7 @@ def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
     }
     if problem.conforming:  # on a background mesh they would ignore the cuts
         content["nodal_forces"] = problem.nodal_forces()
+        content["free_pieces"] = problem.free_pieces()
     write_json(content, conditions)
     return [mesh, conditions]
 

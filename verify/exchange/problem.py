@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange.quadrature import simplex_rule
@@ -117,6 +119,24 @@ class Problem:
             shares = np.einsum("kq,qi,kqc->kic", load.weights, load.barycentric, load.values)
             np.add.at(force, load.simplices, shares)
         return force
+
+    def free_pieces(self) -> Array:
+        """Centroids (k, d) of the pieces of the body that are held in too few components.
+
+        A piece has 3 rigid motions in the plane and 6 in space; one that is held in fewer
+        components has no static answer, and direct solvers do not always notice. On a background
+        mesh the body is one piece, whatever the cuts.
+        """
+        m, corners = self.cells.shape
+        cell = np.repeat(np.arange(m), corners)
+        link = coo_array((np.ones(m * corners), (cell, self.cells.ravel())))
+        _, node_piece = connected_components(link.T @ link, directed=False)
+        held = np.bincount(node_piece, self.prescribed()[0].sum(axis=1))
+        loose = np.flatnonzero(held < (3 if corners == 3 else 6))
+        cell_piece, middle = node_piece[self.cells[:, 0]], self.points[self.cells].mean(axis=1)
+        return np.array([middle[cell_piece == k].mean(axis=0) for k in loose]).reshape(
+            -1, self.points.shape[1]
+        )
 
     def lame(self) -> tuple[float, float]:
         """Lamé constants λ, μ in Pa; in plane stress the λ of the plane problem."""

@@ -1,0 +1,114 @@
+"""The pages on extending and on regression are run: every file, every command, in order."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+pytest_plugins = ["pytester"]
+needs_skfem = pytest.mark.skipif(find_spec("skfem") is None, reason="needs scikit-fem")
+
+
+def blocks(page, language):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def commands(page):
+    return [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
+
+
+def run(line, folder):
+    first, *words = shlex.split(line)
+    call = {"verify": [sys.executable, "-m", "verify"], "python": [sys.executable]}[first]
+    paths = [str(folder), str(ROOT), os.environ.get("PYTHONPATH", "")]
+    return subprocess.run(
+        [*call, *words],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+@pytest.fixture
+def examples(tmp_path):
+    """A folder with the example files and the case of the page."""
+    for file in (DOCS / "examples").glob("*.py"):
+        (tmp_path / file.name).write_text(file.read_text())
+    (tmp_path / "square.toml").write_text(blocks("extending.md", "toml")[0])
+    return tmp_path
+
+
+def test_the_page_shows_the_example_files_as_they_are():
+    shown = set(blocks("extending.md", "python"))
+    files = {file.name: file.read_text() for file in (DOCS / "examples").glob("*.py")}
+    assert set(files.values()) == shown
+
+
+def test_the_solver_of_the_page_has_less_than_forty_lines():
+    lines = (DOCS / "examples/skfem_solver.py").read_text().splitlines()
+    assert len([line for line in lines if line.strip()]) < 40
+
+
+@needs_skfem
+def test_every_command_on_extending_succeeds_in_order(examples):
+    said = {}
+    for line in commands("extending.md"):
+        done = run(line, examples)
+        assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+        said[line.split()[1]] = done.stdout
+    # the example solver keeps what it does not refuse, and its metric is round-off
+    assert re.search(r"^cut-patch +kept", said["conform"], re.MULTILINE)
+    strain = re.findall(r"(\S+): (\S+) ± ", said["strain_error.py"])
+    assert {name.rpartition("-")[0] for name, _ in strain} == {
+        "skfem_solver_SkfemSolver",
+        "xfem",
+    }
+    assert all(float(value) < 1e-12 for _, value in strain)
+    assert "1 PASS" in said["import"]
+
+
+@needs_skfem
+def test_the_entry_point_of_the_page_gives_the_solver_a_short_name(examples):
+    points = tomllib.loads(blocks("extending.md", "toml")[1])["project"]["entry-points"]
+    (group,) = points
+    (examples / "own-1.0.dist-info").mkdir()
+    (examples / "own-1.0.dist-info/METADATA").write_text("Name: own\nVersion: 1.0\n")
+    lines = [f"[{group}]", *(f"{name} = {value}" for name, value in points[group].items())]
+    (examples / "own-1.0.dist-info/entry_points.txt").write_text("\n".join(lines))
+    done = run("verify conform skfem --check cut-patch", examples)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("cut-patch  kept")
+
+
+def test_every_command_on_regression_succeeds_in_order(tmp_path):
+    for line in commands("regression.md"):
+        done = run(line, tmp_path)
+        # what is undecided about speed depends on the machine: the page says so
+        allowed = (0, 5) if "--strict" in line else (0, 1) if " check " in line else (0,)
+        assert done.returncode in allowed, f"{line}\n{done.stdout}\n{done.stderr}"
+        assert not re.search("^FAIL +(own|independent|reference)", done.stdout, re.MULTILINE)
+        if "--only" in line:
+            assert "1 own values moved" in done.stdout
+
+
+def test_the_marked_test_of_the_page_passes(pytester):
+    from importlib.metadata import entry_points
+
+    installed = {point.value for point in entry_points(group="pytest11")}
+    plugin = [] if "verify.pytest_plugin" in installed else ["-p", "verify.pytest_plugin"]
+    pytester.makepyfile(blocks("regression.md", "python")[0])
+    result = pytester.runpytest_inprocess(*plugin, "-p", "no:cacheprovider", "-p", "no:xdist")
+    checks = result.parseoutcomes()
+    assert set(checks) <= {"passed", "skipped", "warnings"}
+    assert checks["passed"] >= 2
