@@ -13,11 +13,12 @@ def execute(arguments: argparse.Namespace) -> int:
     """Run a study, write its record and table, render its page."""
     from verify.report.study_page import render_study
     from verify.result import Verdict
-    from verify.study.record import write_study
+    from verify.study.record import make_directory, write_study
 
     def announce(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
+    make_directory(arguments.out)  # before minutes of work
     command = shlex.join(["verify", *sys.argv[1:]])
     if arguments.study == "slivers":
         from verify.study.slivers import sliver_study

@@ -19,6 +19,7 @@ from verify.result import Verdict
 __all__ = ["render_study"]
 
 _SCHEMA = 1
+_ACCOUNT = ("mechanical", "kinetic", "strain", "algorithmic")
 _TITLES = {"slivers": "What slivers do", "energy": "Whether energy and momenta are kept"}
 
 
@@ -134,12 +135,12 @@ def _energy(record: Mapping[str, Any]) -> Markup:
     figures = []
     for one in record["spins"]:
         curves = one["curves"]
-        shown = [(n, [float("nan") if v is None else v for v in curves[n]])
-                 for n in ("mechanical", "kinetic", "strain", "algorithmic")]  # fmt: skip
+        shown = [(name, _changes(curves[name])) for name in _ACCOUNT]
         cuts = [jump["time"] for jump in one["jumps"]]
         note = f" Ended early: {one['failure']}." if one["failure"] else ""
         figures.append(
-            tag("figure", time_panel(f"{one['scheme']}: energy, J", curves["time"], shown, cuts),
+            tag("figure",
+                time_panel(f"{one['scheme']}: change of energy, J", curves["time"], shown, cuts),
                 tag("figcaption", f"Step {one['step']:.3g} s.{note}"))
         )  # fmt: skip
     return joined(
@@ -147,11 +148,17 @@ def _energy(record: Mapping[str, Any]) -> Markup:
         tag(
             "section",
             tag("h2", "Vibrating, spinning, cut twice"),
-            tag("p", "Dashed vertical lines are cuts. Algorithmic is what the scheme itself has "
+            tag("p", "Changes since the start; mechanical is kinetic and strain energy together. "
+                "Dashed vertical lines are cuts. Algorithmic is what the scheme itself has "
                 "dissipated (negative: produced).", class_="quiet"),
             tag("div", figures, class_="panels"),
         ),
     )  # fmt: skip
+
+
+def _changes(values: list[float | None]) -> list[float]:
+    known = [float("nan") if value is None else value for value in values]
+    return [value - known[0] for value in known]
 
 
 def _origin(record: Mapping[str, Any]) -> Markup:

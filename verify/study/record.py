@@ -12,7 +12,7 @@ from typing import Any
 from verify.errors import InputError
 from verify.provenance import provenance
 
-__all__ = ["SCHEMA", "write_study"]
+__all__ = ["SCHEMA", "make_directory", "write_study"]
 
 SCHEMA = 1
 
@@ -49,10 +49,7 @@ def write_study(
     InputError
         If the directory cannot be made because a file is in its place.
     """
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise InputError("is a file; expected a directory to write into", str(directory)) from None
+    make_directory(directory)
     document = {
         "schema": SCHEMA,
         "kind": f"{kind} study",
@@ -69,6 +66,22 @@ def write_study(
     writer.writerows(listed)
     _replace(directory / f"{kind}.csv", buffer.getvalue())
     return target
+
+
+def make_directory(directory: Path) -> None:
+    """Make the directory, if it is not there.
+
+    Raises
+    ------
+    InputError
+        If a file is in its place, or it may not be made.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError("is a file; expected a directory to write into", str(directory)) from None
+    except PermissionError:
+        raise InputError("may not be written", str(directory)) from None
 
 
 def _replace(path: Path, text: str) -> None:
