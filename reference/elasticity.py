@@ -12,7 +12,7 @@ from reference.space import ConformingSpace
 from verify.scene import BodyForce, Gravity, Material, Scene, Traction
 from verify.scene.parts import on_part
 
-__all__ = ["LinearSolve", "load_form", "solve_linear"]
+__all__ = ["LinearSolve", "load_form", "plane_lame", "solve_linear"]
 
 _LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 
@@ -55,7 +55,7 @@ def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolv
 
     V = space.function_space
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    lam, mu = _plane_lame(scene.material)
+    lam, mu = plane_lame(scene.material)
     # constants, so that another material does not compile another form
     lam_, mu_ = fem.Constant(V.mesh, lam), fem.Constant(V.mesh, mu)
 
@@ -101,7 +101,7 @@ def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolv
 
 
 def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
-    """Sum up the linear form of all loads."""
+    """Sum up the linear form of all loads of a scene for the test function `v`."""
     import ufl
     from dolfinx import fem
 
@@ -162,7 +162,8 @@ def _sided_function(space: ConformingSpace, values: Any, shape: tuple[int, ...])
     return function
 
 
-def _plane_lame(material: Material) -> tuple[float, float]:
+def plane_lame(material: Material) -> tuple[float, float]:
+    """Lamé constants (λ, μ) in Pa; λ is the reduced one in plane stress."""
     mu = material.young / (2 * (1 + material.poisson))
     lam = material.young * material.poisson / ((1 + material.poisson) * (1 - 2 * material.poisson))
     return (lam, mu) if material.plane == "strain" else (2 * lam * mu / (lam + 2 * mu), mu)

@@ -2,12 +2,16 @@
 
 from collections.abc import Callable
 from time import perf_counter
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from reference.boundary_values import constrained_values
 from reference.dolfinx_versions import import_dolfinx
-from reference.elasticity import LinearSolve, solve_linear
+from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_solution
+from reference.large_strain import solve_large_strain
 from reference.meshing import (
     ConformingMesh,
     Grading,
@@ -33,9 +37,24 @@ def _refusal(scene: Scene) -> str | None:
         return f"conforming meshes of a '{scene.geometry.kind}' geometry are not offered yet"
     if scene.analysis.kind == "dynamic":
         return "dynamics is not offered by the reference yet"
-    if scene.analysis.kinematics == "corotational":
-        return "finite rotations are not offered by the reference yet"
+    if scene.analysis.kinematics == "corotational" and any(
+        quantity.kind == "strain_energy" for quantity in scene.quantities
+    ):
+        return (
+            "strain energies at finite rotation are not compared yet; ask for displacements and "
+            "openings in [[quantities]]"
+        )
     return None
+
+
+class _Equilibrium(NamedTuple):
+    """What every way to solve gives: displacement (n, 2), energy, seconds, iterations, notes."""
+
+    displacement: NDArray[np.float64]
+    strain_energy: float
+    timings: dict[str, float]
+    iterations: dict[str, int]
+    notes: dict[str, str]
 
 
 class ConformingSolver:
@@ -163,23 +182,58 @@ def _solve(
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
-        solve_linear(scene, conforming_space(make_mesh(0), degree), exact)
+        _equilibrium(scene, conforming_space(make_mesh(0), degree), exact)
     for _ in range(max(repetitions, 1)):
         start = perf_counter()
         mesh = make_mesh(level)
         space = conforming_space(mesh, degree)
         meshed = perf_counter() - start
-        result = solve_linear(scene, space, exact)
+        result = _equilibrium(scene, space, exact)
         if repetitions:
             for phase, seconds in {"meshing": meshed, **result.timings}.items():
                 timings.setdefault(phase, []).append(seconds)
     return _solution(mesh, space, result, size, timings)
 
 
+def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Equilibrium:
+    """Solve a scene by its kinematics."""
+    if scene.analysis.kinematics == "linear":
+        linear = solve_linear(scene, space, exact)
+        return _Equilibrium(
+            linear.displacement,
+            linear.strain_energy,
+            linear.timings,
+            {},
+            {
+                "linear solver": "PETSc, MUMPS Cholesky",
+                "round-off": f"{linear.round_off:.1e}",
+            },
+        )
+    unknowns, values = constrained_values(scene, space, exact)
+    finite = solve_large_strain(
+        scene.material,
+        space,
+        unknowns,
+        lambda factor: factor * values,
+        lambda v: load_form(scene, space, v, exact),
+    )
+    return _Equilibrium(
+        finite.displacement,
+        finite.strain_energy,
+        finite.timings,
+        {"newton": finite.iterations, "load steps": finite.steps},
+        {
+            "linear solver": "PETSc SNES, MUMPS Cholesky",
+            "smallest det F": f"{finite.smallest_jacobian:.3g}",
+            "steps taken again": "; ".join(finite.refused_steps) or "none",
+        },
+    )
+
+
 def _solution(
     mesh: ConformingMesh,
     space: ConformingSpace,
-    result: LinearSolve,
+    result: _Equilibrium,
     size: float,
     timings: dict[str, list[float]],
 ) -> Solution:
@@ -196,10 +250,6 @@ def _solution(
         unknowns=result.displacement.size,
         size=size,
         timings=timings,
-        notes={
-            "linear solver": "PETSc, MUMPS Cholesky",
-            "element": f"P{space.degree}",
-            "cells": str(len(mesh.cells)),
-            "round-off": f"{result.round_off:.1e}",
-        },
+        iterations=result.iterations,
+        notes={"element": f"P{space.degree}", "cells": str(len(mesh.cells)), **result.notes},
     )
