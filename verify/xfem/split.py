@@ -7,7 +7,7 @@ cut is in effect moved a little to its minus side, the same at every node. Piece
 volume then still take part in the connectivity and are left out afterwards.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,12 +21,13 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["Partition", "TipRule", "split_cells"]
+__all__ = ["Held", "Partition", "TipRule", "split_cells"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 TipRule = Literal["inside", "through", "nearest"]
+Held = Callable[[_Ints, NDArray[np.int8], int], NDArray[np.bool_]]
 
 _ROUND_OFF = 8.0 * np.finfo(float).eps
 _AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
@@ -72,7 +73,9 @@ class Partition:
         return np.bincount(self.sub_piece, self.sub_fraction, minlength=len(self.parent))
 
 
-def split_cells(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside") -> Partition:
+def split_cells(
+    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside", held: Held | None = None
+) -> Partition:
     """Split every cell that a cut goes through; the others do not appear in the result.
 
     Parameters
@@ -83,6 +86,9 @@ def split_cells(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside")
     tip : {"inside", "through", "nearest"}
         What to do where a cut ends inside an element: leave the element whole (the rule of the
         thesis, 3.2.1), split it, or whichever of the two moves the tip less.
+    held : callable, optional
+        For a cut that grows: given the cells and labels of pieces that a cut meets but does not
+        go through, and its number, tells which it shall split: those that it split before.
 
     Raises
     ------
@@ -114,7 +120,7 @@ def split_cells(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside")
     for _ in range(max(1, len(cuts))):
         before = len(partition.parent)
         for index, cut in enumerate(cuts):
-            partition = _split_by(partition, index, cut, sizes, tip)
+            partition = _split_by(partition, index, cut, sizes, tip, held)
         if len(partition.parent) == before:
             break
     return _only_split(partition)
@@ -133,7 +139,12 @@ def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]
 
 
 def _split_by(
-    partition: Partition, index: int, cut: Cut, sizes: _Floats, tip: TipRule
+    partition: Partition,
+    index: int,
+    cut: Cut,
+    sizes: _Floats,
+    tip: TipRule,
+    held: Held | None,
 ) -> Partition:
     points = partition.points
     plus = points.values[partition.sub_points, index] >= 0.0
@@ -156,6 +167,9 @@ def _split_by(
         len(partition.parent),
         tip,
     )
+    if held is not None:
+        doubtful = np.flatnonzero((np.bincount(piece, minlength=len(active)) > 0) & ~active)
+        active[doubtful] = held(partition.parent[doubtful], partition.label[doubtful], index)
     if not active.any():
         return partition
     return _bisect_beside(_divide(partition, index, active, plus), index)

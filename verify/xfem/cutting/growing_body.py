@@ -21,12 +21,13 @@ from verify.xfem.cutting.renumber_kernels import (
     match_pieces,
     number_unknowns,
     retire,
+    separated,
     write_pieces,
 )
 from verify.xfem.errors import XfemError
 from verify.xfem.joining import PatchSlots, join_slots
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.split import Partition, split_cells
+from verify.xfem.split import Held, Partition, split_cells
 
 __all__ = ["CutsNear", "GrowingBody", "Increment"]
 
@@ -101,6 +102,9 @@ class GrowingBody:
         First sub-simplex of each cell, and one past the last.
     split_cells : (m,) bool array
         Whether a cell is split.
+    held : int
+        How often a cut separated a piece only because it had done so before a later cut came:
+        where that is not 0, the cuts at once would have left some element less divided.
     """
 
     def __init__(self, mesh: SimplexMesh) -> None:
@@ -124,6 +128,7 @@ class GrowingBody:
         self.cut_count = 0
         self.split_cells = np.zeros(cells, dtype=bool)
         self._dropped = np.zeros(cells, dtype=np.int64)
+        self.held = 0
 
     @property
     def node_count(self) -> int:
@@ -167,7 +172,7 @@ class GrowingBody:
         while len(wanted):
             patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
             numbers, cuts = cuts_near(patch)
-            partition = split_cells(patch, cuts)
+            partition = split_cells(patch, cuts, held=self._held_in(patch, numbers))
             state = self._compare(patch, partition, numbers)
             more = np.setdiff1d(state.changed_cells, wanted, assume_unique=True)
             if len(more) == 0:
@@ -175,6 +180,24 @@ class GrowingBody:
             # a cell at the edge of the patch changes too: its own surroundings are needed
             wanted = np.union1d(wanted, more)
         return None
+
+    def _held_in(self, patch: MeshPatch, numbers: _Ints) -> Held:
+        """Make the rule that what a cut has separated it separates, whatever came later."""
+
+        def held(parent: _Ints, label: NDArray[np.int8], index: int) -> NDArray[np.bool_]:
+            before = separated(
+                patch.whole_cells[parent],
+                label,
+                numbers,
+                numbers[index],
+                self.piece_label.rows,
+                self.first_piece,
+                self.next_piece.rows,
+            )
+            self.held += int(before.sum())
+            return before
+
+        return held
 
     def _compare(self, patch: MeshPatch, partition: Partition, numbers: _Ints) -> "_Comparison":
         """Match the pieces of a patch with the stored ones."""

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["labelled", "match_pieces", "number_unknowns", "retire", "write_pieces"]
+__all__ = ["labelled", "match_pieces", "number_unknowns", "retire", "separated", "write_pieces"]
 
 
 @njit(cache=True)
@@ -155,4 +155,28 @@ def labelled(cells, cut, piece_label, first_piece, next_piece):
         while piece >= 0:
             found[k] = found[k] or piece_label[piece, cut] != 0
             piece = next_piece[piece]
+    return found
+
+
+@njit(cache=True)
+def separated(cells, label, numbers, cut, piece_label, first_piece, next_piece):
+    """Whether a cut has split every stored piece of which each given piece may be a part.
+
+    `numbers` says which cuts the columns of `label` (p, q) are.
+    """
+    found = np.zeros(len(cells), dtype=np.bool_)
+    for p in range(len(cells)):
+        stored = first_piece[cells[p]]
+        every, some = True, False
+        while stored >= 0 and every:
+            fits = True
+            for k in range(len(numbers)):
+                side = piece_label[stored, numbers[k]]
+                if label[p, k] != 0 and side != 0 and side != label[p, k]:
+                    fits = False
+            if fits:
+                some = True
+                every = piece_label[stored, cut] != 0
+            stored = next_piece[stored]
+        found[p] = some and every
     return found

@@ -126,7 +126,8 @@ def walk(
             strokes_near[cell] += 1
         if through or strokes_near[cell] > 1:
             candidates.append(cell)
-        if through or latest < front - size[cell]:
+        # what other strokes have left of a cell may be crossed through later than its edges
+        if strokes_near[cell] == 1 and (through or latest < front - size[cell]):
             settled[cell] = True
         else:
             frontier.append(cell)
