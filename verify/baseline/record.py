@@ -100,6 +100,8 @@ def read_baseline(path: Path) -> Baseline:
         raise InputError(f"not a JSON file ({error})", str(path)) from None
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", str(path)) from None
+    if not isinstance(content, dict):
+        raise InputError("not a JSON object", str(path))
     try:
         return Baseline.model_validate(content)
     except ValidationError as error:
