@@ -21,6 +21,7 @@ from verify.solvers.xfem_scene import (
 )
 from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.slivers import SliverReport, treat_slivers
 from verify.xfem.static import solve_static
 from verify.xfem.subdivision import Subdivision, subdivide
 from verify.xfem.virtual import VirtualMesh, cut_mesh
@@ -29,6 +30,7 @@ __all__ = ["XfemSolver"]
 
 _BASES = ("sidewise", "shifted", "heaviside")
 _TIPS = ("inside", "through", "nearest")
+_POLICIES = ("keep", "merge", "drop")
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,16 @@ class _Run:
     displacement: NDArray[np.float64]
     timings: dict[str, float]
     residual: float | None
+    slivers: SliverReport | None
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """The parameters of a solve."""
+
+    basis: str
+    tip: str
+    slivers: str
 
 
 class XfemSolver:
@@ -50,6 +62,9 @@ class XfemSolver:
         Unknowns of the enrichment; all give the same displacements up to round-off.
     tip : {"inside", "through", "nearest"}
         What happens to an element in which a cut ends; see `verify.xfem.split.split_cells`.
+    slivers : {"keep", "merge", "drop"}
+        What happens to pieces with less than a tenth of their element; see
+        `verify.xfem.slivers`. A direct static solve does not mind them, so they are kept.
     """
 
     name = "xfem"
@@ -73,6 +88,7 @@ class XfemSolver:
         repetitions: int = 1,
         basis: str = "sidewise",
         tip: str = "inside",
+        slivers: str = "keep",
     ) -> Solution:
         """Solve `scene` on mesh `level`.
 
@@ -85,7 +101,8 @@ class XfemSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        for name, value, known in (("basis", basis, _BASES), ("tip", tip, _TIPS)):
+        given = (("basis", basis, _BASES), ("tip", tip, _TIPS), ("slivers", slivers, _POLICIES))
+        for name, value, known in given:
             if value not in known:
                 raise InputError(f"{name} '{value}'; expected one of {', '.join(known)}")
         if not 0 <= level < self.levels(scene):
@@ -95,13 +112,14 @@ class XfemSolver:
             start = perf_counter()
             mesh, size = background_mesh(scene, level)
             meshing = perf_counter() - start
-            runs = [_run(scene, mesh, size, exact, basis, tip) for _ in range(1 + repetitions)]
+            choice = _Choice(basis, tip, slivers)
+            runs = [_run(scene, mesh, size, exact, choice) for _ in range(1 + repetitions)]
         except BasisError as error:  # another basis can do the scene
             raise UnsupportedSceneError(str(error)) from None
         except XfemError as error:
             raise InputError(str(error), str(scene.file or scene.name)) from None
         timings = {phase: [run.timings[phase] for run in runs[1:]] for phase in runs[0].timings}
-        return _solution(scene, runs[-1], size, {"meshing": [meshing], **timings}, basis, tip)
+        return _solution(scene, runs[-1], size, {"meshing": [meshing], **timings}, choice)
 
 
 def _exact(scene: Scene) -> Any:
@@ -113,36 +131,41 @@ def _exact(scene: Scene) -> Any:
     return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
-def _run(scene: Scene, mesh: SimplexMesh, size: float, exact: Any, basis: str, tip: str) -> _Run:
+def _run(scene: Scene, mesh: SimplexMesh, size: float, exact: Any, choice: _Choice) -> _Run:
     """Cut, load, solve: all of it, nothing kept from the run before."""
     mesh = SimplexMesh(mesh.points, mesh.cells)
     start = perf_counter()
-    virtual = cut_mesh(mesh, cuts_of(scene, size), tip)  # type: ignore[arg-type]
+    virtual = cut_mesh(mesh, cuts_of(scene, size), choice.tip)  # type: ignore[arg-type]
+    slivers = None
+    if choice.slivers != "keep":
+        virtual, slivers = treat_slivers(virtual, choice.slivers)  # type: ignore[arg-type]
     enrichment = perf_counter() - start
     supports = supports_of(scene, virtual, exact)
     load = loads_of(scene, virtual, exact)
     loading = perf_counter() - start - enrichment
     material = material_of(scene)
-    if basis == "sidewise":
+    if choice.basis == "sidewise":
         static = solve_static(virtual, material, supports, load)
         displacement, phases, residual = static.displacement, static.timings, static.residual
     else:
-        displacement, phases = solve_in_basis(virtual, material, supports, load, basis)  # type: ignore[arg-type]
+        basis: Any = choice.basis
+        displacement, phases = solve_in_basis(virtual, material, supports, load, basis)
         residual = None
     timings = {"enrichment": enrichment, "loading": loading, **phases}
-    return _Run(virtual, displacement, timings, residual)
+    return _Run(virtual, displacement, timings, residual, slivers)
 
 
 def _solution(
-    scene: Scene, run: _Run, size: float, timings: dict[str, list[float]], basis: str, tip: str
+    scene: Scene, run: _Run, size: float, timings: dict[str, list[float]], choice: _Choice
 ) -> Solution:
     virtual = run.virtual
     body = subdivide(virtual)
     notes = {
         "method": "P1 XFEM, element-wise cut",
-        "basis": basis,
-        "tip": tip,
-        "linear solver": "own sparse Cholesky" if basis == "sidewise" else "SciPy SuperLU",
+        "basis": choice.basis,
+        "tip": choice.tip,
+        "slivers": choice.slivers,
+        "linear solver": "own sparse Cholesky" if choice.basis == "sidewise" else "SciPy SuperLU",
         "timed": "every phase as listed; first call (compilation) excluded; writing excluded",
     }
     if run.residual is not None:
@@ -157,7 +180,7 @@ def _solution(
         unknowns=run.displacement.size,
         size=size,
         timings=timings,
-        regularisations=_regularisations(scene, virtual, body),
+        regularisations=[*_regularisations(scene, virtual, body), *_absorbed(run.slivers)],
         notes=notes,
     )
 
@@ -188,6 +211,21 @@ def _regularisations(scene: Scene, virtual: VirtualMesh, body: Subdivision) -> l
         kind = "end of a cut moved to an element edge"
         entries.append(Regularisation(kind, len(moved), max(moved), "m"))
     return entries
+
+
+def _absorbed(report: SliverReport | None) -> list[Regularisation]:
+    """Report slivers that a larger piece absorbed, each kind with its largest volume fraction."""
+    if report is None:
+        return []
+    counts = {
+        "sliver absorbed by its neighbour on the same side": report.merged,
+        "sliver absorbed across the cut": report.dropped,
+    }
+    return [
+        Regularisation(kind, count, report.largest, "volume fraction")
+        for kind, count in counts.items()
+        if count
+    ]
 
 
 def _moved_ends(scene: Scene, body: Subdivision) -> list[float]:
