@@ -12,7 +12,7 @@ from reference.space import ConformingSpace
 from verify.scene import BodyForce, Gravity, Material, Scene, Traction
 from verify.scene.parts import on_part
 
-__all__ = ["LinearSolve", "load_form", "plane_lame", "solve_linear"]
+__all__ = ["LinearSolve", "load_form", "plane_lame", "solve_linear", "stiffness_form"]
 
 _LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 
@@ -55,18 +55,8 @@ def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolv
 
     V = space.function_space
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    lam, mu = plane_lame(scene.material)
-    # constants, so that another material does not compile another form
-    lam_, mu_ = fem.Constant(V.mesh, lam), fem.Constant(V.mesh, mu)
-
-    def strain(w: Any) -> Any:
-        return ufl.sym(ufl.grad(w))
-
-    def stress(w: Any) -> Any:
-        return 2 * mu_ * strain(w) + lam_ * ufl.tr(strain(w)) * ufl.Identity(2)
-
     unknowns, values = constrained_values(scene, space, exact)
-    a = fem.form(ufl.inner(stress(u), strain(v)) * ufl.dx)
+    a = fem.form(stiffness_form(scene.material, u, v))
     load = fem.form(load_form(scene, space, v, exact))
 
     start = perf_counter()
@@ -84,7 +74,7 @@ def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolv
     solver.solve(vector, x)
     solved = perf_counter()
     round_off = _refine(solver, matrix, x, vector)
-    energy = fem.form(0.5 * ufl.inner(stress(solution), strain(solution)) * ufl.dx)
+    energy = fem.form(0.5 * stiffness_form(scene.material, solution, solution))
     result = LinearSolve(
         np.array(solution.x.array, dtype=float).reshape(-1, 2),
         float(np.real(fem.assemble_scalar(energy))),
@@ -98,6 +88,19 @@ def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolv
     for entry in (solver, matrix, vector):
         entry.destroy()
     return result
+
+
+def stiffness_form(material: Material, u: Any, v: Any) -> Any:
+    """Write the virtual work ∫ σ(u) : ε(v) of plane linear elasticity."""
+    import ufl
+    from dolfinx import fem
+
+    # constants, so that another material does not compile another form
+    domain = ufl.domain.extract_unique_domain(v)
+    lam, mu = (fem.Constant(domain, value) for value in plane_lame(material))
+    strain = ufl.sym(ufl.grad(u))
+    stress = 2 * mu * strain + lam * ufl.tr(strain) * ufl.Identity(2)
+    return ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx
 
 
 def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:

@@ -63,8 +63,8 @@ def singular_points(scene: Scene) -> Array:
     """Points (k, 2) where the gradient of the solution may be unbounded.
 
     Tips, kinks of more than 15°, junctions and crossings of cuts; points of the outline at which
-    a support ends or a traction jumps, and re-entrant corners. None of the outline's where the
-    supports prescribe an exact field, which is smooth there.
+    a support ends or a traction jumps, mouths in a support, and re-entrant corners. None of the
+    outline's where the supports prescribe an exact field, which is smooth there.
     """
     geometry = scene.geometry
     assert isinstance(geometry, Rectangle | Polygon)
@@ -75,6 +75,7 @@ def singular_points(scene: Scene) -> Array:
         found.append(_inner(_junctions(cuts), outline))
     if not any(support.displacement == "exact" for support in scene.supports):
         found.append(_corners(scene))
+        found.append(_held_mouths(scene, cuts))
     points = np.concatenate([f.reshape(-1, 2) for f in found])
     scale = float(np.ptp(outline, axis=0).max())
     _, first = np.unique(np.round(points / scale, 9), axis=0, return_index=True)
@@ -123,6 +124,19 @@ def _corners(scene: Scene) -> Array:
     reentrant = turn * _orientation(corners) < -1e-9 * sizes
     free = ~held & ~np.roll(held, 1)
     return corners[(held != np.roll(held, 1)) | reentrant | (free & load_jumps(scene, corners))]
+
+
+def _held_mouths(scene: Scene, cuts: list[Feature]) -> Array:
+    """Points where a cut meets an edge that is held: a clamped corner on either side."""
+    corners = divided_outline(scene)
+    held = supported_edges(scene, corners)
+    edges = [
+        Feature("the boundary", a, b)
+        for a, b, on in zip(corners, np.roll(corners, -1, axis=0), held, strict=True)
+        if on
+    ]
+    meetings = [crossing_points([cut, edge]) for cut in cuts for edge in edges]
+    return np.concatenate([np.zeros((0, 2)), *meetings])
 
 
 def _orientation(outline: Array) -> float:

@@ -51,6 +51,11 @@ def test_corners_where_a_support_ends_are_singular_and_free_ones_are_not():
     assert rounded(singular_points(square())) == set()
 
 
+def test_a_mouth_is_singular_where_the_boundary_is_held_and_not_where_it_is_free():
+    cut = polyline("a", (0.4, -0.1), (0.4, 1.1))
+    assert rounded(singular_points(square([cut], **CLAMPED_TOP))) == {(0, 1), (1, 1), (0.4, 1)}
+
+
 def test_the_end_of_an_inequality_inside_an_edge_is_singular():
     supports = [{"where": "y > 0.9999999 and x < 0.37", "displacement": [0, 0]}]
     assert rounded(singular_points(square(supports=supports))) == {(0, 1), (0.37, 1)}
