@@ -6,6 +6,7 @@ from numba import njit
 from verify.xfem.collision.simplex_kernels import (
     foot_on_facet,
     nearest_on_facet,
+    signed_volume,
     squared_distance,
 )
 
@@ -34,30 +35,34 @@ def _facets_in_box(box_low, box_high, low, high, order):
 
 
 @njit(cache=True)
-def _pierce(start, along, corners, weights):
+def _pierce(start, end, corners, weights):
     """Share of the segment at which it pierces a facet, weights written; -1 if it does not."""
-    space = len(start)
-    matrix, right = np.empty((space, space)), np.empty(space)
-    for i in range(space):
-        matrix[i, 0] = -along[i]
-        right[i] = start[i] - corners[0, i]
-        for k in range(1, space):
-            matrix[i, k] = corners[k, i] - corners[0, i]
-    if space == 2:
-        determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
-    else:
-        determinant = np.linalg.det(matrix)
-    if determinant == 0.0:
+    size = len(corners)
+    simplex = np.empty((size + 1, size))
+    simplex[1:] = corners
+    simplex[0] = start
+    before = signed_volume(simplex)
+    simplex[0] = end
+    behind = signed_volume(simplex)
+    if (before > 0.0) == (behind > 0.0) and before != 0.0 and behind != 0.0:
         return -1.0
-    solution = np.linalg.solve(matrix, right)
-    weights[0] = 1.0
-    for k in range(1, space):
-        weights[k] = solution[k]
-        weights[0] -= solution[k]
-    for k in range(space):
+    if before == behind:
+        return -1.0  # in the plane of the facet
+    # each corner's weight is the volume that the segment spans with the others
+    share, total = before / (before - behind), 0.0
+    for k in range(size):
+        simplex[0] = start
+        simplex[1:] = corners
+        simplex[k + 1] = end
+        weights[k] = signed_volume(simplex)
+        total += weights[k]
+    if total == 0.0:
+        return -1.0
+    weights /= total
+    for k in range(size):
         if weights[k] < 0.0:
             return -1.0
-    return solution[0] if 0.0 <= solution[0] <= 1.0 else -1.0
+    return share
 
 
 @njit(cache=True)
@@ -71,7 +76,7 @@ def segment_hits(start, end, points, facets, low, high, order):
     for facet in about:
         for k in range(size):
             corners[k] = points[facets[facet, k]]
-        where = _pierce(start, end - start, corners, weights)
+        where = _pierce(start, end, corners, weights)
         if where >= 0.0:
             found[count], share[count] = facet, where
             at[count] = weights
@@ -102,7 +107,7 @@ def _nearest_of_segments(p, q, a, b):
 def _segment_to_facet(start, end, corners, weights):
     """(distance, share of the segment) of the nearest points; weights on the facet written."""
     size, space = corners.shape
-    share = _pierce(start, end - start, corners, weights)
+    share = _pierce(start, end, corners, weights)
     if share >= 0.0:
         return 0.0, share
     trial, foot = np.empty(size), np.empty(space)

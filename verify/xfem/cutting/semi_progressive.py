@@ -138,6 +138,12 @@ class SemiProgressiveCutter:
         """What has been cut so far; `cut_mesh` with these gives the same pieces and joins."""
         return [stroke.cut for stroke in self.strokes]
 
+    @property
+    def level_sets(self) -> _Floats:
+        """(n, cuts) nodal level sets in metres, NaN where no cut has come near."""
+        columns = [stroke.values for stroke in self.strokes]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.mesh.points), 0))
+
     def virtual_mesh(self) -> VirtualMesh:
         """Copy the body as it is now; unknown nodes keep their numbers."""
         nodes = np.arange(len(self.mesh.points))

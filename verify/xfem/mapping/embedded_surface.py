@@ -142,7 +142,7 @@ class EmbeddedSurface:
         corners = at @ given
         weights = np.empty((*ids.shape, body.mesh.dim + 1))
         piece = embed_corners(
-            corners, label, self._level_sets(), *self._elements, body.piece_label.rows,
+            corners, label, self._cutter.level_sets, *self._elements, body.piece_label.rows,
             body.first_piece, body.next_piece.rows, weights,
         )  # fmt: skip
         vertex = self.surface.weld(
@@ -204,13 +204,6 @@ class EmbeddedSurface:
             place = np.searchsorted(nodes, mesh.cells[self._vertex_cell[vertices]])
             values[:, k] = (self._vertex_at[vertices] * level[place]).sum(axis=1)
         return np.array([stroke.number for stroke in near], dtype=np.int64), values
-
-    def _level_sets(self) -> _Floats:
-        """Nodal level sets (n, cuts) as far as known: at least at the nodes of split cells."""
-        columns = [stroke.values for stroke in self._cutter.strokes]
-        if not columns:
-            return np.zeros((len(self._cutter.mesh.points), 0))
-        return np.stack(columns, axis=1)
 
 
 def _check(points: _Floats, facets: _Ints, space: int) -> None:

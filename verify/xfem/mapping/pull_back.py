@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.cutting.growing_body import GrowingBody
+from verify.xfem.collision.simplex_kernels import signed_volume
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
 from verify.xfem.mapping.partner_kernels import partner
 
@@ -17,15 +18,17 @@ __all__ = ["pull_back"]
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
+_ON_FACE = -1e-12  # barycentric coordinates: that far outside is on the face
+
 
 def pull_back(
-    body: GrowingBody, displacement: _Floats, points: ArrayLike, start: ArrayLike
+    cutter: SemiProgressiveCutter, displacement: _Floats, points: ArrayLike, start: ArrayLike
 ) -> tuple[_Floats, _Ints]:
     """Material position of points in the deformed body.
 
     Parameters
     ----------
-    body : GrowingBody
+    cutter : SemiProgressiveCutter
     displacement : (N, s) float array
         Of the unknown nodes, in metres.
     points : (q, s) array_like
@@ -36,19 +39,22 @@ def pull_back(
     Returns
     -------
     material : (q, s) float array
-        Of a point outside the body: as if its last piece went on.
+        Of a point outside the material: as if the last piece went on.
     piece : (q,) int array
-        Piece in which it lies; -1 outside the body, or where the walk was lost in inverted
-        elements.
+        Piece in which it lies; -1 outside the material (in an open cut, too), or where the walk
+        was lost among inverted elements.
 
     Raises
     ------
     XfemError
-        If shapes do not match.
+        If shapes do not match, or the body is a membrane.
     """
+    body = cutter.body
     places = np.ascontiguousarray(points, dtype=float)
     pieces = np.ascontiguousarray(start, dtype=np.int64)
     space = body.mesh.space
+    if body.mesh.dim != space:
+        raise XfemError("a membrane does not fill the space in which its tool moves")
     if places.shape != (len(pieces), space) or displacement.shape != (body.node_count, space):
         raise XfemError(
             f"points {places.shape}, pieces {pieces.shape}, displacement {displacement.shape}; "
@@ -65,49 +71,87 @@ def pull_back(
         body.mesh.neighbours,
         body.piece_cells.rows,
         body.piece_parent.rows,
+        body.piece_label.rows,
         body.first_piece,
         body.next_piece.rows,
+        cutter.level_sets,
     )
+
+
+@njit(cache=True)
+def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, simplex, at):
+    """Write the barycentric coordinates of a place in the deformed virtual element."""
+    corners, space = simplex.shape
+    for a in range(corners):
+        for i in range(space):
+            simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
+    whole = signed_volume(simplex)
+    for a in range(corners):
+        kept = simplex[a].copy()
+        simplex[a] = place
+        at[a] = signed_volume(simplex) / whole if whole != 0.0 else -1.0
+        simplex[a] = kept
+    return at.min()
+
+
+@njit(cache=True)
+def _is_material(piece, cell, at, cells, piece_label, levels):
+    """Whether a point of a virtual element lies in its piece's share of the material."""
+    for cut in range(piece_label.shape[1]):
+        if piece_label[piece, cut] == 0:
+            continue
+        level = 0.0
+        for a in range(len(at)):
+            level += at[a] * levels[cells[cell, a], cut]
+        if (level >= 0.0) != (piece_label[piece, cut] > 0):
+            return False
+    return True
 
 
 @njit(cache=True)
 def _pull_back(
     places, pieces, displacement, points, cells, neighbours,
-    piece_cells, piece_parent, first_piece, next_piece,
+    piece_cells, piece_parent, piece_label, first_piece, next_piece, levels,
 ):  # fmt: skip
     count, space = places.shape
     corners = cells.shape[1]
     material, found = np.zeros((count, space)), np.full(count, -1)
-    matrix, right = np.empty((corners, corners)), np.ones(corners)
+    simplex, at = np.empty((corners, space)), np.empty(corners)
     for q in range(count):
         piece = pieces[q]
         for _ in range(len(cells)):
-            cell = piece_parent[piece]
-            for a in range(corners):
-                matrix[corners - 1, a] = 1.0
-                for i in range(space):
-                    matrix[i, a] = (
-                        points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
+            cell, place = piece_parent[piece], places[q]
+            least = _coordinates(
+                place, piece, cell, displacement, points, cells, piece_cells, simplex, at
+            )
+            if least >= _ON_FACE:
+                # beside a tip the pieces of an element overlap: the one with material here counts
+                other = first_piece[cell]
+                while other >= 0 and found[q] < 0:
+                    least = _coordinates(
+                        place, other, cell, displacement, points, cells, piece_cells, simplex, at
                     )
-            right[:space] = places[q]
-            at = np.linalg.solve(matrix, right)
+                    if least >= _ON_FACE and _is_material(
+                        other, cell, at, cells, piece_label, levels
+                    ):
+                        found[q] = piece = other
+                    other = next_piece[other]
+            _coordinates(place, piece, cell, displacement, points, cells, piece_cells, simplex, at)
             material[q] = 0.0
             for a in range(corners):
-                material[q] += at[a] * points[cells[cell, a]]
-            # out through the face that is farthest behind; if that is free, through the next
-            across, outside = -1, False
-            for a in np.argsort(at):
-                if at[a] >= -1e-12:
-                    break
-                outside = True
-                across = partner(
-                    piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
-                )
-                if across >= 0:
-                    break
-            if not outside:
-                found[q] = piece
+                for i in range(space):
+                    material[q, i] += at[a] * points[cells[cell, a], i]
+            if found[q] >= 0:
                 break
+            # out through the face that is farthest behind and not free
+            across, farthest = -1, _ON_FACE
+            for a in range(corners):
+                if at[a] < farthest:
+                    beyond = partner(
+                        piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
+                    )
+                    if beyond >= 0:
+                        across, farthest = beyond, at[a]
             if across < 0:
                 break
             piece = across

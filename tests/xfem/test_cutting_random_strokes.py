@@ -1,0 +1,72 @@
+"""Random strokes, generic and degenerate: the growing body never departs from the cut at once.
+
+Checked after every stroke: same pieces and joins as `cut_mesh`; volumes sum to the body's; the
+surface of the material closes, is oriented, and encloses the volume of each free body. The one
+exception is counted (`GrowingBody.held`): a later stroke may leave an earlier one, cut at once,
+ending inside an element that it had already split.
+"""
+
+import numpy as np
+import pytest
+from cut_comparison import assert_same_cut
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from random_strokes import meshes, strokes
+from surface_measures import enclosed_by_body, loose_edges, volume_by_body
+
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.mapping.body_surface import BodySurface
+from verify.xfem.virtual import cut_mesh
+
+QUICK = settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.explicit, Phase.generate],  # shrinking takes minutes; the heavy run shrinks
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
+THOROUGH = settings(
+    max_examples=3000,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
+
+
+def _claims(dim: int, most: int):
+    @given(meshes(dim), strokes(dim, most), st.lists(st.floats(0.0, 3.0), max_size=3))
+    def claim(mesh, paths, moments):
+        cutter = SemiProgressiveCutter(mesh)
+        surface = BodySurface(cutter.body)
+        for path in paths:
+            cutter.begin(path)
+            for time in [*(path.times[0] + m for m in sorted(moments)), path.times[-1]]:
+                surface.update(cutter.advance(time))
+            virtual = cutter.virtual_mesh()
+            if cutter.body.held == 0:  # else the cuts at once would join what was separate
+                assert_same_cut(
+                    virtual, cut_mesh(mesh, [p.sweep for p in paths[: len(cutter.strokes)]])
+                )
+            assert (virtual.fraction > 0.0).all()
+            np.testing.assert_allclose(virtual.volumes.sum(), 1.0, rtol=1e-13)
+            facets = surface.surface.facets.rows[surface.surface.used]
+            assert loose_edges(facets) == 0
+            # the sum of some thousand triangles' shares, each of round-off 1e-16
+            np.testing.assert_allclose(
+                enclosed_by_body(surface.surface, virtual), volume_by_body(virtual), atol=1e-12
+            )
+
+    return claim
+
+
+def test_random_strokes_in_the_plane() -> None:
+    QUICK(_claims(2, 4))()
+
+
+def test_random_strokes_in_space() -> None:
+    QUICK(_claims(3, 3))()
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("dim", [2, 3])
+def test_thousands_of_random_strokes(dim) -> None:
+    THOROUGH(_claims(dim, 4))()

@@ -1,0 +1,281 @@
+"""Separate visual and collision surfaces: embedded in pieces, split with them, in equilibrium."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from surface_measures import loose_edges
+
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.errors import XfemError
+from verify.xfem.mapping.alternative_mesh import virtual_elements
+from verify.xfem.mapping.body_surface import BodySurface
+from verify.xfem.mapping.embedded_surface import EmbeddedSurface
+from verify.xfem.mapping.pull_back import pull_back
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.tool_path import ToolPath
+
+PATHS = [
+    ToolPath.of_tip([[-0.1, -0.2, 0.48], [1.1, -0.2, 0.55]], [0.0, 1.0], [0.0, 1.4, 0.05]),
+    ToolPath.of_tip([[0.3, 1.1, 1.1], [0.33, 0.1, 1.2]], [2.0, 3.0], [0.1, 0.0, -0.7]),
+]
+
+
+def _sphere(refinements, centre, radius):
+    """An octahedron refined: vertices and outward triangles, not those of any mesh here."""
+    points = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    cells = np.array(
+        [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]]
+    )
+    for _ in range(refinements):
+        edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        unique, back = np.unique(edges, axis=0, return_inverse=True)
+        middle = points[unique].mean(axis=1)
+        number = len(points) + back.reshape(-1, 3)
+        points = np.concatenate([points, middle / np.linalg.norm(middle, axis=1)[:, None]])
+        a, b, c = cells.T
+        ab, bc, ca = number.T
+        cells = np.concatenate(
+            [np.stack(t, 1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+    return centre + radius * points, cells
+
+
+def _own_boundary(mesh):
+    outer = BodySurface(SemiProgressiveCutter(mesh).body).surface
+    heaviest = np.abs(outer.weights.rows).argmax(axis=1)
+    node = outer.nodes.rows[np.arange(len(heaviest)), heaviest]
+    return node[outer.facets.rows]
+
+
+def _cut(mesh, paths, surface_points=None, facets=None):
+    cutter = SemiProgressiveCutter(mesh)
+    body = BodySurface(cutter.body)
+    if facets is None:
+        surface_points, facets = mesh.points, _own_boundary(mesh)
+    embedded = EmbeddedSurface(cutter, surface_points, facets)
+    for path in paths:
+        cutter.begin(path)
+        for time in np.linspace(path.times[0], path.times[-1], 4):
+            increment = cutter.advance(time)
+            body.update(increment)
+            embedded.update(increment)
+    return cutter, body, embedded
+
+
+@pytest.mark.parametrize("refinements", [1, 3])
+def test_an_affine_motion_moves_every_vertex_as_it_moves_the_material(refinements) -> None:
+    points, facets = _sphere(refinements, 0.5, 0.45)
+    cutter, _, embedded = _cut(box_mesh((4, 5, 3)), PATHS, points, facets)
+    gradient, shift = np.random.default_rng(6).normal(size=(3, 3)), np.array([1.0, -2.0, 3.0])
+    nodes = cutter.mesh.points[cutter.body.node_parent.rows]
+    moved = embedded.surface.positions(nodes @ gradient + shift)
+    expected = embedded.surface.material.rows @ (np.eye(3) + gradient) + shift
+    np.testing.assert_allclose(moved, expected, atol=1e-13)
+
+
+def test_a_surface_outside_the_body_moves_with_the_nearest_element() -> None:
+    points, facets = _sphere(2, 0.5, 0.95)
+    cutter, _, embedded = _cut(box_mesh((3, 3, 3)), PATHS[:1], points, facets)
+    nodes = cutter.mesh.points[cutter.body.node_parent.rows]
+    rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    moved = embedded.surface.positions(nodes @ rotation.T - nodes)
+    np.testing.assert_allclose(moved, embedded.surface.material.rows @ rotation.T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "paths"),
+    [
+        (box_mesh((4, 3, 5)), PATHS),
+        (
+            rectangle_mesh((6, 7)),
+            [
+                ToolPath.of_tip([[-0.1, 0.43], [0.4, 0.51], [0.8, 0.3]], [0.0, 1.0, 2.0]),
+                ToolPath.of_tip([[0.3, 1.1], [0.33, 0.1]], [3.0, 4.0]),
+            ],
+        ),
+    ],
+)
+def test_the_mesh_boundary_embedded_opens_exactly_as_the_material_does(mesh, paths) -> None:
+    cutter, body, embedded = _cut(mesh, paths)
+    displacement = np.random.default_rng(7).normal(size=(cutter.body.node_count, mesh.dim))
+    used = body.surface.used
+    outer = used[~body.surface.inner.rows[used]]
+    sizes, vertices = [], []
+    for surface, rows in ((body.surface, outer), (embedded.surface, embedded.surface.used)):
+        x = surface.positions(displacement)
+        facets = surface.facets.rows[rows]
+        corners = x[facets]
+        edges = corners[:, 1:] - corners[:, :1]
+        sizes.append(np.sqrt(np.linalg.det(edges @ edges.transpose(0, 2, 1))).sum())
+        vertices.append(np.unique(x[np.unique(facets)].round(9), axis=0))
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-12)
+    assert vertices[0].shape == vertices[1].shape
+    np.testing.assert_allclose(vertices[0], vertices[1], atol=1e-9)
+
+
+def test_each_vertex_belongs_to_the_piece_that_contains_it() -> None:
+    points, facets = _sphere(3, 0.5, 0.45)
+    mesh = box_mesh((4, 4, 4))
+    cutter, _, embedded = _cut(mesh, PATHS[:1], points, facets)
+    surface = embedded.surface
+    rows = surface.used
+    # pull the two halves apart: everything above the cut by 1, everything below by -1
+    virtual = cutter.virtual_mesh()
+    side = virtual.node_side[:, 0].astype(float)
+    lift = surface.positions(np.stack([0 * side, 0 * side, side], axis=1))
+    lift = (lift - surface.material.rows)[:, 2]
+    facet_lift = lift[surface.facets.rows[rows]]
+    np.testing.assert_allclose(np.abs(facet_lift), 1.0, atol=1e-12)
+    assert (np.ptp(facet_lift, axis=1) < 1e-9).all()  # no facet spans the cut
+    height = PATHS[0].sweep.level_set(surface.material.rows[surface.facets.rows[rows]].mean(axis=1))
+    assert (np.sign(height) == np.sign(facet_lift[:, 0])).all()
+    # opened, it has two rims and no other hole: as many edges loose in one half as in the other
+    facets = surface.facets.rows[rows]
+    upper = loose_edges(facets[facet_lift[:, 0] > 0])
+    assert upper == loose_edges(facets[facet_lift[:, 0] < 0]) > 0
+
+
+def test_only_facets_near_a_cut_are_looked_at_again() -> None:
+    points, facets = _sphere(4, 0.5, 0.45)
+    mesh = box_mesh((10, 10, 10))
+    cutter = SemiProgressiveCutter(mesh)
+    embedded = EmbeddedSurface(cutter, points, facets)
+    before = len(embedded.surface.facets)
+    cutter.begin(
+        ToolPath.of_tip([[0.05, 0.5, 0.97], [0.25, 0.5, 0.97]], [0.0, 1.0], [0.0, 0.0, -0.94])
+    )
+    increment = cutter.advance(1.0)
+    embedded.update(increment)
+    looked_at = embedded.surface.retired
+    assert 0 < looked_at < 0.35 * before
+    far = points[facets[:, 0], 0] > 0.6
+    assert (embedded.surface.facets.rows[:before][far, 0] >= 0).all()
+
+
+def test_virtual_work_is_the_same_on_the_surface_and_on_the_unknowns() -> None:
+    points, facets = _sphere(3, 0.5, 0.45)
+    cutter, body, embedded = _cut(box_mesh((4, 4, 4)), PATHS, points, facets)
+    rng = np.random.default_rng(8)
+    motion = rng.normal(size=(cutter.body.node_count, 3))
+    for surface in (embedded.surface, body.surface):
+        force = rng.normal(size=surface.material.rows.shape)
+        nodal = surface.nodal_forces(force, np.zeros_like(motion))
+        velocity = surface.positions(motion) - surface.material.rows
+        work = (force * velocity).sum()
+        assert (nodal * motion).sum() == pytest.approx(work, rel=1e-12)
+        # forces in equilibrium stay so: resultant and moment
+        np.testing.assert_allclose(nodal.sum(axis=0), force.sum(axis=0), atol=1e-11)
+        x = cutter.mesh.points[cutter.body.node_parent.rows]
+        np.testing.assert_allclose(
+            np.cross(x, nodal).sum(axis=0),
+            np.cross(surface.material.rows, force).sum(axis=0),
+            atol=1e-10,
+        )
+        facet = int(surface.used[17])
+        at, push = np.array([0.2, 0.5, 0.3]), np.array([1.0, 2.0, -3.0])
+        nodal = surface.facet_force(facet, at, push, np.zeros_like(motion))
+        moved = at @ velocity[surface.facets.rows[facet]]
+        assert (nodal * motion).sum() == pytest.approx(push @ moved, rel=1e-12)
+
+
+def test_a_step_of_the_mapping_allocates_nothing() -> None:
+    points, facets = _sphere(3, 0.5, 0.45)
+    cutter, _, embedded = _cut(box_mesh((4, 4, 4)), PATHS[:1], points, facets)
+    displacement = np.zeros((cutter.body.node_count, 3))
+    out, forces = np.empty_like(embedded.surface.material.rows), np.zeros_like(displacement)
+    embedded.surface.positions(displacement, out)
+    embedded.surface.nodal_forces(out, forces)
+    tracemalloc.start()
+    for _ in range(50):
+        embedded.surface.positions(displacement, out)
+        embedded.surface.nodal_forces(out, forces)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 0.2 * out.nbytes  # views and call frames only
+
+
+def test_a_tool_in_the_deformed_body_is_found_in_the_material() -> None:
+    cutter, _, _ = _cut(box_mesh((4, 4, 4)), PATHS)
+    body = cutter.body
+    rng = np.random.default_rng(9)
+    nodes = cutter.mesh.points[body.node_parent.rows]
+    # a rotation by 60 degrees and a stretch, and the cuts opened by a random 2 %
+    angle = np.pi / 3
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.3]]
+    )
+    displacement = nodes @ turn.T - nodes + 0.005 * rng.normal(size=nodes.shape)
+    # in every piece a point of its material: the centroid of a sub-simplex, or of the element
+    virtual = cutter.virtual_mesh()
+    wanted = virtual.piece_centroids
+    share = virtual.shape_integrals / virtual.volumes[:, None]
+    place = np.einsum("pa,pas->ps", share, nodes[virtual.cells] + displacement[virtual.cells])
+    order = np.argsort(body.piece_parent.rows, kind="stable")
+    same, found = pull_back(cutter, displacement, place, order)
+    np.testing.assert_array_equal(found, order)
+    np.testing.assert_allclose(same, wanted, atol=1e-12)
+    # from a neighbour it walks there, through shared unknowns only
+    start = np.array([_neighbour(cutter, p) for p in order])
+    assert (start != order).sum() > 0.9 * len(order)
+    walked, found = pull_back(cutter, displacement, place, start)
+    np.testing.assert_array_equal(found, order)
+    np.testing.assert_allclose(walked, wanted, atol=1e-12)
+    outside, found = pull_back(cutter, displacement, place + 10.0, order)
+    assert (found == -1).all()
+    assert np.isfinite(outside).all()
+
+
+def test_a_tool_in_an_open_cut_is_outside_the_material() -> None:
+    cutter, _, _ = _cut(box_mesh((3, 3, 3)), PATHS[:1])
+    body = cutter.body
+    virtual = cutter.virtual_mesh()
+    displacement = np.zeros((body.node_count, 3))
+    displacement[:, 2] = 0.1 * virtual.node_side[:, 0]
+    below = int(np.flatnonzero(body.piece_label.rows[:, 0] < 0)[0])
+    height = 0.48 + 0.07 / 1.2 * 0.6 + 0.05 / 1.4 * 0.7  # of the cut at (0.5, 0.5)
+    above_gap = [[0.5, 0.5, height + z] for z in (-0.12, 0.0, 0.12)]
+    _, piece = pull_back(cutter, displacement, above_gap, [below] * 3)
+    assert piece[0] >= 0
+    assert body.piece_label.rows[piece[0], 0] <= 0
+    assert piece[1] == -1
+    assert piece[2] == -1  # the other half cannot be reached through the cut
+
+
+def _neighbour(cutter, piece):
+    """A piece that shares all but one unknown with this one, or the piece itself."""
+    body = cutter.body
+    mine = body.piece_cells.rows[piece]
+    shared = np.isin(body.piece_cells.rows, mine).sum(axis=1)
+    others = np.flatnonzero(shared == 3)
+    return int(others[0]) if len(others) else piece
+
+
+def test_virtual_elements_are_whole_elements_where_their_unknowns_are() -> None:
+    cutter, _, _ = _cut(box_mesh((2, 2, 3)), PATHS[:1])
+    body, mesh = cutter.body, cutter.mesh
+    displacement = np.random.default_rng(10).normal(size=(body.node_count, 3))
+    elements = virtual_elements(body, displacement)
+    moved = elements - mesh.points[mesh.cells[body.piece_parent.rows]]
+    np.testing.assert_allclose(moved, displacement[body.piece_cells.rows], atol=1e-15)
+    with pytest.raises(XfemError, match="displacement of shape"):
+        virtual_elements(body, displacement[1:])
+
+
+def test_bad_input_is_refused_with_its_reason() -> None:
+    cutter = SemiProgressiveCutter(box_mesh((1, 1, 1)))
+    points, facets = _sphere(0, 0.5, 0.4)
+    for wrong, message in (
+        ((points[:, :2], facets), "surface points of shape"),
+        ((points, facets[:, :2]), "surface facets of shape"),
+        ((points, facets + 1), "outside 0..5"),
+        ((points, [[0, 1, 1]]), "a vertex twice"),
+    ):
+        with pytest.raises(XfemError, match=message):
+            EmbeddedSurface(cutter, *wrong)
+    surface = EmbeddedSurface(cutter, points, facets).surface
+    with pytest.raises(XfemError, match="2 nodal values; expected at least"):
+        surface.positions(np.zeros((2, 3)))
+    surface.retire(np.array([3]))
+    with pytest.raises(XfemError, match="facet 3 is no longer in use"):
+        surface.facet_force(3, np.ones(3) / 3, np.ones(3), np.zeros((8, 3)))
