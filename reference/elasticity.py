@@ -12,7 +12,14 @@ from reference.space import ConformingSpace
 from verify.scene import BodyForce, Gravity, Material, Scene, Traction
 from verify.scene.parts import on_part
 
-__all__ = ["LinearSolve", "load_form", "plane_lame", "solve_linear", "stiffness_form"]
+__all__ = [
+    "LinearSolve",
+    "direct_solver",
+    "load_form",
+    "plane_lame",
+    "solve_linear",
+    "stiffness_form",
+]
 
 _LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 
@@ -69,7 +76,7 @@ def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolv
     # symmetric elimination; the free rows keep their equilibrium, and any component can be held
     matrix.zeroRowsColumns(unknowns, 1.0, x, vector)
     assembled = perf_counter()
-    solver = _direct_solver(matrix)
+    solver = direct_solver(matrix)
     factored = perf_counter()
     solver.solve(vector, x)
     solved = perf_counter()
@@ -172,7 +179,8 @@ def plane_lame(material: Material) -> tuple[float, float]:
     return (lam, mu) if material.plane == "strain" else (2 * lam * mu / (lam + 2 * mu), mu)
 
 
-def _direct_solver(matrix: Any) -> Any:
+def direct_solver(matrix: Any) -> Any:
+    """Factorise a symmetric positive definite matrix by MUMPS; gives a PETSc KSP."""
     from petsc4py import PETSc
 
     matrix.setOption(PETSc.Mat.Option.SPD, True)

@@ -1,0 +1,275 @@
+"""Linear motion of a cut body: generalised-α (Newmark), implicit Euler, an energy ledger."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.elasticity import direct_solver, stiffness_form
+from reference.space import ConformingSpace
+from verify.errors import InputError
+from verify.scene import Material
+
+__all__ = ["LinearMotion", "Moment", "Scheme", "generalised_alpha", "implicit_euler", "inherit"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Parameters of one-step schemes with one unknown acceleration a₊.
+
+    M a_{n+1−α_m} + C v_{n+1−α_f} + K u_{n+1−α_f} = f, where n+1−α is (1−α)·new + α·old, with
+    u₊ = u + Δt v + Δt² (β₀ a + β a₊) and v₊ = v + Δt (γ₀ a + γ a₊).
+    """
+
+    alpha_m: float
+    alpha_f: float
+    beta_old: float
+    beta: float
+    gamma_old: float
+    gamma: float
+
+
+def generalised_alpha(spectral_radius: float = 1.0) -> Scheme:
+    """Make the generalised-α scheme of a spectral radius at infinite frequency.
+
+    Of second order (Chung & Hulbert, J. Appl. Mech. 60, 1993). At 1 it is the midpoint form of
+    the trapezoidal rule and dissipates nothing.
+    """
+    rho = spectral_radius
+    if not 0.0 <= rho <= 1.0:
+        raise InputError(f"spectral radius {rho}; expected 0 to 1")
+    alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
+    beta, gamma = (1 - alpha_m + alpha_f) ** 2 / 4, 0.5 - alpha_m + alpha_f
+    return Scheme(alpha_m, alpha_f, 0.5 - beta, beta, 1 - gamma, gamma)
+
+
+def implicit_euler() -> Scheme:
+    """Make implicit Euler: u₊ = u + Δt v₊, v₊ = v + Δt a₊.
+
+    Of first order; an amplitude is multiplied by 1/√(1+(ωΔt)²) per step.
+    """
+    return Scheme(0.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """State and energies at one time.
+
+    Attributes
+    ----------
+    time : float
+        s.
+    displacement, velocity : (n, 2) arrays
+        m, m/s.
+    kinetic, strain, work : float
+        J/m; `work` is what loads have done since the start.
+    dissipated : float
+        By damping and by the scheme since the start, J/m: what closes the balance.
+    """
+
+    time: float
+    displacement: Array
+    velocity: Array
+    kinetic: float
+    strain: float
+    work: float
+    dissipated: float
+
+
+class LinearMotion:
+    """Linear elastic motion on one mesh, from a given state; supports stay where they are.
+
+    Parameters
+    ----------
+    material : Material
+        With a density.
+    space : ConformingSpace
+    unknowns : (k,) int array
+        Scalar unknowns held at their initial displacement.
+    displacement, velocity : (n, 2) arrays
+        At the nodes of the space at `start`, m and m/s.
+    load : callable, optional
+        Gives the linear form of constant loads for a test function.
+    damping : (float, float)
+        Rayleigh: mass (1/s) and stiffness (s) factors.
+    start : float
+        Time, s.
+    """
+
+    def __init__(
+        self,
+        material: Material,
+        space: ConformingSpace,
+        unknowns: NDArray[np.int32],
+        displacement: Array,
+        velocity: Array,
+        load: Any = None,
+        damping: tuple[float, float] = (0.0, 0.0),
+        start: float = 0.0,
+    ) -> None:
+        import ufl
+        from dolfinx import fem
+        from dolfinx.fem import petsc
+
+        if material.density is None:
+            raise InputError("material.density is missing: motion needs it")
+        V = space.function_space
+        u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+        density = fem.Constant(V.mesh, np.asarray(material.density))
+        self._stiffness = _matrix(stiffness_form(material, u, v))
+        self._mass = _matrix(density * ufl.inner(u, v) * ufl.dx)
+        self._damping, self._unknowns, self._time = damping, unknowns, start
+        self._u = _vector(self._stiffness, displacement)
+        self._v = _vector(self._stiffness, velocity)
+        self._v.array[unknowns] = 0.0
+        zero = fem.Constant(V.mesh, np.zeros(2))
+        form = ufl.inner(zero, v) * ufl.dx if load is None else load(v)
+        self._force: Any = petsc.assemble_vector(fem.form(form))
+        self._a = self._initial_acceleration()
+
+    def run(self, scheme: Scheme, step: float, steps: int, every: int = 1) -> Iterator[Moment]:
+        """March in time; give the initial state and every `every`-th of `steps` states.
+
+        Parameters
+        ----------
+        scheme : Scheme
+        step : float
+            Δt, s.
+        steps, every : int
+        """
+        mass, stiffness = self._damping
+        solver = self._effective(scheme, step)
+        start_total = self._total()
+        work = 0.0
+        yield self._moment(work, start_total)
+        right, part = self._u.duplicate(), self._u.duplicate()
+        for n in range(1, steps + 1):
+            # predictors with a₊ = 0, then one solve for a₊
+            u_p, v_p = self._u.copy(), self._v.copy()
+            u_p.axpy(step, self._v)
+            u_p.axpy(step**2 * scheme.beta_old, self._a)
+            v_p.axpy(step * scheme.gamma_old, self._a)
+            u_mid = _between(u_p, self._u, scheme.alpha_f)
+            v_mid = _between(v_p, self._v, scheme.alpha_f)
+            u_mid.axpy(stiffness, v_mid)
+            self._stiffness.mult(u_mid, right)
+            v_mid.scale(mass)
+            v_mid.axpy(scheme.alpha_m, self._a)
+            self._mass.mult(v_mid, part)
+            right.axpy(1.0, part)
+            right.aypx(-1.0, self._force)
+            right.array[self._unknowns] = 0.0
+            before = self._u.copy()
+            solver.solve(right, self._a)
+            u_p.axpy(step**2 * scheme.beta, self._a)
+            v_p.axpy(step * scheme.gamma, self._a)
+            self._u, self._v = u_p, v_p
+            before.aypx(-1.0, self._u)
+            work += float(self._force.dot(before))
+            self._time += step
+            if n % every == 0 or n == steps:
+                yield self._moment(work, start_total)
+        solver.destroy()
+
+    def _effective(self, scheme: Scheme, step: float) -> Any:
+        mass, stiffness = self._damping
+        keep = 1 - scheme.alpha_f
+        matrix = self._mass.copy()
+        matrix.scale(1 - scheme.alpha_m + keep * scheme.gamma * step * mass)
+        matrix.axpy(
+            keep * (scheme.beta * step**2 + scheme.gamma * step * stiffness), self._stiffness
+        )
+        matrix.zeroRowsColumns(self._unknowns, 1.0)
+        return direct_solver(matrix)
+
+    def _initial_acceleration(self) -> Any:
+        """M a = f − C v − K u with a = 0 where held."""
+        right, part, mixed = (self._u.duplicate() for _ in range(3))
+        mass, stiffness = self._damping
+        self._u.copy(mixed)
+        mixed.axpy(stiffness, self._v)
+        self._stiffness.mult(mixed, right)
+        self._mass.mult(self._v, part)
+        right.axpy(mass, part)
+        right.aypx(-1.0, self._force)
+        right.array[self._unknowns] = 0.0
+        matrix = self._mass.copy()
+        matrix.zeroRowsColumns(self._unknowns, 1.0)
+        solver = direct_solver(matrix)
+        acceleration = self._u.duplicate()
+        solver.solve(right, acceleration)
+        solver.destroy()
+        return acceleration
+
+    def _energies(self) -> tuple[float, float]:
+        product = self._u.duplicate()
+        self._mass.mult(self._v, product)
+        kinetic = 0.5 * float(self._v.dot(product))
+        self._stiffness.mult(self._u, product)
+        return kinetic, 0.5 * float(self._u.dot(product))
+
+    def _total(self) -> float:
+        return sum(self._energies())
+
+    def _moment(self, work: float, start_total: float) -> Moment:
+        kinetic, strain = self._energies()
+        return Moment(
+            self._time,
+            np.array(self._u.array, dtype=float).reshape(-1, 2),
+            np.array(self._v.array, dtype=float).reshape(-1, 2),
+            kinetic,
+            strain,
+            work,
+            start_total + work - kinetic - strain,
+        )
+
+
+def inherit(closed: ConformingSpace, opened: ConformingSpace, field: Array) -> Array:
+    """Carry nodal values (n, 2) over to the same mesh with more of its cuts open.
+
+    Every copy of a node starts with the value that the node had: nothing jumps when a cut
+    opens, so energy and momentum go on.
+
+    Raises
+    ------
+    InputError
+        If the two are not the same cells.
+    """
+    same = closed.cell_nodes.shape == opened.cell_nodes.shape and np.allclose(
+        closed.node_points[closed.cell_nodes],
+        opened.node_points[opened.cell_nodes],
+        rtol=0.0,
+        atol=1e-12 * float(np.ptp(closed.node_points, axis=0).max()),
+    )
+    if not same:
+        raise InputError("the opened mesh does not have the cells of the closed one")
+    values = np.empty((len(opened.node_points), field.shape[1]))
+    values[opened.cell_nodes] = field[closed.cell_nodes]
+    return values
+
+
+def _matrix(form: Any) -> Any:
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
+    matrix = petsc.assemble_matrix(fem.form(form))
+    matrix.assemble()
+    return matrix
+
+
+def _vector(matrix: Any, values: Array) -> Any:
+    vector = matrix.createVecRight()
+    vector.array[:] = values.ravel()
+    return vector
+
+
+def _between(later: Any, earlier: Any, alpha: float) -> Any:
+    """Mix (1 − α) later + α earlier."""
+    mixed = later.copy()
+    mixed.scale(1 - alpha)
+    mixed.axpy(alpha, earlier)
+    return mixed
