@@ -58,6 +58,12 @@ class Other(Instant):
     name = "other"
 
 
+class Wrong(Instant):
+    """Stretches twice as much as it should."""
+
+    strain = 0.2
+
+
 class Refusing(Instant):
     def refuses(self, scene):
         return "it only does beams"

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,14 @@ import verify
 from verify.provenance import versions
 from verify.scene import MeshFile, Scene, mesh_path
 
-__all__ = ["code_of_comparison", "code_of_solvers", "digest_of", "file_digest", "physics_digest"]
+__all__ = ["code_of_comparison", "code_of_solver", "digest_of", "file_digest", "physics_digest"]
 
 _PACKAGE = Path(verify.__file__).resolve().parent
-# what can change a solution
-_SOLVING = ("errors.py", "scene", "solution.py", "solvers", "xfem", "methods", "runner/solve.py")
+# what can change any solution, and those of solvers that are built on our own methods
+_SOLVING = ("errors.py", "scene", "solution.py", "solvers", "runner/solve.py", "calibration.py")
+_METHODS = ("xfem", "methods")
+# the layers forbid them to import our methods, so that these do not make them solve again
+_INDEPENDENT = ("conforming", "reference")
 # what can change a verdict, given the solutions
 _COMPARING = ("result.py", "compare", "study", "verdict.py", "runner/assess.py")
 
@@ -46,9 +50,11 @@ def physics_digest(scene: Scene) -> str:
     return digest_of(content)
 
 
-def code_of_solvers() -> str:
-    """Return the hash of the sources and of the versions that a solution depends on."""
-    return digest_of([versions(), _sources(_SOLVING, _PACKAGE.parent / "reference")])
+@cache
+def code_of_solver(name: str) -> str:
+    """Return the hash of the sources and of the versions that a solver's answers depend on."""
+    parts = _SOLVING if name in _INDEPENDENT else (*_SOLVING, *_METHODS)
+    return digest_of([versions(), _sources(parts, _PACKAGE.parent / "reference")])
 
 
 def code_of_comparison() -> str:

@@ -11,7 +11,7 @@ from verify.errors import InputError
 from verify.result import SolveRecord, Status
 from verify.runner.child import POLL_SECONDS, Child
 from verify.runner.directory import RunDirectory
-from verify.runner.fingerprint import code_of_solvers, digest_of, physics_digest
+from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.interruption import StopRequest
 from verify.runner.job import Job
 from verify.runner.log import telling_line
@@ -97,23 +97,30 @@ def survey_solvers(scenes: Sequence[Scene], options: Options, stop: StopRequest)
 def plan_case(scene: Scene, options: Options, survey: Survey, directory: RunDirectory) -> CasePlan:
     """Lay out the solves of `scene`, coarse to fine."""
     plan = CasePlan(scene, solvers_of(scene, options))
-    physics, code = physics_digest(scene), code_of_solvers()
+    physics = physics_digest(scene)
     for name in plan.solvers:
         answer = survey[name]
         parameters = options.parameters.get(name, {})
-
-        def job(level: int, name: str = name, parameters: dict[str, Any] = parameters) -> Job:
-            what = [physics, name, level, options.repetitions, parameters]
-            key = digest_of([*what, code, survey[name].get("source", "")])
-            folder = directory.solve_folder(scene.name, name, level)
-            return Job(scene.name, name, level, options.repetitions, key, folder, parameters)
-
+        code = [code_of_solver(name), answer.get("source", "")]
+        asked = answer.get("cases", {}).get(scene.name, {})
+        jobs = [
+            Job(
+                case=scene.name,
+                solver=name,
+                level=level,
+                repetitions=options.repetitions,
+                key=digest_of([physics, name, level, options.repetitions, parameters, code]),
+                folder=directory.solve_folder(scene.name, name, level),
+                parameters=parameters,
+            )
+            for level in range(max(asked.get("levels", 0), 1))
+        ]
         if answer["error"]:
-            plan.refused.append((job(0), job(0).blank(Status.FAILED, answer["error"])))
-        elif refusal := answer["cases"][scene.name]["refusal"]:
-            plan.refused.append((job(0), job(0).blank(Status.REFUSED, refusal)))
+            plan.refused.append((jobs[0], jobs[0].blank(Status.FAILED, answer["error"])))
+        elif asked["refusal"]:
+            plan.refused.append((jobs[0], jobs[0].blank(Status.REFUSED, asked["refusal"])))
         else:
-            plan.jobs += [job(level) for level in range(answer["cases"][scene.name]["levels"])]
+            plan.jobs += jobs[: asked["levels"]]
     return plan
 
 

@@ -12,11 +12,22 @@ __all__ = ["read_json", "write_json"]
 
 
 def write_json(content: Any, path: Path) -> None:
-    """Write `content` in one step: a reader, or a kill at any time, never sees half a file."""
+    """Write `content` in one step: a reader, or a kill at any time, never sees half a file.
+
+    Raises
+    ------
+    OSError
+        With the name of the file; what was there before stays.
+    """
     partial = path.with_name(path.name + ".partial")
     text = json.dumps(_plain(content), indent=1, allow_nan=False)
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+    try:
+        partial.write_text(text, encoding="utf-8")
+        os.replace(partial, path)
+    except OSError as error:
+        error.filename = error.filename or str(path)  # a full disk does not say where
+        partial.unlink(missing_ok=True)
+        raise
 
 
 def read_json(path: Path) -> dict[str, Any]:

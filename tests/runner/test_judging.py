@@ -1,0 +1,77 @@
+"""From the solves of a case to its verdicts, and to the exit code."""
+
+import json
+
+import pytest
+
+INSTANT, WRONG = "fake_solvers:Instant", "fake_solvers:Wrong"
+
+
+def check(solver, metric="displacement_l2", at_most=1e-10):
+    return (
+        f'\n[[acceptance]]\ncheck = "error"\nsolver = "{solver}"\n'
+        f'metric = "{metric}"\nat_most = {at_most}\n'
+    )
+
+
+def with_checks(verify, *checks):
+    case = verify.folder / "square.toml"
+    case.write_text(case.read_text() + "".join(checks))
+
+
+def verdicts(done):
+    (case,) = json.loads(done.stdout)["cases"]
+    return {v["solver"]: (v["verdict"], v["reason"]) for v in case["verdicts"]}
+
+
+def test_a_right_solver_passes_and_a_wrong_one_fails_whatever_else_died(verify):
+    with_checks(verify, check(INSTANT), check(WRONG), check("fake_solvers:Raising"))
+    solvers = [f"--solver={s}" for s in (INSTANT, WRONG, "fake_solvers:Raising")]
+    done = verify("run", "square.toml", "--out", "out", "--json", "-j", "2", *solvers)
+    found = verdicts(done)
+    assert found[INSTANT][0] == "PASS"
+    assert found[WRONG][0] == "FAIL"
+    assert found["fake_solvers:Raising"][0] == "ERROR"
+    assert "the pivot is zero" in found["fake_solvers:Raising"][1]
+    assert done.returncode == json.loads(done.stdout)["exit"] == 1
+
+
+@pytest.mark.parametrize(("options", "code"), [((), 0), (("--strict",), 5)])
+def test_a_check_of_a_solver_that_was_not_asked_for_stays_undecided(verify, options, code):
+    with_checks(verify, check(INSTANT), check("xfem"))
+    done = verify("run", "square.toml", "--out", "out", "--json", "--solver", INSTANT, *options)
+    assert verdicts(done)["xfem"] == ("UNDECIDED", "the run was not asked for solver 'xfem'")
+    assert verdicts(done)[INSTANT][0] == "PASS"
+    assert done.returncode == code
+
+
+def test_changed_acceptance_is_judged_again_without_solving(verify):
+    solves = verify.folder / "solves"
+    command = ("run", "square.toml", "--out", "out", "--json", "--solver", WRONG)
+    with_checks(verify, check(WRONG))
+    assert verdicts(verify(*command, COUNT_SOLVES=str(solves)))[WRONG][0] == "FAIL"
+    case = verify.folder / "square.toml"
+    case.write_text(case.read_text().replace("at_most = 1e-10", "at_most = 10.0"))
+    assert verdicts(verify(*command, COUNT_SOLVES=str(solves)))[WRONG][0] == "PASS"
+    assert len(solves.read_text().splitlines()) == 2
+
+
+def test_a_comparison_that_dies_is_an_error_of_its_checks_and_the_solves_stay(verify):
+    (verify.folder / "saboteur").mkdir()
+    (verify.folder / "saboteur" / "sitecustomize.py").write_text(
+        "import os, sys\n"
+        "if 'verify.runner.assess' in sys.orig_argv:\n"
+        "    print('FloatingPointError: overflow'); sys.stdout.flush(); os._exit(7)\n"
+    )
+    with_checks(verify, check(INSTANT))
+    command = ("run", "square.toml", "--out", "out", "--json", "--solver", INSTANT)
+    path = f"{verify.folder / 'saboteur'}:{verify.environment['PYTHONPATH']}"
+    done = verify(*command, PYTHONPATH=path)
+    reason = "comparison failed: FloatingPointError: overflow (exit code 7)"
+    assert verdicts(done)[INSTANT] == ("ERROR", reason)
+    assert done.returncode == 3
+    assert {r["status"] for r in verify.records().values()} == {"solved"}
+    # the same command then only compares
+    again = verify(*command)
+    assert verdicts(again)[INSTANT][0] == "PASS"
+    assert again.stderr.count("taken over") == 2

@@ -1,0 +1,173 @@
+"""The adapter puts a scene before the compact solver as it was meant, and says what it changed."""
+
+import meshio
+import numpy as np
+import pytest
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.scene import load_scene
+from verify.solvers.xfem import XfemSolver
+from verify.xfem.structured_meshes import rectangle_mesh
+
+STRIP = """
+title = "A hanging strip, cut halfway"
+requirement = "It shall hang."
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [0.02, 0.1]
+[mesh]
+cells = [[4, 21], [8, 41]]
+[material]
+young = 1e4
+poisson = 0.3
+density = 1000.0
+plane = "strain"
+[[supports]]
+where = "top"
+displacement = [0.0, 0.0]
+[[loads]]
+kind = "gravity"
+acceleration = [0.0, -9.8]
+[[cuts]]
+kind = "polyline"
+points = [[0.0, 0.05], [0.01, 0.05]]
+"""
+
+
+SLIDING = '"top"\ncomponents = ["y"]\ndisplacement = [0.0]'
+
+
+def scene(folder, *changes, base=STRIP):
+    text = base
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "strip.toml").write_text(text)
+    return load_scene(folder / "strip.toml")
+
+
+def strain_energy(solution, young=1e4, poisson=0.3):
+    """Strain energy of a P1 field, from its cells alone."""
+    corners = solution.points[solution.cells]
+    moved = solution.displacement[-1][solution.cells]
+    edges, area = corners[:, 1:] - corners[:, :1], None
+    area = np.linalg.det(edges) / 2
+    gradient = (np.linalg.inv(edges) @ (moved[:, 1:] - moved[:, :1])).transpose(0, 2, 1)
+    strain = 0.5 * (gradient + gradient.transpose(0, 2, 1))
+    lam = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    mu = young / (2 * (1 + poisson))
+    trace = np.trace(strain, axis1=1, axis2=2)
+    return float(area @ (0.5 * lam * trace**2 + mu * (strain**2).sum(axis=(1, 2))))
+
+
+def test_the_three_bases_give_the_same_displacements(tmp_path):
+    strip = scene(tmp_path)
+    solutions = [
+        XfemSolver().solve(strip, 1, basis=b) for b in ("sidewise", "shifted", "heaviside")
+    ]
+    scale = np.abs(solutions[0].displacement).max()
+    for other in solutions[1:]:
+        # round-off times the condition number of a mesh of 41 elements in length, about 1e5
+        np.testing.assert_allclose(
+            other.displacement, solutions[0].displacement, rtol=0, atol=1e-9 * scale
+        )
+        assert other.unknowns == solutions[0].unknowns
+
+
+def test_the_patch_has_its_exact_energy_on_every_level():
+    patch = load_scene("statics/f1_patch")
+    for level in range(XfemSolver().levels(patch)):
+        solution = XfemSolver().solve(patch, level)
+        assert strain_energy(solution, young=1.0) == pytest.approx(3.434065934e-3, rel=1e-9)
+
+
+def test_the_work_of_gravity_is_twice_the_strain_energy(tmp_path):
+    """Clapeyron; the work is integrated on the stored field, the energy too."""
+    solution = XfemSolver().solve(scene(tmp_path), 1)
+    corners = solution.points[solution.cells]
+    area = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 2
+    fall = solution.displacement[-1][solution.cells][:, :, 1].mean(axis=1)
+    work = -9.8 * 1000.0 * float(area @ fall)
+    assert work == pytest.approx(2 * strain_energy(solution), rel=1e-10)
+
+
+def test_an_end_inside_an_element_is_reported_with_how_far_it_moved(tmp_path):
+    on_edge = XfemSolver().solve(scene(tmp_path), 0)
+    assert not [r for r in on_edge.regularisations if "end of a cut" in r.kind]
+    # 2 mm past an edge, in elements 5 mm wide, along the middle of a row of elements
+    inside = XfemSolver().solve(scene(tmp_path, ("[0.01, 0.05]", "[0.012, 0.05]")), 0)
+    (moved,) = [r for r in inside.regularisations if "end of a cut" in r.kind]
+    assert (moved.count, moved.unit) == (1, "m")
+    ends = inside.cut_facets.reshape(-1, 2)[:, 0].max()
+    assert moved.size == pytest.approx(0.012 - ends, abs=1e-12)
+
+
+def test_a_cut_that_reaches_no_element_is_reported(tmp_path):
+    tiny = scene(tmp_path, ("[[0.0, 0.05], [0.01, 0.05]]", "[[0.0101, 0.05], [0.0102, 0.05]]"))
+    solution = XfemSolver().solve(tiny, 0)
+    (moved,) = [r for r in solution.regularisations if "end of a cut" in r.kind]
+    assert moved.count == 2
+    assert len(solution.cut_facets) == 0
+
+
+def test_a_given_mesh_gives_the_same_as_the_structured_one(tmp_path):
+    mesh = rectangle_mesh([8, 41], (0.0, 0.0), (0.02, 0.1))
+    shuffled = np.random.default_rng(3).permutation(len(mesh.points))
+    place = np.argsort(shuffled)
+    points = np.column_stack([mesh.points[shuffled], np.zeros(len(shuffled))])
+    meshio.Mesh(points, [("triangle", place[mesh.cells])]).write(tmp_path / "body.vtu")
+    rectangle = 'kind = "rectangle"\nlower = [0.0, 0.0]\nupper = [0.02, 0.1]'
+    given = scene(
+        tmp_path,
+        (rectangle, 'kind = "file"\nfile = "body.vtu"'),
+        ("cells = [[4, 21], [8, 41]]", 'pattern = "given"'),
+        ('"top"', '"y > 0.0999999"'),
+    )
+    one = XfemSolver().solve(given, 0)
+    other = XfemSolver().solve(scene(tmp_path), 1)
+    assert strain_energy(one) == pytest.approx(strain_energy(other), rel=1e-10)
+
+
+def test_timings_have_one_entry_per_repetition_and_the_first_call_is_not_among_them(tmp_path):
+    solution = XfemSolver().solve(scene(tmp_path), 0, repetitions=4)
+    phases = {"enrichment", "loading", "analysis", "assembly", "factorisation", "solve"}
+    assert set(solution.timings) == phases | {"meshing"}
+    assert {len(solution.timings[phase]) for phase in phases} == {4}
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ([('"top"', '"x > 5"')], r"supports\[0\]\.where: no node of the boundary lies in 'x > 5'"),
+        ([("[0.01, 0.05]", "[0.02, 0.05]")], "is not held"),
+        ([('"top"\ndisplacement = [0.0, 0.0]', SLIDING)], "is not held"),
+    ],
+    ids=["support nowhere", "piece cut off", "sliding"],
+)  # fmt: skip
+def test_what_cannot_be_solved_is_said_in_one_line(tmp_path, changes, said):
+    with pytest.raises(InputError, match=said) as caught:
+        XfemSolver().solve(scene(tmp_path, *changes), 0)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("parameters", [{"basis": "plain"}, {"tip": "nowhere"}])
+def test_an_unknown_parameter_is_named(tmp_path, parameters):
+    with pytest.raises(InputError, match="expected one of"):
+        XfemSolver().solve(scene(tmp_path), 0, **parameters)
+
+
+@pytest.mark.parametrize("level", [-1, 2])
+def test_a_level_that_is_not_there_is_refused(tmp_path, level):
+    with pytest.raises(InputError, match=r"expected 0\.\.1"):
+        XfemSolver().solve(scene(tmp_path), level)
+
+
+@pytest.mark.parametrize(
+    "analysis", ['kind = "dynamic"\nduration = 1.0', 'kinematics = "corotational"']
+)
+def test_what_the_adapter_does_not_offer_is_refused_before_and_while_solving(tmp_path, analysis):
+    asked = scene(tmp_path, ("[[supports]]", f"[analysis]\n{analysis}\n[[supports]]"))
+    assert XfemSolver().refuses(asked)
+    with pytest.raises(UnsupportedSceneError):
+        XfemSolver().solve(asked, 0)
