@@ -1,0 +1,188 @@
+"""Collision: the tree answers as brute force does, before and after the surface has moved."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from verify.xfem.collision.bounding_tree import BoundingTree
+from verify.xfem.collision.simplex_kernels import nearest_on_facet
+from verify.xfem.collision.surface_collider import SurfaceCollider
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.errors import XfemError
+from verify.xfem.mapping.body_surface import BodySurface
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.tool_path import ToolPath
+
+
+def _nearest_by_sampling(x, corners, n=60):
+    """Smallest distance to a fine grid of points of a facet: an upper bound, good to 1/n."""
+    grid = [np.array([1 - t, t]) for t in np.linspace(0, 1, n * n)]
+    if len(corners) == 3:
+        u = np.linspace(0, 1, n)
+        grid = [np.array([1 - a - b, a, b]) for a in u for b in u if a + b <= 1 + 1e-12]
+    return np.linalg.norm(np.array(grid) @ corners - x, axis=1).min()
+
+
+@pytest.mark.parametrize(("size", "space"), [(2, 2), (3, 3), (3, 2)])
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None, derandomize=True)
+def test_the_nearest_point_of_a_facet_is_the_nearest(size, space, seed) -> None:
+    rng = np.random.default_rng(seed)
+    x, corners, weights = rng.normal(size=space), rng.normal(size=(size, space)), np.empty(size)
+    nearest_on_facet(x, corners, weights)
+    assert weights.min() >= 0.0
+    assert weights.sum() == pytest.approx(1.0, abs=1e-14)
+    distance = np.linalg.norm(weights @ corners - x)
+    sampled = _nearest_by_sampling(x, corners)
+    spacing = np.ptp(corners, axis=0).max() / 59 * 2
+    assert sampled - spacing <= distance <= sampled + 1e-12
+
+
+def _model(dim, seed):
+    """A cut body, its surface displaced at random, and the collider on it."""
+    mesh = box_mesh((4, 4, 4)) if dim == 3 else rectangle_mesh((8, 8))
+    cutter = SemiProgressiveCutter(mesh)
+    body = BodySurface(cutter.body)
+    collider = SurfaceCollider(body.surface)
+    depth = [0.0, 0.1, 1.4] if dim == 3 else None
+    tips = [[-0.1, 0.47, -0.2], [1.1, 0.53, -0.2]]
+    cutter.begin(ToolPath.of_tip([tip[:dim] for tip in tips], [0.0, 1.0], depth))
+    rng = np.random.default_rng(seed)
+    for time in (0.4, 1.0):
+        body.update(cutter.advance(time))
+        displacement = 0.05 * rng.normal(size=(cutter.body.node_count, dim))
+        collider.refit(displacement)
+    collider.refit(displacement)  # once without a change of the surface: boxes only
+    rows = body.surface.used
+    corners = body.surface.positions(displacement)[body.surface.facets.rows[rows]]
+    return cutter, body, collider, rows, corners, rng
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_nearest_facet_is_that_of_all(dim) -> None:
+    _, body, collider, rows, corners, rng = _model(dim, 1)
+    points = rng.uniform(-0.3, 1.3, (60, dim))
+    contacts = collider.nearest(points)
+    weights = np.empty(dim)
+    for q, x in enumerate(points):
+        best = np.inf
+        for facet in corners:
+            nearest_on_facet(x, facet, weights)
+            best = min(best, np.linalg.norm(weights @ facet - x))
+        assert contacts.distance[q] == pytest.approx(best, rel=1e-12)
+        foot = contacts.at[q] @ corners[np.searchsorted(rows, contacts.facet[q])]
+        assert np.linalg.norm(foot - x) == pytest.approx(best, rel=1e-12)
+    np.testing.assert_array_equal(contacts.piece, body.surface.facet_piece.rows[contacts.facet])
+    # a limit hides what is farther, and nothing else
+    limited = collider.nearest(points, limit=0.05)
+    np.testing.assert_array_equal(limited.facet >= 0, contacts.distance < 0.05)
+    assert np.isinf(limited.distance[limited.facet < 0]).all()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_each_part_of_a_cut_body_answers_for_itself(dim) -> None:
+    cutter, _, collider, _, _, rng = _model(dim, 2)
+    virtual = cutter.virtual_mesh()
+    order = np.argsort(cutter.body.piece_parent.rows, kind="stable")
+    piece_body = np.empty(len(order), dtype=np.int64)
+    piece_body[order] = virtual.bodies[virtual.cells[:, 0]]
+    points = rng.uniform(-0.3, 1.3, (40, dim))
+    every = collider.nearest(points)
+    one_by_one = [collider.nearest(points, piece_body=piece_body, body=b) for b in (0, 1)]
+    for b, contacts in enumerate(one_by_one):
+        assert (piece_body[contacts.piece] == b).all()
+    nearest = np.minimum(one_by_one[0].distance, one_by_one[1].distance)
+    np.testing.assert_array_equal(every.distance, nearest)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_segment_pierces_what_a_linear_solve_says(dim) -> None:
+    _, _, collider, rows, corners, rng = _model(dim, 3)
+    hits = 0
+    for _ in range(40):
+        start, end = rng.uniform(-0.3, 1.3, (2, dim))
+        contacts = collider.pierced(start, end)
+        expected = {}
+        for facet, corner in zip(rows, corners, strict=True):
+            matrix = np.column_stack([start - end, *(corner[1:] - corner[0])])
+            share, *rest = np.linalg.solve(matrix, start - corner[0])
+            if 0 <= share <= 1 and min([*rest, 1 - sum(rest)]) >= 0:
+                expected[int(facet)] = share
+        assert sorted(contacts.facet.tolist()) == sorted(expected)
+        assert (np.diff(contacts.share) >= 0.0).all()
+        for k, facet in enumerate(contacts.facet):
+            assert contacts.share[k] == pytest.approx(expected[int(facet)], abs=1e-10)
+            foot = contacts.at[k] @ corners[np.searchsorted(rows, facet)]
+            np.testing.assert_allclose(foot, start + contacts.share[k] * (end - start), atol=1e-12)
+        hits += len(expected)
+    assert hits > 40
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_capsule_touches_what_is_within_its_radius(dim) -> None:
+    _, _, collider, rows, corners, rng = _model(dim, 4)
+    weights = np.empty(dim)
+    for _ in range(5):
+        start, end = rng.uniform(-0.3, 1.3, (2, dim))
+        radius = 0.08
+        contacts = collider.touched(start, end, radius)
+        axis = start + np.linspace(0, 1, 150)[:, None] * (end - start)
+        step = np.linalg.norm(end - start) / 149
+        for facet, corner in zip(rows, corners, strict=True):
+            gap = np.inf
+            for x in axis:
+                nearest_on_facet(x, corner, weights)
+                gap = min(gap, np.linalg.norm(weights @ corner - x))
+            found = np.flatnonzero(contacts.facet == facet)
+            # sampling the axis is an upper bound, good to half a step
+            if gap <= radius:
+                assert len(found) == 1
+            if gap > radius + step:
+                assert len(found) == 0
+            if len(found):
+                k = found[0]
+                assert gap - step <= contacts.distance[k] <= gap + 1e-12
+                on_axis = start + contacts.share[k] * (end - start)
+                assert np.linalg.norm(contacts.at[k] @ corner - on_axis) == pytest.approx(
+                    contacts.distance[k], abs=1e-12
+                )
+
+
+def test_a_penalty_on_a_contact_does_the_work_on_the_unknowns_that_it_does_on_the_tool() -> None:
+    cutter, body, collider, _, _, rng = _model(3, 5)
+    motion = rng.normal(size=(cutter.body.node_count, 3))
+    velocity = body.surface.positions(motion) - body.surface.material.rows
+    contacts = collider.nearest(rng.uniform(0.0, 1.0, (10, 3)))
+    for facet, at in zip(contacts.facet, contacts.at, strict=True):
+        push = rng.normal(size=3)
+        nodal = body.surface.facet_force(int(facet), at, push, np.zeros_like(motion))
+        on_surface = push @ (at @ velocity[body.surface.facets.rows[facet]])
+        assert (nodal * motion).sum() == pytest.approx(on_surface, rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 64, 100])
+def test_a_refitted_tree_holds_every_simplex(count) -> None:
+    rng = np.random.default_rng(count)
+    points, cells = rng.normal(size=(40, 3)), rng.integers(0, 40, (count, 4))
+    tree = BoundingTree(points, cells)
+    for scale in (1.0, 3.0):
+        tree.refit(scale * points)
+        low, high = np.array([-0.5, -0.2, -1.0]), np.array([0.4, 0.3, 0.2])
+        found = np.sort(tree.meeting_box(low, high))
+        corners = scale * points[cells]
+        meets = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
+        np.testing.assert_array_equal(found, np.flatnonzero(meets))
+
+
+def test_bad_input_is_refused_with_its_reason() -> None:
+    _, _, collider, *_ = _model(2, 6)
+    with pytest.raises(XfemError, match="query points of shape"):
+        collider.nearest([[0.0, 0.0, 0.0]])
+    with pytest.raises(XfemError, match="query points of shape"):
+        collider.pierced([0.0, np.nan], [1.0, 1.0])
+    with pytest.raises(XfemError, match="radius -1"):
+        collider.touched([0.0, 0.0], [1.0, 1.0], -1.0)
+    tree = BoundingTree(np.eye(3), np.array([[0, 1, 2]]))
+    with pytest.raises(XfemError, match="2 points; expected more than 2"):
+        tree.refit(np.eye(3)[:2])
