@@ -10,7 +10,7 @@ from reference.meshing.features import Feature, close_pairs, plane_features
 from reference.meshing.grading import Grading
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.outline import divided_outline
-from reference.meshing.separation import TOUCHING, check_separation, check_strips
+from reference.meshing.separation import APART, check_separation, check_strips
 from reference.meshing.session import gmsh_session, plane_triangles
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
@@ -146,7 +146,7 @@ def _set_sizes(
         field.setString(tag, "F", f"{graded} + {smallest:.17g}")
         terms.append(tag)
     if grading.strip is not None:
-        close = close_pairs(features, TOUCHING * scale, grading.size / grading.strip)
+        close = close_pairs(features, APART * scale, grading.size / grading.strip)
         for i, j in close:
             tag = field.add("MathEval")
             apart = " + ".join(_distance(features[k], origin, scale) for k in (i, j))

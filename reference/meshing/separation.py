@@ -1,15 +1,21 @@
 """Features of a body that come too close to each other to be meshed apart."""
 
+from itertools import permutations
+
 import numpy as np
+from numpy.typing import NDArray
 
 from reference.meshing.features import Feature, close_pairs, crossing_points
 from verify.errors import InputError
 
-__all__ = ["TOUCHING", "check_separation", "check_strips"]
+__all__ = ["APART", "check_separation", "check_strips"]
 
-TOUCHING = 1e-9  # of the body's size: closer features touch (the scene judges so too)
+_TOUCHING = 1e-9  # of the body's size: closer features touch (the scene judges so too)
 _RESOLVED = 1e-6  # of the body's size: OpenCASCADE merges at 1e-7, silently
+APART = 1e-7  # between the two: what neither touches nor was refused is farther apart
 _MOST_CELLS = 2e6
+_ALONG = 2049  # samples of a feature
+_LONGEST_OVERLAP = 2e-3  # of the body's size: longer, and the angle at a contact is below 5e-4
 
 
 def check_separation(features: list[Feature], size: float, where: str) -> None:
@@ -26,25 +32,65 @@ def check_separation(features: list[Feature], size: float, where: str) -> None:
     Raises
     ------
     InputError
-        Saying which two, their distance and what is resolved.
+        Saying which two, their distance and what is resolved; or that they lie on each other,
+        or at an angle of less than about 5e-4, over a length.
     """
-    points = np.concatenate(
-        [np.array([p for f in features for p in (f.start, f.end)]), crossing_points(features)]
-    )
+    ends = np.array([p for f in features for p in (f.start, f.end)])
+    points = np.concatenate([ends, crossing_points(features), _bulges(features)])
     for feature in features:
         away = feature.distance(points)
-        bad = (away > TOUCHING * size) & (away < _RESOLVED * size)
+        bad = (away > _TOUCHING * size) & (away < _RESOLVED * size)
         if not bad.any():
             continue
         x, y = points[np.argmax(bad)]
-        others = {f.name for f in features if f.distance(points[bad][:1])[0] <= TOUCHING * size}
+        others = {f.name for f in features if f.distance(points[bad][:1])[0] <= _TOUCHING * size}
         other = sorted(others - {feature.name} or others or {"another part"})[-1]
         raise InputError(
             f"cuts: {_pair(feature.name, other)} come within {away[bad].min():.3g} m of each "
             f"other at ({x:.6g}, {y:.6g}) without touching; a conforming mesh of this body "
-            f"resolves {_RESOLVED * size:.3g} m (below {TOUCHING * size:.3g} m they touch)",
+            f"resolves {_RESOLVED * size:.3g} m (below {_TOUCHING * size:.3g} m they touch)",
             where,
         )
+    _check_no_overlap(features, size, where)
+
+
+def _check_no_overlap(features: list[Feature], size: float, where: str) -> None:
+    """Refuse two features that stay closer than what is resolved over a length."""
+    for one, other in permutations(features, 2):
+        if one.name == other.name == "the boundary":
+            continue
+        within = other.distance(one.samples(_ALONG)) < _RESOLVED * size
+        shared = (np.count_nonzero(within) - 1) / (_ALONG - 1) * one.length
+        if shared > min(_LONGEST_OVERLAP * size, 0.5 * one.length):
+            x, y = one.samples(_ALONG)[np.argmax(within)]
+            raise InputError(
+                f"cuts: {_pair(one.name, other.name)} lie within {_RESOLVED * size:.3g} m of each "
+                f"other over {shared:.3g} m from ({x:.6g}, {y:.6g}) on; a conforming mesh of this "
+                "body cannot tell them apart",
+                where,
+            )
+
+
+def _bulges(features: list[Feature]) -> NDArray[np.float64]:
+    """Points (k, 2) of arcs that come nearest to another line or circle."""
+    found = [np.zeros((0, 2))]
+    arcs = [feature for feature in features if feature.centre is not None]
+    for arc in arcs:
+        assert arc.centre is not None
+        towards = [_foot(other, arc.centre) - arc.centre for other in features if other is not arc]
+        away = np.array([way for way in towards if np.linalg.norm(way) > 0]).reshape(-1, 2)
+        spokes = arc.radius * away / np.linalg.norm(away, axis=1)[:, None]
+        points = np.concatenate([arc.centre + spokes, arc.centre - spokes])
+        found.append(points[arc.distance(points) <= 1e-12 * arc.radius])
+    return np.concatenate(found)
+
+
+def _foot(feature: Feature, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Find the centre of a circle, or the foot of a perpendicular on the line of a segment."""
+    if feature.centre is not None:
+        return feature.centre
+    along = feature.end - feature.start
+    return np.asarray(feature.start + (point - feature.start) @ along / (along @ along) * along)
 
 
 def _strip_cells(features: list[Feature], size: float, share: float) -> float:
@@ -62,7 +108,7 @@ def _strip_cells(features: list[Feature], size: float, share: float) -> float:
         Element size over the width of the strip.
     """
     cells = 0.0
-    for i, j in close_pairs(features, TOUCHING * size, size):
+    for i, j in close_pairs(features, APART * size, size):
         gap = features[j].distance(features[i].samples(513))
         cells += 4.6 / share**2 * features[i].length * float(np.mean(1 / gap))
     return cells
@@ -86,5 +132,6 @@ def check_strips(features: list[Feature], size: float, share: float, where: str)
         )
 
 
-def _pair(one: str, other: str) -> str:
+def _pair(*names: str) -> str:
+    one, other = sorted(names)
     return f"two parts of {one}" if one == other else f"{one} and {other}"

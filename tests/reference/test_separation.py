@@ -23,7 +23,6 @@ def two_cuts(apart, **changes):
 
 
 CLOSE = {
-    "two cuts": (two_cuts(1e-8).cuts, "cut 'a' and cut 'b'", "1e-08"),
     "a tip and the boundary": ([polyline("a", (0.4, 0.5), (1 - 1e-8, 0.5))], "boundary", "1e-08"),
     "a tip and another cut": (
         [polyline("a", (0.2, 0.5), (0.8, 0.5)), polyline("b", (0.5, 0.5 + 1e-7), (0.5, 0.8))],
@@ -33,6 +32,42 @@ CLOSE = {
     "a crossing and a tip": (
         [polyline("a", (0.2, 0.5), (0.5 + 1e-8, 0.5)), polyline("b", (0.5, 0.2), (0.5, 0.8))],
         "cut 'a'",
+        "1e-08",
+    ),
+    "an arc that almost touches the boundary between its ends": (
+        [
+            {
+                "kind": "arc",
+                "name": "a",
+                "centre": [0.5, 0.2 + 1e-8],
+                "radius": 0.2,
+                "start": 250.0,
+                "sweep": 50.0,
+            }
+        ],
+        "cut 'a' and the boundary",
+        "1e-08",
+    ),
+    "two arcs back to back": (
+        [
+            {
+                "kind": "arc",
+                "name": "a",
+                "centre": [0.3, 0.5],
+                "radius": 0.1,
+                "start": -30.0,
+                "sweep": 90.0,
+            },
+            {
+                "kind": "arc",
+                "name": "b",
+                "centre": [0.5 + 1e-8, 0.5],
+                "radius": 0.1,
+                "start": 150.0,
+                "sweep": 90.0,
+            },
+        ],
+        "cut 'a' and cut 'b'",
         "1e-08",
     ),
     "an arc and a line": (
@@ -54,6 +89,17 @@ def test_what_is_too_close_to_mesh_apart_is_refused_with_its_distance(what):
     assert names in str(caught.value)
     assert f"within {distance} m" in str(caught.value)
     assert "resolves 1e-06 m" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "upper",
+    [[(0.3, 0.5 + 1e-9), (0.7, 0.5 + 1e-9)], [(0.2, 0.5), (0.8, 0.5001)]],
+    ids=["parallel", "at a tiny angle"],
+)
+def test_cuts_that_almost_lie_on_each_other_are_not_taken_for_one(upper):
+    lower = polyline("a", (0.2, 0.5), (0.8, 0.5))
+    with pytest.raises(InputError, match="cut 'a' and cut 'b' lie within 1e-06 m of each other"):
+        graded(square([lower, polyline("b", *upper)]))
 
 
 def test_a_strip_that_would_take_millions_of_cells_is_refused_before_it_is_meshed():
