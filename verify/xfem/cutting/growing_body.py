@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.cuts import Cut
+from verify.xfem.cutting.distinct import distinct
 from verify.xfem.cutting.growing_array import GrowingArray
 from verify.xfem.cutting.orientation_kernels import simplex_signs
 from verify.xfem.cutting.patch import MeshPatch, PatchCutter
@@ -47,7 +48,9 @@ class Increment:
     cells : int array
         Cells that were split, or whose pieces were.
     touched : int array
-        Cells around the nodes of these: no other cell has new unknowns.
+        Cells around the nodes of these.
+    moved : int array
+        Those of them that have new unknowns, or are split anew.
     nodes_before : int
         Number of unknown nodes before.
     source : (new,) int array
@@ -56,6 +59,7 @@ class Increment:
 
     cells: _Ints
     touched: _Ints
+    moved: _Ints
     nodes_before: int
     source: _Ints
 
@@ -168,17 +172,17 @@ class GrowingBody:
         XfemError
             If a cut would join what is already separate.
         """
-        wanted = np.unique(candidates)
+        wanted = distinct(candidates)
         while len(wanted):
             patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
             numbers, cuts = cuts_near(patch)
             partition = split_cells(patch, cuts, held=self._held_in(patch, numbers))
             state = self._compare(patch, partition, numbers)
-            more = np.setdiff1d(state.changed_cells, wanted, assume_unique=True)
-            if len(more) == 0:
+            all_wanted = distinct(np.concatenate([wanted, state.changed_cells]))
+            if len(all_wanted) == len(wanted):
                 return self._update(patch, partition, numbers, state)
             # a cell at the edge of the patch changes too: its own surroundings are needed
-            wanted = np.union1d(wanted, more)
+            wanted = all_wanted
         return None
 
     def _held_in(self, patch: MeshPatch, numbers: _Ints) -> Held:
@@ -232,9 +236,10 @@ class GrowingBody:
         self.split_cells[cells] = True
         self._dropped[cells] = 0
         empty = state.cell[~state.solid]
-        np.add.at(self._dropped, empty[np.isin(empty, cells)], 1)
+        np.add.at(self._dropped, empty[_among(empty, cells)], 1)
         touched = self.patches.cells_around(self.patches.nodes_of(cells))
-        return Increment(cells, touched, before, self._source)
+        moved = distinct(np.concatenate([cells, self._moved]))
+        return Increment(cells, touched, moved, before, self._source)
 
     def _renumber(
         self, patch: MeshPatch, partition: Partition, slots: PatchSlots, state: "_Comparison"
@@ -288,6 +293,7 @@ class GrowingBody:
         state: "_Comparison",
     ) -> _Ints:
         place = np.empty(len(old), dtype=np.int64)
+        moved = np.zeros(len(old), dtype=bool)
         changed = np.zeros(len(old), dtype=bool)
         changed[: len(state.changed)] = state.changed
         stores = (
@@ -317,7 +323,9 @@ class GrowingBody:
             self.piece_label.rows,
             count,
             place,
+            moved,
         )
+        self._moved = cell[moved]
         for store in stores:
             store.rows = store.rows[:after]
         return place
@@ -333,7 +341,7 @@ class GrowingBody:
         """Replace the sub-simplices of the changed cells."""
         ids = self.points.number(partition.points, patch.whole_nodes, numbers)
         cell = patch.whole_cells[partition.parent[partition.sub_piece]]
-        rows = np.flatnonzero((partition.sub_fraction > 0.0) & np.isin(cell, cells))
+        rows = np.flatnonzero((partition.sub_fraction > 0.0) & _among(cell, cells))
         rows = rows[np.argsort(cell[rows], kind="stable")]
         retire(self.sub_piece.rows, self.sub_range, cells)
         begin = len(self.sub_piece)
@@ -369,7 +377,13 @@ class _Comparison:
     @property
     def changed_cells(self) -> _Ints:
         """Cells of the pieces whose labels are new, ascending."""
-        return np.unique(self.cell[self.changed & self.solid])
+        return distinct(self.cell[self.changed & self.solid])
+
+
+def _among(values: _Ints, ascending: _Ints) -> NDArray[np.bool_]:
+    """Whether each value is one of some ascending ones, of which there is at least one."""
+    place = np.searchsorted(ascending, values)
+    return ascending[np.minimum(place, len(ascending) - 1)] == values
 
 
 def _sides(partition: Partition) -> NDArray[np.int8]:

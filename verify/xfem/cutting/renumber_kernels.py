@@ -97,11 +97,12 @@ def write_pieces(
     piece_label,
     count,
     place,
+    moved,
 ):
     """Write the pieces of a patch into the store; the count of pieces.
 
     The first part of a stored piece takes its place, further ones are appended. `place` (p,) is
-    the stored piece of each, -1 for those without volume.
+    the stored piece of each, -1 for those without volume; `moved` (p,) if it has new unknowns.
     """
     owner = np.full(len(old), -1, dtype=np.int64)
     for p in range(len(old)):
@@ -131,6 +132,7 @@ def write_pieces(
             continue
         for a in range(group.shape[1]):
             if touched[p, a]:
+                moved[p] = moved[p] or piece_cells[row, a] != number[group[p, a]]
                 piece_cells[row, a] = number[group[p, a]]
         if changed[p]:
             piece_fraction[row] = fraction[p]

@@ -170,7 +170,7 @@ class SemiProgressiveCutter:
 
     def _record(self, increment: Increment, time: float) -> None:
         cells = increment.cells
-        nodes = np.unique(self.mesh.cells[cells])
+        nodes = self.body.patches.nodes_of(cells)
         for stroke in self.strokes:
             mine = cells[self.body.split_by(cells, stroke.number) & ~stroke.recorded[cells]]
             if len(mine) == 0:

@@ -8,6 +8,7 @@ vertices doubled where, and only where, the material is separate.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.cutting.distinct import ranges
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
 from verify.xfem.errors import XfemError
 from verify.xfem.mapping.edge_points import EdgePoints
@@ -46,7 +47,7 @@ class BodySurface:
         self.surface = MovingSurface(mesh.dim + 1, mesh.space, mesh.dim)
         self._edges = EdgePoints(mesh.points, body.points)
         self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
-        self._facets_of_cell: dict[int, _Ints] = {}
+        self._facet_range = np.zeros((len(mesh.cells), 2), dtype=np.int64)
         boundary = np.unique(mesh.boundary_facets[:, 0])
         split = np.flatnonzero(body.split_cells)
         self._cover(np.union1d(boundary, split), split)
@@ -59,17 +60,9 @@ class BodySurface:
     def _cover(self, cells: _Ints, split: _Ints) -> None:
         """Make the facets of some cells anew; `split` are those with new sub-simplices."""
         body, mesh = self._body, self._body.mesh
-        if len(split):
-            ranges = body.sub_range[split]
-            rows = np.concatenate([np.arange(a, b) for a, b in ranges])
-            self._edges.add(body.sub_points.rows[rows].ravel())
-        old = [
-            self._facets_of_cell.pop(cell)
-            for cell in cells.tolist()
-            if cell in self._facets_of_cell
-        ]
-        if old:
-            self.surface.retire(np.concatenate(old))
+        self._edges.add(body.sub_points.rows[ranges(body.sub_range[split])].ravel())
+        self.surface.retire(ranges(self._facet_range[cells]))
+        self._facet_range[cells] = 0
         ids, at, piece, cell, inner = exposed_facets(
             cells,
             body.split_cells,
@@ -98,5 +91,5 @@ class BodySurface:
         numbers = self.surface.add(vertex.reshape(ids.shape), piece, inner[source])
         # facets come cell by cell
         starts = np.flatnonzero(np.diff(cell, prepend=-1))
-        for begin, part in zip(starts, np.split(numbers, starts[1:]), strict=True):
-            self._facets_of_cell[int(cell[begin])] = part
+        self._facet_range[cell[starts], 0] = numbers[starts]
+        self._facet_range[cell[starts], 1] = np.append(numbers[starts[1:]], numbers[-1:] + 1)

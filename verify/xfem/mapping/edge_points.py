@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.xfem.cutting.distinct import distinct
 from verify.xfem.cutting.growing_array import GrowingArray
 from verify.xfem.cutting.point_numbers import PointNumbers
 from verify.xfem.cutting.row_numbers import RowNumbers, find_row, number_of_row
@@ -50,7 +51,7 @@ class EdgePoints:
         fresh = self._recorded.extend(len(self._points.ends) - len(self._recorded))
         self._recorded.rows[fresh:] = False
         zero = numbers[numbers >= self._points.nodes] - self._points.nodes
-        zero = np.unique(zero[~self._recorded.rows[zero]])
+        zero = distinct(zero[~self._recorded.rows[zero]])
         self._recorded.rows[zero] = True
         table, known, lines = self._lines.open_for(_CUTS * len(zero))
         begin = self._first.extend(_CUTS * len(zero))
@@ -89,8 +90,7 @@ class EdgePoints:
             return facets, np.arange(len(facets)), eye
         table, known, count = self._lines.open_for(0)
         self._lines.close(count)
-        return _bisect(
-            facets,
+        record = (
             self._points.nodes,
             self._nodes,
             self._points.positions.rows,
@@ -101,6 +101,15 @@ class EdgePoints:
             self._entries.rows,
             self._directions.rows,
         )
+        hanging = _hanging(facets, *record)
+        rows, whole = np.flatnonzero(hanging), np.flatnonzero(~hanging)
+        if len(rows) == 0:
+            return facets, whole, np.broadcast_to(np.eye(3), (len(facets), 3, 3))
+        parts, part_of, corners = _bisect(facets[rows], *record)
+        source = np.concatenate([whole, rows[part_of]])
+        order = np.argsort(source, kind="stable")
+        weights = np.concatenate([np.broadcast_to(np.eye(3), (len(whole), 3, 3)), corners])
+        return np.concatenate([facets[whole], parts])[order], source[order], weights[order]
 
 
 @njit(cache=True)
@@ -226,6 +235,23 @@ def _inner_point(
             if z >= 0:
                 return z, share
     return -1, 0.0
+
+
+@njit(cache=True)
+def _hanging(
+    facets, nodes, node_points, positions, supports, table, known, first, entries, directions
+):
+    """Whether each triangle has a recorded point on one of its edges."""
+    found = np.zeros(len(facets), dtype=np.bool_)
+    for t in range(len(facets)):
+        for k in range(3):
+            if not found[t]:
+                at, _ = _inner_point(
+                    facets[t, k], facets[t, (k + 1) % 3], nodes, node_points, positions, supports,
+                    table, known, first, entries, directions,
+                )  # fmt: skip
+                found[t] = at >= 0
+    return found
 
 
 @njit(cache=True)

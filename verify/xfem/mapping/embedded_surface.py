@@ -11,13 +11,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from verify.xfem.cutting.distinct import distinct, ranges
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.point_numbers import PointNumbers
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
 from verify.xfem.mapping.edge_points import EdgePoints
-from verify.xfem.mapping.locate_kernels import cut_at, embed_corners, locate_many
+from verify.xfem.mapping.locate_kernels import (
+    corner_cells,
+    corner_pieces,
+    cut_at,
+    locate_many,
+)
 from verify.xfem.mapping.moving_surface import MovingSurface
 from verify.xfem.split import split_cells
 
@@ -94,7 +100,8 @@ class EmbeddedSurface:
         self._numbers = PointNumbers(len(self.points), mesh.space)
         self._edges = EdgePoints(self.points, self._numbers)
         self._near = self._facets_near_cells()
-        self._parts: dict[int, _Ints] = {}
+        self._corners = corner_cells(self.points[self.facets], *self._elements)
+        self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
         self._cover(np.arange(len(self.facets)))
 
     def update(self, increment: Increment | None) -> None:
@@ -102,10 +109,9 @@ class EmbeddedSurface:
         if increment is None:
             return
         starts, facets = self._near
-        ranges = zip(starts[increment.touched], starts[increment.touched + 1], strict=True)
-        near = [facets[a:b] for a, b in ranges if b > a]
-        if near:
-            self._cover(np.unique(np.concatenate(near)))
+        near = facets[ranges(np.stack([starts[increment.moved], starts[increment.moved + 1]], 1))]
+        if len(near):
+            self._cover(distinct(near))
 
     def is_cut(self, places: _Floats, cut: int) -> NDArray[np.bool_]:
         """Whether the element at each material place (q, s) is split by a cut."""
@@ -134,41 +140,48 @@ class EmbeddedSurface:
     def _cover(self, facets: _Ints) -> None:
         """Split and embed some facets anew."""
         body = self._cutter.body
-        old = [self._parts.pop(f) for f in facets.tolist() if f in self._parts]
-        if old:
-            self.surface.retire(np.concatenate(old))
-        ids, source, at, label = self._fragments(facets)
-        given = self.points[self.facets[source]]
-        corners = at @ given
-        weights = np.empty((*ids.shape, body.mesh.dim + 1))
-        piece = embed_corners(
-            corners, label, self._cutter.level_sets, *self._elements, body.piece_label.rows,
-            body.first_piece, body.next_piece.rows, weights,
+        self.surface.retire(ranges(self._facet_range[facets]))
+        ids, source, at, label, whole = self._fragments(facets)
+        # where the corners of a whole facet are is known; only which piece that is may be new
+        cell, weights, inside = (array[source] for array in self._corners)
+        material = self.points[self.facets[source]]
+        if not whole.all():
+            parts = ~whole
+            material[parts] = at[parts] @ material[parts]
+            found = corner_cells(material[parts], *self._elements)
+            cell[parts], weights[parts], inside[parts] = found
+        piece = corner_pieces(
+            cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,
+            body.first_piece, body.next_piece.rows,
         )  # fmt: skip
         vertex = self.surface.weld(
             ids.ravel(),
-            corners.reshape(-1, corners.shape[2]),
+            material.reshape(-1, material.shape[2]),
             body.piece_cells.rows[piece.ravel()],
             weights.reshape(ids.size, -1),
         )
         numbers = self.surface.add(
             vertex.reshape(ids.shape), piece[:, 0], np.zeros(len(ids), dtype=bool)
         )
-        order = np.argsort(source, kind="stable")
-        starts = np.flatnonzero(np.diff(source[order], prepend=-1))
-        for begin, part in zip(starts, np.split(numbers[order], starts[1:]), strict=True):
-            self._parts[int(source[order[begin]])] = part
+        # facets come one after the other, each with its parts
+        starts = np.flatnonzero(np.diff(source, prepend=-1))
+        self._facet_range[source[starts], 0] = numbers[starts]
+        self._facet_range[source[starts], 1] = np.append(numbers[starts[1:]], numbers[-1:] + 1)
 
-    def _fragments(self, facets: _Ints) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8]]:
-        """Parts of facets: points (q, k), facet, barycentric corners in it, sides of cuts."""
+    def _fragments(
+        self, facets: _Ints
+    ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8], NDArray[np.bool_]]:
+        """Parts of facets: points (q, k), facet, barycentric corners in it, sides, if whole."""
         patch = self._patch(facets)
-        numbers, values = self._values(facets, patch.whole_nodes)
+        numbers, values = self._values(patch.whole_nodes)
         cuts = [
             _SurfaceCut(patch.points, values[:, k], int(cut), self) for k, cut in enumerate(numbers)
         ]
         parts = split_cells(patch, cuts)
         solid = np.flatnonzero(parts.sub_fraction > 0.0)
-        whole = np.setdiff1d(np.arange(len(facets)), parts.parent)
+        unsplit = np.ones(len(facets), dtype=bool)
+        unsplit[parts.parent] = False
+        whole = np.flatnonzero(unsplit)
         size = self.facets.shape[1]
         point = self._numbers.number(parts.points, patch.whole_nodes, numbers)
         split_ids = point[parts.sub_points[solid]]
@@ -184,20 +197,25 @@ class EmbeddedSurface:
         ids[wrong, 0], ids[wrong, 1] = ids[wrong, 1], ids[wrong, 0].copy()
         at[wrong, 0], at[wrong, 1] = at[wrong, 1], at[wrong, 0].copy()
         ids, origin, share = self._edges.bisect(ids)
-        return ids, facets[source[origin]], share @ at[origin], label[origin]
+        order = np.argsort(source[origin], kind="stable")
+        origin = origin[order]
+        alone = np.bincount(origin, minlength=len(source)) == 1
+        is_whole = (origin < len(whole)) & alone[origin]
+        at = share[order] @ at[origin]
+        return ids[order], facets[source[origin]], at, label[origin], is_whole
 
     def _patch(self, facets: _Ints) -> MeshPatch:
-        nodes, local = np.unique(self.facets[facets], return_inverse=True)
+        nodes = distinct(self.facets[facets])
+        local = np.searchsorted(nodes, self.facets[facets])
         extent = self._cutter.mesh.extent
         across = np.full((len(facets), self.facets.shape[1]), -1)
-        return MeshPatch(self.points, extent, facets, nodes, local.reshape(across.shape), across)
+        return MeshPatch(self.points, extent, facets, nodes, local, across)
 
-    def _values(self, facets: _Ints, vertices: _Ints) -> tuple[_Ints, _Floats]:
-        """Cuts near facets, and their realised level sets (q, cuts) at vertices."""
+    def _values(self, vertices: _Ints) -> tuple[_Ints, _Floats]:
+        """Cuts under way, and their realised level sets (q, cuts) at vertices."""
         mesh = self._cutter.mesh
-        cells = np.unique(self._vertex_cell[self.facets[facets]])
         near = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
-        nodes = np.unique(mesh.cells[cells])
+        nodes = distinct(mesh.cells[self._vertex_cell[vertices]])
         values = np.empty((len(vertices), len(near)))
         for k, stroke in enumerate(near):
             level = stroke.level_sets(nodes)

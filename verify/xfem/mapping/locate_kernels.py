@@ -7,7 +7,14 @@ largest; on a common face several elements tie.
 import numpy as np
 from numba import njit
 
-__all__ = ["barycentric", "cut_at", "embed_corners", "locate", "locate_many"]
+__all__ = [
+    "barycentric",
+    "corner_cells",
+    "corner_pieces",
+    "cut_at",
+    "locate",
+    "locate_many",
+]
 
 _DEEP = 128  # twice the height of any heap of boxes
 _TIE = 1e-9  # barycentric coordinates: closer than that to a face is on it
@@ -54,11 +61,27 @@ def _cells_about(x, reach, low, high, order):
 @njit(cache=True)
 def locate(x, reach, low, high, order, cells, points, gradients):
     """Give the cell of x."""
-    trial, best, at = np.empty(cells.shape[1]), -np.inf, -1
-    for cell in _cells_about(x, reach, low, high, order):
-        smallest = barycentric(x, cell, cells, points, gradients, trial)
-        if smallest > best:
-            best, at = smallest, cell
+    trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
+    best, at = -np.inf, -1
+    while at < 0:
+        stack[0], top = 1, 1
+        while top > 0:
+            top -= 1
+            node, apart = stack[top], False
+            for i in range(len(x)):
+                if x[i] < low[node, i] - reach or x[i] > high[node, i] + reach:
+                    apart = True
+            if apart:
+                continue
+            if node < len(order):
+                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+                top += 2
+                continue
+            cell = order[node - len(order)]
+            smallest = barycentric(x, cell, cells, points, gradients, trial)
+            if smallest > best:
+                best, at = smallest, cell
+        reach *= 2.0
     return at
 
 
@@ -98,26 +121,45 @@ def cut_at(
 
 
 @njit(cache=True)
-def embed_corners(
-    corners, label, levels, reach, low, high, order, cells, points, gradients,
-    piece_label, first_piece, next_piece, weights,
-):  # fmt: skip
-    """Piece (q, k) of each corner of facets (q, k, s), and its weights (q, k, d + 1).
+def corner_cells(corners, reach, low, high, order, cells, points, gradients):
+    """Cell (q, k) of each corner of facets (q, k, s), looked up a little inside the facet.
 
-    `label` (q, cuts) are the sides on which the cuts that split a facet have left it; on which
-    side of the others a corner is, the level sets (n, cuts) tell.
+    Returns the cells and the coordinates (q, k, d + 1) of the corner, and of the place inside.
     """
     count, size, space = corners.shape
     found = np.empty((count, size), dtype=np.int64)
-    inside, at = np.empty(space), np.empty(cells.shape[1])
+    weights = np.empty((count, size, cells.shape[1]))
+    at, inside = np.empty_like(weights), np.empty(space)
     for q in range(count):
         for k in range(size):
             for i in range(space):
                 centre = corners[q, :, i].sum() / size
                 inside[i] = corners[q, k, i] + _INWARDS * (centre - corners[q, k, i])
             cell = locate(inside, reach, low, high, order, cells, points, gradients)
-            barycentric(inside, cell, cells, points, gradients, at)
-            best, best_agree, piece = -1, 0, first_piece[cell]
+            found[q, k] = cell
+            barycentric(inside, cell, cells, points, gradients, at[q, k])
+            barycentric(corners[q, k], cell, cells, points, gradients, weights[q, k])
+            total = 0.0
+            for a in range(cells.shape[1]):
+                if abs(weights[q, k, a]) <= _SNAP:
+                    weights[q, k, a] = 0.0
+                total += weights[q, k, a]
+            weights[q, k] /= total
+    return found, weights, at
+
+
+@njit(cache=True)
+def corner_pieces(cell, at, label, levels, cells, piece_label, first_piece, next_piece):
+    """Piece (q, k) of each corner of facets, from its cell and the place `at` inside the facet.
+
+    `label` (q, cuts) are the sides on which the cuts that split a facet have left it; on which
+    side of the others a corner is, the level sets (n, cuts) tell.
+    """
+    count, size = cell.shape
+    found = np.empty((count, size), dtype=np.int64)
+    for q in range(count):
+        for k in range(size):
+            best, best_agree, piece = -1, 0, first_piece[cell[q, k]]
             while piece >= 0:
                 agree = 0
                 for cut in range(piece_label.shape[1]):
@@ -127,7 +169,7 @@ def embed_corners(
                     if side == 0:
                         level = 0.0
                         for a in range(cells.shape[1]):
-                            level += at[a] * levels[cells[cell, a], cut]
+                            level += at[q, k, a] * levels[cells[cell[q, k], a], cut]
                         side = 1 if level >= 0.0 else -1
                     # of all pieces the right one agrees with every cut; else the nearest to it
                     agree += 1 if side == piece_label[piece, cut] else -1000
@@ -135,11 +177,4 @@ def embed_corners(
                     best, best_agree = piece, agree
                 piece = next_piece[piece]
             found[q, k] = best
-            barycentric(corners[q, k], cell, cells, points, gradients, weights[q, k])
-            total = 0.0
-            for a in range(cells.shape[1]):
-                if abs(weights[q, k, a]) <= _SNAP:
-                    weights[q, k, a] = 0.0
-                total += weights[q, k, a]
-            weights[q, k] /= total
     return found
