@@ -105,7 +105,7 @@ class SolveRecord:
     solution: str | None = None  # path of the stored solution, relative to the run directory
 
     def metric(self, name: str) -> Metric | None:
-        """The metric called `name`, if it was measured."""
+        """Return the metric called `name`, if it was measured."""
         return next((metric for metric in self.metrics if metric.name == name), None)
 
 
@@ -207,7 +207,11 @@ def read_result(path: Path) -> CaseResult:
     try:
         record["solves"] = [
             SolveRecord(
-                **{**s, "status": Status(s["status"]), "metrics": [Metric(**m) for m in s["metrics"]]}
+                **{
+                    **s,
+                    "status": Status(s["status"]),
+                    "metrics": [Metric(**m) for m in s["metrics"]],
+                }
             )
             for s in record["solves"]
         ]

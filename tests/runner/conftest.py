@@ -34,6 +34,12 @@ parameters = { matrix = [[0.1, 0.0], [0.0, 0.0]] }
 """
 
 
+@pytest.fixture
+def case_text() -> str:
+    """The text of a case that every solver can do."""
+    return CASE
+
+
 @dataclass
 class CommandLine:
     """Runs ``verify`` in a folder."""

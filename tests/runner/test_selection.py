@@ -16,15 +16,13 @@ CASES = {
 
 
 @pytest.fixture(autouse=True)
-def _project(tmp_path, monkeypatch):
-    from conftest import CASE
-
+def _project(tmp_path, monkeypatch, case_text):
     from verify.scene import loading
 
     for name, (title, tags) in CASES.items():
         path = tmp_path / f"{name}.toml"
         path.parent.mkdir(exist_ok=True)
-        text = CASE.replace("A stretched square", title).replace('["stretched"]', str(tags))
+        text = case_text.replace("A stretched square", title).replace('["stretched"]', str(tags))
         path.write_text(text.replace("'", '"'))
     monkeypatch.setattr(loading, "case_folder", lambda: tmp_path)
     monkeypatch.setattr(selection, "list_cases", lambda: loading.list_cases(tmp_path))
