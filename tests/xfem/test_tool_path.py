@@ -33,9 +33,7 @@ def test_a_sweep_in_space_has_the_level_set_of_its_triangulation() -> None:
     np.testing.assert_allclose(sweep.level_set(points), surface.level_set(points), atol=1e-13)
     # both call a point past the rim the same, and by the same distance
     past = surface.depth(points) < -1e-12
-    np.testing.assert_allclose(
-        sweep.depth(points)[past], surface.depth(points)[past], atol=1e-13
-    )
+    np.testing.assert_allclose(sweep.depth(points)[past], surface.depth(points)[past], atol=1e-13)
     assert (sweep.depth(points)[~past] >= -1e-12).all()
 
 
