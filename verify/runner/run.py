@@ -126,7 +126,8 @@ class _Work:
         self.to_judge = [name for name, count in self.open.items() if not count]
         self.running: dict[Child, Job | str] = {}  # a job, or the case that is compared
         self.results: dict[str, CaseResult] = {}
-        self.memory = options.memory or 0.8 * origin["memory"] / options.jobs
+        side_by_side = max(1, min(options.jobs, len(self.waiting)))
+        self.memory = options.memory or 0.8 * origin["memory"] / side_by_side
 
     def until_done(self, stop: StopRequest) -> list[CaseResult]:
         """Run everything; kill what runs if that is interrupted or fails."""
