@@ -114,12 +114,31 @@ def crossing_points(features: list[Feature]) -> Array:
 
 
 def close_pairs(features: list[Feature], touching: float, below: float) -> list[tuple[int, int]]:
-    """Pairs of features, one of them a cut, that come closer than `below` but do not touch."""
-    return [
-        (i, j)
-        for i, j in combinations(range(len(features)), 2)
-        if features[j].name != "the boundary" and touching < features[i].gap(features[j]) < below
+    """Pairs of features, one of them a cut, that come closer than `below` but do not touch.
+
+    Two parts of one cut count only where it turns back on itself; else each vertex of a smooth
+    curve given as a polyline would make a pair.
+    """
+    lengths = np.array([feature.length for feature in features])
+    found = []
+    for i, j in combinations(range(len(features)), 2):
+        one, other = features[i], features[j]
+        if other.name != "the boundary" and touching < one.gap(other) < below:
+            between = float(lengths[i + 1 : j].sum())
+            if one.name != other.name or _turns_back(one, other, between):
+                found.append((i, j))
+    return found
+
+
+def _turns_back(one: Feature, other: Feature, between: float) -> bool:
+    """Whether an end of one part of a cut is half as far from a later part as the way there."""
+    ways = [
+        (one.start, other, one.length + between),
+        (one.end, other, between),
+        (other.start, one, between),
+        (other.end, one, other.length + between),
     ]
+    return any(part.distance(point[None])[0] < 0.5 * way for point, part, way in ways)
 
 
 def _segment_crossing(one: Feature, other: Feature) -> Array:

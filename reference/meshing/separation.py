@@ -57,7 +57,7 @@ def check_separation(features: list[Feature], size: float, where: str) -> None:
 def _check_no_overlap(features: list[Feature], size: float, where: str) -> None:
     """Refuse two features that stay closer than what is resolved over a length."""
     for one, other in permutations(features, 2):
-        if one.name == other.name == "the boundary":
+        if one.name == other.name == "the boundary" or one.gap(other) > _RESOLVED * size:
             continue
         within = other.distance(one.samples(_ALONG)) < _RESOLVED * size
         shared = (np.count_nonzero(within) - 1) / (_ALONG - 1) * one.length

@@ -126,3 +126,13 @@ def test_the_reference_of_a_narrow_strip_knows_its_error():
     known = extrapolate(values[:3], [4.0, 2.0, 1.0], theoretical=2, best=4)
     assert abs(values[3] - values[2]) <= known.half_width
     assert known.half_width < 2e-4 * values[3]
+
+
+def test_a_curve_given_as_a_polyline_of_many_vertices_is_no_strip():
+    from reference.meshing.features import close_pairs, plane_features
+
+    angle = np.linspace(0.0, 5.0, 60)
+    ring = np.column_stack([0.5 + 0.2 * np.cos(angle), 0.5 + 0.2 * np.sin(angle)])
+    assert close_pairs(plane_features(square([polyline("a", *ring)])), 1e-7, 0.1) == []
+    hairpin = polyline("a", (0.2, 0.5), (0.8, 0.5), (0.8, 0.51), (0.2, 0.51))
+    assert close_pairs(plane_features(square([hairpin])), 1e-7, 0.1) == [(4, 6)]

@@ -225,6 +225,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Equilibri
         {
             "linear solver": "PETSc SNES, MUMPS Cholesky",
             "smallest det F": f"{finite.smallest_jacobian:.3g}",
+            "area inside out": f"{finite.inverted:.1e}",
             "steps taken again": "; ".join(finite.refused_steps) or "none",
         },
     )
