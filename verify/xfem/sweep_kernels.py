@@ -13,11 +13,14 @@ __all__ = ["probe", "probe_points"]
 
 
 @njit(cache=True)
-def probe(x, sweep):
-    """(level set, distance past the rim or 0, travel of the nearest point) at x (s,)."""
+def probe(x, sweep, room):
+    """Give (level set, distance past the rim or 0, travel of the nearest point) at x (s,).
+
+    `room` (4, 3) is written: a walk asks this thousands of times and allocates nothing.
+    """
     count, size, space = sweep.corners.shape
-    weights, best_weights = np.empty(size), np.empty(size)
-    foot, best_foot = np.empty(space), np.empty(space)
+    weights, best_weights = room[0, :size], room[1, :size]
+    foot, best_foot = room[2, :space], room[3, :space]
     best, nearest = np.inf, 0
     for t in range(count):
         nearest_on_facet(x, sweep.corners[t], weights)
@@ -59,10 +62,10 @@ def probe_points(points, sweep):
     found = np.empty((len(points), 3))
     space = points.shape[1]
     size = sweep.rim.shape[1]
-    weights, corner = np.empty(size), np.empty(space)
+    weights, corner, room = np.empty(size), np.empty(space), np.empty((4, 3))
     for n in range(len(points)):
         x = points[n]
-        level, beyond, travel = probe(x, sweep)
+        level, beyond, travel = probe(x, sweep, room)
         if beyond > 0.0:
             depth = -beyond
         else:

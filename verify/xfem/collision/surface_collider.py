@@ -150,7 +150,8 @@ class SurfaceCollider:
             ends[0], ends[1], self.positions, self._facets, self._tree.low, self._tree.high,
             self._tree.order,
         )  # fmt: skip
-        return self._contacts(facet, np.zeros(len(facet)), at, share)
+        order = np.argsort(share)
+        return self._contacts(facet[order], np.zeros(len(facet)), at[order], share[order])
 
     def touched(self, start: ArrayLike, end: ArrayLike, radius: float) -> Contacts:
         """Facets within the radius of a tool's axis from start to end (a capsule)."""

@@ -81,8 +81,7 @@ def segment_hits(start, end, points, facets, low, high, order):
             found[count], share[count] = facet, where
             at[count] = weights
             count += 1
-    order_along = np.argsort(share[:count])
-    return found[:count][order_along], share[:count][order_along], at[:count][order_along]
+    return found[:count], share[:count], at[:count]
 
 
 @njit(cache=True)

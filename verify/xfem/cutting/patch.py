@@ -56,11 +56,11 @@ class PatchCutter:
 
     def nodes_of(self, cells: _Ints) -> _Ints:
         """Nodes of some cells, ascending."""
-        return _nodes_of(self.mesh.cells, cells, self._node_place)
+        return np.sort(_nodes_of(self.mesh.cells, cells, self._node_place))
 
     def cells_around(self, nodes: _Ints) -> _Ints:
         """Cells that have one of the nodes, ascending."""
-        return _cells_around(self._starts, self._around, nodes, self._cell_place)
+        return np.sort(_cells_around(self._starts, self._around, nodes, self._cell_place))
 
     def patch(self, cells: _Ints) -> MeshPatch:
         """Make the patch of these cells, given ascending."""
@@ -86,7 +86,7 @@ def _nodes_of(mesh_cells, cells, place):
                 place[node], found[count] = 0, node
                 count += 1
     place[found[:count]] = -1
-    return np.sort(found[:count])
+    return found[:count]
 
 
 @njit(cache=True)
@@ -103,7 +103,7 @@ def _cells_around(starts, around, nodes, place):
                 place[cell], found[count] = 0, cell
                 count += 1
     place[found[:count]] = -1
-    return np.sort(found[:count])
+    return found[:count]
 
 
 @njit(cache=True)

@@ -3,6 +3,8 @@
 import numpy as np
 from numba import njit
 
+from verify.xfem.short_sort import sort_short
+
 __all__ = ["labelled", "match_pieces", "number_unknowns", "retire", "separated", "write_pieces"]
 
 
@@ -56,7 +58,9 @@ def number_unknowns(
                 return -1 - p
             ancestor[g] = unknown
             at_home[g] = at_home[g] or (home[p, a] and unknown < mesh_nodes)
-    order = np.argsort(ancestor, kind="mergesort")
+    order = ancestor * groups + np.arange(groups)
+    sort_short(order)
+    order %= groups
     before = count
     k = 0
     while k < groups and ancestor[order[k]] < 0:

@@ -39,26 +39,29 @@ def cells_hit(sweep, after, front, margin, low, high, order):
 
 
 @njit(cache=True)
-def _level(node, points, snap, sweep, phi):
+def _level(node, points, snap, sweep, phi, room):
     if np.isnan(phi[node]):
-        value = probe(points[node], sweep)[0]
+        value = probe(points[node], sweep, room)[0]
         phi[node] = 0.0 if abs(value) <= snap else value
     return phi[node]
 
 
 @njit(cache=True)
-def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave):
+def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, room):
     """(near the sweep, crossed through, latest travel) of a cell.
 
     Writes the travel at which the blade entered it, and crossed it through.
     """
     corners, space = cells.shape[1], points.shape[1]
-    place = np.empty(space)
+    place = room[4, :space]
     near, through, any_zero, latest = False, True, False, 0.0
     for a in range(corners):
         for b in range(a + 1, corners):
             p, m = cells[cell, a], cells[cell, b]
-            above, below = _level(p, points, snap, sweep, phi), _level(m, points, snap, sweep, phi)
+            above, below = (
+                _level(p, points, snap, sweep, phi, room),
+                _level(m, points, snap, sweep, phi, room),
+            )
             if (above >= 0.0) == (below >= 0.0):
                 continue
             if above < 0.0:
@@ -66,7 +69,7 @@ def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave):
             any_zero = True
             for i in range(space):
                 place[i] = (above * points[m, i] - below * points[p, i]) / (above - below)
-            level, beyond, travel = probe(place, sweep)
+            level, beyond, travel = probe(place, sweep, room)
             if abs(level) <= size[cell] and beyond <= size[cell]:
                 near = near or travel <= front + size[cell]
                 latest = max(latest, travel)
@@ -105,7 +108,7 @@ def walk(
     `settled` marks cells that the blade has left behind, `near_cell` all that were ever near it.
     """
     queue, candidates = [np.int64(0) for _ in range(0)], [np.int64(0) for _ in range(0)]
-    frontier = [np.int64(0) for _ in range(0)]
+    frontier, room = [np.int64(0) for _ in range(0)], np.empty((5, 3))
     for cell in seeds:
         if turns[cell] != turn:
             turns[cell] = turn
@@ -117,7 +120,7 @@ def walk(
         if settled[cell]:
             continue
         near, through, latest = _cross(
-            cell, front, cells, points, size, snap, sweep, phi, entry, leave
+            cell, front, cells, points, size, snap, sweep, phi, entry, leave, room
         )
         if not near:
             continue
