@@ -168,7 +168,7 @@ def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]])
 
 def _round_scale(scale: float) -> float:
     """Return 1 for bodies that move visibly by themselves, else 1, 2 or 5 times a power of ten."""
-    if 0.3 <= scale < 2:
+    if 0.7 <= scale < 2:
         return 1.0
     power = 10.0 ** math.floor(math.log10(scale))
     return next(m * power for m in (5, 2, 1) if scale >= m * power * (1 - 1e-12))
