@@ -88,7 +88,8 @@ def number_of_row(row, table, known, count):
     at = _place(row, table, known)
     if table[at] < 0:
         table[at] = count
-        known[count] = row
+        for k in range(len(row)):
+            known[count, k] = row[k]
         return count, count + 1
     return table[at], count
 

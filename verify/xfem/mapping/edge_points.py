@@ -177,14 +177,21 @@ def _between(x, y, nodes, node_points, positions, first, entries, directions, li
     a, b, c = np.empty(space), np.empty(space), np.empty(space)
     _place(x, nodes, node_points, positions, a)
     _place(y, nodes, node_points, positions, b)
-    direction, total = directions[line], ((b - a) ** 2).sum()
-    length = (direction**2).sum()
-    if straight and length == 0.0:
-        direction[:] = b - a
-    aligned = ((b - a) * direction).sum() ** 2
-    if not straight and (length == 0.0 or aligned < _ALIGNED * length * total):
+    direction, unset = directions[line], True
+    for i in range(space):
+        unset = unset and direction[i] == 0.0
+    if unset and straight:
+        for i in range(space):
+            direction[i] = b[i] - a[i]
+    total, length, aligned, start, end = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(space):
+        total += (b[i] - a[i]) ** 2
+        length += direction[i] ** 2
+        aligned += (b[i] - a[i]) * direction[i]
+        start += a[i] * direction[i]
+        end += b[i] * direction[i]
+    if not straight and (unset or aligned**2 < _ALIGNED * length * total):
         return -1, 0.0
-    start, end = (a * direction).sum(), (b * direction).sum()
     forward = _after(end, y, start, x)
     entry = first[line]
     while entry >= 0:
@@ -193,11 +200,13 @@ def _between(x, y, nodes, node_points, positions, first, entries, directions, li
         if z in (x, y):
             continue
         _place(z, nodes, node_points, positions, c)
-        at = (c * direction).sum()
+        at, along = 0.0, 0.0
+        for i in range(space):
+            at += c[i] * direction[i]
+            along += (c[i] - a[i]) * (b[i] - a[i])
         if _after(at, z, start, x) != forward or _after(end, y, at, z) != forward:
             continue
-        share = ((c - a) * (b - a)).sum() / total if total > 0.0 else 0.5
-        return z, min(max(share, 0.0), 1.0)
+        return z, min(max(along / total, 0.0), 1.0) if total > 0.0 else 0.5
     return -1, 0.0
 
 
@@ -209,11 +218,14 @@ def _inner_point(
     row = np.full(_WIDTH, _NONE, dtype=np.int64)
     if not (_join(x, nodes, supports, row) and _join(y, nodes, supports, row)):
         return -1, 0.0
-    if row[_FACE - 1] == _NONE:
+    straight = row[_FACE - 1] == _NONE
+    if straight:
         line = find_row(row, table, known)
         if line < 0:
             return -1, 0.0
-        return _between(x, y, nodes, node_points, positions, first, entries, directions, line, True)
+        return _between(
+            x, y, nodes, node_points, positions, first, entries, directions, line, straight
+        )
     for number, other in ((x, y), (y, x)):
         if number < nodes:
             continue
