@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # Distribution -> what it is imported as, where that is another name.
 IMPORTED_AS = {
     "dolfinx-solver-real": {
-        "dolfinx", "dolfinx_solver", "ufl", "basix", "ffcx", "petsc4py", "mpi4py",
+        "dolfinx", "dolfinx_solver", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py",
     },
     "pillow": {"PIL"},
     "import-linter": {"importlinter"},
