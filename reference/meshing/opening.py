@@ -9,24 +9,24 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError
 
-__all__ = ["ConformingMesh", "open_cut"]
+__all__ = ["ConformingMesh", "cell_facets", "interior_facets", "open_cut"]
 
 
 @dataclass(frozen=True)
 class ConformingMesh:
-    """A simplicial mesh that conforms to a cut, with the cut open.
+    """A simplicial mesh that conforms to a cut, with the cut open; in d = 2 or 3 dimensions.
 
     Attributes
     ----------
-    points : (n, 2) float array
+    points : (n, d) float array
         Nodes in m; doubled on the cut.
-    cells : (m, 3) int array
-        Positively oriented triangles.
+    cells : (m, d + 1) int array
+        Positively oriented simplices.
     parent : (n,) int array
         The node before the cut was opened.
     boundary : (b, 2) int array
         Cell and opposite corner of each facet on the outer boundary (faces of the cut are not).
-    cut_facets : (f, 2) int array
+    cut_facets : (f, d) int array
         Nodes before opening of each facet of the cut.
     """
 
@@ -37,13 +37,75 @@ class ConformingMesh:
     cut_facets: NDArray[np.int64]
 
     @property
+    def dimension(self) -> int:
+        """Space dimension, 2 or 3."""
+        return int(self.points.shape[1])
+
+    @property
     def pieces(self) -> NDArray[np.int64]:
         """(m,) number of the connected piece of material that each cell belongs to."""
-        node = np.repeat(np.arange(len(self.cells)), 3)
-        link = coo_array((np.ones(len(node)), (node, self.cells.ravel())),
-                         shape=(len(self.cells), len(self.points)))  # fmt: skip
-        _, label = connected_components((link @ link.T).tocsr(), directed=False)
-        return label.astype(np.int64)
+        first, second = _links_of_corners(self.cells)
+        link = coo_array((np.ones(len(first)), (first, second)), shape=(len(self.points),) * 2)
+        _, label = connected_components(link.tocsr(), directed=False)
+        # numbered by their first cells
+        _, start, of_cell = np.unique(
+            label[self.cells[:, 0]], return_index=True, return_inverse=True
+        )
+        return np.argsort(np.argsort(start))[of_cell].astype(np.int64)
+
+    @property
+    def realised_cut(self) -> NDArray[np.float64]:
+        """(f, d, d) corner coordinates of the facets of the cut, m."""
+        first = np.zeros(int(self.parent.max()) + 1, dtype=np.int64)
+        first[self.parent[::-1]] = np.arange(len(self.parent))[::-1]
+        d = self.dimension
+        corners: NDArray[np.float64] = self.points[first[self.cut_facets]].reshape(-1, d, d)
+        return corners
+
+
+def cell_facets(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Nodes (m · (d + 1), d), ascending, of the facets; facet k of a cell lies opposite corner k."""
+    corners = [[c for c in range(cells.shape[1]) if c != k] for k in range(cells.shape[1])]
+    return np.sort(cells[:, corners], axis=2).reshape(-1, cells.shape[1] - 1)
+
+
+def interior_facets(
+    cells: NDArray[np.int64], chosen: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]]:
+    """Match the facets of neighbouring cells, and find some of them by their nodes.
+
+    Parameters
+    ----------
+    cells : (m, d + 1) array
+    chosen : (f, d) array
+        Nodes of facets.
+
+    Returns
+    -------
+    first, second : (i,) arrays
+        Interior facets as rows of `cell_facets`, seen from either cell.
+    is_chosen : (i,) bool array
+        Whether it is one of `chosen`.
+    outer : (b,) array
+        Facets of one cell only.
+
+    Raises
+    ------
+    InputError
+        If one of `chosen` is not an interior facet.
+    """
+    keys, wanted = _facet_keys(cell_facets(cells), np.sort(chosen, axis=1))
+    order = np.argsort(keys, kind="stable")
+    twin = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    first, second = order[twin], order[twin + 1]
+    alone = np.ones(len(keys), dtype=bool)
+    alone[first] = alone[second] = False
+    wanted = np.unique(wanted)
+    is_chosen = np.isin(keys[first], wanted)
+    if is_chosen.sum() != len(wanted):
+        missing = len(wanted) - int(is_chosen.sum())
+        raise InputError(f"{missing} facets of the cut are not inside the mesh")
+    return first, second, is_chosen, np.flatnonzero(alone)
 
 
 def open_cut(
@@ -52,43 +114,29 @@ def open_cut(
     """Double the nodes on a cut.
 
     Around each node the cells are grouped through the facets that are not cut; every group
-    after the first gets a node of its own. Tips stay closed, mouths open, and a junction gets
-    as many nodes as there are sectors, without being told which is which.
+    after the first gets a fresh node. Tips and fronts stay closed, mouths open, and a junction
+    gets as many nodes as there are sectors, without being told which is which.
 
     Parameters
     ----------
-    points : (n, 2) float array
-    cells : (m, 3) int array
-    cut_facets : (f, 2) int array
-        Node pairs of the interior facets along the cut.
+    points : (n, d) float array
+    cells : (m, d + 1) int array
+        Positively oriented.
+    cut_facets : (f, d) int array
+        Nodes of the interior facets along the cut.
 
     Raises
     ------
     InputError
-        If a facet of the cut is not an interior facet of the mesh, or a cell has no area.
+        If a facet of the cut is not an interior facet of the mesh, or a cell has no volume.
     """
-    _check_areas(points, cells)
-    count = len(points)
-    corners = np.array([[1, 2], [2, 0], [0, 1]])
-    facets = np.sort(cells[:, corners], axis=2).reshape(-1, 2)
-    keys = facets[:, 0] * count + facets[:, 1]
-    order = np.argsort(keys, kind="stable")
-    twin = np.flatnonzero(keys[order][1:] == keys[order][:-1])
-    first, second = order[twin], order[twin + 1]
-    alone = np.ones(len(keys), dtype=bool)
-    alone[first] = alone[second] = False
-    outer = np.flatnonzero(alone)
-
-    sorted_cut = np.sort(np.asarray(cut_facets, dtype=np.int64).reshape(-1, 2), axis=1)
-    cut_keys = np.unique(sorted_cut[:, 0] * count + sorted_cut[:, 1])
-    is_cut = np.isin(keys[first], cut_keys)
-    if is_cut.sum() != len(cut_keys):
-        missing = len(cut_keys) - int(is_cut.sum())
-        raise InputError(f"{missing} facets of the cut are not inside the mesh")
+    _check_volumes(points, cells)
+    d = points.shape[1]
+    cut_facets = np.asarray(cut_facets, dtype=np.int64).reshape(-1, d)
+    first, second, is_cut, outer = interior_facets(cells, cut_facets)
 
     # a slot is (cell, corner); join the slots of one node across every facet that is not cut
-    joined_first, joined_second = first[~is_cut], second[~is_cut]
-    slot_a, slot_b = _facing_slots(cells, joined_first, joined_second)
+    slot_a, slot_b = _facing_slots(cells, first[~is_cut], second[~is_cut])
     link = coo_array((np.ones(len(slot_a)), (slot_a, slot_b)), shape=(cells.size, cells.size))
     _, group = connected_components(link.tocsr(), directed=False)
     _, start, label = np.unique(group, return_index=True, return_inverse=True)
@@ -98,45 +146,65 @@ def open_cut(
     rank[np.argsort(parent, kind="stable")] = np.arange(len(start))
     opened = rank[label].reshape(cells.shape)
     parent = np.sort(parent, kind="stable")
-    boundary = np.column_stack([outer // 3, outer % 3])
-    mesh = ConformingMesh(
-        points[parent], opened, parent, boundary, np.column_stack(np.divmod(cut_keys, count))
-    )
+    boundary = np.column_stack(np.divmod(outer, d + 1))
+    facets = np.unique(cell_facets(cells)[first[is_cut]], axis=0)
+    mesh = ConformingMesh(points[parent], opened, parent, boundary, facets)
     _check_opening(mesh, len(outer))
     return mesh
+
+
+def _facet_keys(
+    facets: NDArray[np.int64], others: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Give equal facets (rows) of both arrays equal whole numbers."""
+    rows = np.vstack([facets, others])
+    count = int(rows.max(initial=0)) + 1
+    keys = rows[:, 0]
+    for column in rows.T[1:]:
+        # compressed before each product, which so stays below 2⁶³
+        keys = np.unique(keys, return_inverse=True)[1] * count + column
+    return keys[: len(facets)], keys[len(facets) :]
 
 
 def _facing_slots(
     cells: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of slots (cell · 3 + corner) of one node in two cells that share a facet."""
+    """Pairs of slots (cell · (d + 1) + corner) of one node in two cells that share a facet."""
+    k = cells.shape[1]
     pairs_a, pairs_b = [], []
-    for step in (1, 2):
-        corner = (first % 3 + step) % 3
-        node = cells[first // 3, corner]
-        at = np.argmax(cells[second // 3] == node[:, None], axis=1)
-        pairs_a.append(first // 3 * 3 + corner)
-        pairs_b.append(second // 3 * 3 + at)
+    for step in range(1, k):
+        corner = (first % k + step) % k
+        node = cells[first // k, corner]
+        at = np.argmax(cells[second // k] == node[:, None], axis=1)
+        pairs_a.append(first // k * k + corner)
+        pairs_b.append(second // k * k + at)
     return np.concatenate(pairs_a), np.concatenate(pairs_b)
 
 
-def _check_areas(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
+def _links_of_corners(cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of nodes that some cell holds together: its first corner with each other."""
+    others = cells[:, 1:]
+    return np.repeat(cells[:, 0], others.shape[1]), others.ravel()
+
+
+def _check_volumes(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
     if not len(cells):
         raise InputError("the mesh has no cells")
-    a, b, c = (points[cells[:, k]] for k in range(3))
-    area = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    longest = np.max([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
-    if not (area > 1e-10 * longest**2).all():
-        raise InputError(f"the mesh generator made a cell of area {area.min():.3g} m²")
+    d = points.shape[1]
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    volume = np.linalg.det(edges) / (2 if d == 2 else 6)
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    if not (volume > (1e-10 if d == 2 else 1e-14) * longest**d).all():
+        unit = "area {:.3g} m²" if d == 2 else "volume {:.3g} m³"
+        raise InputError(f"the mesh generator made a cell of {unit.format(volume.min())}")
 
 
 def _check_opening(mesh: ConformingMesh, outer: int) -> None:
     """Every facet of the cut must have become two exterior facets."""
-    corners = np.array([[1, 2], [2, 0], [0, 1]])
-    facets = np.sort(mesh.cells[:, corners], axis=2).reshape(-1, 2)
-    _, times = np.unique(facets, axis=0, return_counts=True)
+    keys, _ = _facet_keys(cell_facets(mesh.cells), np.zeros((0, mesh.dimension), dtype=np.int64))
+    _, times = np.unique(keys, return_counts=True)
     exterior = int((times == 1).sum())
-    # a facet between two closed tips stays whole: its two ends are single nodes
+    # a facet between two closed tips stays whole: its ends are single nodes
     expected = outer + 2 * len(mesh.cut_facets)
     if exterior != expected:
         raise InputError(
