@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.cuts import Cut
 from verify.xfem.cutting.distinct import distinct
-from verify.xfem.cutting.growing_array import GrowingArray
+from verify.xfem.growing_array import GrowingArray
 from verify.xfem.cutting.orientation_kernels import simplex_signs
 from verify.xfem.cutting.patch import MeshPatch, PatchCutter
 from verify.xfem.cutting.point_numbers import PointNumbers

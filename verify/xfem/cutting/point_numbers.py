@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.cutting.growing_array import GrowingArray
-from verify.xfem.cutting.row_numbers import RowNumbers, number_of_row
+from verify.xfem.growing_array import GrowingArray
+from verify.xfem.row_numbers import RowNumbers, number_of_row
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["PointNumbers"]

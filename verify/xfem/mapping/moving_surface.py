@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.cutting.growing_array import GrowingArray
-from verify.xfem.cutting.row_numbers import RowNumbers
+from verify.xfem.growing_array import GrowingArray
+from verify.xfem.row_numbers import RowNumbers
 from verify.xfem.errors import XfemError
 
 __all__ = ["MovingSurface"]

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.cutting.growing_array import GrowingArray
+from verify.xfem.growing_array import GrowingArray
 
 __all__ = ["RowNumbers", "find_row", "number_of_row"]
 
