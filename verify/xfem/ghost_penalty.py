@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from verify.xfem.block_pattern import BlockPattern, block_pattern
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
-from verify.xfem.mass import Mass, cell_densities
+from verify.xfem.mass import Mass, cell_densities, coupled_pattern, pattern_places
 from verify.xfem.piece_contacts import face_contacts
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["GhostPenalty"]
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 
 class GhostPenalty:
@@ -43,6 +44,8 @@ class GhostPenalty:
         h A, with h the mean height of both cells over the face, in m^d.
     modulus : (f,) float array
         (λ + 2μ) of the stiffer cell, in pascal.
+    couplings : (f, 2) int array
+        Unknown nodes on either side of each face that only the penalty couples.
 
     Raises
     ------
@@ -80,9 +83,10 @@ class GhostPenalty:
         self._heights = 0.5 * (height + across)
         self._cells = cells
         self.modulus = self._of_faces(material.lam + 2.0 * material.mu)
-        self._pairs = np.stack(
+        self.couplings: _Ints = np.stack(
             [virtual.cells[pieces[0], local], virtual.cells[pieces[1], there]], axis=1
         )
+        self._places: tuple[BlockPattern, _Ints] | None = None
 
     @cached_property
     def matrix(self) -> csr_array:
@@ -92,19 +96,27 @@ class GhostPenalty:
 
     def pattern(self) -> BlockPattern:
         """Sparsity of stiffness and penalty; its first cells are those of the body."""
-        corners = self.virtual.cells.shape[1]
-        couplings = self._pairs[:, [0] + [1] * (corners - 1)]
-        cells = np.concatenate([self.virtual.cells, couplings])
-        return block_pattern(cells, self.virtual.node_count)
+        return coupled_pattern(self.virtual, self.couplings)
 
-    def add_stiffness(self, pattern: BlockPattern, blocks: _Floats) -> None:
-        """Add the penalty to nodal blocks (B, d, d) of a `pattern`."""
-        entries = self.matrix.tocoo()
-        of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
-        keys = of_row * pattern.node_count + pattern.columns
-        at = np.searchsorted(keys, entries.row.astype(np.int64) * pattern.node_count + entries.col)
+    def add_stiffness(self, pattern: BlockPattern, blocks: _Floats, scale: float = 1.0) -> None:
+        """Add `scale` times the penalty to nodal blocks (B, d, d) of a pattern.
+
+        Raises
+        ------
+        XfemError
+            If the pattern lacks couplings of the penalty.
+        """
+        rows, columns, values = self._entries
+        if self._places is None or self._places[0] is not pattern:
+            self._places = (pattern, pattern_places(pattern, rows, columns))
+        at = self._places[1]
         for axis in range(blocks.shape[1]):
-            blocks[at, axis, axis] += entries.data
+            blocks[at, axis, axis] += scale * values
+
+    @cached_property
+    def _entries(self) -> tuple[_Ints, _Ints, _Floats]:
+        entries = self.matrix.tocoo()
+        return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
 
     def force(self, displacement: _Floats) -> tuple[_Floats, float]:
         """Force (N, d) of the penalty, in newtons, and its energy."""

@@ -18,7 +18,15 @@ from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Mass", "cell_densities", "consistent_mass", "second_moments", "side_wise_mass"]
+__all__ = [
+    "Mass",
+    "cell_densities",
+    "consistent_mass",
+    "coupled_pattern",
+    "pattern_places",
+    "second_moments",
+    "side_wise_mass",
+]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -79,18 +87,25 @@ class Mass:
         """(N, d) dead weight of the unknowns in a field of gravity (d,), in newtons."""
         return self.weights[:, None] * np.asarray(gravity, dtype=float)
 
-    def pattern(self, virtual: VirtualMesh) -> BlockPattern:
+    def pattern(self, virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockPattern:
         """Sparsity of stiffness and mass together; its first cells are those of the body.
 
-        The lumpings of the thesis couple the unknowns of one node, which no cell does.
+        The lumpings of the thesis couple the unknowns of one node, and the mass of a ghost
+        penalty those on both sides of a face: no cell does.
+
+        Parameters
+        ----------
+        virtual : VirtualMesh
+        couplings : (k, 2) int array, optional
+            Further pairs of unknown nodes that are to be coupled.
         """
-        rows, columns, _ = self.entries
-        corners = virtual.cells.shape[1]
-        same_parent = virtual.node_parent[rows] == virtual.node_parent[columns]
-        extra = same_parent & (rows < columns)
-        pairs = np.stack([rows[extra], columns[extra]], axis=1)
-        couplings = pairs[:, [0] + [1] * (corners - 1)]
-        return block_pattern(np.concatenate([virtual.cells, couplings]), virtual.node_count)
+        own = np.empty((0, 2), dtype=np.int64) if couplings is None else couplings
+        if self.diagonal is None:
+            rows, columns, _ = self.entries
+            upper = rows < columns
+            pairs = np.stack([rows[upper], columns[upper]], axis=1)
+            own = np.concatenate([own, pairs[_uncoupled(virtual, pairs)]])
+        return coupled_pattern(virtual, own)
 
     def places(self, pattern: BlockPattern) -> _Ints:
         """Block of each of the `entries` in a pattern.
@@ -101,13 +116,46 @@ class Mass:
             If the pattern lacks one.
         """
         rows, columns, _ = self.entries
-        of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
-        keys = of_row * pattern.node_count + pattern.columns
-        wanted = rows * pattern.node_count + columns
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        if (keys[at] != wanted).any():
-            raise XfemError("the pattern lacks couplings of this mass; expected Mass.pattern(...)")
-        return at
+        return pattern_places(pattern, rows, columns)
+
+
+def coupled_pattern(virtual: VirtualMesh, couplings: _Ints) -> BlockPattern:
+    """Sparsity of a body and of further couplings (k, 2) between its unknown nodes."""
+    if len(couplings) == 0:
+        return block_pattern(virtual.cells, virtual.node_count)
+    corners = virtual.cells.shape[1]
+    extra = couplings[:, [0] + [1] * (corners - 1)]
+    return block_pattern(np.concatenate([virtual.cells, extra]), virtual.node_count)
+
+
+def pattern_places(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> _Ints:
+    """Blocks at the given rows and columns.
+
+    Raises
+    ------
+    XfemError
+        If the pattern lacks one.
+    """
+    at, found = _find(pattern, rows, columns)
+    if not found.all():
+        raise XfemError("the pattern lacks couplings of this mass or penalty; expected Mass.pattern(...)")
+    return at
+
+
+def _find(
+    pattern: BlockPattern, rows: _Ints, columns: _Ints
+) -> tuple[_Ints, NDArray[np.bool_]]:
+    of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
+    keys = of_row * pattern.node_count + pattern.columns
+    wanted = rows * pattern.node_count + columns
+    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    return at, keys[at] == wanted
+
+
+def _uncoupled(virtual: VirtualMesh, pairs: _Ints) -> NDArray[np.bool_]:
+    """Which pairs of unknown nodes no cell contains."""
+    _, found = _find(block_pattern(virtual.cells, virtual.node_count), pairs[:, 0], pairs[:, 1])
+    return ~found
 
 
 def cell_densities(virtual: VirtualMesh, density: ArrayLike) -> _Floats:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from verify.xfem.corotational import InternalForce
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass
+from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.supports import Supports
 
 __all__ = ["DynamicBody", "MotionState", "MovingSupports", "RayleighDamping"]
@@ -101,6 +102,7 @@ class DynamicBody:
     Parameters
     ----------
     force : InternalForce
+        With a ghost penalty: `PenalisedForce`.
     mass : Mass
     weight : (N, d) float array, optional
         Dead load with the potential −weight·u, e.g. `Mass.weight(gravity)`, in newtons.
@@ -141,7 +143,9 @@ class DynamicBody:
                 f"supports: {self.supports.fixed.dtype} array of shape "
                 f"{self.supports.fixed.shape}; expected bool and {self.shape}"
             )
-        self.pattern = self.mass.pattern(virtual)
+        penalised = self.force if isinstance(self.force, PenalisedForce) else None
+        couplings = penalised.ghost.couplings if penalised else None
+        self.pattern = self.mass.pattern(virtual, couplings)
         self.fixed = self.supports.fixed
         self.moving = isinstance(self.supports, MovingSupports)
 

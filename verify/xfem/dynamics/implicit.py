@@ -12,6 +12,7 @@ from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.dynamics.integrator import StepForces
 from verify.xfem.dynamics.linear_solver import LinearSolver, SparseLU
 from verify.xfem.dynamics.newton import NewtonIntegrator
+from verify.xfem.penalised_force import PenalisedForce
 
 __all__ = ["EnergyMomentum", "ImplicitEuler", "Trapezoidal"]
 
@@ -113,6 +114,8 @@ class EnergyMomentum(NewtonIntegrator):
                 force.virtual.cells, *force.geometry, self._first, force.rotations,
                 start.displacement, displacement, self.substituted, internal,
             )  # fmt: skip
+            if isinstance(force, PenalisedForce):
+                force.add_penalty(0.5 * (start.displacement + displacement), 1.0, internal)
         else:
             force.add_frozen_product(0.5 * (start.displacement + displacement), 1.0, internal)
         middle = start.time + 0.5 * self.step_size
@@ -129,3 +132,5 @@ class EnergyMomentum(NewtonIntegrator):
             *force.geometry, self._first, force.rotations,
             self._start.displacement, displacement, self.substituted, self._blocks,
         )  # fmt: skip
+        if isinstance(force, PenalisedForce):
+            force.ghost.add_stiffness(self.body.pattern, self._blocks, self.share)
