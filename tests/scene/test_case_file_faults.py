@@ -63,7 +63,7 @@ FAULTS = {
     "cells in 3D": ("[4, 8],", "[4, 8, 8],", "has 3 numbers; expected 2"),
     "cells and sizes": ("[mesh]", "[mesh]\nsizes = [0.1]", "a mesh has either sizes or cells"),
     "unknown kind": ('"polyline"', '"polylin"', "cuts[0].kind: no 'polylin'; did you mean"),
-    "no kind": ('kind = "polyline"\n', "", "cuts[0].kind: missing; expected one of arc, polygon"),
+    "no kind": ('kind = "polyline"\n', "", "cuts[0].kind: missing; expected one of arc, "),
     "a single table": ("[[supports]]", "[supports]", "supports: expected a list of tables ([[…]]"),
     "point in 3D": ("[0.5, 1.0]]", "[0.5, 1.0, 0.0]]", "cuts[0].points[1]: expected at most 2"),
     "one point": ("[-0.1, 1.0], ", "", "cuts[0].points: expected at least 2 entries"),

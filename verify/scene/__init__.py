@@ -3,14 +3,17 @@
 from verify.scene.acceptance import (
     BoundCheck,
     DisplacementQuantity,
+    MaximumDisplacementQuantity,
     OpeningQuantity,
     RateCheck,
     RatioCheck,
     StrainEnergyQuantity,
+    StressIntensityQuantity,
     ValueCheck,
 )
-from verify.scene.cuts import ArcCut, PolygonCut, PolylineCut
+from verify.scene.cuts import ArcCut, PolylineCut
 from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle
+from verify.scene.initial import AtRest, Equilibrium, Moving
 from verify.scene.loading import (
     case_folder,
     list_cases,
@@ -34,19 +37,26 @@ from verify.scene.physics import (
 )
 from verify.scene.regions import Region, parse_region
 from verify.scene.scene import Scene
+from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut, SweptCut
 
 __all__ = [
     "Analysis",
     "ArcCut",
+    "AtRest",
     "BodyForce",
     "BoundCheck",
     "Box",
+    "CylinderCut",
+    "DiscCut",
     "DisplacementQuantity",
+    "Equilibrium",
     "Exact",
     "Gravity",
     "Material",
+    "MaximumDisplacementQuantity",
     "MeshFile",
     "MeshLevels",
+    "Moving",
     "OpeningQuantity",
     "Polygon",
     "PolygonCut",
@@ -57,8 +67,11 @@ __all__ = [
     "ReferenceLevels",
     "Region",
     "Scene",
+    "SpatialCut",
     "StrainEnergyQuantity",
+    "StressIntensityQuantity",
     "Support",
+    "SweptCut",
     "Traction",
     "ValueCheck",
     "case_folder",

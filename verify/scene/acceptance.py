@@ -4,21 +4,37 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from verify.scene.strict import Finite, Positive, Strict, Vector
+from verify.scene.strict import Finite, NonNegative, Point3, Positive, Strict, Vector
 
 __all__ = [
     "Acceptance",
     "BoundCheck",
     "DisplacementQuantity",
+    "MaximumDisplacementQuantity",
     "OpeningQuantity",
     "Quantity",
     "RateCheck",
     "RatioCheck",
     "StrainEnergyQuantity",
+    "StressIntensityQuantity",
     "ValueCheck",
 ]
 
-METRICS = ("displacement_l2", "energy_norm", "jump_l2", "strain_energy")
+# near and far: closer to a tip or front than a tenth of its cut, and the rest; max and mean: over
+# time; the last seven are of dynamic analyses and need no reference
+METRICS = (
+    "displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_l2", "opening_max",
+    "displacement_l2_near", "displacement_l2_far", "energy_norm_near", "energy_norm_far",
+    "displacement_l2_max", "displacement_l2_mean", "energy_norm_max", "energy_norm_mean",
+    "jump_l2_max", "jump_l2_mean", "strain_energy",
+    "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
+    "linear_momentum_drift", "angular_momentum_drift",
+)  # fmt: skip
+
+
+Time = Annotated[
+    NonNegative | None, Field(description="dynamic: when, s; default the last output time")
+]
 
 
 class StrainEnergyQuantity(Strict):
@@ -39,6 +55,15 @@ class DisplacementQuantity(Strict):
     name: str
     point: Vector = Field(description="material coordinates, m; not on a cut")
     component: Literal["x", "y", "z"]
+    time: Time = None
+
+
+class MaximumDisplacementQuantity(Strict):
+    """The largest length of the displacement over the body, m."""
+
+    kind: Literal["maximum_displacement"]
+    name: str = "maximum_displacement"
+    time: Time = None
 
 
 class OpeningQuantity(Strict):
@@ -47,14 +72,35 @@ class OpeningQuantity(Strict):
     kind: Literal["opening"]
     name: str
     cut: str = "cut"
-    at: float = Field(
-        strict=True, ge=0.0, le=1.0, description="position as a fraction of the cut's length"
+    at: float | None = Field(
+        default=None,
+        strict=True,
+        ge=0.0,
+        le=1.0,
+        description="2D: position as a fraction of the cut's length",
     )
+    point: Point3 | None = Field(default=None, description="3D: a point of the cut, m")
     component: Literal["normal", "tangential"] = "normal"
+    time: Time = None
+
+
+class StressIntensityQuantity(Strict):
+    """A stress-intensity factor at an end of a plane cut, Pa √m."""
+
+    kind: Literal["stress_intensity"]
+    name: str
+    cut: str = "cut"
+    end: Literal["start", "end"] = Field(description="which end of the cut")
+    mode: Literal["I", "II"] = "I"
 
 
 Quantity = Annotated[
-    StrainEnergyQuantity | DisplacementQuantity | OpeningQuantity, Field(discriminator="kind")
+    StrainEnergyQuantity
+    | DisplacementQuantity
+    | MaximumDisplacementQuantity
+    | OpeningQuantity
+    | StressIntensityQuantity,
+    Field(discriminator="kind"),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Cuts: geometric objects in the material frame."""
+"""Cuts: geometric objects in the material frame; here those of plane scenes."""
 
 from typing import Annotated, Literal
 
@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from verify.scene.planar import polyline_defect
-from verify.scene.strict import Finite, NonNegative, Point2, Point3, Positive, Strict
+from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SweptCut
+from verify.scene.strict import Finite, NonNegative, Point2, Positive, Strict
 
-__all__ = ["ArcCut", "Cut", "PolygonCut", "PolylineCut"]
+__all__ = ["ArcCut", "Cut", "PlaneCut", "PolylineCut"]
 
 
 class PolylineCut(Strict):
@@ -31,6 +32,11 @@ class PolylineCut(Strict):
             raise ValueError(f"the polyline {defect}")
         return self
 
+    @property
+    def dimension(self) -> int:
+        """Space dimension."""
+        return 2
+
     def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
         """Vertices (n, 2) of the polyline; `spacing` does not matter to straight segments."""
         return np.array(self.points, dtype=float)
@@ -50,6 +56,11 @@ class ArcCut(Strict):
     expected: Literal["through", "edge", "inner"] | None = None
     opens_at: NonNegative = Field(default=0.0, description="time at which it opens, s")
 
+    @property
+    def dimension(self) -> int:
+        """Space dimension."""
+        return 2
+
     def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
         """Points (n, 2) on the arc, at most `spacing` apart (default: a 256th of a turn)."""
         length = np.deg2rad(self.sweep) * self.radius
@@ -64,25 +75,8 @@ class ArcCut(Strict):
         return ring
 
 
-class PolygonCut(Strict):
-    """A plane polygon in space; its normal follows the right-hand rule."""
-
-    kind: Literal["polygon"]
-    name: str = "cut"
-    points: list[Point3] = Field(min_length=3, description="corners in order, m")
-    expected: Literal["through", "edge", "inner"] | None = None
-    opens_at: NonNegative = Field(default=0.0, description="time at which it opens, s")
-
-    @model_validator(mode="after")
-    def _is_plane(self) -> "PolygonCut":
-        corners = np.array(self.points, dtype=float)
-        centred = corners - corners.mean(axis=0)
-        sizes = np.linalg.svd(centred, compute_uv=False)
-        if sizes[1] <= 1e-9 * sizes[0]:
-            raise ValueError("the polygon has no area")
-        if sizes[2] > 1e-9 * sizes[0]:
-            raise ValueError(f"the polygon is not plane (off by {sizes[2]:.3g} m)")
-        return self
-
-
-Cut = Annotated[PolylineCut | ArcCut | PolygonCut, Field(discriminator="kind")]
+PlaneCut = PolylineCut | ArcCut
+Cut = Annotated[
+    PolylineCut | ArcCut | PolygonCut | DiscCut | CylinderCut | SweptCut,
+    Field(discriminator="kind"),
+]

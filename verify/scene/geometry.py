@@ -110,6 +110,15 @@ class MeshFile(Strict):
     kind: Literal["file"]
     file: Path = Field(description="mesh file, relative to the case file")
     dimension_: Literal[2, 3] = Field(default=2, alias="dimension", description="space dimension")
+    cells: Literal["volume", "surface"] = Field(
+        default="volume", description="surface: triangles in space, a membrane"
+    )
+
+    @model_validator(mode="after")
+    def _surface_is_in_space(self) -> "MeshFile":
+        if self.cells == "surface" and self.dimension_ == 2:
+            raise ValueError("cells = 'surface' is a membrane in space: dimension = 3")
+        return self
 
     @property
     def dimension(self) -> int:

@@ -1,10 +1,10 @@
 """Material, supports, loads and the analysis of a scene. SI units."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
-from verify.scene.strict import Finite, NonNegative, Positive, Strict, Vector
+from verify.scene.strict import Count, Finite, NonNegative, Positive, Strict, Vector
 
 __all__ = [
     "Analysis",
@@ -17,7 +17,27 @@ __all__ = [
     "Traction",
 ]
 
+_OUTPUTS = 11
+
 Values = Annotated[list[Finite], Field(min_length=1, max_length=3)]
+
+
+def _ordered(history: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    times = [time for time, _ in history]
+    if times != sorted(times) or any(a == b for a, b in zip(times, times[2:], strict=False)):
+        raise ValueError("times must ascend; two equal ones are a jump, three are too many")
+    return history
+
+
+History = Annotated[
+    list[tuple[NonNegative, Finite]],
+    Field(
+        min_length=1,
+        description="dynamic: [[time in s, factor], …]; the value times the factor, linear between "
+        "the times and constant before and after them; two equal times make a jump",
+    ),
+    AfterValidator(_ordered),
+]
 
 
 class Material(Strict):
@@ -29,6 +49,7 @@ class Material(Strict):
     plane: Literal["strain", "stress"] | None = Field(
         default=None, description="2D only: plane strain or plane stress"
     )
+    thickness: Positive | None = Field(default=None, description="membranes only: thickness, m")
 
 
 class Support(Strict):
@@ -41,6 +62,7 @@ class Support(Strict):
     components: list[Literal["x", "y", "z"]] | None = Field(
         default=None, description="which components are held; default all"
     )
+    history: History | None = None
 
     @model_validator(mode="after")
     def _lengths_agree(self) -> "Support":
@@ -73,6 +95,7 @@ class BodyForce(Strict):
 
     kind: Literal["body_force"]
     force: Vector | Literal["exact"] = Field(description="N/m³, or 'exact'")
+    history: History | None = None
 
 
 class Traction(Strict):
@@ -81,6 +104,7 @@ class Traction(Strict):
     kind: Literal["traction"]
     where: str = Field(description="name of a boundary part, 'boundary', or an inequality")
     traction: Vector | Literal["exact"] = Field(description="Pa, or 'exact'")
+    history: History | None = None
 
 
 Load = Annotated[Gravity | BodyForce | Traction, Field(discriminator="kind")]
@@ -95,13 +119,32 @@ class Exact(Strict):
     )
 
 
+def _one_name(given: Any) -> Any:
+    """Both names mean the energy μ‖U − I‖² + ½λ tr²(U − I) at any rotation."""
+    return "corotational" if given == "finite_rotation" else given
+
+
+Kinematics = Annotated[
+    Literal["linear", "corotational"],
+    BeforeValidator(_one_name),
+    WithJsonSchema({"enum": ["linear", "corotational", "finite_rotation"], "type": "string"}),
+]
+
+
 class Analysis(Strict):
     """What is solved for."""
 
     kind: Literal["static", "dynamic"] = "static"
-    kinematics: Literal["linear", "corotational"] = "linear"
+    kinematics: Kinematics = Field(
+        default="linear", description="corotational, also called finite_rotation: large rotations"
+    )
     duration: Positive | None = Field(default=None, description="dynamic: end time, s")
     time_step: Positive | None = Field(default=None, description="dynamic: largest step, s")
+    outputs: Count | None = Field(
+        default=None,
+        ge=2,
+        description="dynamic: number of output times, 0 and the end among them (default 11)",
+    )
     damping: tuple[NonNegative, NonNegative] = Field(
         default=(0.0, 0.0), description="Rayleigh: mass (1/s) and stiffness (s) factors"
     )
@@ -110,6 +153,16 @@ class Analysis(Strict):
     def _times_belong(self) -> "Analysis":
         if self.kind == "dynamic" and self.duration is None:
             raise ValueError("a dynamic analysis needs a duration")
-        if self.kind == "static" and (self.duration or self.time_step):
-            raise ValueError("duration and time_step belong to a dynamic analysis")
+        if self.kind == "static" and (self.duration or self.time_step or self.outputs):
+            raise ValueError("duration, time_step and outputs belong to a dynamic analysis")
+        if self.kind == "static" and any(self.damping):
+            raise ValueError("damping belongs to a dynamic analysis")
         return self
+
+    @property
+    def output_times(self) -> tuple[float, ...]:
+        """Output times in s, evenly spaced from 0 to the duration; ``(0.0,)`` if static."""
+        if self.duration is None:
+            return (0.0,)
+        count = self.outputs or _OUTPUTS
+        return tuple(self.duration * k / (count - 1) for k in range(count))

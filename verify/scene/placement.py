@@ -1,33 +1,20 @@
-"""Checks that take more than one part of a scene: dimensions, names, where the cuts lie."""
+"""Checks that take more than one part of a scene: dimensions, names, times."""
 
-from itertools import combinations
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from verify.scene.acceptance import METRICS, DisplacementQuantity, OpeningQuantity
-from verify.scene.cuts import ArcCut, PolygonCut, PolylineCut
-from verify.scene.geometry import MeshFile, Polygon, Rectangle
+from verify.scene.acceptance import METRICS
+from verify.scene.cut_placement import check_cuts, check_points
+from verify.scene.cuts import ArcCut
+from verify.scene.geometry import MeshFile, Polygon
+from verify.scene.initial import Moving
 from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, Gravity, Traction
-from verify.scene.planar import (
-    distance_to_outline,
-    distance_to_polyline,
-    inner_parts,
-    inside_polygon,
-    overlap_length,
-    point_along,
-    polylines_meet,
-)
 from verify.scene.regions import parse_region
 
 if TYPE_CHECKING:
     from verify.scene.scene import Scene
 
-Array = NDArray[np.float64]
-
-__all__ = ["boundary_condition_names", "check_placement", "crossing_cuts"]
+__all__ = ["boundary_condition_names", "check_placement"]
 
 
 def check_placement(scene: "Scene") -> None:
@@ -36,10 +23,9 @@ def check_placement(scene: "Scene") -> None:
     _check_regions(scene)
     _check_exact(scene)
     _check_names(scene)
-    for i, cut in enumerate(scene.cuts):
-        _check_cut(scene, cut, f"cuts[{i}] ('{cut.name}')")
-    _check_overlaps(scene)
-    _check_points(scene)
+    _check_times(scene)
+    check_cuts(scene)
+    check_points(scene)
 
 
 def boundary_condition_names(scene: "Scene") -> tuple[str, ...]:
@@ -78,8 +64,17 @@ def _check_dimensions(scene: "Scene") -> None:
         if isinstance(load, Gravity) and scene.material.density is None:
             raise ValueError(f"loads[{i}]: gravity needs material.density")
     for i, cut in enumerate(scene.cuts):
-        if isinstance(cut, PolygonCut) != (d == 3):
+        if cut.dimension != d:
             raise ValueError(f"cuts[{i}]: a {cut.kind} cut in a {d}D scene")
+    membrane = scene.cell_dimension < d
+    if membrane != (scene.material.thickness is not None):
+        need = "a membrane needs it" if membrane else "belongs to membranes (cells = 'surface')"
+        raise ValueError(f"material.thickness: {need}")
+    if membrane and scene.analysis.kinematics == "linear":
+        raise ValueError(
+            "analysis.kinematics: a membrane has no stiffness across itself but by its rotation; "
+            "expected 'corotational'"
+        )
     if scene.analysis.kind == "dynamic" and scene.material.density is None:
         raise ValueError("material.density: a dynamic analysis needs it")
 
@@ -117,6 +112,54 @@ def _check_exact(scene: "Scene") -> None:
         raise ValueError(f"{wants[0]}: 'exact' needs an [exact] solution")
 
 
+def _check_tip(scene: "Scene", name: str, place: str) -> None:
+    cut = next(cut for cut in scene.cuts if cut.name == name)
+    if cut.dimension == 3:
+        raise ValueError(f"{place}: stress-intensity factors are asked for in 2D scenes only")
+    if isinstance(cut, ArcCut) and cut.sweep == 360.0:
+        raise ValueError(f"{place}.cut: '{name}' is closed and has no end")
+
+
+def _check_times(scene: "Scene") -> None:
+    """Refuse times in a static scene, and times after the end."""
+    duration = scene.analysis.duration
+    times: dict[str, float | None] = {
+        f"quantities[{i}].time": getattr(quantity, "time", None)
+        for i, quantity in enumerate(scene.quantities)
+    }
+    times |= {
+        f"cuts[{i}].opens_at": getattr(cut, "opens_at", None) or None
+        for i, cut in enumerate(scene.cuts)
+    }
+    for place, time in times.items():
+        if time is not None and duration is None:
+            raise ValueError(f"{place}: belongs to a dynamic analysis")
+        if time is not None and duration is not None and time > duration:
+            raise ValueError(f"{place}: {time:g} s is after the end, {duration:g} s")
+    if duration is None:
+        entries = {f"supports[{i}]": entry.history for i, entry in enumerate(scene.supports)}
+        entries |= {
+            f"loads[{i}]": getattr(load, "history", None) for i, load in enumerate(scene.loads)
+        }
+        for place, history in entries.items():
+            if history is not None:
+                raise ValueError(f"{place}.history: belongs to a dynamic analysis")
+        if scene.initial.kind != "rest":
+            raise ValueError("initial: belongs to a dynamic analysis")
+    if isinstance(scene.initial, Moving):
+        _check_motion(scene, scene.initial)
+
+
+def _check_motion(scene: "Scene", motion: Moving) -> None:
+    d = scene.dimension
+    for key in ("velocity", "centre"):
+        vector = getattr(motion, key)
+        if vector is not None and len(vector) != d:
+            raise ValueError(f"initial.{key}: {len(vector)} values; expected {d}")
+    if motion.spin is not None and isinstance(motion.spin, tuple) != (d == 3):
+        raise ValueError(f"initial.spin: expected {'a number' if d == 2 else 'three numbers'}")
+
+
 def _check_names(scene: "Scene") -> None:
     cuts = [cut.name for cut in scene.cuts]
     if len(set(cuts)) != len(cuts):
@@ -125,12 +168,22 @@ def _check_names(scene: "Scene") -> None:
     if len(set(quantities)) != len(quantities):
         raise ValueError(f"quantities: names must differ, got {quantities}")
     for i, quantity in enumerate(scene.quantities):
-        if quantity.kind == "opening" and quantity.cut not in cuts:
+        if quantity.kind in ("opening", "stress_intensity") and quantity.cut not in cuts:
             raise ValueError(
                 f"quantities[{i}].cut: no cut '{quantity.cut}'{nearest(quantity.cut, cuts)}"
             )
         if quantity.kind == "displacement" and len(quantity.point) != scene.dimension:
             raise ValueError(f"quantities[{i}].point: expected {scene.dimension} coordinates")
+        if quantity.kind == "displacement" and "xyz".index(quantity.component) >= scene.dimension:
+            raise ValueError(f"quantities[{i}].component: z in a 2D scene")
+        if quantity.kind == "opening":
+            key, other = ("at", "point") if scene.dimension == 2 else ("point", "at")
+            if getattr(quantity, key) is None or getattr(quantity, other) is not None:
+                raise ValueError(
+                    f"quantities[{i}].{key}: an opening in {scene.dimension}D is at '{key} = …'"
+                )
+        if quantity.kind == "stress_intensity":
+            _check_tip(scene, quantity.cut, f"quantities[{i}]")
     known = dict.fromkeys((*METRICS, *quantities))
     for i, check in enumerate(scene.acceptance):
         if check.metric not in known:
@@ -141,69 +194,3 @@ def _check_names(scene: "Scene") -> None:
             raise ValueError(f"acceptance[{i}].metric: jump_l2 needs a cut")
         if check.check == "rate" and scene.mesh.count < 2:
             raise ValueError(f"acceptance[{i}]: a rate needs at least two mesh levels")
-
-
-def _check_cut(scene: "Scene", cut: PolylineCut | ArcCut | PolygonCut, place: str) -> None:
-    if not isinstance(scene.geometry, Rectangle | Polygon) or isinstance(cut, PolygonCut):
-        return  # checked against the mesh by the solvers
-    outline = scene.geometry.outline()
-    vertices = cut.vertices()
-    if not inner_parts(vertices, outline):
-        raise ValueError(f"{place}: lies outside the body or along its boundary; it cuts nothing")
-    kind = {0: "through", 1: "edge", 2: "inner"}[int(_inside(vertices[[0, -1]], outline).sum())]
-    if cut.expected and cut.expected != kind and not np.array_equal(vertices[0], vertices[-1]):
-        raise ValueError(f"{place}: expected '{cut.expected}' but it is '{kind}'")
-
-
-def _check_overlaps(scene: "Scene") -> None:
-    plane = [cut for cut in scene.cuts if not isinstance(cut, PolygonCut)]
-    for a, b in combinations(plane, 2):
-        length = overlap_length(a.vertices(), b.vertices())
-        if length > 0.0:
-            raise ValueError(
-                f"cuts: '{a.name}' and '{b.name}' lie on each other over {length:.3g} m"
-            )
-
-
-def _check_points(scene: "Scene") -> None:
-    """Quantities are asked for where there is material, and on one side of each cut."""
-    if not isinstance(scene.geometry, Rectangle | Polygon):
-        return
-    outline = scene.geometry.outline()
-    tolerance = 1e-9 * float(np.ptp(outline, axis=0).max())
-    cuts = {cut.name: cut.vertices() for cut in scene.cuts if not isinstance(cut, PolygonCut)}
-    for i, quantity in enumerate(scene.quantities):
-        if isinstance(quantity, DisplacementQuantity):
-            place, point = f"quantities[{i}].point:", np.array([quantity.point], dtype=float)
-        elif isinstance(quantity, OpeningQuantity):
-            place = f"quantities[{i}].at: {quantity.at} of cut '{quantity.cut}' is at"
-            point = point_along(cuts[quantity.cut], quantity.at)[None]
-        else:
-            continue
-        where = f"{place} ({', '.join(f'{x:.6g}' for x in point[0])})"
-        on_boundary = distance_to_outline(point, outline)[0] <= tolerance
-        if not (on_boundary or inside_polygon(point, outline)[0]):
-            raise ValueError(f"{where}, which is not in the body")
-        on_cut = [n for n, v in cuts.items() if distance_to_polyline(point, v)[0] <= tolerance]
-        if isinstance(quantity, DisplacementQuantity) and on_cut:
-            raise ValueError(
-                f"{where} lies on cut '{on_cut[0]}', where the displacement has two values; "
-                "ask for an opening"
-            )
-
-
-def _inside(points: Array, outline: Array) -> NDArray[np.bool_]:
-    """Whether `points` (n, 2) lie inside the body and not on its boundary."""
-    tolerance = 1e-9 * float(np.ptp(outline, axis=0).max())
-    inner: NDArray[np.bool_] = inside_polygon(points, outline)
-    return inner & (distance_to_outline(points, outline) > tolerance)
-
-
-def crossing_cuts(scene: "Scene") -> list[tuple[str, str]]:
-    """Pairs of names of plane cuts whose polylines share a point."""
-    plane = [cut for cut in scene.cuts if not isinstance(cut, PolygonCut)]
-    return [
-        (a.name, b.name)
-        for a, b in combinations(plane, 2)
-        if polylines_meet(a.vertices(), b.vertices())
-    ]

@@ -114,7 +114,10 @@ def polylines_meet(p: Array, q: Array) -> bool:
 
 
 def overlap_length(p: Array, q: Array) -> float:
-    """Length over which the polylines `p` (n, 2) and `q` (m, 2) lie on each other."""
+    """Length over which the polylines `p` (n, 2) and `q` (m, 2) lie on each other.
+
+    Less than 1e-9 of their size is none: they touch, up to round-off.
+    """
     scale = float(np.ptp(np.vstack([p, q]), axis=0).max())
     total = 0.0
     for a, b in pairwise(p):
@@ -124,7 +127,7 @@ def overlap_length(p: Array, q: Array) -> float:
         s, e = (q[:-1] - a) @ u, (q[1:] - a) @ u
         shared = np.clip(np.maximum(s, e), 0, length) - np.clip(np.minimum(s, e), 0, length)
         total += float(shared[off <= 1e-12 * scale].sum())
-    return total
+    return total if total > 1e-9 * scale else 0.0
 
 
 def _cross(u: Array, v: Array) -> Array:

@@ -7,7 +7,8 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from verify.scene.acceptance import Acceptance, Quantity, StrainEnergyQuantity
 from verify.scene.cuts import Cut
-from verify.scene.geometry import Geometry
+from verify.scene.geometry import Geometry, MeshFile
+from verify.scene.initial import AtRest, Initial
 from verify.scene.mesh import MeshLevels, ReferenceLevels
 from verify.scene.physics import Analysis, Exact, Load, Material, Support
 from verify.scene.placement import check_placement
@@ -18,6 +19,10 @@ __all__ = ["Scene"]
 
 def _strain_energy_only() -> list[Quantity]:
     return [StrainEnergyQuantity(kind="strain_energy")]
+
+
+def _at_rest() -> Initial:
+    return AtRest(kind="rest")
 
 
 class Scene(Strict):
@@ -35,6 +40,7 @@ class Scene(Strict):
     exact: Exact | None = None
     cuts: list[Cut] = Field(default_factory=list)
     analysis: Analysis = Field(default_factory=Analysis)
+    initial: Initial = Field(default_factory=_at_rest)
     reference: ReferenceLevels = Field(default_factory=ReferenceLevels)
     quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
         default_factory=_strain_energy_only
@@ -64,6 +70,12 @@ class Scene(Strict):
     def dimension(self) -> int:
         """Space dimension, 2 or 3."""
         return self.geometry.dimension
+
+    @property
+    def cell_dimension(self) -> int:
+        """Dimension of the body itself: 2 for a membrane in space, else the space dimension."""
+        membrane = isinstance(self.geometry, MeshFile) and self.geometry.cells == "surface"
+        return 2 if membrane else self.dimension
 
     @property
     def judged_by_exact(self) -> bool:

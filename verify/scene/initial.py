@@ -1,0 +1,48 @@
+"""The state in which a dynamic analysis begins."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from verify.scene.strict import Finite, Point3, Strict, Vector
+
+__all__ = ["AtRest", "Equilibrium", "Initial", "Moving"]
+
+
+class AtRest(Strict):
+    """Undeformed and at rest."""
+
+    kind: Literal["rest"]
+
+
+class Equilibrium(Strict):
+    """Static equilibrium, at rest, with every cut still closed.
+
+    Supports and loads have the first factor of their history.
+    """
+
+    kind: Literal["equilibrium"]
+
+
+class Moving(Strict):
+    """Undeformed, and moving as a rigid body."""
+
+    kind: Literal["moving"]
+    velocity: Vector | None = Field(default=None, description="translation, m/s; default none")
+    spin: Finite | Point3 | None = Field(
+        default=None, description="angular velocity, rad/s: a number in 2D, a vector in 3D"
+    )
+    centre: Vector | None = Field(
+        default=None, description="point about which it spins, m; default the origin"
+    )
+
+    @model_validator(mode="after")
+    def _moves(self) -> "Moving":
+        if self.velocity is None and self.spin is None:
+            raise ValueError("a moving body needs a velocity, a spin, or both")
+        if self.centre is not None and self.spin is None:
+            raise ValueError("centre belongs to a spin")
+        return self
+
+
+Initial = Annotated[AtRest | Equilibrium | Moving, Field(discriminator="kind")]
