@@ -1,7 +1,7 @@
 """The neutral solution: what is written is read, a wrong shape fails where it arises."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -55,6 +55,27 @@ def test_a_solution_is_read_as_it_was_written_to_the_last_bit(tmp_path, dimensio
             assert one == other
 
 
+def test_times_that_do_not_ascend_are_refused():
+    solution = simplex(2, 1, times=3)
+    with pytest.raises(InputError, match="expected ascending"):
+        replace(solution, times=np.array([0.0, 1.0, 0.5]))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_membrane_is_triangles_in_space_and_read_as_such(tmp_path, order):
+    flat = simplex(2, order)
+    points = np.column_stack([flat.points, np.cos(flat.points[:, 0])])
+    moved = np.random.default_rng(3).normal(size=(1, len(points), 3))
+    edge = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 0.5]]])
+    written = Solution(points, flat.cells, moved, order=order, cut_facets=edge)
+    assert (written.dimension, written.cell_dimension) == (3, 2)
+    write_solution(written, tmp_path / "skin")
+    read = read_solution(tmp_path / "skin")
+    assert read.cell_type == flat.cell_type
+    for name in ("points", "cells", "displacement", "cut_facets"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(written, name))
+
+
 def test_a_size_that_is_not_known_stays_so_and_the_file_stays_json(tmp_path):
     plain = Solution(np.eye(3, 2), np.array([[0, 1, 2]]), np.zeros((1, 3, 2)))
     write_solution(plain, tmp_path / "solution")
@@ -89,6 +110,8 @@ def test_the_json_half_comes_last(tmp_path, monkeypatch):
         ({"displacement": np.full((1, 3, 2), np.nan)}, "not finite"),
         ({"velocity": np.zeros((2, 3, 2))}, "velocity of shape"),
         ({"times": np.zeros(2)}, r"expected \(2, 3, 2\)"),
+        ({"ledger": {"strain": np.zeros(2)}}, r"ledger 'strain' of shape \(2,\); expected \(1,\)"),
+        ({"times": np.array([np.nan])}, "times .* expected ascending and finite"),
     ],
 )
 def test_a_wrong_shape_is_refused_where_the_solver_hands_over(change, fault):

@@ -27,7 +27,8 @@ __all__ = ["SCHEMA_VERSION", "Regularisation", "Solution", "read_solution", "wri
 
 SCHEMA_VERSION = 1
 
-# VTK cell names by (dimension, order); node order is VTK's (corners, then edge mid-points)
+# VTK cell names by (dimension of the cells, order); node order is VTK's (corners, then edge
+# mid-points)
 _CELL_TYPES = {
     (2, 1): "triangle",
     (2, 2): "triangle6",
@@ -36,8 +37,8 @@ _CELL_TYPES = {
 }
 _MANDATORY = ("schema", "files", "dimension", "order")
 _OPTIONAL = (
-    "times", "cut_facets", "ledger", "quantities", "unknowns", "size", "timings", "iterations",
-    "regularisations", "notes",
+    "cell_dimension", "times", "cut_facets", "ledger", "quantities", "unknowns", "size", "timings",
+    "iterations", "regularisations", "notes",
 )  # fmt: skip
 _NODES_PER_CELL = {"triangle": 3, "triangle6": 6, "tetra": 4, "tetra10": 10}
 
@@ -74,7 +75,8 @@ class Solution:
         Nodes in the material configuration, in metres; doubled on the cut.
     cells : (m, k) int array
         Simplices: k = d + 1 for order 1, VTK's quadratic simplex for order 2 (3, 6, 4 or 10
-        nodes; corners first). A quadratic field is isoparametric.
+        nodes; corners first). A quadratic field is isoparametric. Triangles in space are a
+        membrane.
     displacement : (t, n, d) float array
         Nodal displacement at each output time, in metres.
     times : (t,) float array
@@ -82,7 +84,8 @@ class Solution:
     order : {1, 2}
         Polynomial order of the field.
     cut_facets : (f, d, d) float array
-        The cut as realised: segments (2D) or triangles (3D) by their corner coordinates.
+        The cut as realised: segments (2D) or triangles (3D) by their corner coordinates; of a
+        membrane (f, 2, 3).
     cell_sides : (m,) int array
         Labels of the piece of material that a cell belongs to, as far as the solver knows
         them (0 away from the cut). Information for pictures; the comparison decides sides by
@@ -134,10 +137,11 @@ class Solution:
         if (d, self.order) not in _CELL_TYPES:
             text = f"a solution of dimension {d} and order {self.order}"
             raise InputError(f"{text}; expected 2 or 3, and 1 or 2")
-        k = _NODES_PER_CELL[self.cell_type]
-        if self.cells.ndim != 2 or self.cells.shape[1] != k:
+        fit = dict.fromkeys(_CELL_TYPES[k, self.order] for k in (d, 2))
+        if self.cells.ndim != 2 or self.cells.shape[1] not in map(_NODES_PER_CELL.get, fit):
             text = f"cells of shape {self.cells.shape}"
-            raise InputError(f"{text}; expected (m, {k}) for {self.cell_type}")
+            wanted = " or ".join(f"(m, {_NODES_PER_CELL[name]}) for {name}" for name in fit)
+            raise InputError(f"{text}; expected {wanted}")
         if len(self.cells) == 0:
             raise InputError("a solution without cells")
         if self.cells.min() < 0 or self.cells.max() >= n:
@@ -149,6 +153,12 @@ class Solution:
             raise InputError("displacement has values that are not finite")
         if self.velocity is not None and self.velocity.shape != (t, n, d):
             raise InputError(f"velocity of shape {self.velocity.shape}; expected {(t, n, d)}")
+        if not np.isfinite(self.times).all() or (np.diff(self.times) <= 0.0).any():
+            raise InputError(f"times {self.times.tolist()}; expected ascending and finite")
+        for name, column in self.ledger.items():
+            if np.shape(column) != (t,):
+                text = f"ledger '{name}' of shape {np.shape(column)}"
+                raise InputError(f"{text}; expected ({t},), one value per time")
 
     @property
     def dimension(self) -> int:
@@ -156,9 +166,14 @@ class Solution:
         return int(self.points.shape[1])
 
     @property
+    def cell_dimension(self) -> int:
+        """Dimension of the cells: 2 for a membrane in space, else the space dimension."""
+        return 2 if self.cells.shape[1] == _NODES_PER_CELL[_CELL_TYPES[2, self.order]] else 3
+
+    @property
     def cell_type(self) -> str:
         """VTK (meshio) name of the cells."""
-        return _CELL_TYPES[self.dimension, self.order]
+        return _CELL_TYPES[self.cell_dimension, self.order]
 
 
 def write_solution(solution: Solution, path: Path) -> None:
@@ -195,6 +210,7 @@ def write_solution(solution: Solution, path: Path) -> None:
         "schema": SCHEMA_VERSION,
         "files": names,
         "dimension": solution.dimension,
+        "cell_dimension": solution.cell_dimension,
         "order": solution.order,
         "times": solution.times.tolist(),
         "cut_facets": solution.cut_facets.tolist(),
@@ -247,7 +263,10 @@ def read_solution(path: Path) -> Solution:
         d, order, files = int(record["dimension"]), int(record["order"]), record["files"]
         if (d, order) not in _CELL_TYPES:
             raise InputError(f"dimension {d}, order {order}; expected 2 or 3, and 1 or 2")
-        cell_type = _CELL_TYPES[d, order]
+        k = int(record.get("cell_dimension", d))
+        if k not in (2, d):
+            raise InputError(f"cell_dimension {k} in {d}D; expected {d}, or 2 for a membrane")
+        cell_type = _CELL_TYPES[k, order]
         meshes = [_read_vtu(path.parent / name, cell_type) for name in files]
         first, times = meshes[0], record.get("times", [0.0] if len(files) == 1 else None)
         if times is None or len(times) != len(files):
@@ -262,7 +281,7 @@ def read_solution(path: Path) -> Solution:
             displacement=np.stack([_vectors(m, "displacement", d) for m in meshes]),
             times=np.asarray(times, dtype=float),
             order=order,
-            cut_facets=np.asarray(record.get("cut_facets", []), dtype=float).reshape(-1, d, d),
+            cut_facets=np.asarray(record.get("cut_facets", []), dtype=float).reshape(-1, k, d),
             cell_sides=None if sides is None else np.asarray(sides, dtype=np.int64),
             velocity=np.stack([_vectors(m, "velocity", d) for m in meshes]) if moving else None,
             ledger={n: np.asarray(v, dtype=float) for n, v in record.get("ledger", {}).items()},
