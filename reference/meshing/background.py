@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.meshing.session import gmsh_session, plane_triangles
+from reference.meshing.session import gmsh_session, simplices
 
 __all__ = ["background_mesh"]
 
@@ -37,5 +37,5 @@ def background_mesh(
         gmsh.option.setNumber("Mesh.MeshSizeMin", size / scale)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size / scale)
         gmsh.model.mesh.generate(2)
-        points, cells, _ = plane_triangles(gmsh)
+        points, cells, _ = simplices(gmsh, 2)
     return points * scale + origin, cells

@@ -11,9 +11,10 @@ from reference.meshing.grading import Grading
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.outline import divided_outline
 from reference.meshing.separation import APART, check_separation, check_strips
-from reference.meshing.session import gmsh_session, plane_triangles
+from reference.meshing.session import gmsh_session, simplices
+from reference.meshing.solid import solid_mesh
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
+from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene
 
 __all__ = ["conforming_mesh"]
 
@@ -21,13 +22,13 @@ Array = NDArray[np.float64]
 
 
 def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
-    """Mesh the body of a plane scene so that its cuts run along facets, and open them.
+    """Mesh the body of a scene so that its cuts run along facets, and open them.
 
     Parameters
     ----------
     scene : Scene
-        A rectangle or polygon with polyline and arc cuts; they may end inside, cross, branch
-        and reach beyond the body.
+        A rectangle, polygon or box with cuts; they may end inside, cross, branch and reach
+        beyond the body.
     grading : Grading
         Element sizes.
 
@@ -38,11 +39,13 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
     Raises
     ------
     UnsupportedSceneError
-        If the geometry is not a rectangle or polygon.
+        If the geometry is not a rectangle, polygon or box.
     InputError
         If gmsh cannot mesh the geometry, or no cut lies inside the body.
     """
     geometry = scene.geometry
+    if isinstance(geometry, Box):
+        return solid_mesh(scene, grading)
     if not isinstance(geometry, Rectangle | Polygon):
         raise UnsupportedSceneError(
             f"a conforming mesh of a '{geometry.kind}' geometry is not offered yet"
@@ -63,7 +66,7 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
             _set_sizes(gmsh, grading, features, origin, scale)
             gmsh.option.setNumber("Mesh.Algorithm", 5 if len(grading.points) else 6)
             gmsh.model.mesh.generate(2)
-            points, cells, number = plane_triangles(gmsh)
+            points, cells, number = simplices(gmsh, 2)
             facets = _curve_facets(gmsh, cut_curves, number)
     except InputError:
         raise

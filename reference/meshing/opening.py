@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError
 
-__all__ = ["ConformingMesh", "cell_facets", "interior_facets", "open_cut"]
+__all__ = ["ConformingMesh", "cell_facets", "doubled_nodes", "interior_facets", "open_cut"]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class ConformingMesh:
 
 
 def cell_facets(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Nodes (m · (d + 1), d), ascending, of the facets; facet k of a cell lies opposite corner k."""
+    """Nodes (m · (d + 1), d), ascending, of the facets; a facet lies opposite its corner."""
     corners = [[c for c in range(cells.shape[1]) if c != k] for k in range(cells.shape[1])]
     return np.sort(cells[:, corners], axis=2).reshape(-1, cells.shape[1] - 1)
 
@@ -135,8 +135,35 @@ def open_cut(
     cut_facets = np.asarray(cut_facets, dtype=np.int64).reshape(-1, d)
     first, second, is_cut, outer = interior_facets(cells, cut_facets)
 
-    # a slot is (cell, corner); join the slots of one node across every facet that is not cut
-    slot_a, slot_b = _facing_slots(cells, first[~is_cut], second[~is_cut])
+    opened, parent = _opened(cells, first[~is_cut], second[~is_cut])
+    boundary = np.column_stack(np.divmod(outer, d + 1))
+    facets = np.unique(cell_facets(cells)[first[is_cut]], axis=0)
+    mesh = ConformingMesh(points[parent], opened, parent, boundary, facets)
+    _check_opening(mesh, len(outer))
+    return mesh
+
+
+def doubled_nodes(cells: NDArray[np.int64], cut_facets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Nodes that `open_cut` gives to several groups of cells, ascending."""
+    first, second, is_cut, _ = interior_facets(cells, cut_facets)
+    _, parent = _opened(cells, first[~is_cut], second[~is_cut])
+    return parent[1:][parent[1:] == parent[:-1]]
+
+
+def _opened(
+    cells: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Give each group of cells around a node, joined by pairs of facets, a node of its own.
+
+    Returns
+    -------
+    opened : (m, d + 1) array
+        The cells with their new nodes.
+    parent : array
+        The old node of each new one, ascending.
+    """
+    # a slot is (cell, corner); the slots of one node are joined across every facet not cut
+    slot_a, slot_b = _facing_slots(cells, first, second)
     link = coo_array((np.ones(len(slot_a)), (slot_a, slot_b)), shape=(cells.size, cells.size))
     _, group = connected_components(link.tocsr(), directed=False)
     _, start, label = np.unique(group, return_index=True, return_inverse=True)
@@ -144,13 +171,7 @@ def open_cut(
     # number the groups by their old node, so that nodes off the cut keep their order
     rank = np.empty(len(start), dtype=np.int64)
     rank[np.argsort(parent, kind="stable")] = np.arange(len(start))
-    opened = rank[label].reshape(cells.shape)
-    parent = np.sort(parent, kind="stable")
-    boundary = np.column_stack(np.divmod(outer, d + 1))
-    facets = np.unique(cell_facets(cells)[first[is_cut]], axis=0)
-    mesh = ConformingMesh(points[parent], opened, parent, boundary, facets)
-    _check_opening(mesh, len(outer))
-    return mesh
+    return rank[label].reshape(cells.shape), np.sort(parent, kind="stable")
 
 
 def _facet_keys(

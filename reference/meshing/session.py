@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["gmsh_session", "plane_triangles"]
+__all__ = ["gmsh_session", "oriented", "simplices"]
 
 
 @contextmanager
@@ -26,31 +26,36 @@ def gmsh_session() -> Iterator[ModuleType]:
         gmsh.finalize()
 
 
-def plane_triangles(
-    gmsh: ModuleType,
+def simplices(
+    gmsh: ModuleType, dimension: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """All triangles of the model.
+    """All triangles (in the plane) or tetrahedra (in space) of the model.
 
     Returns
     -------
-    points : (n, 2) array
-    cells : (m, 3) array
+    points : (n, d) array
+    cells : (m, d + 1) array
         Positively oriented.
     number : array
         Node number (row of `points`) by gmsh tag; −1 where a tag is not used.
     """
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    _, nodes = gmsh.model.mesh.getElementsByType(2)
+    _, nodes = gmsh.model.mesh.getElementsByType({2: 2, 3: 4}[dimension])
     row = np.full(int(tags.max()) + 1 if len(tags) else 1, -1, dtype=np.int64)
     row[tags.astype(np.int64)] = np.arange(len(tags))
-    cells = row[nodes.astype(np.int64)].reshape(-1, 3)
+    cells = row[nodes.astype(np.int64)].reshape(-1, dimension + 1)
     used = np.unique(cells)
     compact = np.full(len(tags) + 1, -1, dtype=np.int64)
     compact[used] = np.arange(len(used))
-    points = np.ascontiguousarray(coordinates.reshape(-1, 3)[used, :2])
+    points = np.ascontiguousarray(coordinates.reshape(-1, 3)[used, :dimension])
     cells = compact[cells]
     number = np.where(row >= 0, compact[row], -1)
-    a, b, c = (points[cells[:, k]] for k in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    cells[area < 0] = cells[area < 0][:, ::-1]
-    return points, cells, number
+    return points, oriented(points, cells), number
+
+
+def oriented(points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Swap two corners of each cell (m, d + 1) of negative volume."""
+    negative = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0
+    cells = cells.copy()
+    cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()
+    return cells

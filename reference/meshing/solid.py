@@ -1,0 +1,138 @@
+"""Meshes of boxes that conform to cut surfaces (gmsh, OpenCASCADE kernel, HXT)."""
+
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.meshing.edge_splitting import mesh_edges, split_edges
+from reference.meshing.grading import Grading
+from reference.meshing.opening import ConformingMesh, doubled_nodes, open_cut
+from reference.meshing.session import gmsh_session, simplices
+from reference.meshing.solid_cuts import CutFaces, add_surface, imprint_surfaces
+from verify.errors import InputError
+from verify.scene import Box, Scene
+
+__all__ = ["solid_mesh"]
+
+Array = NDArray[np.float64]
+_HXT = 10  # ten times quicker than gmsh's Delaunay, and keeps embedded faces
+_MOST_SAMPLES = 20000
+
+
+def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
+    """Mesh a box so that its cuts run along facets, and open them.
+
+    Parameters
+    ----------
+    scene : Scene
+        A box with cut surfaces; they may end inside, cross, branch and reach beyond the body.
+    grading : Grading
+        Element sizes; graded to the fronts, kinks and junctions of the cuts, and to the edges
+        `grading.edges`.
+
+    Raises
+    ------
+    InputError
+        If gmsh cannot mesh the geometry, or no cut lies inside the body.
+    """
+    assert isinstance(scene.geometry, Box)
+    lower, upper = (np.array(c, dtype=float) for c in (scene.geometry.lower, scene.geometry.upper))
+    # gmsh's tolerances are absolute: mesh a body of size one
+    scale = float((upper - lower).max())
+    where = str(scene.file or "")
+    try:
+        with gmsh_session() as gmsh:
+            body = int(gmsh.model.occ.addBox(0, 0, 0, *((upper - lower) / scale)))
+            faces = [tag for cut in scene.cuts for tag in add_surface(gmsh, cut, lower, scale)]
+            cut = imprint_surfaces(gmsh, body, faces)
+            if scene.cuts and not cut.faces:
+                raise InputError("cuts: none of them lies inside the body", where)
+            graded = [*cut.singular, *_curves_along(gmsh, (grading.edges - lower) / scale)]
+            _set_sizes(gmsh, grading, graded, scale)
+            gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
+            gmsh.model.mesh.generate(3)
+            points, cells, number = simplices(gmsh, 3)
+            facets = _face_facets(gmsh, cut, number)
+    except InputError:
+        raise
+    except Exception as error:  # gmsh raises bare Exception
+        raise InputError(f"gmsh could not mesh the body with its cuts ({error})", where) from None
+    points, cells, facets = _loosen_front(points, cells, facets)
+    mesh = open_cut(points * scale + lower, cells, facets)
+    _check_volume(mesh, float(np.prod(upper - lower)), where)
+    return mesh
+
+
+def _set_sizes(gmsh: ModuleType, grading: Grading, curves: list[int], scale: float) -> None:
+    size, radius, smallest = (
+        value / scale for value in (grading.size, grading.radius, grading.smallest)
+    )
+    field = gmsh.model.mesh.field
+    if curves:
+        longest = max(gmsh.model.occ.getMass(1, curve) for curve in curves)
+        distance = field.add("Distance")
+        field.setNumbers(distance, "CurvesList", curves)
+        field.setNumber(distance, "Sampling", min(_MOST_SAMPLES, 20 + 2 * longest / smallest))
+        graded = field.add("MathEval")
+        law = f"{size:.17g}*(F{distance}/{radius:.17g})^{grading.exponent:.17g} + {smallest:.17g}"
+        field.setString(graded, "F", law)
+        field.setAsBackgroundMesh(graded)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5 if curves else size)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+
+
+def _curves_along(gmsh: ModuleType, segments: Array) -> list[int]:
+    """Curves of the model that lie on one of the segments (s, 2, 3)."""
+    lows, highs = segments.min(axis=1) - 1e-6, segments.max(axis=1) + 1e-6  # gmsh pads by 1e-7
+
+    def along_one(curve: int) -> bool:
+        box = np.array(gmsh.model.getBoundingBox(1, curve))
+        return bool(((box[:3] >= lows) & (box[3:] <= highs)).all(axis=1).any())
+
+    return [curve for _, curve in gmsh.model.getEntities(1) if along_one(curve)]
+
+
+def _face_facets(gmsh: ModuleType, cut: CutFaces, number: NDArray[np.int64]) -> NDArray[np.int64]:
+    found = [np.zeros((0, 3), dtype=np.int64)]
+    for face in cut.faces:
+        _, _, nodes = gmsh.model.mesh.getElements(2, face)
+        if nodes:
+            found.append(number[np.asarray(nodes[0], dtype=np.int64)].reshape(-1, 3))
+    return np.concatenate(found)
+
+
+def _loosen_front(
+    points: Array, cells: NDArray[np.int64], facets: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    """Split each edge inside the cut whose two ends both lie on a front.
+
+    Its ends stay single, so the cut could not open along it, nor could a facet in a corner of a
+    front open at all.
+    """
+    if not len(facets):
+        return points, cells, facets
+    opened = np.zeros(len(points), dtype=bool)
+    opened[doubled_nodes(cells, facets)] = True
+    edges = mesh_edges(facets)
+    of_facets = np.sort(
+        np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1
+    )
+    keys = edges[:, 0] * len(points) + edges[:, 1]
+    times = np.bincount(
+        np.searchsorted(keys, of_facets[:, 0] * len(points) + of_facets[:, 1]), minlength=len(edges)
+    )
+    tied = edges[~opened[edges].any(axis=1) & (times > 1)]
+    return split_edges(points, cells, facets, tied, points[tied].mean(axis=1))
+
+
+def _check_volume(mesh: ConformingMesh, expected: float, where: str) -> None:
+    """Nothing was lost or meshed twice."""
+    edges = mesh.points[mesh.cells[:, 1:]] - mesh.points[mesh.cells[:, :1]]
+    volume = float(np.linalg.det(edges).sum()) / 6
+    if abs(volume - expected) > 1e-9 * expected:
+        raise InputError(
+            f"gmsh's mesh of the cut body has a volume of {volume:.9g} m³; expected "
+            f"{expected:.9g} m³",
+            where,
+        )

@@ -1,0 +1,127 @@
+"""Cut surfaces in space as OpenCASCADE faces, and what of them lies inside the body."""
+
+from itertools import pairwise
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CutFaces", "add_surface", "imprint_surfaces"]
+
+Array = NDArray[np.float64]
+_KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matter
+
+
+class CutFaces(NamedTuple):
+    """gmsh's numbers of what the cuts left in the body.
+
+    Attributes
+    ----------
+    faces : list of int
+        Faces of the cuts inside the body.
+    singular : list of int
+        Curves inside the body at which a cut ends, turns by more than 15°, crosses or branches.
+    volumes : list of int
+    """
+
+    faces: list[int]
+    singular: list[int]
+    volumes: list[int]
+
+
+def add_surface(gmsh: ModuleType, cut: Any, origin: Array, scale: float) -> list[int]:
+    """Add the faces of a cut in space, in coordinates (x − origin)/scale."""
+    occ = gmsh.model.occ
+    match cut.kind:
+        case "polygon":
+            return [_polygon(occ, (np.array(cut.points) - origin) / scale)]
+        case "disc":
+            centre = (np.array(cut.centre) - origin) / scale
+            first, second, normal = cut.axes()
+            a, b = (value / scale for value in cut.semi_axes)
+            if a < b:  # OpenCASCADE wants the longer one first
+                a, b, first, normal = b, a, second, -normal
+            return [int(occ.addDisk(*centre, a, b, zAxis=normal.tolist(), xAxis=first.tolist()))]
+        case "cylinder":
+            ring = _arcs(occ, cut, origin, scale)
+            return _swept(occ, ring, cut.height / scale * cut.axes()[2])
+        case "swept":
+            points = (np.array(cut.points) - origin) / scale
+            tags = [occ.addPoint(*p) for p in (points[:-1] if cut.closed else points)]
+            following = [*tags[1:], tags[0]] if cut.closed else tags[1:]
+            lines = [occ.addLine(a, b) for a, b in zip(tags, following, strict=False)]
+            return _swept(occ, lines, np.array(cut.along) / scale)
+    raise AssertionError(f"a {cut.kind} cut in space")  # the scene has checked it
+
+
+def imprint_surfaces(gmsh: ModuleType, body: int, faces: list[int]) -> CutFaces:
+    """Fragment the body by the faces of the cuts; what lies outside or along it is removed."""
+    occ = gmsh.model.occ
+    if not faces:
+        occ.synchronize()
+        return CutFaces([], [], [body])
+    _, images = occ.fragment([(3, body)], [(2, tag) for tag in faces])
+    occ.synchronize()
+    volumes = [tag for dim, tag in images[0] if dim == 3]
+    embedded = {tag for v in volumes for _, tag in gmsh.model.mesh.getEmbedded(3, v)}
+    inside, beyond = [], []
+    for face in sorted({abs(tag) for image in images[1:] for dim, tag in image if dim == 2}):
+        sides = gmsh.model.getAdjacencies(2, face)[0]
+        if len(sides) == 2 or face in embedded:
+            inside.append(face)
+        elif not len(sides):
+            beyond.append((2, face))
+    occ.remove(beyond, recursive=True)
+    occ.synchronize()
+    return CutFaces(inside, _singular_curves(gmsh, inside), volumes)
+
+
+def _polygon(occ: ModuleType, corners: Array) -> int:
+    tags = [occ.addPoint(*p) for p in corners]
+    lines = [occ.addLine(a, b) for a, b in pairwise([*tags, tags[0]])]
+    return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))
+
+
+def _arcs(occ: ModuleType, cut: Any, origin: Array, scale: float) -> list[int]:
+    """Arcs of less than half a turn, so that each extrudes to a simple patch."""
+    count = 1 + int(cut.sweep // 120.0) if cut.sweep < 360.0 else 3
+    first, second, _ = cut.axes()
+    base, radius = (np.array(cut.base) - origin) / scale, cut.radius / scale
+    angle = np.deg2rad(cut.start + cut.sweep * np.arange(count + 1) / count)
+    ring = base + radius * (np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second))
+    closed = cut.sweep == 360.0
+    tags = [occ.addPoint(*p) for p in (ring[:-1] if closed else ring)]
+    centre = occ.addPoint(*base)
+    return [
+        occ.addCircleArc(a, centre, b) for a, b in pairwise([*tags, tags[0]] if closed else tags)
+    ]
+
+
+def _swept(occ: ModuleType, curves: list[int], along: Array) -> list[int]:
+    made = occ.extrude([(1, tag) for tag in curves], *along)
+    return [int(tag) for dim, tag in made if dim == 2]
+
+
+def _singular_curves(gmsh: ModuleType, faces: list[int]) -> list[int]:
+    """Curves off the boundary of the body with other than two faces of the cuts, or a kink."""
+    mine = set(faces)
+    curves = {
+        abs(tag) for face in faces for _, tag in gmsh.model.getBoundary([(2, face)], oriented=False)
+    }
+    found = []
+    for curve in sorted(curves):
+        around = [int(face) for face in gmsh.model.getAdjacencies(1, curve)[0]]
+        if set(around) <= mine and (len(around) != 2 or _turn(gmsh, curve, around) > _KINK):
+            found.append(curve)
+    return found
+
+
+def _turn(gmsh: ModuleType, curve: int, faces: list[int]) -> float:
+    """Angle between two faces at the middle of the curve they share, whatever their senses."""
+    low, high = gmsh.model.getParametrizationBounds(1, curve)
+    normals = []
+    for face in faces:
+        place = gmsh.model.reparametrizeOnSurface(1, curve, [0.5 * (low[0] + high[0])], face)
+        normals.append(gmsh.model.getNormal(face, place))
+    return float(np.arccos(np.clip(abs(normals[0] @ normals[1]), 0.0, 1.0)))
