@@ -39,8 +39,10 @@ def face_contacts(virtual: VirtualMesh, near: bool = False) -> tuple[_Ints, _Int
     within = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
     first = start[cell[face]] + within // count[across[face]]
     second = start[across[face]] + within % count[across[face]]
-    simple = (count[cell] == 1) & (count[across] == 1)
-    check = np.flatnonzero(~simple[face])
+    # the unknowns of mesh nodes are shared wherever both pieces have them; a cut along a face
+    # separates cells that have one piece each, so that counting pieces would not do
+    plain = (virtual.cells < len(mesh.points)).all(axis=1)
+    check = np.flatnonzero(~(plain[first] & plain[second]))
     mine = _face_unknowns(virtual, first[check], local[face[check]])
     other_local = (mesh.neighbours[across[face[check]]] == cell[face[check], None]).argmax(axis=1)
     theirs = _face_unknowns(virtual, second[check], other_local)
