@@ -36,8 +36,11 @@ from verify.scene.physics import (
     Traction,
 )
 from verify.scene.regions import Region, parse_region
+from verify.scene.replay import Pull, Replay
 from verify.scene.scene import Scene
+from verify.scene.skin import Skin
 from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut, SweptCut
+from verify.scene.tool_path import ToolPathCut
 
 __all__ = [
     "Analysis",
@@ -61,17 +64,21 @@ __all__ = [
     "Polygon",
     "PolygonCut",
     "PolylineCut",
+    "Pull",
     "RateCheck",
     "RatioCheck",
     "Rectangle",
     "ReferenceLevels",
     "Region",
+    "Replay",
     "Scene",
+    "Skin",
     "SpatialCut",
     "StrainEnergyQuantity",
     "StressIntensityQuantity",
     "Support",
     "SweptCut",
+    "ToolPathCut",
     "Traction",
     "ValueCheck",
     "case_folder",

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from verify.scene.planar import polygon_defect
+from verify.scene.skin import Skin
 from verify.scene.strict import Point2, Point3, Strict
 
 __all__ = ["Box", "Geometry", "MeshFile", "Polygon", "Rectangle"]
@@ -130,4 +131,4 @@ class MeshFile(Strict):
         return ()
 
 
-Geometry = Annotated[Rectangle | Polygon | Box | MeshFile, Field(discriminator="kind")]
+Geometry = Annotated[Rectangle | Polygon | Box | MeshFile | Skin, Field(discriminator="kind")]

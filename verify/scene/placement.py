@@ -10,6 +10,7 @@ from verify.scene.initial import Moving
 from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, Gravity, Traction
 from verify.scene.regions import parse_region
+from verify.scene.skin import Skin
 
 if TYPE_CHECKING:
     from verify.scene.scene import Scene
@@ -42,8 +43,10 @@ def _check_dimensions(scene: "Scene") -> None:
     for cells in scene.mesh.cells or []:
         if len(cells) != d:
             raise ValueError(f"mesh.cells: {list(cells)} has {len(cells)} numbers; expected {d}")
-    if isinstance(scene.geometry, MeshFile) != (scene.mesh.pattern == "given"):
-        raise ValueError("mesh.pattern: 'given' and a geometry of kind 'file' belong together")
+    if isinstance(scene.geometry, MeshFile | Skin) != (scene.mesh.pattern == "given"):
+        raise ValueError(
+            "mesh.pattern: 'given' and a geometry of kind 'file' or 'skin' belong together"
+        )
     if scene.mesh.pattern == "structured" and isinstance(scene.geometry, Polygon):
         raise ValueError(
             "mesh.pattern: only rectangles and boxes have structured meshes; use 'unstructured'"

@@ -12,7 +12,10 @@ from verify.scene.initial import AtRest, Initial
 from verify.scene.mesh import MeshLevels, ReferenceLevels
 from verify.scene.physics import Analysis, Exact, Load, Material, Support
 from verify.scene.placement import check_placement
+from verify.scene.replay import Replay, check_replay
+from verify.scene.skin import Skin
 from verify.scene.strict import Line, Strict
+from verify.scene.tool_path import ToolPathCut
 
 __all__ = ["Scene"]
 
@@ -42,6 +45,7 @@ class Scene(Strict):
     analysis: Analysis = Field(default_factory=Analysis)
     initial: Initial = Field(default_factory=_at_rest)
     reference: ReferenceLevels = Field(default_factory=ReferenceLevels)
+    replay: Replay | None = None
     quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
         default_factory=_strain_energy_only
     )
@@ -54,6 +58,7 @@ class Scene(Strict):
     @model_validator(mode="after")
     def _is_consistent(self) -> "Scene":
         check_placement(self)
+        check_replay(self)
         return self
 
     @property
@@ -75,7 +80,19 @@ class Scene(Strict):
     def cell_dimension(self) -> int:
         """Dimension of the body itself: 2 for a membrane in space, else the space dimension."""
         membrane = isinstance(self.geometry, MeshFile) and self.geometry.cells == "surface"
+        membrane |= isinstance(self.geometry, Skin) and self.geometry.is_membrane
         return 2 if membrane else self.dimension
+
+    @property
+    def played_only(self) -> str | None:
+        """Why no solver takes this scene but `verify play`, or None."""
+        if isinstance(self.geometry, Skin):
+            return "a geometry of kind 'skin' is for `verify play`"
+        if self.replay is not None and self.replay.pulls:
+            return "pulls at the edges of a cut are for `verify play`"
+        if any(isinstance(cut, ToolPathCut) for cut in self.cuts):
+            return "a tool_path, which cuts as time goes on, is for `verify play`"
+        return None
 
     @property
     def judged_by_exact(self) -> bool:
