@@ -38,6 +38,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("verify_cases", "case files to collect: patterns below rootdir", "args", [])
     parser.addini("verify_strict", "an UNDECIDED check fails instead of a skip", "bool", False)
     parser.addini("verify_timeout", "wall seconds after which a solve is killed", default="600")
+    parser.addini("verify_references", "bundle of references to judge by, below rootdir")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -83,6 +84,7 @@ class _Runs:
 
     def _run(self, source: str) -> "CaseResult":
         from verify.runner import Options, run_cases
+        from verify.runner.reference_cache import cache_folder
         from verify.scene import load_scene
 
         scene = load_scene(source)
@@ -91,7 +93,14 @@ class _Runs:
         # the default would run the conforming solver too, for the report that nobody reads here;
         # if more are named, the default takes them all and survives one that is not installed
         alone = ("xfem",) if named == {"xfem"} else ()
-        options = Options(solvers=alone, repetitions=1, timeout=timeout)
+        bundle = self._config.getini("verify_references")
+        options = Options(
+            solvers=alone,
+            repetitions=1,
+            timeout=timeout,
+            cache=cache_folder(),
+            references=self._config.rootpath / bundle if bundle else None,
+        )
         folder = self._root() / scene.name.replace("/", "__")
         return run_cases([scene], folder, options, _Silent(), "pytest").results[0]
 

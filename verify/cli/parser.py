@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from verify import __version__
+from verify.cli.cache_parser import add_cache_command
 from verify.cli.extension_parser import add_extension_commands
 from verify.cli.study_parser import add_study_command
 
@@ -83,6 +84,14 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run(add("run", "solve, compare and judge cases, and render the report", _RUN))
     add_extension_commands(add)
     add_study_command(add)
+    add_cache_command(add)
+    add(
+        "doctor",
+        "say what of the software that the solvers stand on is here, works, or is missing",
+        "examples:\n  verify doctor\n\n"
+        "Exit code 0 if everything that a full run needs works, 3 if something is missing; each\n"
+        "missing thing comes with the line that installs it.",
+    ).add_argument("--json", action="store_true", help="print JSON")
     return parser
 
 
@@ -166,6 +175,13 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     command.add_argument(
         "--strict", action="store_true", help="undecided verdicts and refusals: exit code 5"
+    )
+    command.add_argument(
+        "--references", metavar="BUNDLE", type=Path,
+        help="judge by the references in this file (`verify cache export`); solve none",
+    )  # fmt: skip
+    command.add_argument(
+        "--no-cache", action="store_true", help="solve references again, and keep none"
     )
     command.add_argument(
         "--no-report", action="store_true", help="leave the report to `verify report DIR`"

@@ -12,6 +12,7 @@ from verify.cli.verdict_text import verdict_lines
 from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
 from verify.runner.checking import check_solver_name
 from verify.runner.ending import NOTHING_RAN
+from verify.runner.reference_cache import cache_folder
 
 __all__ = ["execute"]
 
@@ -32,6 +33,8 @@ def execute(arguments: argparse.Namespace) -> int:
         jobs=arguments.jobs,
         timeout=arguments.timeout,
         memory=arguments.memory * 1e9 if arguments.memory else None,
+        cache=None if arguments.no_cache else cache_folder(),
+        references=arguments.references,
     )
     with progress_on(sys.stderr) as progress:
         try:

@@ -11,7 +11,14 @@ import verify
 from verify.provenance import versions
 from verify.scene import MeshFile, Scene, mesh_path
 
-__all__ = ["code_of_comparison", "code_of_solver", "digest_of", "file_digest", "physics_digest"]
+__all__ = [
+    "bytes_digest",
+    "code_of_comparison",
+    "code_of_solver",
+    "digest_of",
+    "file_digest",
+    "physics_digest",
+]
 
 _PACKAGE = Path(verify.__file__).resolve().parent
 # what can change any solution, and those of solvers that are built on our own methods
@@ -29,6 +36,11 @@ def digest_of(content: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 
+def bytes_digest(data: bytes) -> str:
+    """Return the hash of some bytes, as `file_digest` does for those of a file."""
+    return hashlib.sha256(data).hexdigest()[:24]
+
+
 def file_digest(path: Path) -> str:
     """Return the hash of a file's bytes.
 
@@ -42,9 +54,14 @@ def file_digest(path: Path) -> str:
 
 
 def physics_digest(scene: Scene) -> str:
-    """Return the hash of what a solver sees: the scene without its words and its acceptance."""
+    """Return the hash of what a solver sees: the scene without its words and its acceptance.
+
+    Defaults are left out, so that a key that a later version adds does not make another scene
+    of it; a default whose meaning changes needs another version of the schema.
+    """
     words = {"title", "requirement", "tags", "acceptance"}
-    content: list[Any] = [scene.model_dump(mode="json", by_alias=True, exclude=words)]
+    physics = scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
+    content: list[Any] = [scene.schema_, physics]
     if isinstance(scene.geometry, MeshFile):
         content.append(file_digest(mesh_path(scene)))
     return digest_of(content)

@@ -9,7 +9,7 @@ from verify.result import Metric, SolveRecord, Status
 from verify.runner.fingerprint import file_digest
 from verify.runner.storage import read_json, write_json
 
-__all__ = ["Job", "load_record", "solution_files", "store_record", "stored_record"]
+__all__ = ["Job", "load_record", "record_of", "solution_files", "store_record", "stored_record"]
 
 
 @dataclass(frozen=True)
@@ -59,14 +59,14 @@ def load_record(folder: Path) -> SolveRecord:
     InputError
         If it is missing or damaged.
     """
-    return _record_of(read_json(folder / "record.json"), folder)
+    return _stored(read_json(folder / "record.json"), folder)
 
 
 def stored_record(job: Job) -> SolveRecord | None:
     """Return the record of an earlier, solved run of this very job whose files are whole."""
     try:
         content = read_json(job.folder / "record.json")
-        record = _record_of(content, job.folder)
+        record = _stored(content, job.folder)
         files = content["files"]
         whole = files and all(file_digest(job.folder / n) == d for n, d in files.items())
     except (InputError, OSError, KeyError, TypeError, AttributeError):
@@ -82,10 +82,23 @@ def solution_files(folder: Path) -> list[Path]:
     return [folder / "solution.json", *(folder / name for name in names)]
 
 
-def _record_of(content: dict[str, Any], folder: Path) -> SolveRecord:
+def record_of(entry: dict[str, Any], where: str) -> SolveRecord:
+    """Make a record from its plain values.
+
+    Raises
+    ------
+    InputError
+        If they are not those of a record.
+    """
     try:
-        entry = content["record"]
         status, metrics = Status(entry["status"]), [Metric(**m) for m in entry["metrics"]]
         return SolveRecord(**{**entry, "status": status, "metrics": metrics})
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"not a readable record ({error})", str(folder / "record.json")) from None
+        raise InputError(f"not a readable record ({error})", where) from None
+
+
+def _stored(content: dict[str, Any], folder: Path) -> SolveRecord:
+    where = str(folder / "record.json")
+    if "record" not in content:
+        raise InputError("not a readable record ('record' is missing)", where)
+    return record_of(content["record"], where)

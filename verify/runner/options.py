@@ -1,9 +1,12 @@
 """What a run was asked for, apart from the cases."""
 
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 __all__ = ["Options"]
+
+_PATHS = ("cache", "references")
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,10 @@ class Options:
     memory : float or None
         Bytes of resident memory above which a solve is killed; default: 80 % of the machine's,
         shared by `jobs`.
+    cache : Path or None
+        Folder of references that were solved before; None: every run solves its own.
+    references : Path or None
+        A bundle of references, which judges instead of solving any.
     """
 
     solvers: tuple[str, ...] = ()
@@ -35,6 +42,8 @@ class Options:
     jobs: int = 1
     timeout: float = 600.0
     memory: float | None = None
+    cache: Path | None = None
+    references: Path | None = None
 
     def of_result(self) -> dict[str, Any]:
         """Return those that change what is computed; a resumed run must have the same."""
@@ -46,4 +55,5 @@ class Options:
 
     def record(self) -> dict[str, Any]:
         """Return all of them as plain values."""
-        return {**asdict(self), "solvers": list(self.solvers)}
+        paths = {name: str(v) if (v := getattr(self, name)) else None for name in _PATHS}
+        return {**asdict(self), **paths, "solvers": list(self.solvers)}

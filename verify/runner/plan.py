@@ -16,12 +16,13 @@ from verify.runner.interruption import StopRequest
 from verify.runner.job import Job
 from verify.runner.log import telling_line
 from verify.runner.options import Options
+from verify.runner.reference_bundle import ReferenceBundle
+from verify.runner.reference_cache import REFERENCE
 from verify.runner.storage import read_json, write_json
 from verify.scene import Scene, scene_content
 
 __all__ = ["CasePlan", "Survey", "plan_case", "solvers_of", "survey_solvers"]
 
-REFERENCE = "reference"
 _SURVEY_SECONDS = 300.0
 
 Survey = dict[str, dict[str, Any]]
@@ -47,15 +48,22 @@ def solvers_of(scene: Scene, options: Options) -> list[str]:
     return names
 
 
-def survey_solvers(scenes: Sequence[Scene], options: Options, stop: StopRequest) -> Survey:
+def survey_solvers(
+    scenes: Sequence[Scene],
+    options: Options,
+    stop: StopRequest,
+    bundle: ReferenceBundle | None = None,
+) -> Survey:
     """Ask each solver, in a process of its own, what it refuses and how many levels it has.
+
+    The reference is not asked if there is a `bundle`, so that it need not be installed.
 
     Raises
     ------
     InputError
-        If a scene names something bad (a mesh file), or `options` name a solver that does not
-        work here. A solver that only the cases want may be missing: its solves fail, with
-        that reason.
+        If a scene names something bad (a mesh file), the bundle lacks a scene, or `options`
+        name a solver that does not work here. A solver that only the cases want may be
+        missing: its solves fail, with that reason.
     RunStoppedError
         If a signal came.
     """
@@ -64,6 +72,10 @@ def survey_solvers(scenes: Sequence[Scene], options: Options, stop: StopRequest)
         for name in solvers_of(scene, options):
             asked.setdefault(name, []).append(scene)
     answers: Survey = {}
+    if bundle is not None and (judged := asked.pop(REFERENCE, [])):
+        levels = {scene.name: bundle.levels(scene) for scene in judged}
+        cases = {name: {"levels": n, "refusal": None} for name, n in levels.items()}
+        answers[REFERENCE] = {"error": None, "cases": cases}
     with tempfile.TemporaryDirectory(prefix="verify-") as folder:
         waiting = list(asked)
         running: dict[str, Child] = {}
@@ -85,7 +97,7 @@ def survey_solvers(scenes: Sequence[Scene], options: Options, stop: StopRequest)
     for name, answer in answers.items():
         if answer["error"] and name in options.solvers:
             raise InputError(answer["error"], "--solver")
-        for scene in asked[name]:
+        for scene in asked.get(name, []):
             bad = answer.get("cases", {}).get(scene.name, {}).get("bad_input")
             if bad:
                 raise InputError(
@@ -94,7 +106,13 @@ def survey_solvers(scenes: Sequence[Scene], options: Options, stop: StopRequest)
     return answers
 
 
-def plan_case(scene: Scene, options: Options, survey: Survey, directory: RunDirectory) -> CasePlan:
+def plan_case(
+    scene: Scene,
+    options: Options,
+    survey: Survey,
+    directory: RunDirectory,
+    bundle: ReferenceBundle | None = None,
+) -> CasePlan:
     """Lay out the solves of `scene`, coarse to fine."""
     plan = CasePlan(scene, solvers_of(scene, options))
     physics = physics_digest(scene)
@@ -109,7 +127,9 @@ def plan_case(scene: Scene, options: Options, survey: Survey, directory: RunDire
                 solver=name,
                 level=level,
                 repetitions=options.repetitions,
-                key=digest_of([physics, name, level, options.repetitions, parameters, code]),
+                key=bundle.key(scene, level)
+                if bundle is not None and name == REFERENCE
+                else digest_of([physics, name, level, options.repetitions, parameters, code]),
                 folder=directory.solve_folder(scene.name, name, level),
                 parameters=parameters,
             )

@@ -20,6 +20,8 @@ from verify.runner.job import Job, store_record, stored_record
 from verify.runner.log import telling_line
 from verify.runner.options import Options
 from verify.runner.plan import CasePlan, plan_case, survey_solvers
+from verify.runner.reference_bundle import ReferenceBundle
+from verify.runner.reference_cache import REFERENCE, ReferenceCache
 from verify.runner.storage import read_json, write_json
 from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene, scene_content
@@ -87,8 +89,9 @@ def run_cases(
         "cases": [scene.name for scene in scenes],
         "options_of_result": options.of_result(),
     }
+    bundle = ReferenceBundle(options.references) if options.references else None
     with listening() as stop:
-        survey = survey_solvers(scenes, options, stop)
+        survey = survey_solvers(scenes, options, stop, bundle)
         with claimed(out, identity) as directory:
             origin = provenance()
             record: dict[str, Any] = {
@@ -100,8 +103,8 @@ def run_cases(
                 "provenance": origin,
             }
             write_run(directory, record)
-            plans = [plan_case(scene, options, survey, directory) for scene in scenes]
-            work = _Work(plans, directory, options, origin, progress)
+            plans = [plan_case(scene, options, survey, directory, bundle) for scene in scenes]
+            work = _Work(plans, directory, options, origin, progress, bundle)
             results = work.until_done(stop)
             write_run(directory, {**record, "finished": _now()})
     return RunSummary(out, results, work.reused)
@@ -117,7 +120,9 @@ class _Work:
         options: Options,
         origin: dict[str, Any],
         progress: Progress,
+        bundle: ReferenceBundle | None,
     ) -> None:
+        self.bundle, self.cache = bundle, ReferenceCache(options.cache) if options.cache else None
         self.directory, self.options, self.origin = directory, options, origin
         self.progress, self.reused = progress, 0
         self.plans = {plan.scene.name: plan for plan in plans}
@@ -174,6 +179,11 @@ class _Work:
         job.folder.mkdir(exist_ok=True)
         for leftover in job.folder.iterdir():
             leftover.unlink()
+        if (record := self._known(job)) is not None:
+            self.reused += 1
+            store_record(job, record)
+            self._solve_done(job, record, reused=True)
+            return
         write_json(
             {
                 "scene": scene_content(self.plans[job.case].scene),
@@ -194,11 +204,24 @@ class _Work:
         self.running[child] = job
         self.progress.started(job.label)
 
+    def _known(self, job: Job) -> SolveRecord | None:
+        """Take a reference from the bundle or the cache."""
+        scene = self.plans[job.case].scene
+        if job.solver != REFERENCE:
+            return None
+        if self.bundle is not None:
+            return self.bundle.take(scene, job)
+        return self.cache.take(scene, job) if self.cache is not None else None
+
     def _ended(self, child: Child, what: Job | str, ending: Ending) -> None:
         if isinstance(what, str):
             self._judged(what, child, ending)
             return
         record = self._record(what, child, ending)
+        if what.solver == REFERENCE and self.cache is not None:
+            trouble = self.cache.keep(self.plans[what.case].scene, what, record)
+            if trouble:
+                record.notes["cache"] = trouble
         store_record(what, record)
         self._solve_done(what, record, reused=False)
 

@@ -1,0 +1,101 @@
+"""What of FEniCSx and gmsh is here, and whether it works: ``python -m reference.probe NAME``.
+
+Prints one line of JSON. Each probe runs in a process of its own, because what is half installed
+may crash or hang instead of failing.
+"""
+
+import json
+import sys
+from collections.abc import Callable
+
+from reference.dolfinx_versions import import_dolfinx
+
+__all__ = ["PROBES", "main"]
+
+# direct solvers, preconditioners and orderings that PETSc may have been built with
+_PACKAGES = ("mumps", "superlu_dist", "hypre", "metis", "parmetis", "ptscotch", "hdf5")
+
+
+def _dolfinx() -> str:
+    dolfinx = import_dolfinx()
+    import basix
+    import ufl
+
+    return f"{dolfinx.__version__} (basix {basix.__version__}, ufl {ufl.__version__})"
+
+
+def _petsc() -> str:
+    import_dolfinx()
+    from petsc4py import PETSc
+
+    version = ".".join(map(str, PETSc.Sys.getVersion()))
+    scalar = "real" if PETSc.ScalarType().dtype.kind == "f" else "complex"
+    if scalar != "real":
+        raise RuntimeError(f"PETSc {version} is built for complex numbers; real ones are needed")
+    built = [name for name in _PACKAGES if PETSc.Sys.hasExternalPackage(name)]
+    if "mumps" not in built:
+        raise RuntimeError(f"PETSc {version} is built without MUMPS ({', '.join(built)})")
+    return f"{version}, real, with {', '.join([*built, 'gamg'])}"
+
+
+def _slepc() -> str:
+    import_dolfinx()
+    from slepc4py import SLEPc
+
+    return ".".join(map(str, SLEPc.Sys.getVersion()))
+
+
+def _mpi() -> str:
+    import_dolfinx()
+    from mpi4py import MPI
+
+    name, version = MPI.get_vendor()
+    return f"{name} {'.'.join(map(str, version))}"
+
+
+def _forms() -> str:
+    """Compile and assemble a form: needs a C compiler and the headers of Python."""
+    import_dolfinx()
+    import ufl
+    from dolfinx import fem, mesh
+    from mpi4py import MPI
+
+    square = mesh.create_unit_square(MPI.COMM_SELF, 2, 2)
+    x = ufl.SpatialCoordinate(square)
+    value = fem.assemble_scalar(fem.form(6.0 * x[0] * ufl.dx(square)))
+    if abs(value - 3.0) > 1e-12:
+        raise RuntimeError(f"the integral of 6x over the unit square came out as {value}")
+    return "compiled, assembled, right"
+
+
+def _gmsh() -> str:
+    import gmsh
+
+    gmsh.initialize(["-v", "0"], interruptible=False)
+    try:
+        gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.mesh.generate(2)
+        version: str = gmsh.option.getString("General.Version")
+    finally:
+        gmsh.finalize()
+    return version
+
+
+PROBES: dict[str, Callable[[], str]] = {
+    "dolfinx": _dolfinx,
+    "petsc": _petsc,
+    "slepc": _slepc,
+    "mpi": _mpi,
+    "forms": _forms,
+    "gmsh": _gmsh,
+}
+
+
+def main(name: str) -> None:
+    """Run a probe and print what it found."""
+    print(json.dumps({"found": PROBES[name]()}))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,153 @@
+"""References in one file, to be committed: runs that judge by them need no FEniCSx.
+
+A bundle is a zip file: ``bundle.json`` with the entries of `verify.runner.reference_cache`, and
+the files of their solutions below ``<key>/``. It is given to a run by name (``--references``),
+so that, other than in the cache, an entry is found by the physics of the scene alone: the code
+and the versions that made it are those that it says, and the report repeats them. A scene whose
+physics changed is not found, which is an error and not a reason to compute something else.
+"""
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from verify.errors import InputError
+from verify.result import SolveRecord
+from verify.runner.fingerprint import bytes_digest, digest_of, file_digest, physics_digest
+from verify.runner.job import Job
+from verify.runner.reference_cache import Entry, ReferenceCache, read_entry
+from verify.scene import Scene
+
+__all__ = ["ReferenceBundle", "write_bundle"]
+
+BUNDLE_SCHEMA = 1
+_CONTENTS = "bundle.json"
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the same references give the same bytes
+
+
+def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> list[Entry]:
+    """Write the references of `scenes` that are in `cache` into the file `path`, in one step.
+
+    Raises
+    ------
+    InputError
+        If a level of a scene's reference is not in the cache, or the scene has none.
+    """
+    entries: list[Entry] = []
+    for scene in scenes:
+        if scene.judged_by_exact:
+            raise InputError(f"'{scene.name}' is judged by its exact solution; it has no reference")
+        own = cache.find(scene)
+        missing = set(range(scene.reference.levels)) - {entry.level for entry in own}
+        if missing:
+            levels = ", ".join(map(str, sorted(missing)))
+            raise InputError(
+                f"level {levels} of the reference of '{scene.name}' is not in the cache "
+                f"({cache.root}); `verify run` of the case puts it there"
+            )
+        entries += own
+    partial = path.with_name(f"{path.name}.partial")
+    try:
+        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+            contents = {
+                "schema": BUNDLE_SCHEMA,
+                "entries": [entry.as_json() for entry in entries],
+            }
+            text = json.dumps(contents, indent=1, sort_keys=True)
+            archive.writestr(_member(_CONTENTS), text, zipfile.ZIP_DEFLATED)
+            for entry in entries:
+                for name in sorted(entry.files):
+                    data = (cache.root / entry.key / name).read_bytes()
+                    archive.writestr(_member(f"{entry.key}/{name}"), data, zipfile.ZIP_DEFLATED)
+        os.replace(partial, path)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", str(path)) from None
+    finally:
+        partial.unlink(missing_ok=True)
+    return entries
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    return zipfile.ZipInfo(name, _EPOCH)
+
+
+class ReferenceBundle:
+    """A bundle that a run takes its references from.
+
+    Raises
+    ------
+    InputError
+        If `path` is not a bundle.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        where = str(path)
+        try:
+            with zipfile.ZipFile(path) as archive:
+                contents = json.loads(archive.read(_CONTENTS))
+            self.digest = file_digest(path)
+        except FileNotFoundError:
+            raise InputError("no such file; expected a bundle of references", where) from None
+        except (OSError, zipfile.BadZipFile, KeyError, ValueError) as error:
+            raise InputError(f"not a bundle of references ({error})", where) from None
+        if not isinstance(contents, dict) or contents.get("schema") != BUNDLE_SCHEMA:
+            raise InputError(f"not a bundle of schema {BUNDLE_SCHEMA}", where)
+        self._entries = [read_entry(entry, where) for entry in contents["entries"]]
+
+    def levels(self, scene: Scene) -> int:
+        """Return how many levels of the reference of `scene` it holds, all of them whole.
+
+        Raises
+        ------
+        InputError
+            If there is none, or a file of it is damaged.
+        """
+        own = self._of(scene)
+        for entry in own:
+            for name in entry.files:
+                self._read(entry, name)
+        if not own:
+            names = ", ".join(sorted({entry.case for entry in self._entries})) or "nothing"
+            raise InputError(
+                f"no reference for the physics of '{scene.name}' (it holds {names}); a scene that "
+                "changed needs a new one: run it where FEniCSx is and `verify cache export`",
+                str(self.path),
+            )
+        return len(own)
+
+    def key(self, scene: Scene, level: int) -> str:
+        """Return what identifies the solve that `take` gives."""
+        return digest_of([physics_digest(scene), level, self.digest])
+
+    def take(self, scene: Scene, job: Job) -> SolveRecord:
+        """Unpack the reference for `job` into its folder.
+
+        Raises
+        ------
+        InputError
+            If the bundle is damaged.
+        """
+        entry = self._of(scene)[job.level]
+        for name in entry.files:
+            (job.folder / Path(name).name).write_bytes(self._read(entry, name))
+        return entry.taken_by(job, f"from the bundle {self.path.name}")
+
+    def _read(self, entry: Entry, name: str) -> bytes:
+        member = f"{entry.key}/{name}"
+        try:
+            with zipfile.ZipFile(self.path) as archive:
+                data = archive.read(member)
+        except (OSError, zipfile.BadZipFile, zlib.error, KeyError) as error:
+            raise InputError(f"is damaged ({error})", str(self.path)) from None
+        if bytes_digest(data) != entry.files[name]:
+            raise InputError(f"'{member}' is damaged", str(self.path))
+        return data
+
+    def _of(self, scene: Scene) -> list[Entry]:
+        physics = physics_digest(scene)
+        own = {entry.level: entry for entry in self._entries if entry.physics == physics}
+        return [own[level] for level in sorted(own)]

@@ -1,0 +1,253 @@
+"""References that were solved before: kept once per content, found again by any later run.
+
+An entry is a folder named by a key that hashes all that the reference depends on: the physics of
+the scene, the level, the parameters, the code of the reference and the versions of what it
+stands on. Whatever changes gives another key, so that an outdated entry is never found; it only
+takes up room until `remove` is asked for it.
+
+::
+
+    <root>/<key>/entry.json            what it is, where it comes from, digests of its files
+                 solution.json|.vtu    as `verify.solution.write_solution` wrote them
+"""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from time import time
+from typing import Any
+
+from verify.errors import InputError
+from verify.provenance import provenance
+from verify.result import SolveRecord, Status
+from verify.runner.fingerprint import code_of_solver, digest_of, file_digest, physics_digest
+from verify.runner.job import Job, record_of, solution_files
+from verify.runner.storage import read_json, write_json
+from verify.scene import Scene
+
+__all__ = ["REFERENCE", "Entry", "ReferenceCache", "cache_folder", "current_key", "read_entry"]
+
+REFERENCE = "reference"
+ENTRY_SCHEMA = 1
+_ENTRY = "entry.json"
+_HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A stored reference: one level of one scene.
+
+    Parameters
+    ----------
+    key, physics, code : str
+        Hashes of all that it depends on; of the scene; of the code and the versions.
+    case : str
+        Name of the case for which it was solved; for people only.
+    level : int
+    record : SolveRecord
+    files : dict of str to str
+        Digest of each file of the solution.
+    origin : dict
+        Provenance of the solve.
+    made : str
+        Date, UTC.
+    """
+
+    key: str
+    physics: str
+    code: str
+    case: str
+    level: int
+    record: SolveRecord
+    files: dict[str, str]
+    origin: dict[str, Any]
+    made: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return {"schema": ENTRY_SCHEMA, **asdict(self)}
+
+    @property
+    def outdated(self) -> bool:
+        """Whether the reference's code or versions are others today."""
+        return self.code != code_of_solver(REFERENCE)
+
+    def taken_by(self, job: Job, words: str) -> SolveRecord:
+        """Return its record as that of `job`, with a note in `words` on where it comes from."""
+        notes = {**self.record.notes, "cache": f"{words}, solved {self.made}{self._by()}"}
+        return replace(self.record, case=job.case, notes=notes)
+
+    def _by(self) -> str:
+        dolfinx = self.origin.get("versions", {}).get("dolfinx")
+        return f" with DOLFINx {dolfinx}" if dolfinx else ""
+
+
+def cache_folder() -> Path:
+    """Return the folder of the cache: ``VERIFY_CACHE``, else below the user's cache folder."""
+    if named := os.environ.get("VERIFY_CACHE"):
+        return Path(named)
+    home = os.environ.get("XDG_CACHE_HOME")
+    return (Path(home) if home else Path.home() / ".cache") / "cutting-verification" / "references"
+
+
+def current_key(scene: Scene, level: int, parameters: dict[str, Any]) -> str:
+    """Return the key under which today's code keeps the reference of `scene`."""
+    return digest_of([physics_digest(scene), level, parameters, code_of_solver(REFERENCE)])
+
+
+def read_entry(content: dict[str, Any], where: str) -> Entry:
+    """Make an entry from what `Entry.as_json` gave.
+
+    Raises
+    ------
+    InputError
+        If it is not one.
+    """
+    try:
+        if content["schema"] != ENTRY_SCHEMA:
+            raise InputError(
+                f"a stored reference of schema {content['schema']}; expected {ENTRY_SCHEMA}", where
+            )
+        fields = {name: content[name] for name in Entry.__dataclass_fields__ if name != "record"}
+        return Entry(**fields, record=record_of(content["record"], where))
+    except (KeyError, TypeError) as error:
+        raise InputError(f"not a stored reference ({error})", where) from None
+
+
+class ReferenceCache:
+    """The references kept in a folder, which many runs may use at the same time."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def take(self, scene: Scene, job: Job) -> SolveRecord | None:
+        """Copy the reference for `job` into its folder, if a whole one is kept.
+
+        A damaged entry is removed, and the reference solved again.
+        """
+        folder = self.root / current_key(scene, job.level, job.parameters)
+        if not folder.is_dir():
+            return None
+        try:
+            entry = self._entry(folder)
+            for name, digest in entry.files.items():
+                shutil.copyfile(folder / name, job.folder / name)
+                if file_digest(job.folder / name) != digest:
+                    raise InputError("differs from what was stored", str(folder / name))
+        except FileNotFoundError:  # removed by somebody while we looked, or damaged
+            self._remove(folder)
+            return None
+        except InputError:
+            self._remove(folder)
+            return None
+        return entry.taken_by(job, "from the reference cache")
+
+    def keep(self, scene: Scene, job: Job, record: SolveRecord) -> str:
+        """Keep the solution in the folder of `job`; say what hindered it, if anything did.
+
+        A full or unwritable disk is not a reason to stop a run whose own files are written.
+        """
+        if record.status is not Status.SOLVED:
+            return ""
+        key = current_key(scene, job.level, job.parameters)
+        try:
+            self.root.mkdir(parents=True, exist_ok=True)
+            partial = Path(tempfile.mkdtemp(prefix=".partial-", dir=self.root))
+            try:
+                files = solution_files(job.folder)
+                for file in files:
+                    shutil.copyfile(file, partial / file.name)
+                entry = Entry(
+                    key=key,
+                    physics=physics_digest(scene),
+                    code=code_of_solver(REFERENCE),
+                    case=scene.name,
+                    level=job.level,
+                    record=record,
+                    files={file.name: file_digest(file) for file in files},
+                    origin=provenance(),
+                    made=datetime.now(UTC).isoformat(timespec="seconds"),
+                )
+                write_json(entry.as_json(), partial / _ENTRY)
+                if not (self.root / key).exists():
+                    # one step; if another run was quicker, the other's is as good as ours
+                    os.rename(partial, self.root / key)
+            finally:
+                shutil.rmtree(partial, ignore_errors=True)
+        except OSError as error:
+            where = error.filename or self.root
+            return f"not kept in the reference cache: {error.strerror} ({where})"
+        return ""
+
+    def entries(self) -> list[Entry]:
+        """Return what is kept, by case, level and date; what cannot be read is not listed."""
+        found = []
+        for folder in self._folders():
+            try:
+                found.append(self._entry(folder))
+            except InputError:
+                continue
+        return sorted(found, key=lambda e: (e.case, e.level, e.made))
+
+    def size(self, entry: Entry) -> int:
+        """Bytes that an entry takes up."""
+        return sum(f.stat().st_size for f in (self.root / entry.key).iterdir())
+
+    def find(self, scene: Scene) -> list[Entry]:
+        """Return the current entries of `scene`, by level."""
+        physics = physics_digest(scene)
+        own = [e for e in self.entries() if e.physics == physics and not e.outdated]
+        return sorted(own, key=lambda entry: entry.level)
+
+    def remove(self, entries: Iterable[Entry]) -> None:
+        """Remove entries."""
+        for entry in entries:
+            self._remove(self.root / entry.key)
+
+    def remove_damaged(self) -> int:
+        """Remove what is not a whole entry, and return how many there were.
+
+        What a run that was killed left behind is damaged after an hour; before, it may be that
+        of a run that still writes.
+        """
+        count = 0
+        for folder in self._folders(_HOUR):
+            try:
+                entry = self._entry(folder)
+                whole = all(file_digest(folder / n) == d for n, d in entry.files.items())
+            except (InputError, OSError):
+                whole = False
+            if not whole:
+                self._remove(folder)
+                count += 1
+        return count
+
+    def _folders(self, older: float = float("inf")) -> list[Path]:
+        """Folders of entries, and of unfinished ones that are `older` (s)."""
+        if not self.root.is_dir():
+            return []
+        return [
+            path
+            for path in sorted(self.root.iterdir())
+            if path.is_dir()
+            and (not path.name.startswith(".") or time() - path.stat().st_mtime > older)
+        ]
+
+    def _entry(self, folder: Path) -> Entry:
+        entry = read_entry(read_json(folder / _ENTRY), str(folder / _ENTRY))
+        if entry.key != folder.name:
+            raise InputError(f"is the entry of '{entry.key}'", str(folder))
+        return entry
+
+    def _remove(self, folder: Path) -> None:
+        # out of sight in one step: a reader finds it whole or not at all
+        doomed = folder.with_name(f".removed-{folder.name}-{os.getpid()}")
+        try:
+            os.rename(folder, doomed)
+        except OSError:
+            return
+        shutil.rmtree(doomed, ignore_errors=True)
