@@ -32,6 +32,7 @@ from verify.scene.physics import (
     Exact,
     Gravity,
     Material,
+    Rotation,
     Support,
     Traction,
 )
@@ -71,6 +72,7 @@ __all__ = [
     "ReferenceLevels",
     "Region",
     "Replay",
+    "Rotation",
     "Scene",
     "Skin",
     "SpatialCut",

@@ -2,9 +2,12 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from verify.scene.strict import Count, Finite, NonNegative, Positive, Strict, Vector
+from verify.scene.history import History
+from verify.scene.strict import Count, Finite, NonNegative, Point3, Positive, Strict, Vector
 
 __all__ = [
     "Analysis",
@@ -13,6 +16,7 @@ __all__ = [
     "Gravity",
     "Load",
     "Material",
+    "Rotation",
     "Support",
     "Traction",
 ]
@@ -20,24 +24,6 @@ __all__ = [
 _OUTPUTS = 11
 
 Values = Annotated[list[Finite], Field(min_length=1, max_length=3)]
-
-
-def _ordered(history: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    times = [time for time, _ in history]
-    if times != sorted(times) or any(a == b for a, b in zip(times, times[2:], strict=False)):
-        raise ValueError("times must ascend; two equal ones are a jump, three are too many")
-    return history
-
-
-History = Annotated[
-    list[tuple[NonNegative, Finite]],
-    Field(
-        min_length=1,
-        description="dynamic: [[time in s, factor], …]; the value times the factor, linear between "
-        "the times and constant before and after them; two equal times make a jump",
-    ),
-    AfterValidator(_ordered),
-]
 
 
 class Material(Strict):
@@ -52,6 +38,31 @@ class Material(Strict):
     thickness: Positive | None = Field(default=None, description="membranes only: thickness, m")
 
 
+class Rotation(Strict):
+    """A finite rotation about a point or an axis."""
+
+    angle: Finite = Field(description="degrees, anticlockwise seen from the tip of the axis")
+    centre: Vector = Field(description="a point that it leaves where it is, m")
+    axis: Point3 | None = Field(default=None, description="3D: its direction; of any length")
+
+    def matrix(self, factor: float = 1.0) -> NDArray[np.float64]:
+        """Rotation matrix (d, d) of the angle times a factor."""
+        angle, n = np.deg2rad(self.angle) * factor, self._spin()
+        turn = np.eye(len(n)) + np.sin(angle) * n + (1.0 - np.cos(angle)) * n @ n
+        return np.asarray(turn)
+
+    def matrix_rate(self, factor: float = 1.0) -> NDArray[np.float64]:
+        """Return the derivative (d, d) of the matrix by the factor."""
+        return np.asarray(np.deg2rad(self.angle) * self._spin() @ self.matrix(factor))
+
+    def _spin(self) -> NDArray[np.float64]:
+        """Skew-symmetric matrix of the unit axis."""
+        if self.axis is None:
+            return np.array([[0.0, -1.0], [1.0, 0.0]])
+        x, y, z = np.asarray(self.axis) / np.linalg.norm(self.axis)
+        return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 class Support(Strict):
     """Prescribed displacement on a part of the boundary."""
 
@@ -62,7 +73,16 @@ class Support(Strict):
     components: list[Literal["x", "y", "z"]] | None = Field(
         default=None, description="which components are held; default all"
     )
+    rotation: Rotation | None = Field(
+        default=None, description="turn the part, then move it by `displacement`"
+    )
     history: History | None = None
+
+    @model_validator(mode="after")
+    def _turns_all_of_it(self) -> "Support":
+        if self.rotation is not None and (self.components or self.displacement == "exact"):
+            raise ValueError("a rotation goes with a displacement of all components")
+        return self
 
     @model_validator(mode="after")
     def _lengths_agree(self) -> "Support":
@@ -81,6 +101,28 @@ class Support(Strict):
         if self.components is None:
             return tuple(range(dimension))
         return tuple("xyz".index(name) for name in self.components)
+
+    def values(self, points: NDArray[np.float64], factor: float = 1.0) -> NDArray[np.float64]:
+        """Prescribed displacement (k, held) of points (k, d), m, unless it is ``"exact"``.
+
+        A history's factor multiplies the displacement and the angle of a rotation.
+        """
+        assert self.displacement != "exact"
+        shift = factor * np.asarray(self.displacement, dtype=float)
+        moved = np.tile(shift, (len(points), 1))
+        if self.rotation is not None:
+            turn = self.rotation.matrix(factor) - np.eye(points.shape[1])
+            moved += (points - np.asarray(self.rotation.centre)) @ turn.T
+        return moved
+
+    def rates(self, points: NDArray[np.float64], factor: float = 1.0) -> NDArray[np.float64]:
+        """Return the derivative (k, held) of `values` by the factor, m."""
+        assert self.displacement != "exact"
+        rate = np.tile(np.asarray(self.displacement, dtype=float), (len(points), 1))
+        if self.rotation is not None:
+            turning = self.rotation.matrix_rate(factor)
+            rate += (points - np.asarray(self.rotation.centre)) @ turning.T
+        return rate
 
 
 class Gravity(Strict):

@@ -8,7 +8,7 @@ from verify.scene.cuts import ArcCut
 from verify.scene.geometry import MeshFile, Polygon
 from verify.scene.initial import Moving
 from verify.scene.nearest import nearest
-from verify.scene.physics import BodyForce, Gravity, Traction
+from verify.scene.physics import BodyForce, Gravity, Rotation, Traction
 from verify.scene.regions import parse_region
 from verify.scene.skin import Skin
 
@@ -59,6 +59,8 @@ def _check_dimensions(scene: "Scene") -> None:
                 f"supports[{i}].displacement: {len(support.displacement)} values; "
                 f"expected {len(support.held(d))}"
             )
+        if support.rotation is not None:
+            _check_rotation(support.rotation, d, f"supports[{i}].rotation")
     for i, load in enumerate(scene.loads):
         vector = {"gravity": "acceleration", "body_force": "force", "traction": "traction"}
         value = getattr(load, vector[load.kind])
@@ -80,6 +82,16 @@ def _check_dimensions(scene: "Scene") -> None:
         )
     if scene.analysis.kind == "dynamic" and scene.material.density is None:
         raise ValueError("material.density: a dynamic analysis needs it")
+
+
+def _check_rotation(rotation: Rotation, dimension: int, place: str) -> None:
+    if len(rotation.centre) != dimension:
+        raise ValueError(f"{place}.centre: expected {dimension} coordinates")
+    if (rotation.axis is not None) != (dimension == 3):
+        need = "3D needs one" if dimension == 3 else "belongs to 3D scenes"
+        raise ValueError(f"{place}.axis: {need}")
+    if rotation.axis is not None and not any(rotation.axis):
+        raise ValueError(f"{place}.axis: is zero")
 
 
 def _check_regions(scene: "Scene") -> None:
