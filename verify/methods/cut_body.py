@@ -1,0 +1,121 @@
+"""What every method gives: a body to solve on, one to show, and an account of the cut."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.elasticity import Material
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.subdivision import Subdivision, subdivide
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Change", "Counts", "CutBody", "make_body"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something that a method moved, merged, removed or took for something else.
+
+    Attributes
+    ----------
+    kind : str
+    count : int
+    size : float
+        Largest contribution, or the sum where the kind says so.
+    unit : str
+    """
+
+    kind: str
+    count: int
+    size: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Sizes before and after; `nodes` carry one displacement vector each."""
+
+    nodes_before: int
+    nodes: int
+    elements_before: int
+    elements: int
+
+
+@dataclass(frozen=True)
+class CutBody:
+    """A body cut by one of the methods.
+
+    Attributes
+    ----------
+    virtual : VirtualMesh
+        The material: loads, supports and masses go here.
+    resisting : VirtualMesh
+        What resists deformation: the same unknowns and cells as `virtual`, and its weights too,
+        except where a method lets copies of cells resist as if they were whole.
+    conforming : Subdivision
+        The body as a mesh that conforms to the realised cut, for output and comparison.
+    cell_origin : (m,) int array
+        Cell of the mesh as given in which each cell of ``virtual.mesh`` lies (or from which it
+        was moved).
+    counts : Counts
+    smallest_fraction : float
+        Smallest volume of a cell, or piece of a cell, over that of the cell as given.
+    changes : tuple of Change
+    seconds : dict of str to float
+        Wall time of the phases of the cut.
+    """
+
+    virtual: VirtualMesh
+    resisting: VirtualMesh
+    conforming: Subdivision
+    cell_origin: _Ints
+    counts: Counts
+    smallest_fraction: float
+    changes: tuple[Change, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def material(self, given: Material) -> Material:
+        """Material of the cells of ``virtual.mesh``, from that of the cells as given."""
+        count = len(self.cell_origin)
+        lam, mu = (
+            value if np.ndim(value) == 0 else value[self.cell_origin]
+            for value in (given.lam, given.mu)
+        )
+        assert np.shape(lam) in ((), (count,))
+        return Material(lam, mu)
+
+
+def make_body(
+    given: SimplexMesh,
+    virtual: VirtualMesh,
+    changes: tuple[Change, ...] = (),
+    *,
+    resisting: VirtualMesh | None = None,
+    conforming: Subdivision | None = None,
+    cell_origin: _Ints | None = None,
+    seconds: dict[str, float] | None = None,
+) -> CutBody:
+    """Make the body of a cut mesh, with its counts.
+
+    Parameters
+    ----------
+    given : SimplexMesh
+        The mesh before the method touched it.
+    virtual, resisting, conforming, cell_origin, changes, seconds
+        As in `CutBody`; without them nothing but `virtual` is special.
+    """
+    origin = np.arange(len(given.cells)) if cell_origin is None else cell_origin
+    return CutBody(
+        virtual=virtual,
+        resisting=virtual if resisting is None else resisting,
+        conforming=subdivide(virtual) if conforming is None else conforming,
+        cell_origin=origin,
+        counts=Counts(len(given.points), virtual.node_count, len(given.cells), len(virtual.cells)),
+        smallest_fraction=float((virtual.volumes / given.measures[origin[virtual.parent]]).min()),
+        changes=tuple(change for change in changes if change.count),
+        seconds=seconds or {},
+    )

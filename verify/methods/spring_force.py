@@ -1,0 +1,118 @@
+"""Mass–spring model of a cut body: springs on the edges of its cells."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.methods.spring_fit import Fit, cell_edges, spring_stiffness
+from verify.methods.spring_kernels import add_spring_stiffness, spring_force, spring_product
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.corotational import InternalForce, Kinematics, TangentKind
+from verify.xfem.elasticity import Material
+from verify.xfem.errors import XfemError
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["SpringForce"]
+
+_Floats = NDArray[np.float64]
+
+
+class SpringForce(InternalForce):
+    """Internal force of springs, in the place of that of finite elements.
+
+    It serves the statics at large rotations and the time integrators of `verify.xfem`, but not
+    those that integrate the stress along a step (`EnergyMomentum`) or keep kernels of their own
+    (`RealTimeEuler`). Masses are the side-wise lumped ones.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+        Pieces of cells have springs on all edges of their cell, weaker by their share of it.
+    material : Material
+        Fitted by the springs as far as springs can; see `verify.methods.spring_fit`.
+    kinematics : {"corotational", "linear"}
+        Springs that turn (½k(l − l0)², any rotation), or that keep their directions.
+    fit : {"fitted", "van_gelder"}
+
+    Attributes
+    ----------
+    springs : (p, e) float array
+        Stiffness of the springs of each piece, in N/m.
+    clamped : int
+        Springs left out because the fit would make them negative.
+
+    Raises
+    ------
+    XfemError
+        If the material does not fit the mesh, the mesh is a membrane, or an option is unknown.
+    """
+
+    def __init__(
+        self,
+        virtual: VirtualMesh,
+        material: Material,
+        kinematics: Kinematics = "corotational",
+        fit: Fit = "fitted",
+    ) -> None:
+        super().__init__(virtual, material, kinematics)
+        mesh = virtual.mesh
+        stiffness, clamped = spring_stiffness(mesh, material, fit)
+        self.springs = stiffness[virtual.parent] * virtual.fraction[:, None]
+        self.clamped = int(clamped[virtual.parent].sum())
+        self._edges = cell_edges(mesh.dim)
+        ends = mesh.points[mesh.cells[virtual.parent]]
+        self._rest = ends[:, self._edges[:, 1]] - ends[:, self._edges[:, 0]]
+        length = np.linalg.norm(self._rest, axis=2, keepdims=True)
+        self._directions = self._rest / length
+        self._excess = np.zeros(self.springs.shape)
+
+    @property
+    def geometry(self) -> tuple[_Floats, NDArray[np.int64], _Floats, _Floats, _Floats, _Floats]:
+        """Springs have no stress to average: always an error."""
+        raise XfemError("springs have no stress field; expected an integrator that needs none")
+
+    def evaluate(
+        self,
+        displacement: _Floats,
+        out: _Floats | None = None,
+        velocity: _Floats | None = None,
+        scale: float = 0.0,
+    ) -> tuple[_Floats, float]:
+        """Return internal force (N, d) in newtons and energy in joules; see `InternalForce`."""
+        if displacement.shape != self._shape:
+            raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
+        force = np.empty(self._shape) if out is None else out
+        force[:] = 0.0
+        energy = spring_force(
+            self.virtual.cells, self._edges, self._rest, self.springs, displacement,
+            self.turning, self._directions, self._excess, force,
+        )  # fmt: skip
+        if velocity is not None:
+            self.add_frozen_product(velocity, scale, force)
+        return force, float(energy)
+
+    def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` K v (N, d), K along the springs of the last `evaluate`, to `out`."""
+        spring_product(
+            self.virtual.cells, self._edges, self.springs, self._directions, vector, scale, out
+        )
+
+    def add_stiffness(
+        self,
+        pattern: BlockPattern,
+        blocks: _Floats,
+        scale: float = 1.0,
+        kind: TangentKind = "frozen",
+        displacement: _Floats | None = None,
+    ) -> None:
+        """Add `scale` times the stiffness at the last `evaluate`; see `InternalForce`.
+
+        "frozen" leaves out what compressed springs take away from it across, so that it is never
+        indefinite.
+        """
+        if kind not in ("frozen", "exact"):
+            raise XfemError(f"stiffness '{kind}'; expected frozen or exact")
+        targets = pattern.targets[: len(self.virtual.cells)]
+        add_spring_stiffness(
+            targets, self._edges, self.springs, self._directions, self._excess,
+            kind == "exact", scale, blocks,
+        )  # fmt: skip

@@ -1,0 +1,107 @@
+"""Cutting by copies of cells: virtual nodes.
+
+Molino, Bao & Fedkiw, *A virtual node algorithm for changing mesh topology during simulation*,
+SIGGRAPH 2004: a cut cell is copied once for each of its parts that contains a node; the nodes of a
+copy outside its part are virtual. Sifakis, Der & Fedkiw, *Arbitrary cutting of deformable
+tetrahedralized objects*, SCA 2007: a copy for every part, whether it contains a node or not.
+
+With copies that resist by their share of the material, the second is the space of XFEM in
+side-wise unknowns (Hansbo & Hansbo 2004), and so is the first as long as every part has a node.
+"""
+
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.methods.cut_body import Change, CutBody, make_body
+from verify.methods.whole_cells import whole_cells
+from verify.xfem.absorption import absorb
+from verify.xfem.cuts import Cut
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.piece_contacts import sibling_contacts
+from verify.xfem.split import TipRule
+from verify.xfem.virtual import VirtualMesh, cut_mesh
+
+__all__ = ["CopyWeights", "virtual_node", "virtual_node_arbitrary"]
+
+CopyWeights = Literal["share", "whole"]
+
+
+def virtual_node(
+    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside", weights: CopyWeights = "share"
+) -> CutBody:
+    """Copy a cell once for each part with a node in it; parts without one join their sibling.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    cuts : sequence of Cut
+    tip : {"inside", "through", "nearest"}
+        See `verify.xfem.split.split_cells`.
+    weights : {"share", "whole"}
+        Copies resist by their share of the volume, or as whole cells: no sliver is left, but the
+        cut cells count several times.
+    """
+    start = perf_counter()
+    cut = cut_mesh(mesh, cuts, tip)
+    into = _parts_with_nodes(cut)
+    merged = np.flatnonzero(into != np.arange(len(into)))
+    largest = float(cut.fraction[merged].max(initial=0.0))
+    change = Change("part without a node left with its sibling", len(merged), largest, "fraction")
+    virtual = absorb(cut, into)[0] if len(merged) else cut
+    return _body(mesh, virtual, weights, [change], start)
+
+
+def virtual_node_arbitrary(
+    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside", weights: CopyWeights = "share"
+) -> CutBody:
+    """Copy a cell once for each of its parts.
+
+    Parameters are those of `virtual_node`.
+    """
+    start = perf_counter()
+    return _body(mesh, cut_mesh(mesh, cuts, tip), weights, [], start)
+
+
+def _body(
+    mesh: SimplexMesh, virtual: VirtualMesh, weights: str, changes: list[Change], start: float
+) -> CutBody:
+    if weights not in ("share", "whole"):
+        raise XfemError(f"weights of copies '{weights}'; expected share or whole")
+    resisting = whole_cells(virtual) if weights == "whole" else virtual
+    extra = float(resisting.volumes.sum() / virtual.volumes.sum() - 1.0)
+    copies = int((resisting.fraction > virtual.fraction).sum())
+    changes.append(
+        Change("copy that resists as a whole cell; material added", copies, extra, "fraction")
+    )
+    seconds = {"cutting": perf_counter() - start}
+    return make_body(mesh, virtual, tuple(changes), resisting=resisting, seconds=seconds)
+
+
+def _parts_with_nodes(cut: VirtualMesh) -> NDArray[np.int64]:
+    """(p,) each piece with a node of its cell in it stays; another goes to a sibling with one.
+
+    The sibling with which it shares most of the cut; without contact the largest.
+    """
+    sign = np.where(cut.level_sets[cut.mesh.cells[cut.parent]] >= 0.0, 1, -1)
+    label = cut.label[:, None, :]
+    has_node = ((label == 0) | (label == sign)).all(axis=2).any(axis=1)
+    into = np.arange(len(cut.cells))
+    if has_node.all():
+        return into
+    without = np.flatnonzero(~has_node)
+    host = np.full(len(cut.mesh.cells), -1)
+    order = np.lexsort([cut.fraction, has_node])
+    host[cut.parent[order]] = order
+    into[without] = host[cut.parent[without]]
+    first, second, area = sibling_contacts(cut, cut.parent[without])
+    fits = ~has_node[first] & has_node[second]
+    pairs, back = np.unique(np.stack([first, second])[:, fits], axis=1, return_inverse=True)
+    total = np.bincount(back.ravel(), area[fits], minlength=pairs.shape[1])
+    best = np.lexsort([total, pairs[0]])
+    into[pairs[0][best]] = pairs[1][best]
+    return into
