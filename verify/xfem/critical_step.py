@@ -1,4 +1,10 @@
-"""Largest stable step 2/ω_max of central differences, exact and as a bound per element."""
+"""Largest stable step 2/ω_max of central differences, exact and as a bound per element.
+
+In nonlinear motion a step below the critical one is not enough. Central differences turn a mode by
+an angle θ per step, 2 sin(θ/2) = ωh, and the time grid itself exchanges energy between any three
+modes whose angles sum to 2π, and any four. No three do while ω_max h < √3, no four while
+ω_max h < √2 (Mandziuk & Schlick 1995; Schlick et al. 1998): `RESONANCE_FREE` of the critical step.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,8 +16,9 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["critical_step", "element_critical_steps"]
+__all__ = ["RESONANCE_FREE", "critical_step", "element_critical_steps"]
 
+RESONANCE_FREE = float(np.sqrt(0.5))
 _DENSE = 400  # unknowns up to which all eigenvalues are cheaper than a Lanczos iteration
 
 
@@ -91,12 +98,34 @@ def _largest_general(K: csr_array, M: csr_array, tolerance: float) -> float:
     return float(values[0])
 
 
-def element_critical_steps(mesh: SimplexMesh, material: Material, density: ArrayLike) -> NDArray:
+def element_critical_steps(
+    mesh: SimplexMesh, material: Material, density: ArrayLike, strain: float = 0.0
+) -> NDArray:
     """Critical step (m,) of each uncut element alone, with its mass lumped.
 
     The smallest is a lower bound of the step of any cut body with side-wise mass, because a
     piece has the stiffness and the mass of its element times the same factor.
+
+    Parameters
+    ----------
+    mesh, material, density
+    strain : float
+        For corotational motion: the largest principal stretch − 1 in reach, up to 2. With polar
+        rotations R the second derivative of the potential is, in the axes of the stretch,
+
+            2μ|sym|² + λ tr² + Σ_{i<j} s_ij² [μ + (λ tr(U − I) − 2μ)/(u_i + u_j)],
+
+        s = RᵀδF − δFᵀR: the linear stiffness, turned, and a stiffness against rotation that
+        grows with the stretch. Its largest value is added here, so that the bound holds for the
+        exact stiffness at any rotation, as long as no stretch exceeds 1 + strain.
+
+    Raises
+    ------
+    XfemError
+        If the strain is outside 0…2, where the largest factor is that of equal stretches.
     """
+    if not 0.0 <= strain <= 2.0:
+        raise XfemError(f"strain {strain!r} in reach; expected 0 to 2")
     b = mesh.gradients
     space = mesh.space
     count = len(mesh.cells)
@@ -105,8 +134,20 @@ def element_critical_steps(mesh: SimplexMesh, material: Material, density: Array
     # unknowns scaled by a unit mass: K_ij (d + 1)/(ρ V)
     eye = np.eye(space)
     dots = np.einsum("eik,ejk->eij", b, b)
-    K = lam * np.einsum("eik,ejl->eikjl", b, b) + mu * np.einsum("ejk,eil->eikjl", b, b)
-    K += mu * np.einsum("eij,kl->eikjl", dots, eye)
+    diagonal = np.einsum("eij,kl->eikjl", dots, eye)
+    turned = np.einsum("ejk,eil->eikjl", b, b)
+    K = lam * np.einsum("eik,ejl->eikjl", b, b) + mu * (turned + diagonal)
+    K += _against_rotation(mesh, lam, mu, strain) * 0.5 * (diagonal - turned)
     size = (mesh.dim + 1) * space
     largest = np.linalg.eigvalsh(K.reshape(count, size, size))[:, -1]
     return 2.0 / np.sqrt(largest * (mesh.dim + 1) / np.broadcast_to(density, count))
+
+
+def _against_rotation(mesh: SimplexMesh, lam: NDArray, mu: NDArray, strain: float) -> NDArray:
+    """Largest factor of |skew|² in the second derivative for stretches up to 1 + strain.
+
+    All stretches at their largest. A membrane (d = 2 in space) in tension resists rotation of its
+    plane with T/u |n·δF|², which the linear stiffness with its μ and twice the factor cover.
+    """
+    factor: NDArray = (2.0 * mu + mesh.dim * lam) * strain / (1.0 + strain)
+    return factor if mesh.dim == mesh.space else 2.0 * factor

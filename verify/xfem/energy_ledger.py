@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.dynamics.body import DynamicBody, MotionState
 from verify.xfem.dynamics.integrator import Integrator, StepForces
+from verify.xfem.penalised_force import PenalisedForce
 
 __all__ = ["EnergyLedger", "Ledger", "run"]
 
@@ -39,6 +40,7 @@ class Ledger:
     momentum : (n + 1, d) linear momentum, in kg m/s
     angular_momentum : (n + 1, 1 or 3), about the origin, in kg m²/s
     impulse : (n + 1, d) of external, viscous and support forces since the start, in N s
+    penalty : share of a ghost penalty in the strain energy, in J
     """
 
     time: _Floats
@@ -53,6 +55,7 @@ class Ledger:
     momentum: _Floats
     angular_momentum: _Floats
     impulse: _Floats
+    penalty: _Floats
 
     @property
     def mechanical(self) -> _Floats:
@@ -88,7 +91,7 @@ class EnergyLedger:
     def __init__(self, body: DynamicBody, state: MotionState) -> None:
         self.body = body
         self._last = state.copy()
-        self._strain = body.force.evaluate(state.displacement)[1]
+        self._strain, self._penalty = self._stored(state)
         space = body.shape[1]
         self._work = np.zeros(5)  # load, support, damping, algorithmic, unbalanced
         self._impulse = np.zeros(space)
@@ -102,7 +105,7 @@ class EnergyLedger:
         inertia = body.mass.apply(state.velocity - last.velocity)
         residual = inertia / h - forces.external + forces.internal + forces.viscous
         reaction = np.where(body.fixed, residual, 0.0)
-        strain = body.force.evaluate(state.displacement)[1]
+        strain, self._penalty = self._stored(state)
         slip = change / h - 0.5 * (last.velocity + state.velocity)
         assert body.weight is not None
         self._work += [
@@ -118,6 +121,12 @@ class EnergyLedger:
         self._last, self._strain = state.copy(), strain
         self._rows.append(self._row(state))
 
+    def _stored(self, state: MotionState) -> tuple[float, float]:
+        """Strain energy, and the share of a ghost penalty in it."""
+        force = self.body.force
+        _, strain = force.evaluate(state.displacement)
+        return strain, force.penalty_energy if isinstance(force, PenalisedForce) else 0.0
+
     def _row(self, state: MotionState) -> _Floats:
         body = self.body
         assert body.weight is not None
@@ -130,15 +139,16 @@ class EnergyLedger:
             -np.sum(body.weight * state.displacement),
         ]
         turning = _cross(position, momenta)
-        return np.concatenate([energies, self._work, momenta.sum(axis=0), turning, self._impulse])
+        vectors = (momenta.sum(axis=0), turning, self._impulse)
+        return np.concatenate([energies, self._work, *vectors, [self._penalty]])
 
     def close(self) -> Ledger:
         """Return the account so far."""
         table = np.array(self._rows).T
         space = self.body.shape[1]
         turns = 1 if space == 2 else 3
-        vectors = np.split(table[9:].T, [space, space + turns], axis=1)
-        return Ledger(*table[:9], *vectors)
+        vectors = np.split(table[9:-1].T, [space, space + turns], axis=1)
+        return Ledger(*table[:9], *vectors, penalty=table[-1])
 
 
 def _cross(position: _Floats, momenta: _Floats) -> _Floats:

@@ -138,13 +138,13 @@ def pattern_places(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> _Ints:
     """
     at, found = _find(pattern, rows, columns)
     if not found.all():
-        raise XfemError("the pattern lacks couplings of this mass or penalty; expected Mass.pattern(...)")
+        raise XfemError(
+            "the pattern lacks couplings of this mass or penalty; expected that of the body"
+        )
     return at
 
 
-def _find(
-    pattern: BlockPattern, rows: _Ints, columns: _Ints
-) -> tuple[_Ints, NDArray[np.bool_]]:
+def _find(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> tuple[_Ints, NDArray[np.bool_]]:
     of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
     keys = of_row * pattern.node_count + pattern.columns
     wanted = rows * pattern.node_count + columns

@@ -7,6 +7,8 @@ from verify.xfem.dynamics.inheritance import ancestors, inherit_state
 from verify.xfem.dynamics.integrator import Integrator, StepFailedError, StepForces
 from verify.xfem.dynamics.linear_solver import LinearSolver, SparseLU
 from verify.xfem.dynamics.real_time import RealTimeEuler
+from verify.xfem.dynamics.sliver_treatment import TreatedBody, treat_moving_body
+from verify.xfem.dynamics.step_control import MeasuredPace, StepPerUnknown
 
 __all__ = [
     "CentralDifferences",
@@ -16,6 +18,7 @@ __all__ = [
     "ImplicitEuler",
     "Integrator",
     "LinearSolver",
+    "MeasuredPace",
     "MotionState",
     "MovingSupports",
     "RayleighDamping",
@@ -23,8 +26,11 @@ __all__ = [
     "SparseLU",
     "StepFailedError",
     "StepForces",
+    "StepPerUnknown",
     "SymplecticEuler",
     "Trapezoidal",
+    "TreatedBody",
     "ancestors",
     "inherit_state",
+    "treat_moving_body",
 ]

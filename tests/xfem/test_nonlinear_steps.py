@@ -1,0 +1,162 @@
+"""Explicit steps of corotational motion: what bounds them, and what the time grid does to them."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, isotropic, material, rotation
+from test_sliver_motion import cube, plate, rest_step, stretched
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.corotational import InternalForce
+from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
+from verify.xfem.dynamics import CentralDifferences, DynamicBody, StepFailedError
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.slivers import treat_slivers
+from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+STATES = {(2, 2): "plane strain", (3, 3): "solid", (2, 3): "plane stress"}
+
+
+def deformed(random, mesh, strain):
+    """A linear field: stretches up to 1 + strain, one of them that, then any rotation."""
+    space, dim = mesh.space, mesh.dim
+    stretch = 1.0 + strain * random.uniform(-0.9, 1.0, size=space)
+    stretch[random.integers(dim)] = 1.0 + strain
+    if random.uniform() < 0.3:
+        stretch[:] = 1.0 + strain
+    axes, _ = np.linalg.qr(random.normal(size=(space, space)))
+    if dim < space:  # stretches are those in the plane
+        axes[:, :2], _ = np.linalg.qr(mesh.edge_vectors[0].T)
+        axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    F = rotation(space, random.uniform(0.0, 6.0)) @ axes @ np.diag(stretch) @ axes.T
+    return mesh.points @ (F - np.eye(space)).T
+
+
+@pytest.mark.parametrize("dim,space", STATES)
+@pytest.mark.parametrize("strain", [0.0, 0.15, 1.0, 2.0])
+def test_no_stretch_in_reach_and_no_rotation_makes_the_exact_step_of_an_element_smaller(
+    dim, space, strain
+):
+    random = np.random.default_rng(5)
+    for poisson in (0.0, 0.3, 0.49):
+        stuff = isotropic(1e4, poisson, STATES[dim, space])
+        for _ in range(25):
+            mesh = SimplexMesh(random.normal(size=(dim + 1, space)), [range(dim + 1)])
+            virtual = cut_mesh(mesh, [])
+            force = InternalForce(virtual, stuff)
+            pattern = block_pattern(virtual.cells, virtual.node_count)
+            K = pattern.matrix(force.stiffness(pattern, deformed(random, mesh, strain)))
+            exact = critical_step(K, side_wise_mass(virtual, DENSITY))
+            bound = element_critical_steps(mesh, stuff, DENSITY, strain)[0]
+            assert exact >= (1.0 - 1e-9) * bound
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_up_to_strains_of_one_the_bound_is_that_of_the_linear_element(dim):
+    """Compression waves are the fastest, and stretching does not make them faster."""
+    mesh = plate(0).mesh if dim == 2 else cube(0).mesh
+    at_rest = element_critical_steps(mesh, material(dim), DENSITY)
+    assert element_critical_steps(mesh, material(dim), DENSITY, 1.0) == pytest.approx(at_rest)
+    for strain in (-0.1, 2.5, np.nan):
+        with pytest.raises(XfemError, match="expected 0 to 2"):
+            element_critical_steps(mesh, material(dim), DENSITY, strain)
+
+
+def growth(virtual, turn, steps=3000):
+    """Largest energy over that of the start, from the highest mode at 5 % strain, with ωh given."""
+    force, mass = InternalForce(virtual, material(3)), side_wise_mass(virtual, DENSITY)
+    body = DynamicBody(force, mass)
+    K = body.pattern.matrix(force.stiffness(body.pattern, np.zeros(body.shape))).toarray()
+    root = np.repeat(np.sqrt(mass.diagonal), 3)
+    values, vectors = np.linalg.eigh(K / np.outer(root, root))
+    mode = (vectors[:, -1] / root).reshape(body.shape)
+    slopes = np.einsum("pik,pil->pkl", mode[virtual.cells], virtual.mesh.gradients[virtual.parent])
+    state = body.rest()
+    state.displacement[:] = 0.05 / np.linalg.norm(slopes, ord=2, axis=(1, 2)).max() * mode
+    start, largest = force.evaluate(state.displacement)[1], 0.0
+    scheme = CentralDifferences(body, turn / np.sqrt(values[-1]))
+    for step in range(steps):
+        try:
+            scheme.step(state)
+        except StepFailedError:
+            return np.inf
+        if step % 7 == 0:
+            kinetic = 0.5 * (mass.apply(state.velocity) * state.velocity).sum()
+            largest = max(largest, (force.evaluate(state.displacement)[1] + kinetic) / start)
+        if largest > 100.0:
+            break
+    return largest
+
+
+def test_an_uncut_cube_blows_up_where_three_turns_of_its_fastest_mode_are_a_full_one():
+    """ωh = √3, .87 of the linear critical step; a little below, and at √2, nothing happens."""
+    virtual = cut_mesh(box_mesh((2, 2, 2)), [])
+    assert growth(virtual, np.sqrt(3.0)) > 100.0
+    for turn in (0.97 * np.sqrt(3.0), np.sqrt(2.0), 0.9 * np.sqrt(2.0)):
+        assert growth(virtual, turn) < 1.01
+
+
+def let_go(virtual, start, share, steps):
+    """Largest energy over that at the start, and instants (of every tenth) with inverted pieces."""
+    stuff = material(virtual.mesh.dim)
+    force, mass = InternalForce(virtual, stuff), side_wise_mass(virtual, DENSITY)
+    supports = Supports.none(virtual).prescribe(virtual, virtual.mesh.points[:, 0] < 1e-9)
+    body = DynamicBody(force, mass, supports=supports)
+    state = body.rest()
+    state.displacement[:] = start(virtual.node_points)
+    energy, largest, inverted = force.evaluate(state.displacement)[1], 0.0, 0
+    scheme = CentralDifferences(body, share * rest_step(virtual, mass, stuff))
+    for step in range(steps):
+        scheme.step(state)
+        if step % 10 == 0:
+            inverted += len(force.inverted(state.displacement)) > 0
+            kinetic = 0.5 * (mass.apply(state.velocity) * state.velocity).sum()
+            largest = max(largest, (force.evaluate(state.displacement)[1] + kinetic) / energy)
+        if not largest < 10.0:
+            break
+    return largest, inverted
+
+
+def uniform(points):
+    return 0.15 * points * np.eye(points.shape[1])[0]
+
+
+def test_an_uncut_cube_let_go_from_a_uniform_stretch_needs_the_smaller_step_too():
+    """15 % strain: at .9 of the linear step it blows up, at .9 of the resonance-free one not."""
+    virtual = cut_mesh(box_mesh((3, 3, 3)), [])
+    assert let_go(virtual, uniform, 0.9, 2_000)[0] > 10.0
+    largest, inverted = let_go(virtual, uniform, 0.9 * RESONANCE_FREE, 10_000)
+    assert inverted == 0
+    assert largest < 1.01
+
+
+def oblique(dim, seed):
+    cut = plate(seed) if dim == 2 else cube(seed)
+    treated, report = treat_slivers(cut)
+    assert report.absorption is not None
+    assert treated.bodies.max() == cut.bodies.max()
+    return treated
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", [0, 2])
+def test_nine_tenths_of_the_resonance_free_step_neither_inverts_nor_blows_up(dim, seed):
+    """15 % nominal strain; default sliver policy; 10⁴ steps. The scheme's own energy oscillates."""
+    largest, inverted = let_go(oblique(dim, seed), stretched, 0.9 * RESONANCE_FREE, 10_000)
+    assert inverted == 0
+    assert largest < 1.01
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("dim", [2, 3])
+def test_nine_tenths_of_the_resonance_free_step_holds_for_every_oblique_cut_tried(dim):
+    """Let go suddenly, waves may turn pieces inside out for an instant: small steps see it too."""
+    for seed in range(12):
+        body = oblique(dim, seed)
+        largest, inverted = let_go(body, stretched, 0.9 * RESONANCE_FREE, 10_000)
+        assert inverted == 0
+        assert largest < 1.01
+        assert let_go(body, uniform, 0.9 * RESONANCE_FREE, 10_000)[0] < 1.01

@@ -1,0 +1,183 @@
+"""A ghost penalty with its mass in motion, and the choice of a sliver policy for what moves."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, GRAVITY, cut_body, material, rotation
+from test_sliver_motion import rest_step, stretched, swing
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.critical_step import RESONANCE_FREE, critical_step
+from verify.xfem.cuts import Plane
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    ImplicitEuler,
+    RealTimeEuler,
+    SymplecticEuler,
+    Trapezoidal,
+    treat_moving_body,
+)
+from verify.xfem.energy_ledger import run
+from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+SCHEMES = [
+    CentralDifferences,
+    SymplecticEuler,
+    RealTimeEuler,
+    ImplicitEuler,
+    Trapezoidal,
+    EnergyMomentum,
+]
+
+
+def penalised(virtual, factor=0.01):
+    stuff = material(virtual.mesh.dim)
+    return treat_moving_body(virtual, stuff, DENSITY, "penalise", factor=factor)
+
+
+def sliver(dim, size):
+    mesh = rectangle_mesh((8, 8)) if dim == 2 else box_mesh((3, 3, 4))
+    up = np.eye(dim)[-1]
+    return cut_mesh(mesh, [Plane(np.full(dim, 0.5) + size / (8 if dim == 2 else 4) * up, up)])
+
+
+@pytest.mark.parametrize("kinematics", ["corotational", "linear"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_penalised_stiffness_is_the_derivative_of_force_and_energy(dim, kinematics):
+    v, stuff = cut_body(dim), material(dim)
+    force = PenalisedForce(v, stuff, GhostPenalty(v, stuff, 0.1), kinematics)
+    random = np.random.default_rng(0)
+    u, w = 0.03 * random.normal(size=(2, v.node_count, dim))
+    pattern = side_wise_mass(v, 1.0).pattern(v, force.ghost.couplings)
+    K = pattern.matrix(force.stiffness(pattern, u))
+    h = 1e-6
+    (plus, above), (minus, below) = (force.evaluate(u + s * h * w) for s in (1.0, -1.0))
+    at = force.evaluate(u)[0]
+    assert 0.0 < force.penalty_energy
+    # central differences: h² of third derivatives, and round-off/h
+    assert (above - below) / (2 * h) == pytest.approx(np.sum(at * w), rel=1e-7)
+    change = ((plus - minus) / (2 * h)).ravel()
+    assert np.abs(K @ w.ravel() - change).max() < 1e-7 * np.abs(change).max()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_every_scheme_closes_its_account_with_a_penalty_and_its_mass(scheme, dim):
+    treated = penalised(cut_body(dim))
+    v, mass = treated.virtual, treated.mass
+    assert mass.diagonal is None
+    body = DynamicBody(
+        treated.force,
+        mass,
+        weight=mass.weight(-GRAVITY * np.eye(dim)[-1]),
+        supports=Supports.none(v).prescribe(v, v.mesh.points[:, -1] == 0.0),
+    )
+    state = body.rest()
+    state.velocity[:] = 0.1 * np.random.default_rng(0).normal(size=body.shape)
+    state.velocity[body.fixed] = 0.0
+    account = run(scheme(body, 0.004), body, state, 40)
+    size = np.ptp(account.gravity) + account.kinetic.max()
+    assert account.penalty.max() > 1e-4 * size
+    assert np.ptp(account.balance) <= 1e-10 * size
+    if scheme is EnergyMomentum:
+        assert account.drift <= 1e-10
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_turning_body_does_not_feel_the_penalty(dim):
+    v = cut_body(dim)
+    force = penalised(v).force
+    turned = v.node_points @ (rotation(dim, 1.0) - np.eye(dim)).T + 0.3
+    force_, energy = force.evaluate(turned)
+    # round-off of λ + 2μ over elements of size one
+    assert np.abs(force_).max() < 1e-10
+    assert energy < 1e-12
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("size", [0.5, 1e-3, 1e-12, 0.0])
+def test_with_its_mass_the_penalty_keeps_the_explicit_step_of_the_uncut_body(dim, size):
+    treated = penalised(sliver(dim, size))
+    v = treated.virtual
+    pattern = treated.mass.pattern(v, treated.force.ghost.couplings)
+    K = pattern.matrix(treated.force.stiffness(pattern, np.zeros_like(v.node_points), "frozen"))
+    uncut = cut_mesh(v.mesh, [])
+    whole = rest_step(uncut, side_wise_mass(uncut, DENSITY), material(dim))
+    assert critical_step(K, treated.mass) >= 0.99 * whole
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_penalty_does_not_tie_halves_together_however_small_the_sliver(dim):
+    """Also where the cut runs along the faces of elements, which then have one piece each."""
+    for size in (1e-3, 1e-12, 0.0):
+        v = sliver(dim, size)
+        lifted = (v.node_side > 0) * np.ones(dim)
+        force, energy = penalised(v).force.evaluate(lifted)
+        assert np.abs(force).max() < 1e-9
+        assert energy < 1e-9
+
+
+def test_slivers_with_a_penalty_stay_upright_at_nine_tenths_of_the_resonance_free_step():
+    """A plate at 15 % nominal strain: inverts with nothing done, and not with the penalty."""
+    v = cut_mesh(rectangle_mesh((8, 8)), [Plane([0.5, 0.5 + 1e-3 / 8], [0.0, 1.0])])
+    assert swing(v, 0.9 * RESONANCE_FREE, 1_000)[1] > 0
+    treated = penalised(v)
+    body = DynamicBody(
+        treated.force,
+        treated.mass,
+        supports=Supports.none(v).prescribe(v, v.mesh.points[:, 0] < 1e-9),
+    )
+    step = rest_step(v, side_wise_mass(v, DENSITY), material(2))
+    state = body.rest()
+    state.displacement[:] = stretched(v.node_points)
+    scheme, inverted = CentralDifferences(body, 0.9 * RESONANCE_FREE * step), 0
+    for number in range(1_000):
+        scheme.step(state)
+        if number % 10 == 0:
+            inverted += len(body.force.inverted(state.displacement)) > 0
+    assert inverted == 0
+
+
+@pytest.mark.parametrize("policy", ["keep", "drop", "merge", "penalise"])
+def test_each_policy_says_what_it_did_and_keeps_mass_and_separation(policy):
+    v = sliver(2, 1e-3)
+    treated = treat_moving_body(v, material(2), DENSITY, policy)
+    assert treated.mass.weights.sum() == pytest.approx(DENSITY, rel=1e-12)
+    assert treated.virtual.bodies.max() == 1
+    report = treated.slivers
+    counts = {"keep": report.kept, "drop": report.dropped, "merge": report.merged}
+    assert str(counts.get(policy, report.kept)) in treated.summary
+    assert max(counts.values()) == (16 if policy != "penalise" else report.kept)
+    assert (treated.ghost is not None) == (policy == "penalise")
+    if treated.ghost is not None:
+        assert f"{len(treated.ghost.weights)} faces" in treated.summary
+
+
+def test_an_uncut_body_has_nothing_to_penalise():
+    v = cut_mesh(rectangle_mesh((3, 3)), [])
+    treated = penalised(v)
+    assert len(treated.ghost.weights) == 0
+    plain = treat_moving_body(v, material(2), DENSITY, "keep").force
+    u = 0.01 * np.random.default_rng(1).normal(size=v.node_points.shape)
+    assert np.array_equal(treated.force.evaluate(u)[0], plain.evaluate(u)[0])
+
+
+def test_wrong_policies_and_penalties_of_other_bodies_are_refused():
+    v = cut_body(2)
+    with pytest.raises(XfemError, match="expected one of keep, drop, merge, penalise"):
+        treat_moving_body(v, material(2), DENSITY, "penalize")
+    with pytest.raises(XfemError, match="positive"):
+        treat_moving_body(v, material(2), DENSITY, "penalise", factor=0.0)
+    with pytest.raises(XfemError, match="another body"):
+        PenalisedForce(v, material(2), GhostPenalty(cut_body(2), material(2)))
+    ghost = GhostPenalty(v, material(2))
+    pattern = block_pattern(v.cells, v.node_count)
+    with pytest.raises(XfemError, match="lacks couplings"):
+        ghost.add_stiffness(pattern, np.zeros((len(pattern.columns), 2, 2)))
