@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.bisection_kernels import bisect_along
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["Simplices", "bisect_at"]
@@ -37,7 +38,7 @@ class Simplices:
     barycentric: _Floats
     fraction: _Floats
 
-    def take(self, rows: NDArray) -> "Simplices":
+    def take(self, rows: NDArray | slice) -> "Simplices":
         """Return some of them."""
         return Simplices(
             self.source[rows], self.points[rows], self.barycentric[rows], self.fraction[rows]
@@ -64,37 +65,26 @@ def bisect_at(zero: ZeroPoints, numbers: _Ints, simplices: Simplices) -> Simplic
         Places of the points in `zero.ends`.
     simplices : Simplices
     """
-    nodes = len(zero.positions) - len(zero.ends)
-    ends = np.zeros(len(zero.positions), dtype=bool)
-    ends[zero.ends[numbers]] = True
-    near = ends[simplices.points].sum(axis=1) >= 2
-    rest, open_ = simplices.take(~near), simplices.take(near)
-    edges = _edge_keys(open_.points)
-    for point in zero.in_order(numbers):
-        plus, minus = zero.ends[point]
-        if (min(plus, minus) << 32 | max(plus, minus)) not in edges:
-            continue
-        has = (open_.points == plus).any(axis=1) & (open_.points == minus).any(axis=1)
-        whole = open_.take(has)
-        r, s = zero.shares(int(zero.cut[point]), np.array([plus]), np.array([minus]))
-        row = np.arange(len(whole.points))
-        at = whole.barycentric[row, (whole.points == plus).argmax(axis=1)]
-        to = whole.barycentric[row, (whole.points == minus).argmax(axis=1)]
-        halves = []
-        for end, share in ((plus, s), (minus, r)):
-            points, corners = whole.points.copy(), whole.barycentric.copy()
-            local = (points == end).argmax(axis=1)
-            points[row, local] = nodes + point
-            corners[row, local] = s * at + r * to
-            halves.append(Simplices(whole.source, points, corners, whole.fraction * share))
-            edges |= _edge_keys(points)
-        open_ = open_.take(~has).joined(*halves)
-    return rest.joined(open_)
-
-
-def _edge_keys(points: _Ints) -> set[int]:
-    """Each edge of the simplices (q, c) as one number."""
-    first, second = np.triu_indices(points.shape[1], 1)
-    low = np.minimum(points[:, first], points[:, second])
-    high = np.maximum(points[:, first], points[:, second])
-    return set(np.unique(low << 32 | high).tolist())
+    order = zero.in_order(numbers)
+    ends = zero.ends[order]
+    above, below = (zero.values[ends[:, k], zero.cut[order]] for k in range(2))
+    share = above / (above - below), -below / (above - below)
+    near = np.zeros(len(zero.positions), dtype=bool)
+    near[ends] = True
+    rows = np.flatnonzero(near[simplices.points].sum(axis=1) >= 2)
+    if len(rows) == 0:
+        return simplices
+    room = 4 * len(rows)
+    while True:
+        open_ = simplices.take(np.resize(rows, room))
+        first = np.full(len(zero.positions), -1)
+        count = bisect_along(
+            len(rows), zero.nodes + order, ends, *share, open_.points, open_.barycentric,
+            open_.fraction, open_.source, first,
+        )  # fmt: skip
+        if count >= 0:
+            break
+        room *= 2
+    rest = np.ones(len(simplices.points), dtype=bool)
+    rest[rows] = False
+    return simplices.take(rest).joined(open_.take(slice(0, count)))

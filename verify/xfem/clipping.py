@@ -9,9 +9,9 @@ the sliver. Paths follow the order of the corners; with corners ordered by their
 sub-simplices of neighbours match on shared faces.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,7 @@ __all__ = ["Staircase", "staircase"]
 _Path = list[tuple[int, int]]
 
 
-@dataclass(frozen=True)
-class Staircase:
+class Staircase(NamedTuple):
     """Sub-simplices of a clipped simplex, for every pattern of signs.
 
     The pattern of a simplex is Σ 2^k over the corners k on the plus side. Its sub-simplices are
@@ -38,6 +37,8 @@ class Staircase:
         (0 for r or 1 for s, a, b): the volume share is the product over these.
     side : (entries,) int8 array
         +1 or −1.
+    sign : (entries,) int8 array
+        Orientation relative to the simplex: +1 or −1, the same wherever the zero points are.
     """
 
     start: NDArray[np.int64]
@@ -45,6 +46,7 @@ class Staircase:
     minus: NDArray[np.int64]
     factors: NDArray[np.int64]
     side: NDArray[np.int8]
+    sign: NDArray[np.int8]
 
 
 @cache
@@ -61,12 +63,15 @@ def staircase(corners: int) -> Staircase:
             factors.append(steps + [(1, 0, 0)] * (corners - len(steps)))
             side.append(sign)
         start.append(len(side))
+    ends = np.eye(corners)[np.array([plus, minus])]
     return Staircase(
         np.array(start),
         np.array(plus),
         np.array(minus),
         np.array(factors),
         np.array(side, dtype=np.int8),
+        # with all zero points in the middle of their edges
+        np.sign(np.linalg.det(0.5 * (ends[0] + ends[1]))).astype(np.int8),
     )
 
 

@@ -9,29 +9,28 @@ volume then still take part in the connectivity and are left out afterwards.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.bisection import Simplices, bisect_at
 from verify.xfem.clipping import staircase
+from verify.xfem.crossing import Crossing, TipRule, crossed_through
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.split_kernels import crossed_edges, divide_simplices
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["Held", "Partition", "TipRule", "split_cells"]
+__all__ = ["Held", "Partition", "split_cells"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
-TipRule = Literal["inside", "through", "nearest"]
 Held = Callable[[_Ints, NDArray[np.int8], int], NDArray[np.bool_]]
 
 _ROUND_OFF = 8.0 * np.finfo(float).eps
-_AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
-_REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,8 @@ class Partition:
         Barycentric coordinates of its vertices (second axis) in its cell.
     sub_fraction : (k,) float array
         Its share of the volume of its cell.
+    sub_sign : (k,) int8 array
+        Its orientation in its cell, +1 or -1: from how it came about, hence right for any sliver.
     points : ZeroPoints
         Mesh nodes and zero points.
     snapped : int
@@ -64,6 +65,7 @@ class Partition:
     sub_points: _Ints
     sub_barycentric: _Floats
     sub_fraction: _Floats
+    sub_sign: NDArray[np.int8]
     points: ZeroPoints
     snapped: int
 
@@ -71,6 +73,35 @@ class Partition:
     def fraction(self) -> _Floats:
         """(p,) share of each piece in the volume of its cell."""
         return np.bincount(self.sub_piece, self.sub_fraction, minlength=len(self.parent))
+
+    @property
+    def simplices(self) -> tuple[_Ints, _Ints, _Floats, _Floats, NDArray[np.int8]]:
+        """Piece, points, barycentric corners, share and sign of the sub-simplices."""
+        return (
+            self.sub_piece,
+            self.sub_points,
+            self.sub_barycentric,
+            self.sub_fraction,
+            self.sub_sign,
+        )
+
+    def with_simplices(
+        self,
+        piece: _Ints,
+        points: _Ints,
+        barycentric: _Floats,
+        fraction: _Floats,
+        sign: NDArray[np.int8],
+    ) -> "Partition":
+        """Return the same with other sub-simplices."""
+        return replace(
+            self,
+            sub_piece=piece,
+            sub_points=points,
+            sub_barycentric=barycentric,
+            sub_fraction=fraction,
+            sub_sign=sign,
+        )
 
 
 def split_cells(
@@ -95,7 +126,7 @@ def split_cells(
     XfemError
         If a level set is not finite or has a wrong shape, or the tip rule is unknown.
     """
-    if tip not in ("inside", "through", "nearest"):
+    if tip not in get_args(TipRule):
         raise XfemError(f"tip rule '{tip}'; expected inside, through or nearest")
     values, snapped = _nodal_values(mesh, cuts)
     snap = _ROUND_OFF * mesh.extent
@@ -108,8 +139,9 @@ def split_cells(
         label=np.zeros((len(candidates), len(cuts)), dtype=np.int8),
         sub_piece=whole,
         sub_points=mesh.cells[candidates],
-        sub_barycentric=np.broadcast_to(np.eye(corners), (len(candidates), corners, corners)),
+        sub_barycentric=np.tile(np.eye(corners), (len(candidates), 1, 1)),
         sub_fraction=np.ones(len(candidates)),
+        sub_sign=np.ones(len(candidates), dtype=np.int8),
         points=ZeroPoints(mesh.points, values, snap),
         snapped=snapped,
     )
@@ -147,165 +179,76 @@ def _split_by(
     held: Held | None,
 ) -> Partition:
     points = partition.points
-    plus = points.values[partition.sub_points, index] >= 0.0
-    mixed = (
-        plus.any(axis=1) & ~plus.all(axis=1) & (partition.label[partition.sub_piece, index] == 0)
+    edges, piece = crossed_edges(
+        partition.sub_points, partition.sub_piece, partition.label, points.values, index
     )
-    rows = np.flatnonzero(mixed)
-    if len(rows) == 0:
+    if len(edges) == 0:
         return partition
-    row, a, b = np.nonzero(plus[rows][:, :, None] & ~plus[rows][:, None, :])
-    ids = partition.sub_points[rows]
-    zero = points.find(index, ids[row, a], ids[row, b])
-    piece = partition.sub_piece[rows][row]
-    active = _crossed_through(
-        cut,
-        points.positions,
-        zero,
-        piece,
-        sizes[partition.parent[piece]],
-        len(partition.parent),
-        tip,
+    crossing = Crossing(
+        zero=points.find(index, edges[:, 0], edges[:, 1]),
+        piece=piece,
+        size=sizes[partition.parent[piece]],
+        pieces=len(partition.parent),
     )
+    active = crossed_through(cut, points.positions, crossing, tip)
     if held is not None:
         doubtful = np.flatnonzero((np.bincount(piece, minlength=len(active)) > 0) & ~active)
         active[doubtful] = held(partition.parent[doubtful], partition.label[doubtful], index)
     if not active.any():
         return partition
-    return _bisect_beside(_divide(partition, index, active, plus), index)
+    return _bisect_beside(_divide(partition, index, active), index)
+
+
+def _divide(partition: Partition, index: int, active: NDArray[np.bool_]) -> Partition:
+    """Replace each active piece by its part above (same place) and below (appended)."""
+    below = np.where(active, len(active) - 1 + np.cumsum(active), -1)
+    label = np.concatenate([partition.label, partition.label[active]])
+    label[: len(active)][active, index] = 1
+    label[len(active) :, index] = -1
+    points = partition.points
+    simplices, kept = divide_simplices(
+        partition.simplices,
+        points.values,
+        index,
+        active,
+        below,
+        staircase(partition.sub_points.shape[1]),
+        points.table,
+    )
+    points.divided(simplices[1][kept:])
+    return replace(
+        partition,
+        parent=np.concatenate([partition.parent, partition.parent[active]]),
+        label=label,
+    ).with_simplices(*simplices)
 
 
 def _bisect_beside(partition: Partition, index: int) -> Partition:
     """Bisect what a cut leaves whole where it ends, so that later cuts find matching edges."""
     zero = partition.points
-    plus = zero.values[partition.sub_points, index] >= 0.0
-    beside = plus.any(axis=1) & ~plus.all(axis=1)
-    beside &= partition.label[partition.sub_piece, index] == 0
-    if not beside.any():
+    beside, _ = crossed_edges(
+        partition.sub_points, partition.sub_piece, partition.label, zero.values, index
+    )
+    if len(beside) == 0:
         return partition
-    nodes = len(zero.positions) - len(zero.ends)
-    used = np.unique(partition.sub_points[partition.label[partition.sub_piece, index] != 0])
-    numbers = used[used >= nodes] - nodes
-    numbers = numbers[zero.cut[numbers] == index]
+    labelled = partition.label[partition.sub_piece, index] != 0
+    on_cut = np.zeros(len(zero.positions), dtype=bool)
+    on_cut[partition.sub_points[labelled]] = True
+    numbers = np.flatnonzero(on_cut[zero.nodes :] & (zero.cut == index))
     simplices = Simplices(
-        partition.sub_piece,
+        np.arange(len(partition.sub_piece)),
         partition.sub_points,
         partition.sub_barycentric,
         partition.sub_fraction,
     )
-    parts = simplices.take(~beside).joined(bisect_at(zero, numbers, simplices.take(beside)))
-    return replace(
-        partition,
-        sub_piece=parts.source,
-        sub_points=parts.points,
-        sub_barycentric=parts.barycentric,
-        sub_fraction=parts.fraction,
+    parts = simplices.take(labelled).joined(bisect_at(zero, numbers, simplices.take(~labelled)))
+    return partition.with_simplices(
+        partition.sub_piece[parts.source],
+        parts.points,
+        parts.barycentric,
+        parts.fraction,
+        partition.sub_sign[parts.source],
     )
-
-
-def _crossed_through(
-    cut: Cut,
-    positions: _Floats,
-    zero: _Ints,
-    piece: _Ints,
-    size: _Floats,
-    pieces: int,
-    tip: TipRule,
-) -> NDArray[np.bool_]:
-    """Which pieces the cut goes through, from the zero points on their edges."""
-    margin = 1.0 if tip == "through" else -1.0
-    if tip == "nearest":
-        pairs, first = np.unique(np.stack([piece, zero]), axis=1, return_index=True)
-        piece, size = pairs[0], size[first]
-        count = np.maximum(np.bincount(piece, minlength=pieces), 1)
-        centres = [np.bincount(piece, x, minlength=pieces) / count for x in positions[pairs[1]].T]
-        at, scale = np.stack(centres, axis=1)[piece], size
-    else:
-        at, scale = positions[zero], size
-    places, back = np.unique(at, axis=0, return_inverse=True)
-    inside = np.abs(cut.level_set(places))[back] <= _REACH * scale
-    inside &= cut.depth(places)[back] >= margin * _AT_END * scale
-    seen = np.bincount(piece, minlength=pieces) > 0
-    if tip == "through":
-        return np.bincount(piece, inside, minlength=pieces) > 0
-    return seen & (np.bincount(piece, ~inside, minlength=pieces) == 0)
-
-
-def _divide(
-    partition: Partition, index: int, active: NDArray[np.bool_], plus: NDArray[np.bool_]
-) -> Partition:
-    """Replace each active piece by its part above (same place) and below (appended)."""
-    above = np.arange(len(active))
-    below = np.where(active, len(active) - 1 + np.cumsum(active), -1)
-    parent = np.concatenate([partition.parent, partition.parent[active]])
-    label = np.concatenate([partition.label, partition.label[active]])
-    label[: len(active)][active, index] = 1
-    label[len(active) :, index] = -1
-
-    touched = active[partition.sub_piece]
-    clipped = touched & plus.any(axis=1) & ~plus.all(axis=1)
-    kept = ~clipped
-    moved = np.where(
-        touched & ~plus.any(axis=1), below[partition.sub_piece], above[partition.sub_piece]
-    )
-    new = _clip(partition, index, clipped)
-    partition.points.divided(new["points"])
-    source, side = new["source"], new["side"]
-    piece = np.where(
-        side > 0, above[partition.sub_piece[source]], below[partition.sub_piece[source]]
-    )
-    return replace(
-        partition,
-        parent=parent,
-        label=label,
-        sub_piece=np.concatenate([moved[kept], piece]),
-        sub_points=np.concatenate([partition.sub_points[kept], new["points"]]),
-        sub_barycentric=np.concatenate([partition.sub_barycentric[kept], new["barycentric"]]),
-        sub_fraction=np.concatenate([partition.sub_fraction[kept], new["fraction"]]),
-    )
-
-
-def _clip(partition: Partition, index: int, clipped: NDArray[np.bool_]) -> dict[str, NDArray]:
-    """Sub-simplices of the clipped sub-simplices."""
-    rows = np.flatnonzero(clipped)
-    points = partition.points
-    order = np.argsort(partition.sub_points[rows], axis=1)
-    ids = np.take_along_axis(partition.sub_points[rows], order, axis=1)
-    barycentric = np.take_along_axis(partition.sub_barycentric[rows], order[:, :, None], axis=1)
-    plus = points.values[ids, index] >= 0.0
-    entry, local = clip_pattern(plus)
-    stairs = staircase(ids.shape[1])
-    r = np.zeros((*ids.shape, ids.shape[1]))
-    s = np.zeros_like(r)
-    row, a, b = np.nonzero(plus[:, :, None] & ~plus[:, None, :])
-    r[row, a, b], s[row, a, b] = points.shares(index, ids[row, a], ids[row, b])
-    corner = np.arange(ids.shape[1])
-    s[:, corner, corner] = 1.0
-    number = np.zeros(r.shape, dtype=np.int64)
-    number[row, a, b] = points.find(index, ids[row, a], ids[row, b])
-    number[:, corner, corner] = ids
-
-    at, p, m = local[:, None], stairs.plus[entry], stairs.minus[entry]
-    kind, fa, fb = (stairs.factors[entry][:, :, k] for k in range(3))
-    factor = np.where(kind == 0, r[at, fa, fb], s[at, fa, fb])
-    return {
-        "source": rows[local],
-        "side": stairs.side[entry],
-        "points": number[at, p, m],
-        "barycentric": s[at, p, m][..., None] * barycentric[at, p]
-        + r[at, p, m][..., None] * barycentric[at, m],
-        "fraction": partition.sub_fraction[rows[local]] * factor.prod(axis=1),
-    }
-
-
-def clip_pattern(plus: NDArray[np.bool_]) -> tuple[_Ints, _Ints]:
-    """Staircase entries of simplices with these signs (q, corners), and the simplex of each."""
-    stairs = staircase(plus.shape[1])
-    pattern = plus @ (1 << np.arange(plus.shape[1]))
-    count = stairs.start[pattern + 1] - stairs.start[pattern]
-    local = np.repeat(np.arange(len(plus)), count)
-    within = np.arange(len(local)) - np.repeat(np.cumsum(count) - count, count)
-    return stairs.start[pattern][local] + within, local
 
 
 def _only_split(partition: Partition) -> Partition:
@@ -317,11 +260,11 @@ def _only_split(partition: Partition) -> Partition:
     number[order] = np.arange(len(order))
     keep = split[partition.sub_piece]
     return replace(
-        partition,
-        parent=partition.parent[order],
-        label=partition.label[order],
-        sub_piece=number[partition.sub_piece[keep]],
-        sub_points=partition.sub_points[keep],
-        sub_barycentric=partition.sub_barycentric[keep],
-        sub_fraction=partition.sub_fraction[keep],
+        partition, parent=partition.parent[order], label=partition.label[order]
+    ).with_simplices(
+        number[partition.sub_piece[keep]],
+        partition.sub_points[keep],
+        partition.sub_barycentric[keep],
+        partition.sub_fraction[keep],
+        partition.sub_sign[keep],
     )

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.joining import PatchSlots, join_slots
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.split import Partition, TipRule, split_cells
+from verify.xfem.split import Partition, split_cells
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["SubCells", "VirtualMesh", "cut_mesh"]

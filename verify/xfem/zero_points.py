@@ -8,6 +8,9 @@ position, and on the sign of every other cut there, to the last bit.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.growing_array import GrowingArray
+from verify.xfem.row_numbers import EdgeTable, RowNumbers
+
 __all__ = ["ZeroPoints"]
 
 _Floats = NDArray[np.float64]
@@ -46,9 +49,18 @@ class ZeroPoints:
         self.turn = np.zeros(0, dtype=np.int64)
         self._turns = 0
         self._snap = snap
-        cuts = values.shape[1]
-        self._keys = [np.zeros(0, dtype=np.int64) for _ in range(cuts)]
-        self._numbers = [np.zeros(0, dtype=np.int64) for _ in range(cuts)]
+        self._edges = RowNumbers(3)
+        self._point = GrowingArray(np.zeros(0, dtype=np.int64))
+
+    @property
+    def nodes(self) -> int:
+        """Number of mesh nodes."""
+        return len(self.positions) - len(self.ends)
+
+    @property
+    def table(self) -> EdgeTable:
+        """The points by edge, for kernels: see `point_on_edge`."""
+        return EdgeTable(self._edges.table, self._edges.rows, self._point.rows)
 
     def shares(self, cut: int, plus: _Ints, minus: _Ints) -> tuple[_Floats, _Floats]:
         """(r, s) of the zero points z = s·plus + r·minus on edges from φ ≥ 0 to φ < 0."""
@@ -58,26 +70,18 @@ class ZeroPoints:
     def find(self, cut: int, plus: _Ints, minus: _Ints) -> _Ints:
         """Numbers of the zero points of `cut` on edges (plus, minus).
 
-        Where φ is exactly zero at the plus end, the zero point is that end.
+        Where φ is exactly zero at the plus end, the zero point is that end. New points are
+        numbered in the order of their ends, whatever the order in which they are asked for.
         """
-        keys: _Ints = (plus << 32) | minus
-        wanted: _Ints = np.unique(keys)
-        back: _Ints = np.searchsorted(wanted, keys)
-        known = self._keys[cut]
-        at = np.searchsorted(known, wanted)
-        old = np.zeros(len(wanted), dtype=bool)
-        inside = at < len(known)
-        old[inside] = known[at[inside]] == wanted[inside]
-        if not old.all():
-            self._append(cut, wanted[~old])
-            at = np.searchsorted(self._keys[cut], wanted)
-        return self._numbers[cut][at][back]
+        before = len(self._edges)
+        edge = self._edges.number(np.stack([np.full(len(plus), cut), plus, minus], axis=1))
+        if len(self._edges) > before:
+            self._append(cut, before)
+        return self._point.rows[edge]
 
     def divided(self, numbers: _Ints) -> None:
         """Note that cells were divided at these points (mesh nodes among them do not count)."""
-        used = np.unique(numbers)
-        used = used[used >= len(self.positions) - len(self.ends)]
-        used -= len(self.positions) - len(self.ends)
+        used = numbers[numbers >= self.nodes] - self.nodes
         self.turn[used] = np.minimum(self.turn[used], self._turns)
         self._turns += 1
 
@@ -90,11 +94,17 @@ class ZeroPoints:
         turn = self.turn if len(self.turn) == len(self.cut) else self.cut
         return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], turn[numbers]])]
 
-    def _append(self, cut: int, keys: _Ints) -> None:
-        plus, minus = keys >> 32, keys & 0xFFFFFFFF
+    def _append(self, cut: int, before: int) -> None:
+        """Give points to the edges from number `before` on."""
+        edges = self._edges.rows[before:]
+        order = np.argsort(edges[:, 1] << 32 | edges[:, 2])
+        plus, minus = edges[order, 1], edges[order, 2]
         r, s = self.shares(cut, plus, minus)
         new = r > 0.0
-        numbers = np.where(new, len(self.positions) - 1 + np.cumsum(new), plus)
+        self._point.extend(len(edges))
+        self._point.rows[before + order] = np.where(
+            new, len(self.positions) - 1 + np.cumsum(new), plus
+        )
         r, s, p, m = r[new, None], s[new, None], plus[new], minus[new]
         values = s * self.values[p] + r * self.values[m]
         values[np.abs(values) <= self._snap] = 0.0
@@ -106,7 +116,3 @@ class ZeroPoints:
         self.ends = np.concatenate([self.ends, np.stack([p, m], axis=1)])
         self.cut = np.concatenate([self.cut, np.full(len(p), cut)])
         self.turn = np.concatenate([self.turn, np.full(len(p), np.iinfo(np.int64).max)])
-        all_keys = np.concatenate([self._keys[cut], keys])
-        order = np.argsort(all_keys)
-        self._keys[cut] = all_keys[order]
-        self._numbers[cut] = np.concatenate([self._numbers[cut], numbers])[order]

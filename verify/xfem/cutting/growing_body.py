@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from verify.xfem.cuts import Cut
 from verify.xfem.cutting.distinct import distinct
-from verify.xfem.growing_array import GrowingArray
-from verify.xfem.cutting.orientation_kernels import simplex_signs
 from verify.xfem.cutting.patch import MeshPatch, PatchCutter
 from verify.xfem.cutting.point_numbers import PointNumbers
 from verify.xfem.cutting.renumber_kernels import (
@@ -26,6 +24,7 @@ from verify.xfem.cutting.renumber_kernels import (
     write_pieces,
 )
 from verify.xfem.errors import XfemError
+from verify.xfem.growing_array import GrowingArray
 from verify.xfem.joining import PatchSlots, join_slots
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import Held, Partition, split_cells
@@ -349,13 +348,7 @@ class GrowingBody:
         self.sub_points.append(ids[partition.sub_points[rows]])
         self.sub_barycentric.append(partition.sub_barycentric[rows])
         self.sub_fraction.append(partition.sub_fraction[rows])
-        sub_cell = partition.parent[partition.sub_piece[rows]]
-        nodes = len(patch.whole_nodes)
-        self.sub_sign.append(
-            simplex_signs(
-                partition.sub_points[rows], sub_cell, patch.cells, nodes, partition.points.ends
-            )
-        )
+        self.sub_sign.append(partition.sub_sign[rows])
         edges = (
             np.searchsorted(cell[rows], cells, side="left"),
             np.searchsorted(cell[rows], cells, side="right"),

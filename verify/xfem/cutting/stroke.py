@@ -4,9 +4,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.collision.bounding_tree import BoundingTree
+from verify.xfem.crossing import REACH
 from verify.xfem.cuts import Cut
 from verify.xfem.cutting.patch import MeshPatch
-from verify.xfem.cutting.walk_kernels import REACH, cells_hit, walk
+from verify.xfem.cutting.walk_kernels import cells_hit, walk
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import Sweep, ToolPath
 

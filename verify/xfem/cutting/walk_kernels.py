@@ -9,12 +9,10 @@ import numpy as np
 from numba import njit
 
 from verify.xfem.collision.tree_kernels import items_near_plane
+from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.sweep_kernels import probe
 
-__all__ = ["AT_END", "REACH", "cells_hit", "walk"]
-
-AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
-REACH = 0.5  # element sizes: a zero point farther from the sweep than that is not on it
+__all__ = ["cells_hit", "walk"]
 
 
 @njit(cache=True)

@@ -11,8 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from verify.xfem.cutting.distinct import distinct
-from verify.xfem.growing_array import GrowingArray
 from verify.xfem.cutting.point_numbers import PointNumbers
+from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import RowNumbers, find_row, number_of_row
 
 __all__ = ["EdgePoints"]

@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.xfem.errors import XfemError
 from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import RowNumbers
-from verify.xfem.errors import XfemError
 
 __all__ = ["MovingSurface"]
 

@@ -1,0 +1,149 @@
+"""Division of simplices by a cut: edges that it crosses, and the parts on its two sides."""
+
+import numpy as np
+from numba import njit
+
+from verify.xfem.row_numbers import point_on_edge
+
+__all__ = ["crossed_edges", "divide_simplices"]
+
+
+@njit(cache=True)
+def crossed_edges(points, piece, label, values, cut):
+    """Edges (q, 2) from plus to minus, and the piece (q,) of the simplex, where a cut crosses one.
+
+    Of pieces that the cut has divided already none are given.
+    """
+    corners = points.shape[1]
+    most = (corners // 2) * (corners - corners // 2)
+    ends = np.empty((most * len(points), 2), dtype=np.int64)
+    owner = np.empty(most * len(points), dtype=np.int64)
+    count = 0
+    for s in range(len(points)):
+        if label[piece[s], cut] != 0:
+            continue
+        for a in range(corners):
+            if values[points[s, a], cut] < 0.0:
+                continue
+            for b in range(corners):
+                if values[points[s, b], cut] < 0.0:
+                    ends[count, 0], ends[count, 1] = points[s, a], points[s, b]
+                    owner[count] = piece[s]
+                    count += 1
+    return ends[:count], owner[:count]
+
+
+@njit(cache=True)
+def _pattern(row, values, cut):
+    """Sum of 2^k over the corners k on the plus side, as `Staircase` counts."""
+    found = 0
+    for k in range(len(row)):
+        if values[row[k], cut] >= 0.0:
+            found |= 1 << k
+    return found
+
+
+@njit(cache=True)
+def _in_order(row, order):
+    """Write the order in which a row ascends; return the sign of that permutation."""
+    sign = 1
+    for i in range(len(row)):
+        k = i
+        while k > 0 and row[order[k - 1]] > row[i]:
+            order[k] = order[k - 1]
+            k, sign = k - 1, -sign
+        order[k] = i
+    return sign
+
+
+@njit(cache=True)
+def divide_simplices(simplices, values, cut, active, below, stairs, edges):
+    """Divide the simplices of active pieces by a cut.
+
+    Parameters
+    ----------
+    simplices : tuple of arrays
+        Piece (k,), points (k, c), barycentric corners (k, c, c), share (k,) and sign (k,).
+    values : (n, cuts) float array
+        Level sets at the points.
+    active : (p,) bool array
+        Pieces that the cut divides.
+    below : (p,) int array
+        Piece that takes what is below in each of these.
+    stairs : Staircase
+    edges : EdgeTable
+
+    Returns
+    -------
+    simplices : tuple of arrays
+        The same, those that are not clipped first.
+    kept : int
+        How many these are.
+    """
+    piece, points, barycentric, fraction, sign = simplices
+    count, corners = points.shape
+    whole = (1 << corners) - 1
+    kept, total = 0, 0
+    for s in range(count):
+        parts = 0
+        if active[piece[s]]:
+            pattern = _pattern(points[s], values, cut)
+            parts = stairs.start[pattern + 1] - stairs.start[pattern]
+        kept += parts == 0
+        total += max(parts, 1)
+    new_piece = np.empty(total, dtype=np.int64)
+    new_points = np.empty((total, corners), dtype=np.int64)
+    new_barycentric = np.empty((total, corners, corners))
+    new_fraction, new_sign = np.empty(total), np.empty(total, dtype=np.int8)
+    new = (new_piece, new_points, new_barycentric, new_fraction, new_sign)
+    order = np.empty(corners, dtype=np.int64)
+    at, end = 0, kept
+    for s in range(count):
+        pattern = _pattern(points[s], values, cut) if active[piece[s]] else whole
+        if pattern == 0 or pattern == whole:
+            new_piece[at] = piece[s] if pattern == whole else below[piece[s]]
+            for k in range(corners):
+                new_points[at, k] = points[s, k]
+                for j in range(corners):
+                    new_barycentric[at, k, j] = barycentric[s, k, j]
+            new_fraction[at], new_sign[at] = fraction[s], sign[s]
+            at += 1
+            continue
+        turned = _in_order(points[s], order)
+        end = _clip(simplices, s, order, turned, values, cut, below, stairs, edges, new, end)
+    return new, kept
+
+
+@njit(cache=True)
+def _clip(simplices, s, order, turned, values, cut, below, stairs, edges, new, end):
+    """Write the parts of a simplex whose corners ascend in that order; give their end."""
+    piece, points, barycentric, fraction, sign = simplices
+    new_piece, new_points, new_barycentric, new_fraction, new_sign = new
+    corners, pattern = len(order), 0
+    for k in range(corners):
+        if values[points[s, order[k]], cut] >= 0.0:
+            pattern |= 1 << k
+    for entry in range(stairs.start[pattern], stairs.start[pattern + 1]):
+        new_piece[end] = piece[s] if stairs.side[entry] > 0 else below[piece[s]]
+        new_sign[end] = turned * sign[s] * stairs.sign[entry]
+        share = 1.0
+        for k in range(corners):
+            a, b = order[stairs.factors[entry, k, 1]], order[stairs.factors[entry, k, 2]]
+            if a != b:
+                above, beneath = values[points[s, a], cut], values[points[s, b], cut]
+                part = above if stairs.factors[entry, k, 0] == 0 else -beneath
+                share *= part / (above - beneath)
+            a, b = order[stairs.plus[entry, k]], order[stairs.minus[entry, k]]
+            if a == b:
+                new_points[end, k] = points[s, a]
+                for j in range(corners):
+                    new_barycentric[end, k, j] = barycentric[s, a, j]
+                continue
+            above, beneath = values[points[s, a], cut], values[points[s, b], cut]
+            r, rest = above / (above - beneath), -beneath / (above - beneath)
+            new_points[end, k] = point_on_edge(cut, points[s, a], points[s, b], edges)
+            for j in range(corners):
+                new_barycentric[end, k, j] = rest * barycentric[s, a, j] + r * barycentric[s, b, j]
+        new_fraction[end] = fraction[s] * share
+        end += 1
+    return end
