@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.linear_solvers import rigid_motions
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Scene
@@ -37,10 +38,11 @@ def constrained_values(
     """
     nodes, owner = space.boundary_nodes()
     points = space.node_points[nodes]
-    value = np.full((len(space.node_points), 2), np.nan)
+    d = space.dimension
+    value = np.full((len(space.node_points), d), np.nan)
     for i, support in enumerate(scene.supports):
         chosen = on_part(scene, support.where, points, f"supports[{i}].where")
-        held = list(support.held(2))
+        held = list(support.held(d))
         if support.displacement == "exact":
             near = space.centroids[owner[chosen]]
             value[np.ix_(nodes[chosen], held)] = exact.displacement(points[chosen], near)[:, held]
@@ -68,26 +70,26 @@ def _check_every_piece_is_held(
         free = _free_motion(space.node_points[node[mine]] - centre, component[mine], size)
         if free:
             raise InputError(
-                f"supports: the piece around ({centre[0]:.4g}, {centre[1]:.4g}) {free}; "
+                f"supports: the piece around ({', '.join(f'{x:.4g}' for x in centre)}) {free}; "
                 "a static scene needs every piece held",
                 str(scene.file or ""),
             )
 
 
 def _free_motion(points: NDArray[np.float64], component: NDArray[np.int64], size: float) -> str:
-    """Say which rigid motion is left when `component` (k,) is held at `points` (k, 2)."""
+    """Say which rigid motion is left when `component` (k,) is held at `points` (k, d)."""
     if not len(points):
         return "is held by no support (the cut frees it)"
-    modes = np.zeros((len(points), 3))
-    modes[np.arange(len(points)), component] = 1.0
-    x, y = (points / size).T
-    modes[:, 2] = np.where(component == 0, -y, x)
-    _, values, rows = np.linalg.svd(modes, full_matrices=len(points) < 3)
+    d = points.shape[1]
+    motions = rigid_motions(points / size, np.zeros(d)).reshape(-1, *points.shape)
+    modes = motions[:, np.arange(len(points)), component]
+    # the left singular vectors are motions
+    columns, values, _ = np.linalg.svd(modes, full_matrices=modes.shape[1] < len(modes))
     rank = int(np.count_nonzero(values > _HELD * values[0]))
-    if rank == 3:
+    if rank == len(modes):
         return ""
-    left = rows[rank:]
-    if np.abs(left[:, 2]).max() > 1e-6:
+    left = columns[:, rank:]
+    if np.abs(left[d:]).max() > 1e-6:
         return "can still turn: its supports hold too few points or components"
-    axis = "x" if np.abs(left[:, 0]).max() > np.abs(left[:, 1]).max() else "y"
+    axis = "xyz"[int(np.argmax(np.abs(left[:d]).max(axis=1)))]
     return f"can still move in {axis}: its supports do not hold that component"

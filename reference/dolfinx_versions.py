@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["create_triangle_mesh", "import_dolfinx"]
+__all__ = ["create_simplex_mesh", "import_dolfinx"]
 
 
 def import_dolfinx() -> ModuleType:
@@ -26,10 +26,20 @@ def import_dolfinx() -> ModuleType:
     return import_module("dolfinx")
 
 
-def create_triangle_mesh(points: NDArray[np.float64], cells: NDArray[np.int64]) -> Any:
-    """Make a serial DOLFINx mesh of straight triangles.
+def create_simplex_mesh(
+    points: NDArray[np.float64], cells: NDArray[np.int64], comm: Any = None
+) -> Any:
+    """Make a DOLFINx mesh of straight triangles or tetrahedra.
 
     ``mesh.topology.original_cell_index`` maps its cells to rows of `cells`.
+
+    Parameters
+    ----------
+    points : (n, d) array
+    cells : (m, d + 1) array
+    comm : MPI communicator, optional
+        Over which the cells are distributed, from its rank 0: what other ranks give is not used.
+        Default: each rank by itself.
     """
     import_dolfinx()
     import basix.ufl
@@ -37,12 +47,17 @@ def create_triangle_mesh(points: NDArray[np.float64], cells: NDArray[np.int64]) 
     from dolfinx import mesh
     from mpi4py import MPI
 
-    domain = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
+    comm = comm or MPI.COMM_SELF
+    d = points.shape[1]
+    if comm.rank > 0:
+        points, cells = points[:0], cells[:0]
+    cell = "triangle" if d == 2 else "tetrahedron"
+    domain = ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(d,)))
     major, minor = _version()
     if (major, minor) >= (0, 10):
-        return mesh.create_mesh(MPI.COMM_SELF, cells, domain, points)
+        return mesh.create_mesh(comm, cells, domain, points)
     create: Any = mesh.create_mesh  # its last arguments were the other way round before
-    return create(MPI.COMM_SELF, cells, points, domain)
+    return create(comm, cells, points, domain)
 
 
 def _version() -> tuple[int, int]:

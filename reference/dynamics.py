@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.elasticity import direct_solver, stiffness_form
+from reference.elasticity import stiffness_form
+from reference.linear_solvers import direct_solver
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Material

@@ -1,27 +1,35 @@
-"""Plane linear elasticity on a conforming mesh with DOLFINx, solved directly by MUMPS."""
+"""Linear elasticity on a conforming mesh with DOLFINx, in the plane and in space."""
 
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_values import constrained_values
+from reference.linear_solvers import (
+    Answer,
+    direct_solver,
+    rigid_motions,
+    solve_by_multigrid,
+    solve_directly,
+)
 from reference.space import ConformingSpace
+from verify.errors import InputError
 from verify.scene import BodyForce, Gravity, Material, Scene, Traction
 from verify.scene.parts import on_part
 
 __all__ = [
     "LinearSolve",
-    "direct_solver",
+    "lame",
     "load_form",
-    "plane_lame",
     "solve_linear",
     "stiffness_form",
 ]
 
-_LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
+# Unknowns in space up to which MUMPS is quicker than multigrid, measured (in the plane it always is)
+_MOST_DIRECT = 30_000
 
 
 @dataclass(frozen=True)
@@ -30,24 +38,41 @@ class LinearSolve:
 
     Attributes
     ----------
-    displacement : (n, 2) array
-        At the nodes of the space, m.
+    displacement : (n, d) array
+        At the nodes of the space, m; the same on every rank.
     strain_energy : float
-        J per metre of thickness.
-    round_off : float
-        Relative size of the last correction by iterative refinement: what the solve is good to.
+        J; in the plane per metre of thickness.
+    answer : Answer
+        How well the system was solved, and by what.
     timings : dict of str to float
         Seconds by phase.
     """
 
     displacement: NDArray[np.float64]
     strain_energy: float
-    round_off: float
+    answer: Answer
     timings: dict[str, float] = field(default_factory=dict)
 
 
-def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolve:
+def solve_linear(
+    scene: Scene,
+    space: ConformingSpace,
+    exact: Any,
+    method: Literal["direct", "multigrid"] | None = None,
+    tolerance: float = 1e-10,
+) -> LinearSolve:
     """Solve the linear static problem of `scene` on `space`.
+
+    Parameters
+    ----------
+    scene : Scene
+    space : ConformingSpace
+    exact : ExactSolution or None
+        For supports and loads that are said to be exact.
+    method : {"direct", "multigrid"}, optional
+        MUMPS, or CG with GAMG; default by the number of unknowns.
+    tolerance : float
+        Of multigrid: the norm of the true residual over that of the loads.
 
     Raises
     ------
@@ -59,54 +84,60 @@ def solve_linear(scene: Scene, space: ConformingSpace, exact: Any) -> LinearSolv
     import ufl
     from dolfinx import fem
     from dolfinx.fem import petsc
+    from petsc4py import PETSc
 
-    V = space.function_space
+    V, d = space.function_space, space.dimension
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     unknowns, values = constrained_values(scene, space, exact)
+    own, at = space.own_unknowns(unknowns)
     a = fem.form(stiffness_form(scene.material, u, v))
     load = fem.form(load_form(scene, space, v, exact))
+    if method is None:
+        small = d == 2 or space.node_points.size <= _MOST_DIRECT
+        method = "direct" if small else "multigrid"
 
     start = perf_counter()
     matrix = petsc.assemble_matrix(a)
     matrix.assemble()
     vector = petsc.assemble_vector(load)
+    vector.ghostUpdate(addv=True, mode="reverse")
     solution = fem.Function(V)
     x = solution.x.petsc_vec
-    x.array[unknowns] = values
+    x.array[own] = values[at]
     # symmetric elimination; the free rows keep their equilibrium, and any component can be held
-    matrix.zeroRowsColumns(unknowns, 1.0, x, vector)
+    rows = (own + d * V.dofmap.index_map.local_range[0]).astype(PETSc.IntType)
+    matrix.zeroRowsColumns(rows, _mean_stiffness(matrix), x, vector)
     assembled = perf_counter()
-    solver = direct_solver(matrix)
-    factored = perf_counter()
-    solver.solve(vector, x)
-    solved = perf_counter()
-    round_off = _refine(solver, matrix, x, vector)
+    timings = {"assembly": assembled - start}
+    if method == "direct":
+        solver = direct_solver(matrix)
+        timings["factorisation"] = perf_counter() - assembled
+        answer = solve_directly(solver, matrix, x, vector)
+        solver.destroy()
+    else:
+        mine = space.node_points[space.node_of_dof[: space.owned]]
+        motions = rigid_motions(mine, space.node_points.mean(axis=0))
+        answer = solve_by_multigrid(matrix, x, vector, motions, tolerance)
+    timings["solve"] = perf_counter() - start - sum(timings.values())
+    solution.x.scatter_forward()
     energy = fem.form(0.5 * stiffness_form(scene.material, solution, solution))
-    result = LinearSolve(
-        np.array(solution.x.array, dtype=float).reshape(-1, 2),
-        float(np.real(fem.assemble_scalar(energy))),
-        round_off,
-        {
-            "assembly": assembled - start,
-            "factorisation": factored - assembled,
-            "solve": solved - factored,
-        },
-    )
-    for entry in (solver, matrix, vector):
+    stored = V.mesh.comm.allreduce(float(np.real(fem.assemble_scalar(energy))))
+    displacement = space.everywhere(np.asarray(x.array, dtype=float))
+    for entry in (matrix, vector):
         entry.destroy()
-    return result
+    return LinearSolve(displacement, stored, answer, timings)
 
 
 def stiffness_form(material: Material, u: Any, v: Any) -> Any:
-    """Write the virtual work ∫ σ(u) : ε(v) of plane linear elasticity."""
+    """Write the virtual work ∫ σ(u) : ε(v) of linear elasticity."""
     import ufl
     from dolfinx import fem
 
     # constants, so that another material does not compile another form
     domain = ufl.domain.extract_unique_domain(v)
-    lam, mu = (fem.Constant(domain, value) for value in plane_lame(material))
+    lam, mu = (fem.Constant(domain, value) for value in lame(material))
     strain = ufl.sym(ufl.grad(u))
-    stress = 2 * mu * strain + lam * ufl.tr(strain) * ufl.Identity(2)
+    stress = 2 * mu * strain + lam * ufl.tr(strain) * ufl.Identity(len(u))
     return ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx
 
 
@@ -116,7 +147,7 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
     from dolfinx import fem
 
     domain = space.function_space.mesh
-    form = ufl.inner(fem.Constant(domain, np.zeros(2)), v) * ufl.dx
+    form = ufl.inner(fem.Constant(domain, np.zeros(space.dimension)), v) * ufl.dx
     tractions = {
         i: _facets(scene, space, load, f"loads[{i}].where")
         for i, load in enumerate(scene.loads)
@@ -131,13 +162,13 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
             form += ufl.inner(fem.Constant(domain, weight), v) * ufl.dx
         elif isinstance(load, BodyForce):
             force = (
-                _sided_function(space, exact.body_force, (2,))
+                _sided_function(space, exact.body_force, (space.dimension,))
                 if load.force == "exact"
                 else fem.Constant(domain, np.asarray(load.force, dtype=float))
             )
             form += ufl.inner(force, v) * ufl.dx
         elif load.traction == "exact":
-            stress = _sided_function(space, exact.stress, (2, 2))
+            stress = _sided_function(space, exact.stress, (space.dimension,) * 2)
             form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
         else:
             traction = fem.Constant(domain, np.asarray(load.traction, dtype=float))
@@ -147,71 +178,52 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
 
 def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> NDArray[np.int32]:
     """Find the facets that a traction acts on, as DOLFINx's pairs of cell and local facet."""
+    d = space.dimension
     cell, opposite = space.mesh.boundary.T
-    ends = space.mesh.cells[cell[:, None], (opposite[:, None] + [1, 2]) % 3]
+    corners_of = np.array([[c for c in range(d + 1) if c != k] for k in range(d + 1)])
+    ends = space.mesh.cells[cell[:, None], corners_of[opposite]]
     corners = np.unique(ends)
     mark = np.zeros(len(space.mesh.points), dtype=bool)
     mark[corners[on_part(scene, load.where, space.mesh.points[corners], key)]] = True
     chosen = mark[ends].all(axis=1)
-    # facet i lies opposite corner i
+    if not chosen.any():
+        raise InputError(
+            f"{key}: no facet of the boundary lies in '{load.where}'", str(scene.file or "")
+        )
+    # facet i lies opposite corner i; other ranks integrate over their cells themselves
     pairs = np.column_stack([space.dolfinx_cell[cell[chosen]], opposite[chosen]])
+    own = space.function_space.mesh.topology.index_map(d).size_local
+    pairs = pairs[(pairs[:, 0] >= 0) & (pairs[:, 0] < own)]
     return pairs[np.argsort(pairs[:, 0], kind="stable")].astype(np.int32).ravel()
 
 
 def _sided_function(space: ConformingSpace, values: Any, shape: tuple[int, ...]) -> Any:
-    """Interpolate an exact field by discontinuous quartics, each cell on its own side."""
+    """Interpolate an exact field by discontinuous polynomials, each cell on its own side."""
     from dolfinx import fem
 
-    broken = fem.functionspace(space.function_space.mesh, ("DG", 4, shape))
-    nodes = np.asarray(broken.dofmap.list, dtype=np.int64)[space.dolfinx_cell]
-    points = broken.tabulate_dof_coordinates()[:, :2]
+    d = space.dimension
+    degree = 4 if d == 2 else space.degree + 1  # in space quartics would take gigabytes
+    broken = fem.functionspace(space.function_space.mesh, ("DG", degree, shape))
+    here = np.flatnonzero(space.dolfinx_cell >= 0)
+    nodes = np.asarray(broken.dofmap.list, dtype=np.int64)[space.dolfinx_cell[here]]
+    points = broken.tabulate_dof_coordinates()[:, :d]
     near = np.empty_like(points)
-    near[nodes] = space.centroids[:, None, :]
+    near[nodes] = space.centroids[here, None, :]
     function = fem.Function(broken)
     function.x.array[:] = values(points, near).ravel()
     return function
 
 
-def plane_lame(material: Material) -> tuple[float, float]:
+def lame(material: Material) -> tuple[float, float]:
     """Lamé constants (λ, μ) in Pa; λ is the reduced one in plane stress."""
     mu = material.young / (2 * (1 + material.poisson))
     lam = material.young * material.poisson / ((1 + material.poisson) * (1 - 2 * material.poisson))
-    return (lam, mu) if material.plane == "strain" else (2 * lam * mu / (lam + 2 * mu), mu)
+    return (2 * lam * mu / (lam + 2 * mu), mu) if material.plane == "stress" else (lam, mu)
 
 
-def direct_solver(matrix: Any) -> Any:
-    """Factorise a symmetric positive definite matrix by MUMPS; gives a PETSc KSP."""
-    from petsc4py import PETSc
-
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    solver = PETSc.KSP().create(matrix.comm)
-    solver.setOperators(matrix)
-    solver.setType("preonly")
-    solver.getPC().setType("cholesky")
-    solver.getPC().setFactorSolverType("mumps")
-    solver.setUp()
-    return solver
-
-
-def _refine(solver: Any, matrix: Any, x: Any, vector: Any) -> float:
-    """Refine x by two residual corrections; return the relative size of the last one.
-
-    The correction estimates the error itself, which the residual of a stiff system does not.
-    """
-    reason = solver.getConvergedReason()
-    residual, correction = vector.duplicate(), x.duplicate()
-    size = 0.0
-    for _ in range(2):
-        matrix.mult(x, residual)
-        residual.aypx(-1.0, vector)
-        solver.solve(residual, correction)
-        size = float(correction.norm() / (x.norm() or 1.0))
-        x.axpy(1.0, correction)
-    residual.destroy()
-    correction.destroy()
-    if reason < 0 or not size <= _LARGEST_CORRECTION:
-        raise RuntimeError(
-            f"MUMPS did not solve the system (PETSc reason {reason}, a refined solution differs "
-            f"by {size:.1e})"
-        )
-    return size
+def _mean_stiffness(matrix: Any) -> float:
+    """Give a mean diagonal entry: a constrained unknown shall not stand out among the others."""
+    diagonal = matrix.getDiagonal()
+    mean = float(diagonal.sum()) / diagonal.getSize()
+    diagonal.destroy()
+    return mean

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.elasticity import plane_lame
+from reference.elasticity import lame
 from reference.space import ConformingSpace
 from reference.strain_energies import ENERGIES
 from verify.scene import Material
@@ -147,7 +147,7 @@ class _Equations:
         self.unknowns, self.iterations, self._most_inverted = unknowns, 0, most_inverted
         self.solution = fem.Function(V)
         self.factor = fem.Constant(V.mesh, 0.0)
-        lam, mu = (fem.Constant(V.mesh, value) for value in plane_lame(material))
+        lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
         dx = ufl.Measure("dx", domain=V.mesh, metadata={"quadrature_degree": 4 * space.degree - 2})
         F = ufl.Identity(2) + ufl.grad(self.solution)
         total = density(F, lam, mu) * dx

@@ -7,18 +7,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.dolfinx_versions import create_triangle_mesh
+from reference.dolfinx_versions import create_simplex_mesh
 from reference.meshing import ConformingMesh
+from reference.meshing.edge_splitting import mesh_edges
 
 __all__ = ["ConformingSpace", "conforming_space"]
 
-# basix numbers the mid-nodes by the opposite corner, VTK along the outline
-_TO_VTK = {1: [0, 1, 2], 2: [0, 1, 2, 5, 3, 4]}
+# basix numbers the mid-nodes by the opposite edge, VTK along the outline
+_TO_VTK = {
+    (2, 1): [0, 1, 2],
+    (2, 2): [0, 1, 2, 5, 3, 4],
+    (3, 1): [0, 1, 2, 3],
+    (3, 2): [0, 1, 2, 3, 9, 6, 8, 7, 5, 4],
+}
+_VTK_EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # the first three in the plane
 
 
 @dataclass(frozen=True)
 class ConformingSpace:
     """Vector Lagrange elements on a conforming mesh.
+
+    Every rank of a parallel run knows the whole mesh and all its nodes; DOLFINx holds a part.
 
     Attributes
     ----------
@@ -27,10 +36,12 @@ class ConformingSpace:
     function_space : dolfinx.fem.FunctionSpace
     cell_nodes : (m, k) int array
         Nodes of each cell of `mesh` in VTK's order.
-    node_points : (n, 2) float array
+    node_points : (n, d) float array
         Nodes of the space, m.
     dolfinx_cell : (m,) int array
-        DOLFINx's number of each cell of `mesh`.
+        DOLFINx's number of each cell of `mesh` on this rank; −1 where it has none.
+    node_of_dof : (l,) int array
+        Node of each (vector) unknown of this rank, those of other ranks last. Serial: 0, 1, 2, …
     """
 
     mesh: ConformingMesh
@@ -39,36 +50,124 @@ class ConformingSpace:
     cell_nodes: NDArray[np.int64]
     node_points: NDArray[np.float64]
     dolfinx_cell: NDArray[np.int64]
+    node_of_dof: NDArray[np.int64]
+
+    @property
+    def dimension(self) -> int:
+        """Space dimension, 2 or 3."""
+        return self.mesh.dimension
 
     @cached_property
     def centroids(self) -> NDArray[np.float64]:
-        """(m, 2) centroids of the cells, m."""
+        """(m, d) centroids of the cells, m."""
         points: NDArray[np.float64] = self.mesh.points[self.mesh.cells].mean(axis=1)
         return points
 
     def boundary_nodes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Nodes (b,) on the outer boundary (not on the faces of the cut), and a cell of each."""
         cell, opposite = self.mesh.boundary.T
-        on_facet = {
-            1: np.array([[1, 2], [2, 0], [0, 1]]),
-            2: np.array([[1, 2, 4], [2, 0, 5], [0, 1, 3]]),
-        }[self.degree][opposite]
+        on_facet = _facet_nodes(self.dimension, self.degree)[opposite]
         nodes = np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
         found, first = np.unique(nodes, return_index=True)
         return found, np.repeat(cell, nodes.shape[1])[first]
 
+    @property
+    def owned(self) -> int:
+        """Number of (vector) unknowns that this rank owns."""
+        return int(self.function_space.dofmap.index_map.size_local)
 
-def conforming_space(mesh: ConformingMesh, degree: int) -> ConformingSpace:
-    """Build the vector space of polynomials of `degree` (1 or 2) on `mesh`."""
-    domain = create_triangle_mesh(mesh.points, mesh.cells)
+    def own_unknowns(
+        self, unknowns: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Find which of some scalar unknowns, numbered by nodes, are this rank's own.
+
+        Returns
+        -------
+        own : (l,) array
+            Their numbers on this rank.
+        at : (l,) array
+            Their places in `unknowns`.
+        """
+        d = self.dimension
+        place = np.full(self.node_points.size, -1, dtype=np.int64)
+        place[unknowns] = np.arange(len(unknowns))
+        at = place[(self.node_of_dof[: self.owned, None] * d + np.arange(d)).ravel()]
+        own = np.flatnonzero(at >= 0)
+        return own, at[own]
+
+    def everywhere(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gather nodal values (n, d) on all ranks from the unknowns of each, its own first."""
+        d = self.dimension
+        values = np.zeros((len(self.node_points), d))
+        values[self.node_of_dof[: self.owned]] = local[: self.owned * d].reshape(-1, d)
+        comm = self.function_space.mesh.comm
+        return values if comm.size == 1 else np.asarray(comm.allreduce(values))
+
+
+def conforming_space(mesh: ConformingMesh, degree: int, comm: Any = None) -> ConformingSpace:
+    """Build the vector space of polynomials of `degree` (1 or 2) on `mesh`.
+
+    Parameters
+    ----------
+    mesh : ConformingMesh
+        The same on every rank, with its cut open: the nodes are doubled before the mesh is
+        distributed.
+    degree : {1, 2}
+    comm : MPI communicator, optional
+        Default: each rank by itself.
+
+    Raises
+    ------
+    RuntimeError
+        If DOLFINx did not make one unknown per node, as an open cut has them.
+    """
+    domain = create_simplex_mesh(mesh.points, mesh.cells, comm)
     from dolfinx import fem
 
-    space = fem.functionspace(domain, ("Lagrange", degree, (2,)))
+    d = mesh.dimension
+    space = fem.functionspace(domain, ("Lagrange", degree, (d,)))
+    cell_nodes, node_points = _nodes(mesh, degree)
     original = np.asarray(domain.topology.original_cell_index, dtype=np.int64)
-    dolfinx_cell = np.empty(len(original), dtype=np.int64)
+    dolfinx_cell = np.full(len(mesh.cells), -1, dtype=np.int64)
     dolfinx_cell[original] = np.arange(len(original))
-    dofs = np.asarray(space.dofmap.list, dtype=np.int64)[dolfinx_cell]
-    points = space.tabulate_dof_coordinates()[:, :2]
-    return ConformingSpace(
-        mesh, degree, space, dofs[:, _TO_VTK[degree]], np.ascontiguousarray(points), dolfinx_cell
-    )
+    dofs = np.asarray(space.dofmap.list, dtype=np.int64)[:, _TO_VTK[d, degree]]
+    index_map = space.dofmap.index_map
+    node_of_dof = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int64)
+    node_of_dof[dofs] = cell_nodes[original]
+    alike = (node_of_dof[dofs] == cell_nodes[original]).all() and (node_of_dof >= 0).all()
+    if not alike or index_map.size_global != len(node_points):
+        raise RuntimeError(
+            f"DOLFINx made {index_map.size_global} unknowns for {len(node_points)} nodes of the "
+            "opened mesh: it does not keep the faces of the cut apart"
+        )
+    if domain.comm.size == 1:  # number the nodes as DOLFINx does its unknowns
+        number = np.argsort(node_of_dof)
+        cell_nodes, node_points = number[cell_nodes], node_points[node_of_dof]
+        node_of_dof = np.arange(len(node_points))
+    return ConformingSpace(mesh, degree, space, cell_nodes, node_points, dolfinx_cell, node_of_dof)
+
+
+def _nodes(mesh: ConformingMesh, degree: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Nodes of each cell in VTK's order, and their places: corners, then middles of edges."""
+    cells, points = mesh.cells, mesh.points
+    if degree == 1:
+        return cells, points
+    edges = mesh_edges(cells)
+    keys, count = edges[:, 0] * len(points) + edges[:, 1], len(points)
+    columns = [cells]
+    for i, j in _VTK_EDGES[: 3 * (mesh.dimension - 1)]:
+        low, high = np.minimum(cells[:, i], cells[:, j]), np.maximum(cells[:, i], cells[:, j])
+        columns.append(count + np.searchsorted(keys, low * count + high)[:, None])
+    return np.hstack(columns), np.vstack([points, points[edges].mean(axis=1)])
+
+
+def _facet_nodes(dimension: int, degree: int) -> NDArray[np.int64]:
+    """Nodes of the facet opposite each corner of a cell, by their place in VTK's order."""
+    facets = []
+    for k in range(dimension + 1):
+        nodes = [corner for corner in range(dimension + 1) if corner != k]
+        if degree == 2:
+            edges = enumerate(_VTK_EDGES[: 3 * (dimension - 1)])
+            nodes += [dimension + 1 + e for e, ends in edges if k not in ends]
+        facets.append(nodes)
+    return np.array(facets)

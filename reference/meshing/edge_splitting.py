@@ -81,7 +81,7 @@ def _keys_of(simplices: Cells, i: int, j: int, count: int) -> Cells:
 
 
 def _first_edge(simplices: Cells, keys: Cells, count: int) -> Cells:
-    """Number of the first of `keys` (ascending where not negative) that a simplex has, or −1."""
+    """Find the first of `keys` (ascending where not negative) that a simplex has, or −1."""
     found = np.full(len(simplices), len(keys), dtype=np.int64)
     for at in _edge_numbers(simplices, keys, count):
         found = np.where(at >= 0, np.minimum(found, at), found)

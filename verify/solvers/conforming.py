@@ -203,10 +203,11 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Equilibri
             linear.displacement,
             linear.strain_energy,
             linear.timings,
-            {},
+            {"cg": linear.answer.iterations} if linear.answer.iterations else {},
             {
-                "linear solver": "PETSc, MUMPS Cholesky",
-                "round-off": f"{linear.round_off:.1e}",
+                "linear solver": linear.answer.method,
+                "round-off": f"{linear.answer.round_off:.1e}",
+                "residual": f"{linear.answer.residual:.1e}",
             },
         )
     unknowns, values = constrained_values(scene, space, exact)

@@ -1,0 +1,187 @@
+"""Solving symmetric positive definite systems: directly, or by multigrid to a true residual."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Answer", "direct_solver", "rigid_motions", "solve_by_multigrid", "solve_directly"]
+
+_LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
+_MOST_ITERATIONS = 2000
+_RESTARTS = 4
+_MULTIGRID = {
+    "ksp_norm_type": "unpreconditioned",
+    "pc_type": "gamg",
+    "pc_gamg_threshold": 0.01,
+    "pc_gamg_aggressive_coarsening": 1,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 3,
+    "mg_levels_pc_type": "jacobi",
+    "mg_levels_esteig_ksp_type": "cg",
+    "mg_coarse_pc_type": "lu",
+    "mg_coarse_pc_factor_mat_solver_type": "mumps",
+}
+
+
+class Answer(NamedTuple):
+    """How well a system was solved.
+
+    Attributes
+    ----------
+    method : str
+    round_off : float
+        Relative size of the last correction of the solution: what it is good to.
+    residual : float
+        Norm of the true residual over that of the loads, with the supports in place.
+    iterations : int
+    """
+
+    method: str
+    round_off: float
+    residual: float
+    iterations: int
+
+
+def direct_solver(matrix: Any) -> Any:
+    """Factorise a symmetric positive definite matrix by MUMPS; gives a PETSc KSP."""
+    from petsc4py import PETSc
+
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOperators(matrix)
+    solver.setType("preonly")
+    solver.getPC().setType("cholesky")
+    solver.getPC().setFactorSolverType("mumps")
+    solver.setUp()
+    return solver
+
+
+def solve_directly(solver: Any, matrix: Any, x: Any, vector: Any) -> Answer:
+    """Solve and refine by two residual corrections.
+
+    The correction estimates the error itself, which the residual of a stiff system does not.
+
+    Raises
+    ------
+    RuntimeError
+        If MUMPS failed, or the last correction is not small.
+    """
+    residual, correction = vector.duplicate(), x.duplicate()
+    loads = _residual(matrix, x, vector, residual)  # x holds the supports' values so far
+    solver.solve(vector, x)
+    reason = solver.getConvergedReason()
+    size = 0.0
+    for _ in range(2):
+        _residual(matrix, x, vector, residual)
+        solver.solve(residual, correction)
+        size = float(correction.norm() / (x.norm() or 1.0))
+        x.axpy(1.0, correction)
+    left = _residual(matrix, x, vector, residual) / (loads or 1.0)
+    residual.destroy()
+    correction.destroy()
+    if reason < 0 or not size <= _LARGEST_CORRECTION:
+        raise RuntimeError(
+            f"MUMPS did not solve the system (PETSc reason {reason}, a refined solution differs "
+            f"by {size:.1e})"
+        )
+    return Answer("PETSc, MUMPS Cholesky", size, left, 0)
+
+
+def solve_by_multigrid(
+    matrix: Any, x: Any, vector: Any, motions: NDArray[np.float64], tolerance: float
+) -> Answer:
+    """Solve by conjugate gradients with algebraic multigrid (GAMG), from x.
+
+    PETSc judges convergence by a residual that it updates, and that drifts away from the true one:
+    the true one is computed after each run, and CG is started again until it is small.
+
+    Parameters
+    ----------
+    matrix, x, vector : PETSc Mat and Vecs
+        x holds the values of the constrained unknowns and zeros else.
+    motions : (k, l) array
+        Rigid motions of the body at the unknowns of this rank.
+    tolerance : float
+        Of the true residual, relative to that of the start.
+
+    Raises
+    ------
+    RuntimeError
+        If the tolerance is not reached; with PETSc's reason.
+    """
+    from petsc4py import PETSc
+
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    modes = _orthonormal(matrix, motions)
+    near = PETSc.NullSpace().create(vectors=modes, comm=matrix.comm)
+    matrix.setNearNullSpace(near)
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOptionsPrefix("reference_")
+    options: Any = PETSc.Options()
+    for name, value in _MULTIGRID.items():
+        options[f"reference_{name}"] = value
+    solver.setOperators(matrix)
+    solver.setType("cg")
+    solver.setInitialGuessNonzero(True)
+    solver.setFromOptions()
+    for name in _MULTIGRID:
+        options.delValue(f"reference_{name}")
+    residual, before = vector.duplicate(), x.duplicate()
+    loads = _residual(matrix, x, vector, residual)
+    iterations, left, size = 0, 1.0, 0.0
+    for _ in range(_RESTARTS):
+        solver.setTolerances(
+            rtol=1e-30, atol=0.5 * tolerance * loads, divtol=1e10, max_it=_MOST_ITERATIONS
+        )
+        x.copy(before)
+        solver.solve(vector, x)
+        iterations += solver.getIterationNumber()
+        left = _residual(matrix, x, vector, residual) / (loads or 1.0)
+        before.aypx(-1.0, x)
+        size = float(before.norm() / (x.norm() or 1.0))
+        if left <= tolerance or int(solver.getConvergedReason()) < 0:
+            break
+    reason = solver.getConvergedReason()
+    for entry in (solver, residual, before, near, *modes):
+        entry.destroy()
+    if not left <= tolerance:
+        raise RuntimeError(
+            f"multigrid left a residual of {left:.1e} after {iterations} iterations (PETSc reason "
+            f"{reason}); {tolerance:.1e} is wanted"
+        )
+    return Answer("PETSc, CG with GAMG", min(size, left), left, iterations)
+
+
+def rigid_motions(points: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the rigid motions (3 or 6, n · d) at points (n, d): shifts, then turns."""
+    n, d = points.shape
+    centred = points - centre
+    pairs = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (2, 0)]
+    motions = np.zeros((d + len(pairs), n, d))
+    for k in range(d):
+        motions[k, :, k] = 1.0
+    for k, (i, j) in enumerate(pairs):
+        motions[d + k, :, i], motions[d + k, :, j] = -centred[:, j], centred[:, i]
+    return motions.reshape(len(motions), -1)
+
+
+def _orthonormal(matrix: Any, motions: NDArray[np.float64]) -> list[Any]:
+    """Vectors of the layout of the matrix, orthonormal (Gram–Schmidt, twice)."""
+    modes: list[Any] = []
+    for motion in motions:
+        vector = matrix.createVecRight()
+        vector.array[:] = motion
+        for _ in range(2):
+            for mode in modes:
+                vector.axpy(-vector.dot(mode), mode)
+        vector.normalize()
+        modes.append(vector)
+    return modes
+
+
+def _residual(matrix: Any, x: Any, vector: Any, out: Any) -> float:
+    """Put vector − matrix x into `out`; give its norm."""
+    matrix.mult(x, out)
+    out.aypx(-1.0, vector)
+    return float(out.norm())
