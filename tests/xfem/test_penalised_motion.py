@@ -60,7 +60,7 @@ def test_the_penalised_stiffness_is_the_derivative_of_force_and_energy(dim, kine
     h = 1e-6
     (plus, above), (minus, below) = (force.evaluate(u + s * h * w) for s in (1.0, -1.0))
     at = force.evaluate(u)[0]
-    assert 0.0 < force.penalty_energy
+    assert force.penalty_energy > 0.0
     # central differences: h² of third derivatives, and round-off/h
     assert (above - below) / (2 * h) == pytest.approx(np.sum(at * w), rel=1e-7)
     change = ((plus - minus) / (2 * h)).ravel()

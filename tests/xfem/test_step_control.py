@@ -46,7 +46,7 @@ def bodies():
 
 
 def simulate(control, clock, first_step, steps=20):
-    """Steps of a body that is cut twice; (step size, lag gained per simulated second) after each."""
+    """A body cut twice: (step size, lag gained per simulated second) at each stage, and its end."""
     old, state, step, stages = None, None, first_step, []
     for body in bodies():
         if old is None:

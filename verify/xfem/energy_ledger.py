@@ -148,7 +148,7 @@ class EnergyLedger:
         space = self.body.shape[1]
         turns = 1 if space == 2 else 3
         vectors = np.split(table[9:-1].T, [space, space + turns], axis=1)
-        return Ledger(*table[:9], *vectors, penalty=table[-1])
+        return Ledger(*table[:9], *vectors, table[-1])
 
 
 def _cross(position: _Floats, momenta: _Floats) -> _Floats:

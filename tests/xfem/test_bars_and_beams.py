@@ -1,0 +1,228 @@
+"""Motion with known answers: a prestrained bar that is cut, the tones of a split cantilever, spin.
+
+The thesis' material (E = 1e4 Pa, ν = .3, ρ = 1000 kg/m³): c_d = 3.668997 m/s.
+"""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, cut_body, material, rotation
+from scipy.sparse import kron
+from scipy.sparse.linalg import eigsh
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.corotational import InternalForce
+from verify.xfem.critical_step import RESONANCE_FREE, critical_step
+from verify.xfem.cuts import Plane
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    inherit_state,
+    treat_moving_body,
+)
+from verify.xfem.energy_ledger import run
+from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.polyline import Polyline
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+HALF, STRAIN = 0.5, 0.01
+SPEED = 3.668996928526  # √((λ + 2μ)/ρ)
+FACE_VELOCITY, PERIOD = -0.0366899693, 0.545108115
+
+
+def bar(dim, cells):
+    """A bar on rollers all along (uniaxial strain), its ends held apart."""
+    width = 2.0 * HALF / cells * np.ones(dim - 1)
+    lower, upper = [-HALF, *(0.0 * width)], [HALF, *width]
+    if dim == 2:
+        return rectangle_mesh((cells, 1), lower, upper)
+    return box_mesh((cells, 1, 1), lower, upper)
+
+
+def dynamic(virtual, policy):
+    """The bar's body, and its supports' displacement."""
+    treated = treat_moving_body(virtual, material(virtual.mesh.dim), DENSITY, policy)
+    ends = np.abs(np.abs(virtual.mesh.points[:, 0]) - HALF) < 1e-9
+    across = tuple(range(1, virtual.mesh.dim))
+    supports = Supports.none(treated.virtual).prescribe(
+        treated.virtual, ends, lambda at, _: STRAIN * at * np.eye(at.shape[1])[0]
+    )
+    everywhere = np.ones(len(ends), dtype=bool)
+    supports = supports.prescribe(treated.virtual, everywhere, 0.0, across)
+    return DynamicBody(treated.force, treated.mass, supports=supports)
+
+
+def freed_bar(dim, cells, offset, policy):
+    """Times after the cut, and the displacement of its left face (mean over the face)."""
+    mesh = bar(dim, cells)
+    whole = dynamic(cut_mesh(mesh, []), "keep")
+    state = whole.rest()
+    state.displacement[:, 0] = STRAIN * whole.force.virtual.node_points[:, 0]
+    h = 0.9 * RESONANCE_FREE * 2.0 * HALF / cells / SPEED
+    run(CentralDifferences(whole, h), whole, state, 10)
+    # equilibrium: nothing has moved
+    assert np.abs(state.velocity).max() < 1e-12
+    normal = np.eye(dim)[0]
+    virtual = cut_mesh(mesh, [Plane(offset * normal, normal)])
+    body = dynamic(virtual, policy)
+    treated = body.force.virtual
+    state = inherit_state(whole.force.virtual, treated, state)
+    parts = subdivide(treated)
+    # the cut as realised: a dropped sliver moves it to the nearest faces
+    left = parts.points[parts.cells].mean(axis=1)[:, 0] < parts.cut_facets[:, :, 0].mean()
+    face = np.unique(parts.cells[left])
+    face = face[parts.points[face, 0] > parts.cut_facets[:, :, 0].min() - 1e-9]
+    at = parts.interpolation[face]
+    scheme, faces = CentralDifferences(body, h), []
+    for _ in range(int(1.4 * PERIOD / h)):
+        faces.append((at @ state.displacement)[:, 0].mean())
+        scheme.step(state)
+    return h * np.arange(len(faces)), np.array(faces) - faces[0]
+
+
+def crossing(times, values, level, after):
+    """First time after another at which linear interpolation reaches a level."""
+    later = np.flatnonzero((values[:-1] - level) * (values[1:] - level) <= 0.0)
+    k = later[times[later] >= after][0]
+    return times[k] + (level - values[k]) / (values[k + 1] - values[k]) * (times[k + 1] - times[k])
+
+
+@pytest.mark.parametrize(
+    "dim,cells,offset,policy",
+    [
+        (2, 81, 0.0, "merge"),  # through the middle of cells
+        (2, 80, 0.0, "keep"),  # along their faces
+        (2, 80, 1e-12, "merge"),
+        (2, 80, 1e-5, "keep"),
+        (2, 81, 0.0, "penalise"),
+        (3, 41, 0.0, "merge"),
+        (3, 40, 1e-7, "merge"),
+    ],
+)
+def test_the_faces_of_a_cut_in_a_prestrained_bar_fly_apart_as_waves_say(dim, cells, offset, policy):
+    """Velocity −c_d ε0 until the wave is back from the end, then reversed; period 4L/c_d."""
+    times, face = freed_bar(dim, cells, offset, policy)
+    turn = 2.0 * HALF / SPEED
+    out = (times > 0.1 * turn) & (times < 0.9 * turn)
+    back = (times > 1.1 * turn) & (times < 1.9 * turn)
+    # the slope of a line through the wiggles that a front leaves on a grid
+    assert np.polyfit(times[out], face[out], 1)[0] == pytest.approx(FACE_VELOCITY, rel=0.01)
+    assert np.polyfit(times[back], face[back], 1)[0] == pytest.approx(-FACE_VELOCITY, rel=0.01)
+    half_way = FACE_VELOCITY * turn / 2.0
+    first = crossing(times, face, half_way, 0.0)
+    again = crossing(times, face, half_way, first + 0.75 * PERIOD)
+    assert first == pytest.approx(PERIOD / 4.0, rel=0.01)
+    assert again - first == pytest.approx(PERIOD, rel=0.01)
+
+
+WHOLE, SPLIT, HALF_SPLIT = 0.65408379, 0.33435932, 0.603212
+
+
+def tones(rows, cuts, mass, columns, count):
+    """Lowest angular frequencies of a cantilever of length 1 and depth .2, in 1/s."""
+    mesh = rectangle_mesh((columns, rows), upper=(1.0, 0.2))
+    v = cut_mesh(mesh, cuts)
+    pattern = block_pattern(v.cells, v.node_count)
+    K = pattern.matrix(LinearStiffness(v, material(2)).assemble(pattern)).tocsc()
+    M = kron(mass(v, DENSITY).matrix, np.eye(2)).tocsc()
+    free = np.flatnonzero(np.repeat(v.node_points[:, 0] > 1e-12, 2))
+    values = eigsh(
+        K[free][:, free], k=count, M=M[free][:, free], sigma=0.0, return_eigenvectors=False
+    )
+    return np.sqrt(np.sort(values))
+
+
+@pytest.mark.parametrize("mass", [side_wise_mass, consistent_mass])
+@pytest.mark.parametrize(
+    "cut,exact,count,rate",
+    [
+        ("none", WHOLE, 1, 1.75),
+        ("full", SPLIT, 2, 1.75),
+        ("half", HALF_SPLIT, 1, 1.4),  # towards 1: the tip is not enriched
+    ],
+)
+def test_the_lowest_tone_of_a_cantilever_converges_whole_split_and_half_split(
+    mass, cut, exact, count, rate
+):
+    """From above (the whole and the split one: nearly h²), cut through the middle of elements."""
+    cuts = {
+        "none": [],
+        "full": [Plane([0.5, 0.1], [0.0, 1.0])],
+        "half": [Polyline([[0.5, 0.1], [1.1, 0.1]])],
+    }[cut]
+    errors = []
+    for rows in (9, 17):
+        columns = 5 * rows + 1  # even: the half cut ends on edges
+        errors.append(tones(rows, cuts, mass, columns, count) / exact - 1.0)
+    coarse, fine = errors
+    assert (fine > 0.0).all()
+    assert (np.log(coarse / fine) / np.log(17.0 / 9.0) > rate).all()
+    assert (fine < 0.03).all()
+    # the two halves have the same tone up to their share of the mesh
+    assert np.ptp(fine) < 0.1 * fine.max()
+
+
+def spinning(dim, mass=side_wise_mass):
+    """A cut body on its way, turning as a rigid one at 1 rad/s."""
+    v = cut_body(dim)
+    body = DynamicBody(InternalForce(v, material(dim)), mass(v, DENSITY))
+    state, X = body.rest(), v.node_points
+    W = (rotation(dim, 0.5 * np.pi) - rotation(dim, -0.5 * np.pi)) / 2.0
+    state.velocity[:] = (X - 0.5) @ W.T + 0.1 * np.arange(1, dim + 1)
+    return body, state
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_rigid_turn_at_constant_rate_stores_nothing_and_keeps_every_momentum(dim):
+    """Displacements of a rigid spin, prescribed: no force, no energy, at any angle.
+
+    The exact mass: every axis of a square or cube is a principal one, none of its lumped nodes'.
+    """
+    body, state = spinning(dim, consistent_mass)
+    X = body.force.virtual.node_points - 0.5
+    W = (rotation(dim, 0.5 * np.pi) - rotation(dim, -0.5 * np.pi)) / 2.0
+    first = None
+    for angle in np.linspace(0.0, 2.0 * np.pi, 9):
+        R = rotation(dim, angle)
+        state.displacement[:] = X @ R.T - X
+        state.velocity[:] = X @ R.T @ W.T
+        force, energy = body.force.evaluate(state.displacement)
+        assert np.abs(force).max() < 1e-10
+        assert energy < 1e-12
+        where = body.force.virtual.node_points + state.displacement - 0.5
+        momenta = body.mass.apply(state.velocity)
+        turning = (
+            np.cross(where, momenta).sum(axis=0)
+            if dim == 3
+            else where[:, 0] @ momenta[:, 1] - where[:, 1] @ momenta[:, 0]
+        )
+        kept = np.concatenate([[np.sum(momenta * state.velocity)], np.atleast_1d(turning)])
+        first = kept if first is None else first
+        assert np.abs(kept - first).max() < 1e-12 * np.abs(first).max()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("scheme", [CentralDifferences, EnergyMomentum])
+def test_the_halves_of_a_spinning_cut_body_each_keep_their_momentum(dim, scheme):
+    """One full turn: energy, both momenta, and the linear momentum of each half on its own."""
+    body, state = spinning(dim)
+    v = body.force.virtual
+    K = body.pattern.matrix(body.force.stiffness(body.pattern, np.zeros(body.shape)))
+    h = 0.9 * RESONANCE_FREE * critical_step(K, body.mass)
+    if scheme is EnergyMomentum:
+        h *= 4.0
+    upper = v.bodies == v.bodies[0]
+    halves = [body.mass.apply(state.velocity)[side].sum(axis=0) for side in (upper, ~upper)]
+    account = run(scheme(body, h), body, state, int(np.ceil(2.0 * np.pi / h)))
+    after = [body.mass.apply(state.velocity)[side].sum(axis=0) for side in (upper, ~upper)]
+    size = np.sqrt(2.0 * account.kinetic.max() * DENSITY)
+    assert np.abs(np.array(after) - halves).max() < 1e-11 * size
+    assert np.abs(account.momentum - account.momentum[0]).max() < 1e-11 * size
+    turning = account.angular_momentum
+    assert np.abs(turning - turning[0]).max() < 1e-9 * np.abs(turning).max()
+    # central differences: their own energy oscillates by (ωh)²/4 of what swings
+    assert account.drift < (1e-9 if scheme is EnergyMomentum else 2e-3)
