@@ -1,0 +1,88 @@
+"""What holds a played body and pulls at it: supports of the scene, hooks at the edges of a cut."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.replay.stage import Hold, Hook
+from verify.xfem.dynamics import MovingSupports
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Grips", "gripped"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+def gripped(virtual: VirtualMesh, hook: Hook) -> _Ints:
+    """Unknown nodes that a hook grips: those on its side within its radius, at least the nearest.
+
+    The unknowns at nodes across the cut are among them: they carry the material up to the cut.
+    """
+    on_side = np.flatnonzero(virtual.node_side[:, hook.stroke] == hook.side)
+    if len(on_side) == 0:
+        return on_side
+    away = np.linalg.norm(virtual.node_points[on_side] - hook.at, axis=1)
+    return on_side[away <= max(hook.radius, float(away.min()))]
+
+
+class Grips:
+    """Supports and loads of a body as it is now, from the time at which it was last cut.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    holds : sequence of Hold
+    hooks : sequence of Hook
+    weights : (N,) float array
+        Lumped masses: a force is shared in proportion, so that slivers get next to nothing.
+    start : dict
+        Displacement (N, s) at which each hook (by its number) has gripped.
+    """
+
+    def __init__(
+        self,
+        virtual: VirtualMesh,
+        holds: Sequence[Hold],
+        hooks: Sequence[Hook],
+        weights: _Floats,
+        start: dict[int, _Floats],
+    ) -> None:
+        shape = virtual.node_points.shape
+        self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
+        for hold in holds:
+            at = hold.nodes[virtual.node_parent]
+            for axis, value in zip(hold.components, hold.values, strict=True):
+                self._fixed[at, axis], self._values[at, axis] = True, value
+        self._moved: list[tuple[Hook, _Ints, _Floats]] = []
+        self._pulled: list[tuple[Hook, _Ints, _Floats]] = []
+        for number, begun in start.items():
+            hook, nodes = hooks[number], gripped(virtual, hooks[number])
+            if len(nodes) == 0:
+                continue
+            if hook.is_force:
+                share = weights[nodes] / weights[nodes].sum()
+                self._pulled.append((hook, nodes, share[:, None] * hook.vector))
+            else:
+                self._fixed[nodes] = True
+                self._moved.append((hook, nodes, begun[nodes]))
+
+    @property
+    def supports(self) -> MovingSupports:
+        """Holds, and hooks that move."""
+        return MovingSupports(self._fixed, self._at)
+
+    def force(self, time: float) -> _Floats:
+        """Nodal forces (N, s) of the hooks that pull, N."""
+        force = np.zeros(self._values.shape)
+        for hook, nodes, full in self._pulled:
+            force[nodes] += hook.share(time) * full
+        return force
+
+    def _at(self, time: float) -> tuple[_Floats, _Floats]:
+        displacement, velocity = self._values.copy(), np.zeros(self._values.shape)
+        for hook, nodes, begun in self._moved:
+            displacement[nodes] = begun + hook.share(time) * hook.vector
+            velocity[nodes] = hook.rate(time) * hook.vector
+        return displacement, velocity

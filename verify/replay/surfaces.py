@@ -1,0 +1,110 @@
+"""Surfaces of a played body: that of the material itself, one to see, one to touch.
+
+Those of a solid are separate. A plane body and a membrane are their own surface: the triangles of
+their pieces.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.replay.stage import Stage
+from verify.xfem.cutting.growing_body import Increment
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.mapping.body_surface import BodySurface
+from verify.xfem.mapping.embedded_surface import EmbeddedSurface
+from verify.xfem.mapping.moving_surface import MovingSurface
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Picture", "Surfaces"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class Picture:
+    """Triangles to be drawn: corners (q, 3), triangles (f, 3), and which lie on a cut (f,)."""
+
+    def __init__(self, points: _Floats, triangles: _Ints, inner: NDArray[np.bool_]) -> None:
+        flat = points.shape[1] == 2
+        self.points = np.pad(points, ((0, 0), (0, 1))) if flat else points
+        self.triangles, self.inner = triangles, inner
+
+
+class Surfaces:
+    """All surfaces of a body under the knife.
+
+    Parameters
+    ----------
+    stage : Stage
+    cutter : SemiProgressiveCutter
+
+    Attributes
+    ----------
+    material : BodySurface or None
+        Closed around the material; None for a membrane, which encloses nothing.
+    visual, collision : EmbeddedSurface or None
+        Where the stage has separate ones.
+    """
+
+    def __init__(self, stage: Stage, cutter: SemiProgressiveCutter) -> None:
+        self._cutter = cutter
+        self.material = None if stage.is_membrane else BodySurface(cutter.body)
+        self.visual = None if stage.visual is None else EmbeddedSurface(cutter, *stage.visual)
+        self.collision = (
+            None if stage.collision is None else EmbeddedSurface(cutter, *stage.collision)
+        )
+        self._positions: dict[str, _Floats] = {}
+
+    def update(self, increment: Increment) -> None:
+        """Follow a cut."""
+        for surface in (self.material, self.visual, self.collision):
+            if surface is not None:
+                surface.update(increment)
+
+    def move(self, displacement: _Floats) -> None:
+        """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""
+        for name, surface in self.moving.items():
+            at = self._positions.get(name)
+            if at is None or len(at) != len(surface.material.rows):
+                at = self._positions[name] = np.empty_like(surface.material.rows)
+            surface.positions(displacement, at)
+
+    @property
+    def moving(self) -> dict[str, MovingSurface]:
+        """The surfaces that there are, by name."""
+        found = {"material": self.material, "visual": self.visual, "collision": self.collision}
+        return {name: surface.surface for name, surface in found.items() if surface is not None}
+
+    @property
+    def touchable(self) -> MovingSurface | None:
+        """The surface that tools collide with; None for a membrane."""
+        chosen = self.collision or self.material
+        return None if chosen is None else chosen.surface
+
+    def picture(self, virtual: VirtualMesh, displacement: _Floats) -> Picture:
+        """Draw the body as it is now: the visual surface with the faces of the cuts."""
+        if virtual.mesh.dim == 2:
+            return _pieces(virtual, displacement)
+        assert self.material is not None
+        inside = self.material.surface
+        parts = [(inside, inside.used)]
+        if self.visual is not None:
+            shown = inside.used[inside.inner.rows[inside.used]]
+            parts = [(inside, shown), (self.visual.surface, self.visual.surface.used)]
+        points, triangles, inner, begin = [], [], [], 0
+        for number, (surface, used) in enumerate(parts):
+            points.append(surface.positions(displacement))
+            triangles.append(surface.facets.rows[used] + begin)
+            inner.append(surface.inner.rows[used] & (number == 0))
+            begin += len(points[-1])
+        return Picture(*(np.concatenate(rows) for rows in (points, triangles, inner)))
+
+
+def _pieces(virtual: VirtualMesh, displacement: _Floats) -> Picture:
+    """Draw a plane body or a membrane: its whole triangles and the parts of the split ones."""
+    piece, at, _ = virtual.solid_simplices
+    corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
+    corners = corners + displacement[virtual.cells[piece]]
+    points = np.einsum("qki,qis->qks", at, corners).reshape(-1, corners.shape[2])
+    triangles = np.arange(len(points)).reshape(-1, 3)
+    return Picture(points, triangles, np.zeros(len(triangles), dtype=bool))
