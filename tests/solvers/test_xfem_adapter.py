@@ -163,11 +163,27 @@ def test_a_level_that_is_not_there_is_refused(tmp_path, level):
         XfemSolver().solve(scene(tmp_path), level)
 
 
-@pytest.mark.parametrize(
-    "analysis", ['kind = "dynamic"\nduration = 1.0', 'kinematics = "corotational"']
-)
-def test_what_the_adapter_does_not_offer_is_refused_before_and_while_solving(tmp_path, analysis):
-    asked = scene(tmp_path, ("[[supports]]", f"[analysis]\n{analysis}\n[[supports]]"))
-    assert XfemSolver().refuses(asked)
+PLAYED = """
+[[cuts]]
+name = "stroke"
+kind = "tool_path"
+points = [[0.0, 0.02], [0.01, 0.02]]
+speed = 0.1
+"""
+
+
+def test_what_the_adapter_does_not_offer_is_refused_before_and_while_solving(tmp_path):
+    dynamic = '[analysis]\nkind = "dynamic"\nduration = 1.0\n[[supports]]'
+    asked = scene(tmp_path, ("[[supports]]", dynamic), base=STRIP + PLAYED)
+    assert "grows while the body moves" in XfemSolver().refuses(asked)
     with pytest.raises(UnsupportedSceneError):
         XfemSolver().solve(asked, 0)
+
+
+@pytest.mark.parametrize("basis", ["shifted", "heaviside"])
+def test_the_other_bases_are_for_linear_statics(tmp_path, basis):
+    asked = scene(
+        tmp_path, ("[[supports]]", '[analysis]\nkinematics = "corotational"\n[[supports]]')
+    )
+    with pytest.raises(UnsupportedSceneError, match="linear statics only"):
+        XfemSolver().solve(asked, 0, basis=basis)

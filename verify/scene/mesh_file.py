@@ -30,7 +30,7 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     points : (n, d) array
         Nodes that some cell uses, m.
     cells : (m, d + 1) array
-        Simplices of positive orientation.
+        Simplices of positive orientation; of a membrane triangles (m, 3), oriented as they were.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     import meshio
 
     assert isinstance(scene.geometry, MeshFile)
-    path, d = mesh_path(scene), scene.dimension
+    path, d, k = mesh_path(scene), scene.dimension, scene.cell_dimension
     if not path.is_file():
         raise InputError(f"geometry.file: no mesh file '{path}'", str(scene.file or ""))
     try:
@@ -52,14 +52,14 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         reason = f"{type(error).__name__}{': ' + why[0] if why and why[0] != '1' else ''}"
         raise InputError(f"not a mesh that meshio can read ({reason})", str(path)) from None
     kinds = {block.type for block in mesh.cells if len(block.data)}
-    strange = kinds - _BELOW[d] - {_SIMPLEX[d]}
-    if strange or _SIMPLEX[d] not in kinds:
+    strange = kinds - _BELOW[k] - {_SIMPLEX[k]}
+    if strange or _SIMPLEX[k] not in kinds:
         found = ", ".join(sorted(strange or kinds)) or "no cells"
-        raise InputError(f"not simplicial: has {found}; expected {_SIMPLEX[d]}s", str(path))
+        raise InputError(f"not simplicial: has {found}; expected {_SIMPLEX[k]}s", str(path))
     if d == 2 and mesh.points.shape[1] == 3 and np.ptp(mesh.points[:, 2]) > 0:
         raise InputError("not plane: its z coordinates differ", str(path))
     points = np.ascontiguousarray(mesh.points[:, :d], dtype=float)
-    cells = mesh.cells_dict[_SIMPLEX[d]].astype(np.int64)
+    cells = mesh.cells_dict[_SIMPLEX[k]].astype(np.int64)
     if cells.min() < 0 or cells.max() >= len(points):
         raise InputError(f"a cell names a node outside 0..{len(points) - 1}", str(path))
     used, compact = np.unique(cells, return_inverse=True)
@@ -74,8 +74,10 @@ def _oriented(
 ) -> NDArray[np.int64]:
     """Swap two corners of every cell of negative orientation; refuse cells without volume."""
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    volume = np.linalg.det(edges)
-    size = np.linalg.norm(edges, axis=2).max(axis=1) ** points.shape[1]
+    membrane = edges.shape[1] < edges.shape[2]
+    normals = np.cross(edges[:, 0], edges[:, 1]) if membrane else None
+    volume = np.linalg.det(edges) if normals is None else np.linalg.norm(normals, axis=1)
+    size = np.linalg.norm(edges, axis=2).max(axis=1) ** edges.shape[1]
     flat = np.flatnonzero(~(np.abs(volume) > 1e-14 * size))
     if flat.size:
         raise InputError(f"{flat.size} cells without volume, first cell {flat[0]}", where)

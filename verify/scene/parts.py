@@ -8,7 +8,7 @@ from verify.scene.geometry import Box, Geometry, Polygon, Rectangle
 from verify.scene.regions import parse_region
 from verify.scene.scene import Scene
 
-__all__ = ["on_edges", "on_part"]
+__all__ = ["lie_on_part", "on_edges", "on_part"]
 
 _TOLERANCE = 1e-9  # of the body's size: a point closer than that to a part is on it
 
@@ -38,10 +38,21 @@ def on_part(scene: Scene, where: str, points: NDArray[np.float64], key: str) -> 
     InputError
         If there is none.
     """
-    found = _found(scene.geometry, where, points)
+    size = float(np.ptp(points, axis=0).max(initial=0.0))
+    found = _found(scene.geometry, where, points, size)
     if not found.any():
         raise InputError(f"{key}: no node of the boundary lies in '{where}'", str(scene.file or ""))
     return found
+
+
+def lie_on_part(
+    scene: Scene, where: str, points: NDArray[np.float64], size: float
+) -> NDArray[np.bool_]:
+    """Tell which points (n, d) lie on the part `where`; it may be none.
+
+    `size` is that of the body, m: within 1e-9 of it a point is on a part.
+    """
+    return _found(scene.geometry, where, points, size)
 
 
 def on_edges(scene: Scene, where: str, corners: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -49,13 +60,16 @@ def on_edges(scene: Scene, where: str, corners: NDArray[np.float64]) -> NDArray[
 
     Each is judged by its middle: meant for an outline that has corners where parts end.
     """
-    return _found(scene.geometry, where, 0.5 * (corners + np.roll(corners, -1, axis=0)))
+    size = float(np.ptp(corners, axis=0).max())
+    return _found(scene.geometry, where, 0.5 * (corners + np.roll(corners, -1, axis=0)), size)
 
 
-def _found(geometry: Geometry, where: str, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _found(
+    geometry: Geometry, where: str, points: NDArray[np.float64], size: float
+) -> NDArray[np.bool_]:
     if where == "boundary":
         return np.ones(len(points), dtype=bool)
-    tolerance = _TOLERANCE * float(np.ptp(points, axis=0).max(initial=0.0))
+    tolerance = _TOLERANCE * size
     if where in geometry.parts():
         return _on_named(geometry, where, points, tolerance)
     dimension = geometry.dimension

@@ -21,6 +21,7 @@ from verify.xfem.bases import (
 )
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.elasticity import Material
+from verify.xfem.errors import BasisError
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
@@ -55,7 +56,7 @@ def solve_in_basis(
     blocks = LinearStiffness(virtual, material).assemble(pattern)
     matrix = transformed_matrix(virtual, basis, csr_array(pattern.matrix(blocks)))
     known = from_sidewise(virtual, basis, supports.values).ravel()
-    held = _held(virtual, supports)
+    held = _held(virtual, supports, basis)
     transposed = transformation(virtual, basis).T
     force = (transposed @ load).ravel() - matrix @ np.where(held, known, 0.0)
     free = np.flatnonzero(~held)
@@ -71,10 +72,18 @@ def solve_in_basis(
     return displacement, dict(zip(phases, np.diff(clock).tolist(), strict=True))
 
 
-def _held(virtual: VirtualMesh, supports: Supports) -> NDArray[np.bool_]:
+def _held(virtual: VirtualMesh, supports: Supports, basis: Basis) -> NDArray[np.bool_]:
     """Which unknowns (u of all nodes, then a of the enriched) are prescribed.
 
-    A support holds every unknown node of a mesh node, hence u and a alike.
+    The plain basis knows the two sides of a node only together; in the shifted one u is the
+    node's own side, and a the difference.
     """
-    nodes = supports.fixed[: len(virtual.mesh.points)]
-    return np.concatenate([nodes, nodes[virtual.enriched_nodes]]).ravel()
+    count = len(virtual.mesh.points)
+    nodes, beyond = supports.fixed[:count], supports.fixed[count:]
+    own = nodes[virtual.node_parent[count:]]
+    if (beyond & ~own).any() or (basis == "heaviside" and (own != beyond).any()):
+        raise BasisError(
+            f"a support holds one side of a cut element and not the other, which the {basis} "
+            "unknowns cannot say; the side-wise ones can"
+        )
+    return np.concatenate([nodes, beyond]).ravel()

@@ -1,36 +1,14 @@
-"""A scene in the terms of the compact XFEM solver: mesh, cuts, supports, loads as arrays."""
-
-from typing import Any
+"""The body of a scene in the terms of the compact XFEM solver: mesh, elasticity, density."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.scene import (
-    ArcCut,
-    Box,
-    Gravity,
-    MeshFile,
-    PolygonCut,
-    PolylineCut,
-    Rectangle,
-    Scene,
-    Traction,
-    read_mesh,
-)
-from verify.scene.parts import on_part
-from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch
+from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.xfem.elasticity import Material, State, isotropic
-from verify.xfem.loads import Density, body_force, traction
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
-from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["background_mesh", "cuts_of", "loads_of", "material_of", "supports_of"]
-
-_ARC_SEGMENTS_PER_CELL = 8
+__all__ = ["background_mesh", "density_of", "material_of"]
 
 
 def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
@@ -70,7 +48,7 @@ def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
             str(scene.file or ""),
         ) from None
     size = _size(scene, level)
-    assert not isinstance(geometry, Box)
+    assert isinstance(geometry, Rectangle | Polygon)
     points, cells = unstructured(geometry.outline(), size)
     return SimplexMesh(points, cells), size
 
@@ -80,110 +58,18 @@ def _size(scene: Scene, level: int) -> float:
     return scene.mesh.sizes[level]
 
 
-def cuts_of(scene: Scene, size: float) -> list[Cut]:
-    """Return the cuts as the solver's own; an arc that ends is sampled finely against `size`."""
-    return [_cut(cut, size) for cut in scene.cuts]
-
-
-def _cut(cut: PolylineCut | ArcCut | PolygonCut, size: float) -> Cut:
-    if isinstance(cut, PolygonCut):
-        return PolygonPatch(cut.points)
-    if isinstance(cut, ArcCut) and cut.sweep == 360.0:
-        centre, radius = np.array(cut.centre), cut.radius
-        return ImplicitCut(lambda points: radius - np.linalg.norm(points - centre, axis=1))
-    vertices = cut.vertices(size / _ARC_SEGMENTS_PER_CELL)
-    closed = bool(np.array_equal(vertices[0], vertices[-1]))
-    return Polyline(vertices[:-1] if closed else vertices, closed)
-
-
 def material_of(scene: Scene) -> Material:
-    """Return the elasticity of the scene."""
+    """Return the elasticity of the scene; of a membrane times its thickness, in N/m."""
     states: dict[str | None, State] = {"strain": "plane strain", "stress": "plane stress"}
     state = states.get(scene.material.plane, "solid")
-    return isotropic(scene.material.young, scene.material.poisson, state)
+    thickness = scene.material.thickness
+    if thickness is None:
+        return isotropic(scene.material.young, scene.material.poisson, state)
+    sheet = isotropic(scene.material.young, scene.material.poisson, "plane stress")
+    return Material(thickness * sheet.lam, thickness * sheet.mu)
 
 
-def supports_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports:
-    """Return the supports; a later one wins where two hold the same node.
-
-    A field with jumps is taken at each unknown node on the side of its own material.
-    """
-    mesh = virtual.mesh
-    boundary = _boundary_nodes(mesh)
-    supports = Supports.none(virtual)
-    for i, support in enumerate(scene.supports):
-        key = f"supports[{i}].where"
-        nodes = boundary[on_part(scene, support.where, mesh.points[boundary], key)]
-        held = support.held(scene.dimension)
-        if support.displacement == "exact":
-            mark = np.zeros(len(mesh.points), dtype=bool)
-            mark[nodes] = True
-            at = np.flatnonzero(mark[virtual.node_parent])
-            values = exact.displacement(virtual.node_points[at], virtual.node_piece_points[at])
-        else:
-            values = np.zeros(scene.dimension)
-            values[list(held)] = support.displacement
-        supports = supports.prescribe(virtual, nodes, values, held)
-    return supports
-
-
-def loads_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> NDArray[np.float64]:
-    """Return the consistent nodal forces (N, d) of all loads, N (per metre in 2D)."""
-    load = np.zeros_like(virtual.node_points)
-    for i, entry in enumerate(scene.loads):
-        if isinstance(entry, Gravity):
-            assert scene.material.density is not None  # the scene has checked it
-            weight = scene.material.density * np.asarray(entry.acceleration)
-            load += body_force(virtual, weight)
-        elif isinstance(entry, Traction):
-            facets = _facets_on(scene, virtual.mesh, entry.where, f"loads[{i}].where")
-            load += _traction(virtual, facets, entry.traction, exact)
-        elif entry.force == "exact":
-            load += body_force(virtual, lambda points, sides: exact.body_force(points))
-        else:
-            load += body_force(virtual, entry.force)
-    return load
-
-
-def _traction(
-    virtual: VirtualMesh, facets: NDArray[np.int64], given: Any, exact: Any
-) -> NDArray[np.float64]:
-    if given != "exact":
-        return traction(virtual, facets, given)
-    mesh = virtual.mesh
-    normals = -mesh.gradients[facets[:, 0], facets[:, 1]]
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    load = np.zeros_like(virtual.node_points)
-    distinct, group = np.unique(np.round(normals, 12), axis=0, return_inverse=True)
-    for k, normal in enumerate(distinct):
-        load += traction(virtual, facets[group.ravel() == k], _stress_vector(exact, normal))
-    return load
-
-
-def _stress_vector(exact: Any, normal: NDArray[np.float64]) -> Density:
-    def density(points: NDArray[np.float64], sides: NDArray[np.int8]) -> NDArray[np.float64]:
-        vector: NDArray[np.float64] = np.einsum("qij,j->qi", exact.stress(points), normal)
-        return vector
-
-    return density
-
-
-def _boundary_nodes(mesh: SimplexMesh) -> NDArray[np.int64]:
-    cells, opposite = mesh.boundary_facets.T
-    on_facet = np.ones((len(cells), mesh.dim + 1), dtype=bool)
-    on_facet[np.arange(len(cells)), opposite] = False
-    return np.unique(mesh.cells[cells][on_facet])
-
-
-def _facets_on(scene: Scene, mesh: SimplexMesh, where: str, key: str) -> NDArray[np.int64]:
-    """Boundary facets whose nodes all lie on the part."""
-    nodes = _boundary_nodes(mesh)
-    mark = np.zeros(len(mesh.points), dtype=bool)
-    mark[nodes[on_part(scene, where, mesh.points[nodes], key)]] = True
-    facets = mesh.boundary_facets
-    inside = mark[mesh.cells[facets[:, 0]]]
-    inside[np.arange(len(facets)), facets[:, 1]] = True
-    chosen = facets[inside.all(axis=1)]
-    if not len(chosen):
-        raise InputError(f"{key}: no boundary facet lies in '{where}'", str(scene.file or ""))
-    return chosen
+def density_of(scene: Scene) -> float:
+    """Return the density in kg/m³; of a membrane times its thickness, in kg/m²."""
+    assert scene.material.density is not None  # the scene has checked it
+    return scene.material.density * (scene.material.thickness or 1.0)

@@ -1,0 +1,95 @@
+"""The boundary of a cut body, as supports and tractions need it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+from verify.scene import Scene
+from verify.scene.parts import on_part
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["boundary_nodes", "facet_parts", "facets_on", "own_corners"]
+
+_Ints = NDArray[np.int64]
+
+
+def boundary_nodes(mesh: SimplexMesh) -> _Ints:
+    """Nodes of the boundary of the uncut mesh, ascending."""
+    cells, opposite = mesh.boundary_facets.T
+    on_facet = np.ones((len(cells), mesh.dim + 1), dtype=bool)
+    on_facet[np.arange(len(cells)), opposite] = False
+    return np.unique(mesh.cells[cells][on_facet])
+
+
+def facets_on(scene: Scene, mesh: SimplexMesh, where: str, key: str) -> _Ints:
+    """Boundary facets (k, 2), as cell and opposite node, whose nodes all lie on a part.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    nodes = boundary_nodes(mesh)
+    mark = np.zeros(len(mesh.points), dtype=bool)
+    mark[nodes[on_part(scene, where, mesh.points[nodes], key)]] = True
+    facets = mesh.boundary_facets
+    inside = mark[mesh.cells[facets[:, 0]]]
+    inside[np.arange(len(facets)), facets[:, 1]] = True
+    chosen: _Ints = facets[inside.all(axis=1)]
+    if not len(chosen):
+        raise InputError(f"{key}: no boundary facet lies in '{where}'", str(scene.file or ""))
+    return chosen
+
+
+def own_corners(virtual: VirtualMesh) -> NDArray[np.bool_]:
+    """(N,) whether the node of an unknown lies in the material that the unknown moves.
+
+    Behind a cut it does not: the unknown belongs to a node that is beyond.
+    """
+    piece, _, in_cell = _solid(virtual)
+    own = np.zeros(virtual.node_count, dtype=bool)
+    simplex, vertex = np.nonzero(in_cell.max(axis=2) == 1.0)
+    own[virtual.cells[piece[simplex], in_cell[simplex, vertex].argmax(axis=1)]] = True
+    return own
+
+
+def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
+    """Parts of the boundary facets that are cut, each for every unknown that moves it.
+
+    Returns
+    -------
+    unknowns : (k,) int array
+        Unknown nodes at the nodes of a facet, on the side of the part.
+    points : (k, space) array
+        Centroid of the part, m.
+    """
+    mesh = virtual.mesh
+    piece, cell, in_cell = _solid(virtual)
+    cut = virtual.split[piece]
+    piece, cell, in_cell = piece[cut], cell[cut], in_cell[cut]
+    facets = mesh.boundary_facets
+    unknowns, points = [], []
+    corners = mesh.dim + 1
+    for local in range(corners):
+        wanted = np.zeros(len(mesh.cells), dtype=bool)
+        wanted[facets[facets[:, 1] == local, 0]] = True
+        here = np.flatnonzero(wanted[cell])
+        rest = [k for k in range(corners) if k != local]
+        for opposite in range(corners):
+            side = [k for k in range(corners) if k != opposite]
+            on_facet = here[(in_cell[here][:, side, local] == 0.0).all(axis=1)]
+            middle = in_cell[on_facet][:, side].mean(axis=1)
+            nodes = mesh.points[mesh.cells[cell[on_facet]]]
+            centroid = np.einsum("ki,kij->kj", middle, nodes)
+            unknowns.append(virtual.cells[piece[on_facet]][:, rest].ravel())
+            points.append(np.repeat(centroid, mesh.dim, axis=0))
+    return np.concatenate(unknowns), np.concatenate(points)
+
+
+def _solid(virtual: VirtualMesh) -> tuple[_Ints, _Ints, NDArray[np.float64]]:
+    """Simplices of the material in their own cells: piece, cell, barycentric corners there."""
+    piece, _, _ = virtual.solid_simplices
+    cell, in_cell = virtual.solid_places
+    home = virtual.parent[piece] == cell  # what a neighbour has absorbed has no unknowns there
+    return piece[home], cell[home], in_cell[home]

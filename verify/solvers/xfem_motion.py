@@ -1,0 +1,314 @@
+"""Motion of a cut body: stages between the openings of cuts, steps between the output times."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import InputError
+from verify.scene import Equilibrium, Gravity, Moving, Scene
+from verify.scene.history import factor_at, first_factor, jumps
+from verify.solvers.xfem_account import Account
+from verify.solvers.xfem_answer import Answer
+from verify.solvers.xfem_cuts import cuts_of
+from verify.solvers.xfem_loads import nodal_forces
+from verify.solvers.xfem_scene import density_of, material_of
+from verify.solvers.xfem_static import in_load_steps
+from verify.solvers.xfem_steps import MASSES, SCHEMES, largest_step
+from verify.solvers.xfem_supports import initial_supports, motion_of_supports
+from verify.xfem.corotational import InternalForce
+from verify.xfem.dynamics import (
+    DynamicBody,
+    Integrator,
+    MotionState,
+    RayleighDamping,
+    ancestors,
+    inherit_state,
+)
+from verify.xfem.dynamics.newton import NewtonIntegrator
+from verify.xfem.energy_ledger import EnergyLedger
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.slivers import SliverReport, treat_slivers
+from verify.xfem.supports import check_bodies
+from verify.xfem.virtual import VirtualMesh, cut_mesh
+
+__all__ = ["MotionChoice", "move"]
+
+_Floats = NDArray[np.float64]
+_SAME = 1e-12  # of the duration: times that close are one
+
+
+@dataclass(frozen=True)
+class MotionChoice:
+    """How a motion is computed: the parameters of the solver that concern it."""
+
+    scheme: str
+    mass: str
+    step_factor: float
+    tip: str
+    slivers: str
+
+
+def move(
+    scene: Scene, mesh: SimplexMesh, size: float, exact: Any, choice: MotionChoice, trial: bool
+) -> Answer:
+    """Integrate the motion of a dynamic scene.
+
+    Every output is on the mesh of the body with all its cuts: before a cut opens, what will be
+    its two sides moves together.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : SimplexMesh
+    size : float
+        Its element size, m.
+    exact : object or None
+        The exact solution that supports and loads may be taken from.
+    choice : MotionChoice
+    trial : bool
+        Whether to stop after the first step: what compiles, compiles in it.
+
+    Raises
+    ------
+    InputError
+        If the state of a body cannot be handed on to that which is cut further.
+    XfemError, StepFailedError, NotInEquilibriumError
+        From the library.
+    """
+    return _Mover(scene, mesh, size, exact, choice).run(trial)
+
+
+class _Mover:
+    """One motion, stage by stage."""
+
+    def __init__(
+        self, scene: Scene, mesh: SimplexMesh, size: float, exact: Any, choice: MotionChoice
+    ) -> None:
+        self.scene, self.mesh, self.exact, self.choice = scene, mesh, exact, choice
+        phases = ("enrichment", "loading", "initial state", "steps", "accounting")
+        self.timings = dict.fromkeys(phases, 0.0)
+        self.times = np.array(scene.analysis.output_times)
+        opens = [self._snapped(float(getattr(cut, "opens_at", 0.0))) for cut in scene.cuts]
+        order = np.argsort(opens, kind="stable")
+        cuts = cuts_of(scene, size)
+        # those that open first come first: what is cut further keeps what is cut already
+        self.cuts, self.opens = [cuts[k] for k in order], [opens[k] for k in order]
+        self.account = Account()
+        self.slivers: SliverReport | None = None
+        self.steps = self.solves = 0
+        self.step_sizes: set[float] = set()
+        self.said = ""
+
+    def run(self, trial: bool) -> Answer:
+        """Run all stages and carry the fields of each to the finally cut mesh."""
+        virtual = self._cut(0)
+        body = self._body(virtual)
+        state = self._initial(body)
+        starts = sorted({0.0, *self.opens})
+        fields: list[tuple[VirtualMesh, MotionState]] = []
+        for k, start in enumerate(starts):
+            count = sum(opens <= start for opens in self.opens)
+            if count:
+                further = self._cut(count)
+                state = self._inherited(virtual, further, state)
+                virtual, body = further, self._body(further)
+            last = k == len(starts) - 1
+            end = float(self.times[-1]) if last else starts[k + 1]
+            wanted = self.times[(self.times >= start) & ((self.times < end) | last)]
+            stage = self._stage(body, state, start, end, wanted, trial)
+            fields += [(virtual, output) for output in stage]
+            if trial:
+                break
+        return self._answer(virtual, fields)
+
+    def _snapped(self, time: float) -> float:
+        """Return the output time that is the same up to round-off, if there is one."""
+        nearest = float(self.times[np.abs(self.times - time).argmin()])
+        return nearest if abs(nearest - time) <= _SAME * self.times[-1] else time
+
+    def _cut(self, count: int) -> VirtualMesh:
+        """Cut the mesh along the first `count` cuts."""
+        clock = perf_counter()
+        tip: Any = self.choice.tip
+        policy: Any = self.choice.slivers
+        virtual = cut_mesh(self.mesh, self.cuts[:count], tip)
+        if count and policy != "keep":
+            virtual, self.slivers = treat_slivers(virtual, policy)
+        self.timings["enrichment"] += perf_counter() - clock
+        return virtual
+
+    def _body(self, virtual: VirtualMesh) -> DynamicBody:
+        """Give a cut mesh its elasticity, mass, supports and loads."""
+        clock = perf_counter()
+        scene, density = self.scene, density_of(self.scene)
+        mass = MASSES[self.choice.mass](virtual, density)
+        weight = np.zeros_like(virtual.node_points)
+        driven: list[tuple[_Floats, Any]] = []
+        for load, forces in nodal_forces(scene, virtual, self.exact):
+            if isinstance(load, Gravity):  # on the mass as it is lumped, so that all falls alike
+                weight += mass.weight(load.acceleration)
+            else:
+                driven.append((forces, load.history))
+
+        def load_at(time: float) -> _Floats:
+            total = np.zeros_like(weight)
+            for forces, history in driven:
+                total += factor_at(history, time) * forces
+            return total
+
+        body = DynamicBody(
+            InternalForce(virtual, material_of(scene), scene.analysis.kinematics),
+            mass,
+            weight,
+            load_at if driven else None,
+            motion_of_supports(scene, virtual, self.exact),
+            RayleighDamping(*scene.analysis.damping),
+        )
+        self.timings["loading"] += perf_counter() - clock
+        return body
+
+    def _initial(self, body: DynamicBody) -> MotionState:
+        """Return the state at the time 0, with every cut closed."""
+        clock = perf_counter()
+        state, initial = body.rest(), self.scene.initial
+        if isinstance(initial, Moving):
+            free = ~body.fixed
+            state.velocity[free] = _rigid_velocity(initial, body.force.virtual.node_points)[free]
+        elif isinstance(initial, Equilibrium):
+            state.displacement[:] = self._equilibrium(body)
+        self.timings["initial state"] += perf_counter() - clock
+        return state
+
+    def _equilibrium(self, body: DynamicBody) -> _Floats:
+        virtual = body.force.virtual
+        assert body.weight is not None
+        load = body.weight.copy()
+        for entry, forces in nodal_forces(self.scene, virtual, self.exact):
+            if not isinstance(entry, Gravity):
+                load += first_factor(entry.history) * forces
+
+        def prescribed(share: float) -> _Floats:
+            return initial_supports(self.scene, virtual, self.exact, share).values
+
+        check_bodies(virtual, initial_supports(self.scene, virtual, self.exact, 1.0))
+        found, _ = in_load_steps(body.force, body.fixed, prescribed, load, 0)
+        return found.displacement
+
+    def _inherited(
+        self, virtual: VirtualMesh, further: VirtualMesh, state: MotionState
+    ) -> MotionState:
+        try:
+            return inherit_state(virtual, further, state)
+        except XfemError as error:
+            raise InputError(
+                f"the state at {state.time:g} s cannot be handed on to the body that is cut "
+                f"further ({error}); slivers = 'keep' may help"
+            ) from None
+
+    def _stage(
+        self,
+        body: DynamicBody,
+        state: MotionState,
+        start: float,
+        end: float,
+        wanted: _Floats,
+        trial: bool,
+    ) -> list[MotionState]:
+        """Step from one opening to the next; return the states at the times that are wanted."""
+        scene, choice = self.scene, self.choice
+        largest, self.said = largest_step(
+            body,
+            material_of(scene),
+            density_of(scene),
+            choice.scheme,
+            choice.step_factor,
+            scene.analysis.time_step,
+        )
+        stops = np.unique([start, end, *wanted, *self._jumps(start, end)])
+        ledger = EnergyLedger(body, state)
+        integrators: dict[float, Integrator] = {}
+        outputs, instants, taken = [], [], 0
+        if start in wanted:
+            outputs, instants = [state.copy()], [0]
+        for a, b in pairwise(stops):
+            count = max(1, int(np.ceil((b - a) / largest * (1 - 1e-9))))
+            size = float(f"{(b - a) / count:.14g}")  # the same up to round-off: one integrator
+            self.step_sizes.add(size)
+            if size not in integrators:
+                integrators[size] = SCHEMES[choice.scheme](body, size)
+            for _ in range(1 if trial else count):
+                clock = perf_counter()
+                forces = integrators[size].step(state)
+                stepped = perf_counter()
+                ledger.record(state, forces)
+                self.timings["steps"] += stepped - clock
+                self.timings["accounting"] += perf_counter() - stepped
+                taken += 1
+            if trial:
+                break
+            if b in wanted:
+                outputs.append(state.copy())
+                instants.append(taken)
+        self.account.enter(ledger.close(), instants)
+        self.steps += taken
+        newton = [one for one in integrators.values() if isinstance(one, NewtonIntegrator)]
+        self.solves += sum(one.solves for one in newton)
+        return outputs
+
+    def _jumps(self, start: float, end: float) -> list[float]:
+        """Return the times between the two at which a load or a support jumps."""
+        parts = [*self.scene.supports, *self.scene.loads]
+        found = [t for part in parts for t in jumps(getattr(part, "history", None))]
+        tolerance = _SAME * float(self.times[-1])
+        apart = [t for t in found if np.abs(self.times - t).min() > tolerance]
+        return [t for t in apart if start + tolerance < t < end - tolerance]
+
+    def _answer(
+        self, virtual: VirtualMesh, fields: list[tuple[VirtualMesh, MotionState]]
+    ) -> Answer:
+        sources = {id(old): ancestors(old, virtual) for old, _ in fields if old is not virtual}
+        shape = (len(fields), *virtual.node_points.shape)
+        displacement, velocity = np.empty(shape), np.empty(shape)
+        for k, (old, state) in enumerate(fields):
+            source = sources.get(id(old), slice(None))
+            displacement[k], velocity[k] = state.displacement[source], state.velocity[source]
+        sizes = sorted(self.step_sizes)
+        notes = {
+            "scheme": self.choice.scheme,
+            "mass": self.choice.mass,
+            "time step": " … ".join(f"{s:.6g} s" for s in dict.fromkeys((sizes[0], sizes[-1])))
+            if sizes
+            else "none",
+            "step from": self.said,
+        }
+        iterations = {"steps": self.steps}
+        if self.solves:
+            iterations["newton"] = self.solves
+        return Answer(
+            virtual,
+            self.times[: len(fields)],
+            displacement,
+            velocity,
+            self.account.columns(),
+            self.timings,
+            iterations,
+            notes,
+            self.slivers,
+        )
+
+
+def _rigid_velocity(initial: Moving, points: _Floats) -> _Floats:
+    """Velocity (n, d) of points (n, d) of a rigid body, m/s."""
+    d = points.shape[1]
+    velocity = np.tile(np.asarray(initial.velocity or (0.0,) * d, dtype=float), (len(points), 1))
+    if initial.spin is None:
+        return velocity
+    arm = points - np.asarray(initial.centre or (0.0,) * d)
+    if d == 2:
+        return velocity + initial.spin * np.column_stack([-arm[:, 1], arm[:, 0]])
+    return velocity + np.cross(np.asarray(initial.spin, dtype=float), arm)

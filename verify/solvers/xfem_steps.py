@@ -1,0 +1,98 @@
+"""Schemes, masses and time steps that the XFEM adapter offers, by the names of its parameters."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from verify.errors import InputError
+from verify.xfem.critical_step import critical_step, element_critical_steps
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    ForwardEuler,
+    ImplicitEuler,
+    Integrator,
+    SymplecticEuler,
+    Trapezoidal,
+)
+from verify.xfem.elasticity import Material
+from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
+from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["MASSES", "SCHEMES", "largest_step"]
+
+SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
+    "newmark": Trapezoidal,
+    "implicit_euler": ImplicitEuler,
+    "energy_momentum": EnergyMomentum,
+    "central_differences": CentralDifferences,
+    "symplectic_euler": SymplecticEuler,
+    "forward_euler": ForwardEuler,
+}
+MASSES: dict[str, Callable[[VirtualMesh, float], Mass]] = {
+    "sidewise": side_wise_mass,
+    "consistent": consistent_mass,
+    "row_sum": lambda virtual, density: shifted_mass(virtual, density, "row sum"),
+    "hrz": lambda virtual, density: shifted_mass(virtual, density, "weighted diagonal"),
+    "thesis": lambda virtual, density: shifted_mass(virtual, density, "enrichment"),
+}
+_EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
+
+
+def largest_step(
+    body: DynamicBody,
+    material: Material,
+    density: float,
+    scheme: str,
+    factor: float,
+    asked: float | None,
+) -> tuple[float, str]:
+    """Return the largest time step, s, and where it comes from.
+
+    An explicit scheme takes `factor` times its critical step, or the step asked for if that is
+    smaller. An implicit one takes the step asked for, or else `factor` times the critical step of
+    the uncut elements: what an explicit scheme could follow.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    material : Material
+    density : float
+    scheme : str
+        One of `SCHEMES`.
+    factor : float
+    asked : float, optional
+        ``analysis.time_step`` of the scene, s.
+    """
+    explicit = scheme in _EXPLICIT
+    if not explicit and asked is not None:
+        return asked, "analysis.time_step"
+    critical = _critical(body, material, density, explicit)
+    found = factor * critical
+    said = f"{factor:g} of the critical step {critical:.4g} s"
+    if not np.isfinite(found) or found <= 0.0:
+        raise InputError(f"the critical step is {critical:g} s; give analysis.time_step")
+    if asked is not None and asked < found:
+        return asked, f"analysis.time_step; the critical step is {critical:.4g} s"
+    return found, said
+
+
+def _critical(body: DynamicBody, material: Material, density: float, explicit: bool) -> float:
+    virtual = body.force.virtual
+    if not explicit or body.mass.diagonal is not None:
+        # side-wise mass: no cut makes it smaller than that of the smallest uncut element
+        step = float(element_critical_steps(virtual.mesh, material, density).min())
+    else:
+        force: Any = body.force
+        blocks = force.stiffness(body.pattern, np.zeros(body.shape), "frozen")
+        step = critical_step(csr_array(body.pattern.matrix(blocks)), body.mass, body.fixed)
+    if not explicit:
+        return step
+    # damping is taken at the velocity half a step back: (1 + ξ²)^½ − ξ of the undamped step
+    highest = 2.0 / step
+    ratio = 0.5 * (body.damping.mass / highest + body.damping.stiffness * highest)
+    return step * float(np.hypot(1.0, ratio) - ratio)

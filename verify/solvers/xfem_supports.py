@@ -1,0 +1,118 @@
+"""Supports of a scene on the unknowns of a cut body, each on its own side of the cuts."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.scene import Scene, Support
+from verify.scene.history import factor_at, first_factor, slope_at
+from verify.scene.parts import lie_on_part, on_part
+from verify.solvers.xfem_boundary import boundary_nodes, facet_parts, own_corners
+from verify.xfem.dynamics import MovingSupports
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["initial_supports", "motion_of_supports", "supports_of"]
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Unknowns (k,) that a support holds, and their displacement where the scene says 'exact'."""
+
+    support: Support
+    unknowns: NDArray[np.int64]
+    components: tuple[int, ...]
+    points: _Floats
+    exact: _Floats | None
+
+    def values(self, factor: float) -> _Floats:
+        """Prescribed displacement (k, held), m."""
+        if self.exact is not None:
+            return factor * self.exact
+        return self.support.values(self.points, factor)
+
+    def rates(self, factor: float) -> _Floats:
+        """Return the derivative (k, held) of the values by the factor, m."""
+        return self.exact if self.exact is not None else self.support.rates(self.points, factor)
+
+
+def supports_of(scene: Scene, virtual: VirtualMesh, exact: Any, share: float = 1.0) -> Supports:
+    """Return the supports of a static scene; a later one wins where two hold the same node.
+
+    A field with jumps is taken at each unknown node on the side of its own material. A `share`
+    below 1 is a point of the path on which a large displacement is prescribed.
+    """
+    held = _held(scene, virtual, exact)
+    return Supports(*_filled(virtual, held, [one.values(share) for one in held]))
+
+
+def initial_supports(scene: Scene, virtual: VirtualMesh, exact: Any, share: float) -> Supports:
+    """Supports with `share` of the first factor of their history."""
+    held = _held(scene, virtual, exact)
+    values = [one.values(share * first_factor(one.support.history)) for one in held]
+    return Supports(*_filled(virtual, held, values))
+
+
+def motion_of_supports(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports | MovingSupports:
+    """Supports of a dynamic scene: moving ones if one has a history."""
+    held = _held(scene, virtual, exact)
+    fixed, values = _filled(virtual, held, [one.values(1.0) for one in held])
+    histories = [one.support.history for one in held]
+    if not any(histories):
+        return Supports(fixed, values)
+
+    def motion(time: float) -> tuple[_Floats, _Floats]:
+        factors = [factor_at(history, time) for history in histories]
+        slopes = [slope_at(history, time) for history in histories]
+        where = [one.values(f) for one, f in zip(held, factors, strict=True)]
+        speed = [s * one.rates(f) for one, f, s in zip(held, factors, slopes, strict=True)]
+        return _filled(virtual, held, where)[1], _filled(virtual, held, speed)[1]
+
+    return MovingSupports(fixed, motion)
+
+
+def _filled(
+    virtual: VirtualMesh, held: list[_Held], values: list[_Floats]
+) -> tuple[NDArray[np.bool_], _Floats]:
+    fixed = np.zeros(virtual.node_points.shape, dtype=bool)
+    filled = np.zeros(virtual.node_points.shape)
+    for one, value in zip(held, values, strict=True):
+        place = np.ix_(one.unknowns, one.components)
+        fixed[place], filled[place] = True, value
+    return fixed, filled
+
+
+def _held(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[_Held]:
+    """Find what each support holds.
+
+    A node of the boundary is on a part by its place, and so is every unknown whose material
+    reaches that node. The other unknowns there belong to material beyond a cut: they are held if
+    the boundary of *that* material is on the part. So a part may end at a cut, and a cut close to
+    a support frees what is behind it.
+    """
+    mesh = virtual.mesh
+    boundary = boundary_nodes(mesh)
+    unknowns, parts = facet_parts(virtual)
+    own = own_corners(virtual)
+    beyond = ~own[unknowns]
+    unknowns, parts = unknowns[beyond], parts[beyond]
+    size = float(np.ptp(mesh.points, axis=0).max())
+    found = []
+    for i, support in enumerate(scene.supports):
+        key = f"supports[{i}].where"
+        on_place = np.zeros(len(mesh.points), dtype=bool)
+        on_place[boundary[on_part(scene, support.where, mesh.points[boundary], key)]] = True
+        mark = own & on_place[virtual.node_parent]
+        mark[unknowns[lie_on_part(scene, support.where, parts, size)]] = True
+        at = np.flatnonzero(mark)
+        components = support.held(scene.dimension)
+        values = None
+        if support.displacement == "exact":
+            points, near = virtual.node_points[at], virtual.node_piece_points[at]
+            values = exact.displacement(points, near)[:, list(components)]
+        found.append(_Held(support, at, components, virtual.node_points[at], values))
+    return found
