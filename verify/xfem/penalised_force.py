@@ -88,3 +88,18 @@ class PenalisedForce(InternalForce):
         """Add `scale` times the stiffness of material and penalty to the nodal blocks."""
         super().add_stiffness(pattern, blocks, scale, kind, displacement)
         self.ghost.add_stiffness(pattern, blocks, scale)
+
+    def linearise(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats,
+        velocity: _Floats,
+        implicit: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+    ) -> None:
+        """Overwrite force and stiffness of a semi-implicit step, the penalty's included."""
+        self.evaluate(displacement, force, velocity, implicit)
+        blocks[:] = 0.0
+        self.add_stiffness(pattern, blocks, scale)
