@@ -47,7 +47,7 @@ def constrained_values(
             near = space.centroids[owner[chosen]]
             value[np.ix_(nodes[chosen], held)] = exact.displacement(points[chosen], near)[:, held]
         else:
-            value[np.ix_(nodes[chosen], held)] = np.asarray(support.displacement, dtype=float)
+            value[np.ix_(nodes[chosen], held)] = support.values(points[chosen])
     _check_every_piece_is_held(scene, space, value)
     flat = value.ravel()
     unknowns = np.flatnonzero(~np.isnan(flat)).astype(np.int32)
