@@ -30,6 +30,17 @@ def declared(*groups):
     return names - {"cutting_verification"}
 
 
+def imported_by(file):
+    """Return the top-level names that a Python file imports."""
+    names = set()
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names.add(node.module.split(".")[0])
+    return names
+
+
 def imported(*folders):
     """Return the third-party top-level names that the Python files in the folders import."""
     names, own = set(), {"verify", "reference"}
@@ -37,16 +48,17 @@ def imported(*folders):
         for file in (ROOT / folder).rglob("*.py"):
             if folder == "tests":
                 own.add(file.stem)  # tests import the modules beside them
-            for node in ast.walk(ast.parse(file.read_bytes())):
-                if isinstance(node, ast.Import):
-                    names |= {alias.name.split(".")[0] for alias in node.names}
-                elif isinstance(node, ast.ImportFrom):
-                    names.add(node.module.split(".")[0])
+            names |= imported_by(file)
     return names - own - set(sys.stdlib_module_names)
 
 
 def test_framework_imports_only_its_base_dependencies():
-    assert imported("verify") - {"pytest"} <= declared(None)
+    assert imported("verify") - {"pytest", "distributed"} <= declared(None)
+
+
+def test_only_what_runs_on_a_cluster_imports_dask():
+    importing = {f.name for f in (ROOT / "verify").rglob("*.py") if "distributed" in imported_by(f)}
+    assert importing == {"cluster.py", "remote.py"}
 
 
 def test_only_the_pytest_plugin_imports_pytest():

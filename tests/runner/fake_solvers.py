@@ -132,3 +132,14 @@ class HangingOnLevelOne(Instant):
 class Brittle(Instant):
     def __init__(self):
         raise RuntimeError("no licence")
+
+
+class HangingOnce(Instant):
+    """Hangs on level 1 the first time, and says so in a file; solves it the second time."""
+
+    def solve(self, scene, level, repetitions=1, **parameters):
+        mark = Path(os.environ["HANG_MARK"])
+        if level == 1 and not mark.exists():
+            mark.write_text(str(os.getpid()))
+            time.sleep(600)
+        return super().solve(scene, level, repetitions)

@@ -177,6 +177,10 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "--strict", action="store_true", help="undecided verdicts and refusals: exit code 5"
     )
     command.add_argument(
+        "--cluster", metavar="ADDRESS",
+        help="solve on the workers of the Dask scheduler at tcp://HOST:PORT or in this file",
+    )  # fmt: skip
+    command.add_argument(
         "--references", metavar="BUNDLE", type=Path,
         help="judge by the references in this file (`verify cache export`); solve none",
     )  # fmt: skip

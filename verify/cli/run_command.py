@@ -35,6 +35,7 @@ def execute(arguments: argparse.Namespace) -> int:
         memory=arguments.memory * 1e9 if arguments.memory else None,
         cache=None if arguments.no_cache else cache_folder(),
         references=arguments.references,
+        cluster=arguments.cluster,
     )
     with progress_on(sys.stderr) as progress:
         try:

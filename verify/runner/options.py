@@ -34,6 +34,8 @@ class Options:
         Folder of references that were solved before; None: every run solves its own.
     references : Path or None
         A bundle of references, which judges instead of solving any.
+    cluster : str or None
+        Scheduler of a Dask cluster whose workers solve; None: processes of this machine do.
     """
 
     solvers: tuple[str, ...] = ()
@@ -44,6 +46,7 @@ class Options:
     memory: float | None = None
     cache: Path | None = None
     references: Path | None = None
+    cluster: str | None = None
 
     def of_result(self) -> dict[str, Any]:
         """Return those that change what is computed; a resumed run must have the same."""

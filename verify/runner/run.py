@@ -13,7 +13,9 @@ from verify.provenance import provenance
 from verify.result import CaseResult, SolveRecord, Status, read_result
 from verify.runner.checking import check_scene
 from verify.runner.child import POLL_SECONDS, Child, Ending
+from verify.runner.cluster import ClusterEngine
 from verify.runner.directory import RunDirectory, claimed, write_run
+from verify.runner.engine import Engine, LocalEngine, Running
 from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.interruption import StopRequest, listening
 from verify.runner.job import Job, store_record, stored_record
@@ -90,6 +92,9 @@ def run_cases(
         "options_of_result": options.of_result(),
     }
     bundle = ReferenceBundle(options.references) if options.references else None
+    cluster = (
+        ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
+    )
     with listening() as stop:
         survey = survey_solvers(scenes, options, stop, bundle)
         with claimed(out, identity) as directory:
@@ -104,7 +109,7 @@ def run_cases(
             }
             write_run(directory, record)
             plans = [plan_case(scene, options, survey, directory, bundle) for scene in scenes]
-            work = _Work(plans, directory, options, origin, progress, bundle)
+            work = _Work(plans, directory, options, origin, progress, bundle, cluster)
             results = work.until_done(stop)
             write_run(directory, {**record, "finished": _now()})
     return RunSummary(out, results, work.reused)
@@ -121,6 +126,7 @@ class _Work:
         origin: dict[str, Any],
         progress: Progress,
         bundle: ReferenceBundle | None,
+        cluster: ClusterEngine | None,
     ) -> None:
         self.bundle, self.cache = bundle, ReferenceCache(options.cache) if options.cache else None
         self.directory, self.options, self.origin = directory, options, origin
@@ -129,10 +135,12 @@ class _Work:
         self.waiting: list[Job] = [job for plan in plans for job in plan.jobs]
         self.open = {name: len(plan.jobs) for name, plan in self.plans.items()}
         self.to_judge = [name for name, count in self.open.items() if not count]
-        self.running: dict[Child, Job | str] = {}  # a job, or the case that is compared
+        self.running: dict[Running, Job] = {}
+        self.comparing: dict[Child, str] = {}
         self.results: dict[str, CaseResult] = {}
         side_by_side = max(1, min(options.jobs, len(self.waiting)))
         self.memory = options.memory or 0.8 * origin["memory"] / side_by_side
+        self.engine: Engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)
 
     def until_done(self, stop: StopRequest) -> list[CaseResult]:
         """Run everything; kill what runs if that is interrupted or fails."""
@@ -143,20 +151,35 @@ class _Work:
         try:
             for plan in self.plans.values():
                 self._prepare(plan)
-            while self.waiting or self.to_judge or self.running:
+            while self.waiting or self.to_judge or self.running or self.comparing:
                 stop.check()
-                while len(self.running) < self.options.jobs and (self.waiting or self.to_judge):
+                while self._has_room():
                     self._start()
-                for child, what in list(self.running.items()):
-                    ending = child.poll()
-                    if ending is not None:
-                        del self.running[child]
-                        self._ended(child, what, ending)
+                for solve, job in list(self.running.items()):
+                    if (ending := solve.poll()) is not None:
+                        del self.running[solve]
+                        self._ended(job, solve, ending)
+                for child, case in list(self.comparing.items()):
+                    if (ending := child.poll()) is not None:
+                        del self.comparing[child]
+                        self._judged(case, child, ending)
                 sleep(POLL_SECONDS)
         finally:
-            for child in self.running:
-                child.kill()
+            for started in (*self.running, *self.comparing):
+                started.kill()
+            self.engine.close()
         return [self.results[name] for name in self.plans]
+
+    def _has_room(self) -> bool:
+        """Whether something can be started: comparisons run here, solves where the engine is."""
+        if self._can_compare():
+            return True
+        beside = 0 if self.options.cluster else len(self.comparing)
+        return bool(self.waiting) and len(self.running) + beside < self.engine.width
+
+    def _can_compare(self) -> bool:
+        here = len(self.comparing) + (0 if self.options.cluster else len(self.running))
+        return bool(self.to_judge) and here < self.options.jobs
 
     def _prepare(self, plan: CasePlan) -> None:
         folder = self.directory.case_folder(plan.scene.name)
@@ -168,7 +191,7 @@ class _Work:
             self.progress.solved(job.label, record, reused=False)
 
     def _start(self) -> None:
-        if self.to_judge:
+        if self._can_compare():
             self._judge(self.to_judge.pop(0))
             return
         job = self.waiting.pop(0)
@@ -184,24 +207,15 @@ class _Work:
             store_record(job, record)
             self._solve_done(job, record, reused=True)
             return
-        write_json(
-            {
-                "scene": scene_content(self.plans[job.case].scene),
-                "solver": job.solver,
-                "level": job.level,
-                "repetitions": job.repetitions,
-                "parameters": job.parameters,
-            },
-            job.folder / "job.json",
-        )
-        child = Child(
-            "verify.runner.solve",
-            job.folder / "job.json",
-            job.folder / "log.txt",
-            self.options.timeout,
-            self.memory,
-        )
-        self.running[child] = job
+        content = {
+            "scene": scene_content(self.plans[job.case].scene),
+            "solver": job.solver,
+            "level": job.level,
+            "repetitions": job.repetitions,
+            "parameters": job.parameters,
+        }
+        write_json(content, job.folder / "job.json")
+        self.running[self.engine.start(content, job.folder)] = job
         self.progress.started(job.label)
 
     def _known(self, job: Job) -> SolveRecord | None:
@@ -213,19 +227,16 @@ class _Work:
             return self.bundle.take(scene, job)
         return self.cache.take(scene, job) if self.cache is not None else None
 
-    def _ended(self, child: Child, what: Job | str, ending: Ending) -> None:
-        if isinstance(what, str):
-            self._judged(what, child, ending)
-            return
-        record = self._record(what, child, ending)
-        if what.solver == REFERENCE and self.cache is not None:
-            trouble = self.cache.keep(self.plans[what.case].scene, what, record)
+    def _ended(self, job: Job, solve: Running, ending: Ending) -> None:
+        record = self._record(job, solve, ending)
+        if job.solver == REFERENCE and self.cache is not None:
+            trouble = self.cache.keep(self.plans[job.case].scene, job, record)
             if trouble:
                 record.notes["cache"] = trouble
-        store_record(what, record)
-        self._solve_done(what, record, reused=False)
+        store_record(job, record)
+        self._solve_done(job, record, reused=False)
 
-    def _record(self, job: Job, child: Child, ending: Ending) -> SolveRecord:
+    def _record(self, job: Job, child: Running, ending: Ending) -> SolveRecord:
         outcome: dict[str, Any] = {}
         if not ending.killed_for and (job.folder / "outcome.json").exists():
             outcome = read_json(job.folder / "outcome.json")
@@ -239,7 +250,7 @@ class _Work:
             record.notes["timing"] = note
         return record
 
-    def _death(self, child: Child, ending: Ending) -> tuple[Status, str]:
+    def _death(self, child: Running, ending: Ending) -> tuple[Status, str]:
         """Explain an end without an outcome."""
         if ending.killed_for == "timeout":
             return Status.TIMEOUT, f"killed after {self.options.timeout:g} s"
@@ -253,6 +264,8 @@ class _Work:
         return Status.FAILED, f"{said} ({how})"
 
     def _contention(self) -> str:
+        if self.options.cluster:
+            return f"on a worker of {self.options.cluster}: other solves may have run beside it"
         if self.options.jobs > 1:
             return f"contended: up to {self.options.jobs} processes at the same time"
         if self.origin["load"] > self.origin["cores"]:
@@ -289,7 +302,7 @@ class _Work:
             max(self.options.timeout, 60.0),
             self.memory,
         )
-        self.running[child] = case
+        self.comparing[child] = case
         self.progress.started(f"{case} · comparison")
 
     def _judged(self, case: str, child: Child, ending: Ending) -> None:

@@ -1,0 +1,103 @@
+"""The same run on a Dask cluster of two workers, one of which is killed: nothing is lost."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("distributed")
+
+
+def wait_for(condition, what, seconds=90):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.05)
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def parent(pid):
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+
+@pytest.fixture
+def cluster(verify):
+    """A scheduler and two workers of one thread each; its scheduler file."""
+    place, mark = verify.folder / "scheduler.json", verify.folder / "mark"
+    environment = {
+        **verify.environment,
+        "HANG_MARK": str(mark),
+        "COUNT_SOLVES": str(verify.folder / "solves"),
+        "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "5s",
+    }
+    started = []
+
+    def start(*words):
+        log = (verify.folder / f"dask-{len(started)}.log").open("wb")
+        command = [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]]
+        options = ["--no-dashboard", "--scheduler-file", str(place)]
+        started.append(
+            subprocess.Popen([*command, *options], env=environment, stdout=log, stderr=log)
+        )
+
+    start("dask_scheduler", "--port", "0", "--host", "127.0.0.1")
+    wait_for(place.exists, "the scheduler does not start")
+    for _ in range(2):
+        start("dask_worker", "--nthreads", "1", "--no-nanny", "--host", "127.0.0.1")
+    yield place
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def run(verify, cluster, solver):
+    return verify.start(
+        "run", "square.toml", "--out", "out", "--solver", solver, "--cluster", str(cluster)
+    )
+
+
+def test_a_killed_worker_loses_nothing(verify, cluster):
+    mark = verify.folder / "mark"
+    process = run(verify, cluster, "fake_solvers:HangingOnce")
+    wait_for(lambda: mark.exists() and mark.read_text(), "no worker took the solve")
+    solving = int(mark.read_text())
+    os.kill(parent(solving), signal.SIGKILL)
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    records = verify.records()
+    assert {key: r["status"] for key, r in records.items()} == {
+        ("HangingOnce", 0): "solved",
+        ("HangingOnce", 1): "solved",
+    }
+    assert all("worker" in r["notes"] for r in records.values())
+    wait_for(lambda: not alive(solving), "the solve outlived its worker")
+    solves = (verify.folder / "solves").read_text().splitlines()
+    assert len(solves) == 2  # what the dead worker had finished was not solved again
+
+
+def test_a_stopped_run_leaves_nothing_running_on_the_workers(verify, cluster):
+    mark = verify.folder / "mark"
+    process = run(verify, cluster, "fake_solvers:HangingOnce")
+    wait_for(lambda: mark.exists() and mark.read_text(), "no worker took the solve")
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    wait_for(lambda: not alive(int(mark.read_text())), "the solve outlived its run", 20)
+
+
+def test_no_scheduler_is_one_line_and_writes_nothing(verify):
+    done = verify("run", "square.toml", "--out", "out", "--cluster", "tcp://127.0.0.1:9")
+    assert done.returncode == 2
+    assert done.stderr.startswith("verify: error: --cluster: no scheduler answers at")
+    assert len(done.stderr.splitlines()) == 1
+    assert not (verify.folder / "out").exists()
