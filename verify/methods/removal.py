@@ -7,7 +7,6 @@ tetrahedralisation: application to real-time surgical simulation*, Medical Image
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.methods.cut_body import Change, CutBody, make_body
+from verify.methods.opened_mesh import OpenedMesh, conforming_to
 from verify.methods.refinement import bisect_cells
 from verify.methods.whole_cells import whole_cells
 from verify.xfem.cuts import Cut
@@ -23,7 +23,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.piece_contacts import face_contacts
 from verify.xfem.split import TipRule
-from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["removal", "removal_refined"]
@@ -34,6 +33,7 @@ _Bools = NDArray[np.bool_]
 
 # A cell of which the cut takes off less than this share is not touched: the cut runs along a face.
 _TOUCHED = 1e-9
+_UNITS = {2: "m²", 3: "m³"}
 
 
 def removal(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "through") -> CutBody:
@@ -112,19 +112,34 @@ def _remove(
     debris = _debris(whole_cells(cut, kept), bodies[kept], touched)
     remaining = kept.copy()
     remaining[np.flatnonzero(kept)[debris]] = False
-    virtual = _without_hinges(whole_cells(cut, remaining))
+    cells, node_parent = _without_hinges(whole_cells(cut, remaining))
+    parents = cut.parent[remaining]
+    outer = np.zeros(mesh.cells.shape, dtype=bool)
+    outer[tuple(mesh.boundary_facets.T)] = True
+    opened = OpenedMesh(mesh.points[node_parent], cells, np.argwhere(outer[parents]))
+    virtual = cut_mesh(opened, [])
     seconds = {"cutting": perf_counter() - start}
-    volume = mesh.measures
-    lost = volume[cut.parent[kept & ~remaining]].sum()
+    lost = mesh.measures[cut.parent[kept & ~remaining]].sum()
+    gone = float(mesh.measures[touched].sum())
     changes += [
-        Change("touched cell removed", int(touched.sum()), float(volume[touched].sum()), "m^d"),
-        Change("cell removed as debris", int(debris.sum()), float(lost), "m^d"),
+        Change("touched cell removed, volume in all", int(touched.sum()), gone, _UNITS[mesh.dim]),
+        Change(
+            "cell removed as debris, volume in all",
+            int(debris.sum()),
+            float(lost),
+            _UNITS[mesh.dim],
+        ),
     ]
-    shown = subdivide(virtual)
-    facets = np.concatenate([shown.cut_facets, _gap_facets(virtual)])
-    conforming = replace(shown, cut_facets=facets, cell_parent=origin[shown.cell_parent])
+    faces = np.argwhere((opened.neighbours < 0) & ~outer[parents])
+    on_face = np.arange(mesh.dim + 1) != faces[:, 1:]
+    facets = opened.points[opened.cells[faces[:, 0]][on_face].reshape(-1, mesh.dim)]
     return make_body(
-        given, virtual, tuple(changes), conforming=conforming, cell_origin=origin, seconds=seconds
+        given,
+        virtual,
+        tuple(changes),
+        conforming=conforming_to(opened, origin[parents], facets),
+        cell_origin=origin[parents],
+        seconds=seconds,
     )
 
 
@@ -160,8 +175,8 @@ def _debris(virtual: VirtualMesh, bodies: _Ints, touched: _Bools) -> _Bools:
     return loose[part]
 
 
-def _without_hinges(virtual: VirtualMesh) -> VirtualMesh:
-    """Double the unknowns at which cells meet that are not joined across faces."""
+def _without_hinges(virtual: VirtualMesh) -> tuple[_Ints, _Ints]:
+    """Cells (p, d + 1) joined across faces only, and the mesh node of each of their nodes."""
     corners = virtual.cells.shape[1]
     first, second = face_contacts(virtual)
     pair, a, b = np.nonzero(virtual.cells[first][:, :, None] == virtual.cells[second][:, None, :])
@@ -174,21 +189,4 @@ def _without_hinges(virtual: VirtualMesh) -> VirtualMesh:
     order = np.argsort(old, kind="stable")
     number = np.empty_like(order)
     number[order] = np.arange(len(order))
-    return replace(
-        virtual,
-        cells=number[group].reshape(-1, corners),
-        node_parent=virtual.node_parent[old[order]],
-        node_side=virtual.node_side[old[order]],
-    )
-
-
-def _gap_facets(virtual: VirtualMesh) -> _Floats:
-    """(f, d, d) corners of the faces towards removed cells."""
-    mesh = virtual.mesh
-    there = np.zeros(len(mesh.cells), dtype=bool)
-    there[virtual.parent] = True
-    across = mesh.neighbours[virtual.parent]
-    piece, opposite = np.nonzero((across >= 0) & ~there[across])
-    on_facet = np.arange(mesh.dim + 1) != opposite[:, None]
-    nodes = mesh.cells[virtual.parent[piece]][on_facet].reshape(-1, mesh.dim)
-    return mesh.points[nodes]
+    return number[group].reshape(-1, corners), virtual.node_parent[old[order]]

@@ -1,7 +1,8 @@
 """Cutting by subdivision: cells are split into simplices along the cut, slivers and all.
 
 The template that splits a simplex by a plane, with the same diagonals on both sides of every
-quadrilateral face, is that of `verify.xfem.clipping` (by ascending node number). Bielser, Glardon,
+quadrilateral face, is that of `verify.xfem.clipping` (by ascending node number; nodes are numbered
+by their coordinates first, so that their numbers as given do not matter). Bielser, Glardon,
 Teschner & Gross, *A state machine for real-time cutting of tetrahedral meshes*, Graphical Models
 66 (2004); with snapping of near nodes before it: Nienhuys & van der Stappen 2001, Steinemann,
 Harders, Gross & Szekely, *Hybrid cutting of deformable solids*, IEEE VR 2006, and in the plane
@@ -12,18 +13,17 @@ from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array
 
 from verify.methods.cut_body import Change, CutBody, make_body
 from verify.methods.nodal_cut import NodalCut
-from verify.methods.opened_mesh import OpenedMesh
+from verify.methods.opened_mesh import OpenedMesh, conforming_to, facets_without_twin
 from verify.methods.snapped_mesh import SnappedMesh, snap_nodes, take_near_nodes
 from verify.methods.tip_points import add_tip_points
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import TipRule
-from verify.xfem.subdivision import Subdivision, subdivide
+from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh
 
 __all__ = ["snapping_subdivision", "subdivision"]
@@ -95,25 +95,30 @@ def _split(
     mesh: SimplexMesh, snapped: SnappedMesh, tip: TipRule, origin: np.ndarray, seconds: dict
 ) -> CutBody:
     start = perf_counter()
-    parts = subdivide(cut_mesh(snapped.mesh, snapped.cuts, tip))
+    placed, cuts = _by_place(snapped)
+    parts = subdivide(cut_mesh(placed, cuts, tip))
     try:
-        opened = OpenedMesh(parts.points, parts.cells)
+        outer = facets_without_twin(parts.points, parts.cells)
     except XfemError as error:
         raise XfemError(f"subdivision along these cuts leaves no valid mesh: {error}") from None
+    opened = OpenedMesh(parts.points, parts.cells, outer)
     virtual = cut_mesh(opened, [])
     seconds["cutting"] = perf_counter() - start
+    parents = origin[parts.cell_parent]
     return make_body(
         mesh,
         virtual,
         tuple(snapped.changes),
-        conforming=Subdivision(
-            points=opened.points,
-            cells=opened.cells,
-            cell_piece=np.arange(len(opened.cells)),
-            cell_parent=origin[parts.cell_parent],
-            interpolation=csr_array(eye_array(len(opened.points))),
-            cut_facets=parts.cut_facets,
-        ),
-        cell_origin=origin[parts.cell_parent],
+        conforming=conforming_to(opened, parents, parts.cut_facets),
+        cell_origin=parents,
         seconds=seconds,
     )
+
+
+def _by_place(snapped: SnappedMesh) -> tuple[SimplexMesh, list[NodalCut]]:
+    """Nodes numbered by their coordinates: the template's diagonals follow node numbers."""
+    order = np.lexsort(snapped.mesh.points.T)
+    number = np.empty_like(order)
+    number[order] = np.arange(len(order))
+    mesh = SimplexMesh(snapped.mesh.points[order], number[snapped.mesh.cells])
+    return mesh, [NodalCut(cut.cut, mesh.points, cut.values[order]) for cut in snapped.cuts]

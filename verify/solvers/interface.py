@@ -16,6 +16,15 @@ __all__ = ["Solver", "find_solver", "solver_names"]
 _BUILT_IN = {
     "xfem": "verify.solvers.xfem:XfemSolver",
     "conforming": "verify.solvers.conforming:ConformingSolver",
+    "subdivision": "verify.solvers.methods_adapter:SubdivisionSolver",
+    "snapping": "verify.solvers.methods_adapter:SnappingSolver",
+    "snapping_subdivision": "verify.solvers.methods_adapter:SnappingSubdivisionSolver",
+    "removal": "verify.solvers.methods_adapter:RemovalSolver",
+    "removal_refined": "verify.solvers.methods_adapter:RemovalRefinedSolver",
+    "virtual_node": "verify.solvers.methods_adapter:VirtualNodeSolver",
+    "virtual_node_arbitrary": "verify.solvers.methods_adapter:VirtualNodeArbitrarySolver",
+    "mass_spring": "verify.solvers.methods_adapter:MassSpringSolver",
+    "uncut": "verify.solvers.methods_adapter:UncutSolver",
     "reference": "verify.solvers.conforming:ReferenceSolver",
 }
 _GROUP = "verify.solvers"
