@@ -28,7 +28,7 @@ __all__ = [
     "stiffness_form",
 ]
 
-# Unknowns in space up to which MUMPS is quicker than multigrid, measured (in the plane it always is)
+# Unknowns in space up to which MUMPS was measured to be quicker (in the plane it always is)
 _MOST_DIRECT = 30_000
 
 

@@ -140,7 +140,7 @@ def solve_by_multigrid(
         left = _residual(matrix, x, vector, residual) / (loads or 1.0)
         before.aypx(-1.0, x)
         size = float(before.norm() / (x.norm() or 1.0))
-        if left <= tolerance or int(solver.getConvergedReason()) < 0:
+        if left <= tolerance or _failed(solver):
             break
     reason = solver.getConvergedReason()
     for entry in (solver, residual, before, near, *modes):
@@ -178,6 +178,10 @@ def _orthonormal(matrix: Any, motions: NDArray[np.float64]) -> list[Any]:
         vector.normalize()
         modes.append(vector)
     return modes
+
+
+def _failed(solver: Any) -> bool:
+    return bool(solver.getConvergedReason() < 0)
 
 
 def _residual(matrix: Any, x: Any, vector: Any, out: Any) -> float:

@@ -1,6 +1,6 @@
 """Element sizes: uniform, or graded to the singular points of the scene."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -39,10 +39,10 @@ class Grading:
     strip : float, optional
         Element size over the width of the strip between two features that come close to each
         other; none leaves such strips to the other sizes.
-    edges : (s, 2, 3) array
-        In space: singular edges of the body, by their ends, m. The fronts of the cuts need not be
-        said. With exponent ⅔, where quadratic elements reach order 3 in energy around an edge, the
-        unknowns grow by no more than h⁻³ (but for a logarithm).
+    curves : bool
+        In space: whether to grade to fronts, kinks and junctions of the cuts and to the edges
+        where supports end. With exponent ⅔, where quadratic elements reach order 3 in energy
+        around an edge, the unknowns grow by no more than h⁻³ (but for a logarithm).
     """
 
     size: float
@@ -50,7 +50,7 @@ class Grading:
     radius: float = 1.0
     exponent: float = 0.8
     strip: float | None = None
-    edges: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    curves: bool = False
 
     @property
     def smallest(self) -> float:

@@ -5,6 +5,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.meshing.box_lines import clamped_edges, part_lines
 from reference.meshing.edge_splitting import mesh_edges, split_edges
 from reference.meshing.grading import Grading
 from reference.meshing.opening import ConformingMesh, doubled_nodes, open_cut
@@ -28,8 +29,7 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
     scene : Scene
         A box with cut surfaces; they may end inside, cross, branch and reach beyond the body.
     grading : Grading
-        Element sizes; graded to the fronts, kinks and junctions of the cuts, and to the edges
-        `grading.edges`.
+        Element sizes.
 
     Raises
     ------
@@ -41,14 +41,17 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
     # gmsh's tolerances are absolute: mesh a body of size one
     scale = float((upper - lower).max())
     where = str(scene.file or "")
+    lines = part_lines(scene)
     try:
         with gmsh_session() as gmsh:
             body = int(gmsh.model.occ.addBox(0, 0, 0, *((upper - lower) / scale)))
             faces = [tag for cut in scene.cuts for tag in add_surface(gmsh, cut, lower, scale)]
-            cut = imprint_surfaces(gmsh, body, faces)
+            cut = imprint_surfaces(gmsh, body, faces, _add_lines(gmsh, (lines - lower) / scale))
             if scene.cuts and not cut.faces:
                 raise InputError("cuts: none of them lies inside the body", where)
-            graded = [*cut.singular, *_curves_along(gmsh, (grading.edges - lower) / scale)]
+            graded = []
+            if grading.curves:
+                graded = [*cut.singular, *_clamped(gmsh, scene, cut, lower, scale)]
             _set_sizes(gmsh, grading, graded, scale)
             gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
             gmsh.model.mesh.generate(3)
@@ -82,15 +85,28 @@ def _set_sizes(gmsh: ModuleType, grading: Grading, curves: list[int], scale: flo
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
 
-def _curves_along(gmsh: ModuleType, segments: Array) -> list[int]:
-    """Curves of the model that lie on one of the segments (s, 2, 3)."""
-    lows, highs = segments.min(axis=1) - 1e-6, segments.max(axis=1) + 1e-6  # gmsh pads by 1e-7
+def _add_lines(gmsh: ModuleType, segments: Array) -> list[int]:
+    occ = gmsh.model.occ
+    return [int(occ.addLine(occ.addPoint(*a), occ.addPoint(*b))) for a, b in segments]
 
-    def along_one(curve: int) -> bool:
-        box = np.array(gmsh.model.getBoundingBox(1, curve))
-        return bool(((box[:3] >= lows) & (box[3:] <= highs)).all(axis=1).any())
 
-    return [curve for _, curve in gmsh.model.getEntities(1) if along_one(curve)]
+def _clamped(
+    gmsh: ModuleType, scene: Scene, cut: CutFaces, origin: Array, scale: float
+) -> list[int]:
+    """Curves on the surface of the body at which a support makes the strain unbounded."""
+    inner = {curve for face in cut.faces for curve in gmsh.model.getAdjacencies(2, face)[1]}
+    curves, middles, tangents = [], [], []
+    for _, curve in gmsh.model.getEntities(1):
+        if curve in inner and curve not in cut.mouths:
+            continue
+        low, high = gmsh.model.getParametrizationBounds(1, curve)
+        middle = [0.5 * (low[0] + high[0])]
+        curves.append(int(curve))
+        middles.append(gmsh.model.getValue(1, curve, middle))
+        tangents.append(gmsh.model.getDerivative(1, curve, middle))
+    mouth = np.isin(curves, cut.mouths)
+    on = clamped_edges(scene, origin + scale * np.array(middles), np.array(tangents), mouth)
+    return [curve for curve, clamped in zip(curves, on, strict=True) if clamped]
 
 
 def _face_facets(gmsh: ModuleType, cut: CutFaces, number: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -22,12 +22,13 @@ class CutFaces(NamedTuple):
         Faces of the cuts inside the body.
     singular : list of int
         Curves inside the body at which a cut ends, turns by more than 15°, crosses or branches.
-    volumes : list of int
+    mouths : list of int
+        Curves at which a cut meets the surface of the body.
     """
 
     faces: list[int]
     singular: list[int]
-    volumes: list[int]
+    mouths: list[int]
 
 
 def add_surface(gmsh: ModuleType, cut: Any, origin: Array, scale: float) -> list[int]:
@@ -55,16 +56,20 @@ def add_surface(gmsh: ModuleType, cut: Any, origin: Array, scale: float) -> list
     raise AssertionError(f"a {cut.kind} cut in space")  # the scene has checked it
 
 
-def imprint_surfaces(gmsh: ModuleType, body: int, faces: list[int]) -> CutFaces:
-    """Fragment the body by the faces of the cuts; what lies outside or along it is removed."""
+def imprint_surfaces(gmsh: ModuleType, body: int, faces: list[int], lines: list[int]) -> CutFaces:
+    """Fragment the body by the faces of the cuts; what lies outside or along it is removed.
+
+    `lines` on the surface of the body become edges of it.
+    """
     occ = gmsh.model.occ
-    if not faces:
+    if not faces and not lines:
         occ.synchronize()
-        return CutFaces([], [], [body])
-    _, images = occ.fragment([(3, body)], [(2, tag) for tag in faces])
+        return CutFaces([], [], [])
+    tools = [(2, tag) for tag in faces] + [(1, tag) for tag in lines]
+    _, images = occ.fragment([(3, body)], tools)
     occ.synchronize()
     volumes = [tag for dim, tag in images[0] if dim == 3]
-    embedded = {tag for v in volumes for _, tag in gmsh.model.mesh.getEmbedded(3, v)}
+    embedded = {tag for v in volumes for dim, tag in gmsh.model.mesh.getEmbedded(3, v) if dim == 2}
     inside, beyond = [], []
     for face in sorted({abs(tag) for image in images[1:] for dim, tag in image if dim == 2}):
         sides = gmsh.model.getAdjacencies(2, face)[0]
@@ -74,7 +79,7 @@ def imprint_surfaces(gmsh: ModuleType, body: int, faces: list[int]) -> CutFaces:
             beyond.append((2, face))
     occ.remove(beyond, recursive=True)
     occ.synchronize()
-    return CutFaces(inside, _singular_curves(gmsh, inside), volumes)
+    return CutFaces(inside, *_rims(gmsh, inside))
 
 
 def _polygon(occ: ModuleType, corners: Array) -> int:
@@ -103,18 +108,20 @@ def _swept(occ: ModuleType, curves: list[int], along: Array) -> list[int]:
     return [int(tag) for dim, tag in made if dim == 2]
 
 
-def _singular_curves(gmsh: ModuleType, faces: list[int]) -> list[int]:
-    """Curves off the boundary of the body with other than two faces of the cuts, or a kink."""
+def _rims(gmsh: ModuleType, faces: list[int]) -> tuple[list[int], list[int]]:
+    """Curves off the surface of the body with a kink or other than two faces, and mouths."""
     mine = set(faces)
     curves = {
         abs(tag) for face in faces for _, tag in gmsh.model.getBoundary([(2, face)], oriented=False)
     }
-    found = []
+    singular, mouths = [], []
     for curve in sorted(curves):
         around = [int(face) for face in gmsh.model.getAdjacencies(1, curve)[0]]
-        if set(around) <= mine and (len(around) != 2 or _turn(gmsh, curve, around) > _KINK):
-            found.append(curve)
-    return found
+        if not set(around) <= mine:
+            mouths.append(curve)
+        elif len(around) != 2 or _turn(gmsh, curve, around) > _KINK:
+            singular.append(curve)
+    return singular, mouths
 
 
 def _turn(gmsh: ModuleType, curve: int, faces: list[int]) -> float:
