@@ -236,7 +236,7 @@ def _held(scene: Scene, mesh: _Mesh, i: int, support: Support, exact: Any) -> He
     nodes = np.flatnonzero(mesh.on(scene, support.where, f"supports[{i}].where"))
     components = support.held(scene.dimension)
     if support.displacement != "exact":
-        values = np.tile(np.asarray(support.displacement, dtype=float), (len(nodes), 1))
+        values = support.values(mesh.points[nodes])
         return HeldNodes(nodes, components, values)
     at = mesh.points[nodes]
     columns = list(components)

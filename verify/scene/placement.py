@@ -51,6 +51,8 @@ def _check_dimensions(scene: "Scene") -> None:
         raise ValueError(
             "mesh.pattern: only rectangles and boxes have structured meshes; use 'unstructured'"
         )
+    if not scene.supports and scene.analysis.kind == "static":
+        raise ValueError("supports: a static scene needs at least one")
     for i, support in enumerate(scene.supports):
         if any(c >= d for c in support.held(d)):
             raise ValueError(f"supports[{i}].components: z in a 2D scene")

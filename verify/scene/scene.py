@@ -38,7 +38,7 @@ class Scene(Strict):
     geometry: Geometry
     mesh: MeshLevels
     material: Material
-    supports: list[Support] = Field(min_length=1)
+    supports: list[Support] = Field(default_factory=list)
     loads: list[Load] = Field(default_factory=list)
     exact: Exact | None = None
     cuts: list[Cut] = Field(default_factory=list)
