@@ -12,20 +12,12 @@ from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_solution
 from reference.large_strain import solve_large_strain
-from reference.meshing import (
-    ConformingMesh,
-    Grading,
-    background_mesh,
-    conforming_mesh,
-    imprint,
-    open_cut,
-    singular_points,
-    structured_triangles,
-)
+from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
+from verify.scene import Box, Polygon, Rectangle, Scene
 from verify.solution import Solution
+from verify.solvers.conforming_meshes import graded_mesh, peer_mesh, structure
 
 __all__ = ["ConformingSolver", "ReferenceSolver"]
 
@@ -33,10 +25,12 @@ import_dolfinx()  # fail here, by name, and not in the middle of a solve
 
 
 def _refusal(scene: Scene) -> str | None:
-    if not isinstance(scene.geometry, Rectangle | Polygon):
+    if not isinstance(scene.geometry, Rectangle | Polygon | Box):
         return f"conforming meshes of a '{scene.geometry.kind}' geometry are not offered yet"
     if scene.analysis.kind == "dynamic":
         return "dynamics is not offered by the reference yet"
+    if scene.dimension == 3 and scene.analysis.kinematics != "linear":
+        return "finite rotations in space are not offered by the reference yet"
     if scene.analysis.kinematics == "corotational" and any(
         quantity.kind == "strain_energy" for quantity in scene.quantities
     ):
@@ -95,15 +89,10 @@ class ConformingSolver:
                 f"mesh '{mesh}', degree {degree}; expected imprinted or remeshed, 1 or 2"
             )
 
-        def make(level: int) -> ConformingMesh:
-            counts, size = _structure(scene, level)
-            if mesh == "remeshed" or any(isinstance(cut, ArcCut) for cut in scene.cuts):
-                # equal mean area: a square is two triangles, equilateral ones of `edge`
-                edge = size if counts is None else size * np.sqrt(2 / np.sqrt(3))
-                return conforming_mesh(scene, Grading(edge, np.zeros((0, 2))))
-            return _imprinted(scene, counts, size)
-
-        return _solve(scene, make, level, degree, _structure(scene, level)[1], repetitions)
+        size = structure(scene, level).size
+        return _solve(
+            scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree, repetitions
+        )
 
 
 class ReferenceSolver:
@@ -124,55 +113,20 @@ class ReferenceSolver:
 
     def solve(self, scene: Scene, level: int, repetitions: int = 1) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
-        outline = scene.geometry.outline()  # type: ignore[union-attr]
-        x, y = outline.T
-        extent = np.sqrt(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-        size = scene.reference.size or extent / 12
-        grading = Grading(size, singular_points(scene), extent / 2, strip=1.0)
         return _solve(
             scene,
-            lambda level: conforming_mesh(scene, grading.halved(level)),
+            lambda level: graded_mesh(scene, level),
             level,
             scene.reference.degree,
-            grading.halved(level).size,
             min(repetitions, 1),
         )
 
 
-def _imprinted(scene: Scene, counts: tuple[int, int] | None, size: float) -> ConformingMesh:
-    """Imprint the polylines of the scene on its background mesh, and open them."""
-    geometry = scene.geometry
-    assert isinstance(geometry, Rectangle | Polygon)
-    if counts is None:
-        points, cells = background_mesh(geometry.outline(), size)
-    else:
-        assert isinstance(geometry, Rectangle)
-        points, cells = structured_triangles(geometry.lower, geometry.upper, counts)
-    polylines = [cut.vertices() for cut in scene.cuts if isinstance(cut, PolylineCut)]
-    return open_cut(*imprint(points, cells, polylines))
-
-
-def _structure(scene: Scene, level: int) -> tuple[tuple[int, int] | None, float]:
-    """Cell counts of a structured level (None if unstructured), and its element size."""
-    geometry = scene.geometry
-    if scene.mesh.pattern == "unstructured" or not isinstance(geometry, Rectangle):
-        assert scene.mesh.sizes is not None
-        return None, scene.mesh.sizes[level]
-    sides = np.subtract(geometry.upper, geometry.lower)
-    if scene.mesh.cells is not None:
-        counts = np.array(scene.mesh.cells[level])
-    else:
-        assert scene.mesh.sizes is not None
-        counts = np.ceil(sides / scene.mesh.sizes[level] * (1 - 1e-9)).astype(int)
-    return (int(counts[0]), int(counts[1])), float((sides / counts).max())
-
-
 def _solve(
     scene: Scene,
-    make_mesh: Callable[[int], ConformingMesh],
+    make_mesh: Callable[[int], tuple[ConformingMesh, float]],
     level: int,
     degree: int,
-    size: float,
     repetitions: int,
 ) -> Solution:
     if reason := _refusal(scene):
@@ -182,10 +136,10 @@ def _solve(
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
-        _equilibrium(scene, conforming_space(make_mesh(0), degree), exact)
+        _equilibrium(scene, conforming_space(make_mesh(0)[0], degree), exact)
     for _ in range(max(repetitions, 1)):
         start = perf_counter()
-        mesh = make_mesh(level)
+        mesh, size = make_mesh(level)
         space = conforming_space(mesh, degree)
         meshed = perf_counter() - start
         result = _equilibrium(scene, space, exact)
@@ -239,14 +193,12 @@ def _solution(
     size: float,
     timings: dict[str, list[float]],
 ) -> Solution:
-    first = np.zeros(int(mesh.parent.max()) + 1, dtype=np.int64)
-    first[mesh.parent[::-1]] = np.arange(len(mesh.parent))[::-1]
     return Solution(
         points=space.node_points,
         cells=space.cell_nodes,
         displacement=result.displacement[None],
         order=space.degree,
-        cut_facets=mesh.points[first[mesh.cut_facets]].reshape(-1, 2, 2),
+        cut_facets=mesh.realised_cut,
         cell_sides=mesh.pieces,
         ledger={"strain": np.array([result.strain_energy])},
         unknowns=result.displacement.size,
