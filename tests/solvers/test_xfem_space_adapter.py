@@ -1,0 +1,245 @@
+"""Scenes in space through the adapter: discs, cylinders, sweeps, membranes, mesh files."""
+
+import meshio
+import numpy as np
+import pytest
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.scene import load_scene
+from verify.solvers.xfem import XfemSolver
+
+CUBE = """
+title = "A cube"
+requirement = "It shall be cut."
+[geometry]
+kind = "box"
+lower = [0.0, 0.0, 0.0]
+upper = [1.0, 1.0, 1.0]
+[mesh]
+cells = [[4, 4, 4], [8, 8, 8]]
+[material]
+young = 1.0
+poisson = 0.3
+density = 1.0
+"""
+PULLED = """
+[[supports]]
+where = "bottom"
+displacement = [0.0, 0.0, 0.0]
+[[supports]]
+where = "top"
+displacement = [0.0, 0.0, 0.1]
+"""
+ENDS = """
+[[supports]]
+where = "boundary"
+displacement = [0.0, 0.0, 0.0]
+"""
+
+
+def scene(folder, text):
+    (folder / "space.toml").write_text(text)
+    return load_scene(folder / "space.toml")
+
+
+def disc(radius, normal="0.0, 0.0, 1.0", height=0.53):
+    place = f"centre = [0.5, 0.5, {height}]\nnormal = [{normal}]"
+    return f'[[cuts]]\nkind = "disc"\n{place}\nradius = {radius}\n'
+
+
+def areas(facets):
+    """Areas of triangles (f, 3, 3), or lengths of segments (f, 2, 3)."""
+    edges = facets[:, 1:] - facets[:, :1]
+    return np.sqrt(np.linalg.det(edges @ edges.transpose(0, 2, 1))) / (facets.shape[1] - 1)
+
+
+def volume(solution):
+    corners = solution.points[solution.cells]
+    return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6
+
+
+def deviation(solution, level_set):
+    return np.abs(level_set(solution.cut_facets.reshape(-1, 3))).max()
+
+
+def test_a_disc_is_cut_in_its_plane_and_ends_at_its_rim(tmp_path):
+    """Elements in which the rim ends stay whole: its area is between π (r − 2h)² and π r²."""
+    found = XfemSolver().solve(scene(tmp_path, CUBE + PULLED + disc(0.3, "0.1, 0.0, 1.0")), 1)
+    normal = np.array([0.1, 0.0, 1.0]) / np.hypot(0.1, 1.0)
+    assert deviation(found, lambda x: (x - [0.5, 0.5, 0.53]) @ normal) <= 1e-12
+    reach = np.linalg.norm(found.cut_facets.reshape(-1, 3) - [0.5, 0.5, 0.53], axis=1).max()
+    assert reach <= 0.3 + 1e-12
+    assert (
+        np.pi * (0.3 - 2 * 0.125 * np.sqrt(2)) ** 2 < areas(found.cut_facets).sum() < np.pi * 0.09
+    )
+    assert volume(found) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_an_ellipse_lies_along_its_axes(tmp_path):
+    cut = (
+        '[[cuts]]\nkind = "disc"\ncentre = [0.5, 0.5, 0.53]\nnormal = [0.0, 0.0, 1.0]\n'
+        "radii = [0.45, 0.2]\naxis = [0.0, 1.0, 0.0]\n"
+    )
+    found = XfemSolver().solve(scene(tmp_path, CUBE + PULLED + cut), 1, tip="through")
+    x, y, _ = (found.cut_facets.reshape(-1, 3) - [0.5, 0.5, 0.53]).T
+    assert np.ptp(y) > 1.5 * np.ptp(x)
+    # cut through, an element in which the rim ends is cut to its end
+    assert (np.abs(x) <= 0.2 + 0.125 * np.sqrt(2)).all()
+    assert (np.abs(y) <= 0.45 + 0.125 * np.sqrt(2)).all()
+
+
+@pytest.mark.parametrize("sweep, expected", [(360.0, 2 * np.pi * 0.3), (180.0, np.pi * 0.3)])
+def test_a_cylinder_cuts_its_mantle(tmp_path, sweep, expected):
+    """Faceted in each element: area and distance differ by O(h²/R)."""
+    cut = (
+        '[[cuts]]\nkind = "cylinder"\nbase = [0.52, 0.51, -0.1]\naxis = [0.0, 0.0, 2.0]\n'
+        f"radius = 0.3\nheight = 1.2\ntowards = [1.0, 0.0, 0.0]\nsweep = {sweep}\n"
+    )
+    found = XfemSolver().solve(scene(tmp_path, CUBE + ENDS + cut), 1, tip="nearest")
+    off = deviation(found, lambda x: np.hypot(x[:, 0] - 0.52, x[:, 1] - 0.51) - 0.3)
+    assert off <= 0.125**2 / 0.3
+    # a sector ends inside elements, at each of its two ends within about an element
+    assert areas(found.cut_facets).sum() == pytest.approx(expected, abs=0.02 + (sweep < 360) * 0.25)
+    if sweep == 180.0:
+        assert found.cut_facets[..., 1].min() >= 0.51 - 0.125 * np.sqrt(2)
+
+
+def test_a_swept_polyline_keeps_its_kink(tmp_path):
+    cut = (
+        '[[cuts]]\nkind = "swept"\n'
+        "points = [[-0.1, 0.45, -0.1], [0.5, 0.45, -0.1], [1.1, 0.75, -0.1]]\n"
+        'along = [0.0, 0.0, 1.2]\nexpected = "through"\n'
+    )
+    found = XfemSolver().solve(scene(tmp_path, CUBE + ENDS + cut), 1)
+    area = areas(found.cut_facets).sum()
+    assert area == pytest.approx(0.5 + np.hypot(0.5, 0.25), rel=0.02)  # the kink is rounded off
+    assert len(np.unique(found.cell_sides)) == 3  # either side, and away from the cut
+
+
+def test_a_cut_through_a_cube_frees_its_halves_of_each_other(tmp_path):
+    """Both halves move as the supports do: nothing is strained."""
+    plane = (
+        '[[cuts]]\nkind = "polygon"\nexpected = "through"\n'
+        "points = [[-0.1, -0.1, 0.53], [1.1, -0.1, 0.53], [1.1, 1.1, 0.57], [-0.1, 1.1, 0.57]]\n"
+    )
+    found = XfemSolver().solve(scene(tmp_path, CUBE + PULLED + plane), 0)
+    assert found.ledger["strain"][0] <= 1e-25
+    lift = found.displacement[0][found.points[:, 2] > 0.6]
+    np.testing.assert_allclose(lift, np.tile([0.0, 0.0, 0.1], (len(lift), 1)), atol=1e-12)
+
+
+def test_two_halves_of_a_cube_turn_apart_without_strain(tmp_path):
+    """Corotational: the part of the boundary that is turned ends at the cut, inside elements."""
+    cut = (
+        '[[cuts]]\nkind = "polygon"\n'
+        "points = [[-0.1, -0.1, 0.53], [1.1, -0.1, 0.53], [1.1, 1.1, 0.57], [-0.1, 1.1, 0.57]]\n"
+    )
+    above = "z > 0.53 + 0.04 * (y + 0.1) / 1.2"
+    turned = (
+        '[analysis]\nkinematics = "corotational"\n'
+        f'[[supports]]\nwhere = "{above.replace(">", "<")}"\n'
+        f'displacement = [0.0, 0.0, 0.0]\n[[supports]]\nwhere = "{above}"\n'
+        "displacement = [0.1, 0.0, 0.2]\n"
+        "rotation = { angle = 70.0, centre = [0.5, 0.5, 0.5], axis = [1.0, 1.0, 1.0] }\n"
+    )
+    found = XfemSolver().solve(scene(tmp_path, CUBE + turned + cut), 0)
+    assert found.ledger["strain"][0] <= 1e-20
+    assert np.linalg.norm(found.displacement[0], axis=1).max() > 0.5
+
+
+def test_a_cube_falls_apart_along_a_disc_that_is_larger_than_it(tmp_path):
+    text = CUBE + (
+        '[analysis]\nkind = "dynamic"\nduration = 0.5\ntime_step = 0.05\noutputs = 2\n'
+        '[[supports]]\nwhere = "top"\ndisplacement = [0.0, 0.0, 0.0]\n'
+        '[[loads]]\nkind = "gravity"\nacceleration = [0.0, 0.0, -9.8]\n'
+    )
+    text += disc(2.0, "0.0, 0.1, 1.0", 0.4)
+    found = XfemSolver().solve(scene(tmp_path, text), 0, 0)
+    fallen = found.displacement[-1][found.points[:, 2] < 0.1][:, 2]
+    np.testing.assert_allclose(fallen, -1.225, rtol=1e-9)
+
+
+def test_tetrahedra_of_a_file_give_what_the_box_gives(tmp_path):
+    from verify.xfem.structured_meshes import box_mesh
+
+    mesh = box_mesh([4, 4, 4])
+    meshio.Mesh(mesh.points, [("tetra", mesh.cells)]).write(tmp_path / "cube.vtu")
+    cut = disc(0.4)
+    own = XfemSolver().solve(scene(tmp_path, CUBE + PULLED + cut), 0)
+    box = 'kind = "box"\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]'
+    given = (CUBE + PULLED + cut).replace(box, 'kind = "file"\nfile = "cube.vtu"\ndimension = 3')
+    given = given.replace("cells = [[4, 4, 4], [8, 8, 8]]", 'pattern = "given"')
+    given = given.replace('"bottom"', '"z < 1e-6"').replace('"top"', '"z > 0.999999"')
+    other = XfemSolver().solve(scene(tmp_path, given), 0)
+    assert other.ledger["strain"][0] == pytest.approx(own.ledger["strain"][0], rel=1e-12)
+
+
+MEMBRANE = """
+title = "A sheet in space"
+requirement = "It shall be cut."
+[geometry]
+kind = "file"
+file = "sheet.vtu"
+dimension = 3
+cells = "surface"
+[mesh]
+pattern = "given"
+[material]
+young = 1e4
+poisson = 0.3
+density = 1000.0
+thickness = 0.002
+[analysis]
+kind = "dynamic"
+kinematics = "corotational"
+duration = 0.5
+time_step = 0.01
+outputs = 3
+[[supports]]
+where = "x < 1e-9"
+displacement = [0.0, 0.0, 0.0]
+[[loads]]
+kind = "gravity"
+acceleration = [0.0, 0.0, -9.8]
+"""
+ACROSS = """
+[[cuts]]
+kind = "polygon"
+points = [[0.47, -0.1, -1.0], [0.43, 1.1, -1.0], [0.43, 1.1, 1.0], [0.47, -0.1, 1.0]]
+"""
+
+
+def sheet(folder, height):
+    from verify.xfem.structured_meshes import rectangle_mesh
+
+    mesh = rectangle_mesh([6, 6])
+    points = np.column_stack([mesh.points, height(*mesh.points.T)])
+    meshio.Mesh(points, [("triangle", mesh.cells)]).write(folder / "sheet.vtu")
+
+
+def test_a_piece_cut_off_a_membrane_falls(tmp_path):
+    sheet(tmp_path, lambda x, y: 0.1 * np.sin(3 * x) * y)
+    found = XfemSolver().solve(scene(tmp_path, MEMBRANE + ACROSS), 0, 0)
+    assert (found.dimension, found.cell_dimension, found.cut_facets.shape[1]) == (3, 2, 2)
+    free = found.points[:, 0] > 0.6
+    np.testing.assert_allclose(found.displacement[-1][free][:, 2], -1.225, rtol=1e-8)
+    # the sheet that is cut: its length between the sides
+    assert areas(found.cut_facets).sum() == pytest.approx(np.hypot(1.0, 0.04), rel=0.02)
+
+
+def test_a_flat_membrane_without_tension_has_no_static_answer_and_that_is_said(tmp_path):
+    """Nothing resists its inner nodes across its plane."""
+    sheet(tmp_path, lambda x, y: 0.0 * x)
+    text = MEMBRANE
+    for gone in ('kind = "dynamic"\n', "duration = 0.5\ntime_step = 0.01\noutputs = 3"):
+        text = text.replace(gone, "", 1)
+    with pytest.raises(InputError, match="not positive definite"):
+        XfemSolver().solve(scene(tmp_path, text.replace("x < 1e-9", "boundary")), 0, 0)
+
+
+def test_a_box_without_structure_is_refused(tmp_path):
+    text = (CUBE + PULLED).replace(
+        "cells = [[4, 4, 4], [8, 8, 8]]", 'pattern = "unstructured"\nsizes = [0.2]'
+    )
+    with pytest.raises(UnsupportedSceneError, match="structured way only"):
+        XfemSolver().solve(scene(tmp_path, text), 0)
