@@ -16,6 +16,7 @@ from verify.xfem.corotational import InternalForce
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
+from verify.xfem.dynamics.taut_euler import TautEuler
 from verify.xfem.energy_ledger import EnergyLedger
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.tool_path import ToolPath
@@ -161,7 +162,8 @@ class Session:
             supports=self._grips.supports,
             damping=stage.damping,
         )
-        self.integrator = RealTimeEuler(self.body, stage.time_step)
+        scheme = TautEuler if stage.is_membrane else RealTimeEuler
+        self.integrator = scheme(self.body, stage.time_step)
 
     def _load(self, time: float) -> _Floats:
         force = self._grips.force(time)
