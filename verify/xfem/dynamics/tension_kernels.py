@@ -14,7 +14,8 @@ __all__ = ["add_tension", "tension", "tension_product"]
 
 @njit(cache=True)
 def tension(
-    cells, gradients, parent, volumes, normals, lam, mu, rotations, displacement, points, pairs, across
+    cells, gradients, parent, volumes, normals, lam, mu, rotations, displacement, points, pairs,
+    across,
 ):  # fmt: skip
     """Write the coupling of corners (p, 3, 3), in N/m, and the normal (p, 3) of each piece."""
     for piece in range(len(cells)):
