@@ -44,6 +44,12 @@ class BlockPattern:
         rows = np.repeat(np.arange(self.node_count), np.diff(self.starts))
         return np.flatnonzero(rows == self.columns).astype(np.int32)
 
+    @cached_property
+    def mirror(self) -> _Ints:
+        """(B,) of each block (i, j), the place of (j, i)."""
+        rows = np.repeat(np.arange(self.node_count), np.diff(self.starts))
+        return np.lexsort((rows, self.columns)).astype(np.int32)
+
     def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
         """Return the matrix of the given blocks (B, d, d), without a copy."""
         size = self.node_count * blocks.shape[1]

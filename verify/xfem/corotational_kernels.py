@@ -142,15 +142,14 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                         lanes[(3 * k + l) * LANES + lane] = F[k, l]
                 for k in range(4):
                     lanes[(9 + k) * LANES + lane] = quaternions[piece, k]
-            solved = turn_lanes(lanes)
+            if not turn_lanes(lanes):
+                for lane in range(count):
+                    mend_lane(lanes, lane)
             for lane in range(count):
                 piece = start + lane
                 for k in range(4):
                     quaternions[piece, k] = lanes[(9 + k) * LANES + lane]
                 rotation_matrix(quaternions[piece], rotations[piece])
-            if not solved:
-                for lane in range(count):
-                    mend_lane(lanes, lane, quaternions[start + lane], rotations[start + lane])
 
     @njit(cache=True)
     def internal_force(

@@ -74,12 +74,11 @@ def nearest_rotation(F, q, R):
             lanes[(3 * k + l) * LANES] = F[k, l]
     for k in range(4):
         lanes[(9 + k) * LANES] = q[k]
-    solved = turn_lanes(lanes)
+    if not turn_lanes(lanes):
+        mend_lane(lanes, 0)
     for k in range(4):
         q[k] = lanes[(9 + k) * LANES]
     rotation_matrix(q, R)
-    if not solved:
-        mend_lane(lanes, 0, q, R)
 
 
 @njit(cache=True)
@@ -97,7 +96,7 @@ def new_lanes():
 
 
 @njit(cache=True)
-def mend_lane(lanes, lane, q, R):
+def mend_lane(lanes, lane):
     """Where Newton's method has failed, take the eigenvector; apart, to keep the loop short."""
     if lanes[13 * LANES + lane] <= _SMALL_TURN:
         return
@@ -105,8 +104,10 @@ def mend_lane(lanes, lane, q, R):
     for k in range(3):
         for l in range(3):
             F[k, l] = lanes[(3 * k + l) * LANES + lane]
+    q = np.empty(4)
     _largest_eigenvector(F, q)
-    rotation_matrix(q, R)
+    for k in range(4):
+        lanes[(9 + k) * LANES + lane] = q[k]
 
 
 @njit(cache=True)

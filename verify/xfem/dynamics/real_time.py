@@ -75,8 +75,7 @@ class RealTimeEuler:
             If the solver fails or the result is not finite; the state is left as it was.
         """
         check_state(state, self.body.shape)
-        self.evaluate(state)
-        self.assemble()
+        self.linearise(state)
         if self._any_fixed:
             self._support(state)
         try:
@@ -100,23 +99,20 @@ class RealTimeEuler:
         self._last = self.solver.solve(self.load, self._last)
         return self._last
 
-    def evaluate(self, state: MotionState) -> None:
-        """Evaluate rotations and forces, and the right-hand side into `load`."""
+    def linearise(self, state: MotionState) -> None:
+        """Write M + hC + h²K into `blocks` and the right-hand side into `load`."""
         body, h = self.body, self.step_size
         damping = body.damping
         implicit = h + damping.stiffness
-        body.force.evaluate(state.displacement, self._internal, state.velocity, implicit)
+        body.force.linearise(
+            body.pattern, state.displacement, state.velocity, implicit, h * implicit,
+            self._internal, self.blocks,
+        )  # fmt: skip
+        _add_mass(self.blocks, self._places, self._values, 1.0 + h * damping.mass)
         np.subtract(body.external(state.time + h), self._internal, out=self.load)
         if damping.mass > 0.0:
             self.load -= damping.mass * body.mass.apply(state.velocity)
         self.load *= h
-
-    def assemble(self) -> None:
-        """Assemble M + hC + h²K into `blocks`."""
-        body, h = self.body, self.step_size
-        self.blocks[:] = 0.0
-        body.force.add_stiffness(body.pattern, self.blocks, h * (h + body.damping.stiffness))
-        _add_mass(self.blocks, self._places, self._values, 1.0 + h * body.damping.mass)
 
     def _support(self, state: MotionState) -> None:
         """Let fixed components move as prescribed; what that does to the others goes right."""
