@@ -5,9 +5,7 @@ import pytest
 from surface_measures import enclosed_by_body, loose_edges, pinched_edges, volume_by_body
 
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
 from verify.xfem.mapping.body_surface import BodySurface
-from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.tool_path import ToolPath
 
@@ -113,10 +111,3 @@ def test_a_surface_begun_after_a_cut_is_the_one_that_has_followed_it() -> None:
         corners = np.sort(x[body.surface.facets.rows[body.surface.used]].reshape(-1, 9), axis=1)
         shapes.append(corners[np.lexsort(corners.T)])
     np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-13)
-
-
-def test_a_membrane_is_refused() -> None:
-    flat = rectangle_mesh((2, 2))
-    membrane = SimplexMesh(np.pad(flat.points, ((0, 0), (0, 1))), flat.cells)
-    with pytest.raises(XfemError, match="membrane"):
-        BodySurface(SemiProgressiveCutter(membrane).body)

@@ -2,7 +2,8 @@
 
 Each piece's share of it closes around the material: facets on the boundary of the mesh, and inner
 facets from the polygons in which cuts cross elements (thesis 3.2.4), oriented outwards, with
-vertices doubled where, and only where, the material is separate.
+vertices doubled where, and only where, the material is separate. A membrane is its own surface,
+with two new rims along a cut instead of inner facets.
 """
 
 import numpy as np
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 
 from verify.xfem.cutting.distinct import ranges
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
-from verify.xfem.errors import XfemError
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.exposed_kernels import exposed_facets
+from verify.xfem.mapping.membrane_facets import membrane_facets, rim_edges
 from verify.xfem.mapping.moving_surface import MovingSurface
 
 __all__ = ["BodySurface"]
@@ -27,12 +28,7 @@ class BodySurface:
     Parameters
     ----------
     body : GrowingBody
-        Of triangles in the plane or tetrahedra.
-
-    Raises
-    ------
-    XfemError
-        If the body is a membrane.
+        Of triangles in the plane, tetrahedra, or triangles in space (a membrane).
 
     Attributes
     ----------
@@ -41,15 +37,16 @@ class BodySurface:
 
     def __init__(self, body: GrowingBody) -> None:
         mesh = body.mesh
-        if mesh.dim != mesh.space:
-            raise XfemError("a membrane has no surface that encloses it")
-        self._body = body
-        self.surface = MovingSurface(mesh.dim + 1, mesh.space, mesh.dim)
+        self._body, self._membrane = body, mesh.dim < mesh.space
+        self.surface = MovingSurface(mesh.dim + 1, mesh.space, mesh.space)
         self._edges = EdgePoints(mesh.points, body.points)
-        self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
         self._facet_range = np.zeros((len(mesh.cells), 2), dtype=np.int64)
-        boundary = np.unique(mesh.boundary_facets[:, 0])
         split = np.flatnonzero(body.split_cells)
+        if self._membrane:
+            self._cover(np.arange(len(mesh.cells)), split)
+            return
+        self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
+        boundary = np.unique(mesh.boundary_facets[:, 0])
         self._cover(np.union1d(boundary, split), split)
 
     def update(self, increment: Increment | None) -> None:
@@ -57,27 +54,23 @@ class BodySurface:
         if increment is not None:
             self._cover(increment.touched, increment.cells)
 
+    @property
+    def rims(self) -> _Ints:
+        """(k, 2) edges of the surface that cuts have made; of a solid there are none.
+
+        They run along the direction of their facets, the material on their left seen from above.
+        """
+        if not self._membrane:
+            return np.empty((0, 2), dtype=np.int64)
+        return rim_edges(self._body, self.surface)
+
     def _cover(self, cells: _Ints, split: _Ints) -> None:
         """Make the facets of some cells anew; `split` are those with new sub-simplices."""
         body, mesh = self._body, self._body.mesh
         self._edges.add(body.sub_points.rows[ranges(body.sub_range[split])].ravel())
         self.surface.retire(ranges(self._facet_range[cells]))
         self._facet_range[cells] = 0
-        ids, at, piece, cell, inner = exposed_facets(
-            cells,
-            body.split_cells,
-            mesh.cells,
-            mesh.neighbours,
-            body.piece_cells.rows,
-            body.first_piece,
-            body.next_piece.rows,
-            body.sub_range,
-            body.sub_piece.rows,
-            body.sub_points.rows,
-            body.sub_barycentric.rows,
-            body.sub_sign.rows,
-            self._orientation,
-        )
+        ids, at, piece, cell, inner = self._facets_of(cells)
         ids, source, share = self._edges.bisect(ids)
         at = share @ at[source]
         piece, cell = piece[source], cell[source]
@@ -93,3 +86,24 @@ class BodySurface:
         starts = np.flatnonzero(np.diff(cell, prepend=-1))
         self._facet_range[cell[starts], 0] = numbers[starts]
         self._facet_range[cell[starts], 1] = np.append(numbers[starts[1:]], numbers[-1:] + 1)
+
+    def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:
+        """Point numbers, barycentric corners, piece, cell, whether on a cut, of their facets."""
+        body, mesh = self._body, self._body.mesh
+        if self._membrane:
+            return membrane_facets(body, cells)
+        return exposed_facets(
+            cells,
+            body.split_cells,
+            mesh.cells,
+            mesh.neighbours,
+            body.piece_cells.rows,
+            body.first_piece,
+            body.next_piece.rows,
+            body.sub_range,
+            body.sub_piece.rows,
+            body.sub_points.rows,
+            body.sub_barycentric.rows,
+            body.sub_sign.rows,
+            self._orientation,
+        )

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.collision.simplex_kernels import signed_volume
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
+from verify.xfem.mapping.material_share_kernels import is_material
+from verify.xfem.mapping.membrane_pull_back_kernels import pull_back_to_membrane
 from verify.xfem.mapping.partner_kernels import partner
 
 __all__ = ["pull_back"]
@@ -26,6 +28,11 @@ def pull_back(
 ) -> tuple[_Floats, _Ints]:
     """Material position of points in the deformed body.
 
+    A membrane does not fill the space in which its tool moves: there it is the nearest material
+    point that is found, by a walk down in distance from the starting piece. Where a membrane is
+    folded so that a path of nearer and nearer points does not lead to the nearest of all, start
+    from the piece of a contact (`SurfaceCollider.nearest`), which is a global search.
+
     Parameters
     ----------
     cutter : SemiProgressiveCutter
@@ -39,22 +46,20 @@ def pull_back(
     Returns
     -------
     material : (q, s) float array
-        Of a point outside the material: as if the last piece went on.
+        Of a point outside the material: as if the last piece went on (of a membrane: at its edge).
     piece : (q,) int array
-        Piece in which it lies; -1 outside the material (in an open cut, too), or where the walk
-        was lost among inverted elements.
+        Piece in which it lies; -1 outside the material (in an open cut, or beside the edge of a
+        membrane, too), or where the walk was lost among inverted elements.
 
     Raises
     ------
     XfemError
-        If shapes do not match, or the body is a membrane.
+        If shapes do not match or a starting piece does not exist.
     """
     body = cutter.body
     places = np.ascontiguousarray(points, dtype=float)
     pieces = np.ascontiguousarray(start, dtype=np.int64)
     space = body.mesh.space
-    if body.mesh.dim != space:
-        raise XfemError("a membrane does not fill the space in which its tool moves")
     if places.shape != (len(pieces), space) or displacement.shape != (body.node_count, space):
         raise XfemError(
             f"points {places.shape}, pieces {pieces.shape}, displacement {displacement.shape}; "
@@ -62,7 +67,8 @@ def pull_back(
         )
     if len(pieces) and not 0 <= pieces.min() <= pieces.max() < len(body.piece_cells):
         raise XfemError(f"a starting piece outside 0..{len(body.piece_cells) - 1}")
-    return _pull_back(
+    walk = _pull_back if body.mesh.dim == space else pull_back_to_membrane
+    return walk(
         places,
         pieces,
         displacement,
@@ -95,20 +101,6 @@ def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, s
 
 
 @njit(cache=True)
-def _is_material(piece, cell, at, cells, piece_label, levels):
-    """Whether a point of a virtual element lies in its piece's share of the material."""
-    for cut in range(piece_label.shape[1]):
-        if piece_label[piece, cut] == 0:
-            continue
-        level = 0.0
-        for a in range(len(at)):
-            level += at[a] * levels[cells[cell, a], cut]
-        if (level >= 0.0) != (piece_label[piece, cut] > 0):
-            return False
-    return True
-
-
-@njit(cache=True)
 def _pull_back(
     places, pieces, displacement, points, cells, neighbours,
     piece_cells, piece_parent, piece_label, first_piece, next_piece, levels,
@@ -131,7 +123,7 @@ def _pull_back(
                     least = _coordinates(
                         place, other, cell, displacement, points, cells, piece_cells, simplex, at
                     )
-                    if least >= _ON_FACE and _is_material(
+                    if least >= _ON_FACE and is_material(
                         other, cell, at, cells, piece_label, levels
                     ):
                         found[q] = piece = other

@@ -1,0 +1,220 @@
+"""Cut membranes: their surface with two rims, contact with it, and tools pulled back to it."""
+
+import numpy as np
+import pytest
+from cut_bodies import rotation
+
+from verify.xfem.collision.surface_collider import SurfaceCollider
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.errors import XfemError
+from verify.xfem.mapping.body_surface import BodySurface
+from verify.xfem.mapping.pull_back import pull_back
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.tool_path import ToolPath
+
+BLADE = [0.0, 0.0, 3.0]
+INSIDE = ToolPath.of_tip([[0.15, 0.43, -1.0], [0.85, 0.55, -1.0]], [0.0, 1.0], BLADE)
+THROUGH = ToolPath.of_tip([[-0.2, 0.43, -1.0], [1.2, 0.55, -1.0]], [0.0, 1.0], BLADE)
+ACROSS = ToolPath.of_tip([[0.52, -0.2, -1.0], [0.47, 1.2, -1.0]], [2.0, 3.0], BLADE)
+
+
+def curved(count=6, diagonal="alternating"):
+    flat = rectangle_mesh((count, count), diagonal=diagonal)
+    x, y = flat.points.T
+    return SimplexMesh(np.stack([x, y, 0.3 * np.sin(2.0 * x) * np.cos(y)], axis=1), flat.cells)
+
+
+def stroked(mesh, *paths, frames=5):
+    """Cutter and surface after strokes, taken frame by frame."""
+    cutter = SemiProgressiveCutter(mesh)
+    skin = BodySurface(cutter.body)
+    for path in paths:
+        cutter.begin(path)
+        for time in np.linspace(path.times[0], path.times[-1], frames):
+            skin.update(cutter.advance(time))
+    return cutter, skin
+
+
+def area_and_normals(skin):
+    corners = skin.surface.material.rows[skin.surface.facets.rows[skin.surface.used]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2.0
+    return np.linalg.norm(normals, axis=1).sum(), normals
+
+
+def loops(edges):
+    """Number of closed loops that directed edges make; each vertex must be left once."""
+    follow = dict(edges.tolist())
+    assert len(follow) == len(edges) == len(set(follow.values()))
+    count = 0
+    while follow:
+        start, _ = next(iter(follow.items()))
+        at = start
+        while True:
+            at = follow.pop(at)
+            if at == start:
+                break
+        count += 1
+    return count
+
+
+def test_a_membrane_is_its_own_surface() -> None:
+    cutter, skin = stroked(curved())
+    area, normals = area_and_normals(skin)
+    assert area == pytest.approx(cutter.mesh.measures.sum(), rel=1e-14)
+    assert (normals[:, 2] > 0.0).all()
+    assert len(skin.rims) == 0
+    assert len(BodySurface(SemiProgressiveCutter(box_mesh((1, 1, 1))).body).rims) == 0
+
+
+@pytest.mark.parametrize("diagonal", ["right", "alternating", "crossed"])
+def test_a_cut_gives_a_membrane_two_rims_of_its_length_and_no_inner_surface(diagonal) -> None:
+    cutter, skin = stroked(curved(7, diagonal), INSIDE)
+    area, normals = area_and_normals(skin)
+    assert area == pytest.approx(cutter.mesh.measures.sum(), rel=1e-14)
+    assert (normals[:, 2] > 0.0).all()  # every part keeps the direction of the membrane
+    assert not skin.surface.inner.rows[skin.surface.used].any()
+    rims = skin.rims
+    # one slit: both rims together are one closed loop around it
+    assert loops(rims) == 1
+    along = skin.surface.material.rows[rims]
+    steps = along[:, 1] - along[:, 0]
+    assert np.abs(steps.sum(axis=0)).max() < 1e-13
+    forward = steps @ np.array([0.7, 0.12, 0.0]) > 0.0
+    lengths = np.linalg.norm(steps, axis=1)
+    assert lengths[forward].sum() == pytest.approx(lengths[~forward].sum(), rel=1e-12)
+    assert lengths[forward].sum() > 0.4
+    # no edge hangs: every edge is used twice, or once at an edge of the membrane or at a rim
+    facets = skin.surface.facets.rows[skin.surface.used]
+    edges = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]])
+    once = {tuple(edge) for edge in edges.tolist()} - {tuple(edge[::-1]) for edge in edges.tolist()}
+    outer = once - {tuple(edge) for edge in rims.tolist()}
+    assert len(outer) == len(cutter.mesh.boundary_facets)
+
+
+def test_two_strokes_through_a_membrane_leave_four_parts_with_rims_of_their_own() -> None:
+    _, skin = stroked(curved(), THROUGH, ACROSS)
+    facets = skin.surface.facets.rows[skin.surface.used]
+    edges = np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]])
+    once = {tuple(edge) for edge in edges.tolist()} - {tuple(edge[::-1]) for edge in edges.tolist()}
+    assert loops(np.array(sorted(once))) == 4
+    assert len(skin.rims) > 0
+
+
+def test_the_rims_open_with_the_material_and_forces_on_them_do_the_same_work() -> None:
+    cutter, skin = stroked(curved(), THROUGH)
+    virtual = cutter.virtual_mesh()
+    apart = np.where(virtual.node_side[:, :1] > 0, 1.0, -1.0) * [0.0, 0.1, 0.02]
+    x = skin.surface.positions(apart)
+    rims = skin.rims
+    moved = (x - skin.surface.material.rows)[rims.ravel()]
+    assert np.allclose(np.abs(moved), [0.0, 0.1, 0.02], atol=1e-14)
+    assert 0 < (moved[:, 1] > 0.0).sum() < len(moved)
+    random = np.random.default_rng(3)
+    force = random.normal(size=x.shape)
+    nodal = np.zeros_like(apart)
+    skin.surface.nodal_forces(force, nodal)
+    u = random.normal(size=apart.shape)
+    work = np.sum(force * (skin.surface.positions(u) - skin.surface.material.rows))
+    assert np.sum(nodal * u) == pytest.approx(work, rel=1e-12)
+
+
+def test_a_surface_begun_after_a_cut_is_that_which_has_followed_it() -> None:
+    cutter, followed = stroked(curved(), INSIDE, ACROSS)
+    fresh = BodySurface(cutter.body)
+    displacement = np.random.default_rng(5).normal(size=(cutter.body.node_count, 3))
+    shapes = []
+    for skin in (followed, fresh):
+        x = skin.surface.positions(displacement)
+        corners = x[skin.surface.facets.rows[skin.surface.used]].reshape(-1, 9)
+        corners = np.sort(corners, axis=1)
+        shapes.append(corners[np.lexsort(corners.T)])
+    np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-13)
+
+
+def nearest_by_force(cutter, displacement, places):
+    """Distance to the material, by brute force over many points of every sub-triangle."""
+    skin = BodySurface(cutter.body)
+    x = skin.surface.positions(displacement)[skin.surface.facets.rows[skin.surface.used]]
+    grid = np.array([[i, j, 60 - i - j] for i in range(61) for j in range(61 - i)]) / 60.0
+    points = np.einsum("ga,fas->fgs", grid, x).reshape(-1, 3)
+    return np.array([np.linalg.norm(points - place, axis=1).min() for place in places])
+
+
+def test_a_tool_on_a_deformed_membrane_is_found_in_its_material() -> None:
+    """Turned, stretched, shaken by 1 %: centroids of all pieces, from a neighbour, off the skin."""
+    cutter, _ = stroked(curved(), INSIDE)
+    body = cutter.body
+    random = np.random.default_rng(9)
+    nodes = cutter.mesh.points[body.node_parent.rows]
+    R = rotation(3, 1.1) @ np.diag([1.2, 0.9, 1.0])
+    displacement = nodes @ R.T - nodes + 1e-3 * random.normal(size=nodes.shape)
+    virtual = cutter.virtual_mesh()
+    wanted = virtual.piece_centroids
+    share = virtual.shape_integrals / virtual.volumes[:, None]
+    x = nodes[virtual.cells] + displacement[virtual.cells]
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    order = np.argsort(body.piece_parent.rows, kind="stable")
+    for height in (0.0, 0.01, -0.01):
+        place = np.einsum("pa,pas->ps", share, x) + height * normal
+        same, found = pull_back(cutter, displacement, place, order)
+        np.testing.assert_array_equal(found, order)
+        np.testing.assert_allclose(same, wanted, atol=1e-12)
+        # from anywhere on the membrane, if the way is not through the cut
+        start = np.full(len(order), order[0])
+        walked, found = pull_back(cutter, displacement, place, start)
+        reached = found == order
+        assert reached.mean() > 0.6
+        np.testing.assert_allclose(walked[reached], wanted[reached], atol=1e-12)
+
+
+def test_the_nearest_material_point_is_found_from_the_piece_in_contact() -> None:
+    """Above and below a skin folded like a roof, over ridges and corners too."""
+    cutter, skin = stroked(curved(), THROUGH)
+    nodes = cutter.mesh.points[cutter.body.node_parent.rows]
+    displacement = np.zeros_like(nodes)
+    displacement[:, 2] = 0.15 * np.sin(9.0 * nodes[:, 0])
+    random = np.random.default_rng(2)
+    places = random.uniform([0.1, 0.1, -0.3], [0.9, 0.9, 0.7], size=(200, 3))
+    collider = SurfaceCollider(skin.surface)
+    collider.refit(displacement)
+    contact = collider.nearest(places)
+    material, piece = pull_back(cutter, displacement, places, contact.piece)
+    brute = nearest_by_force(cutter, displacement, places)
+    # the grid of points is fine to 1/60 of an edge
+    assert np.abs(contact.distance - brute).max() < 2e-3
+    assert (piece >= 0).mean() > 0.9
+    for place, point, at, distance in zip(places, material, piece, contact.distance, strict=True):
+        if at < 0:
+            continue
+        cell = cutter.body.piece_parent.rows[at]
+        X = cutter.mesh.points[cutter.mesh.cells[cell]]
+        share = np.linalg.lstsq(np.vstack([X.T, np.ones(3)]), np.append(point, 1.0), rcond=None)[0]
+        moved = point + share @ displacement[cutter.body.piece_cells.rows[at]]
+        # the rim of a piece is nearer than what lies under its own virtual element: not asked for
+        assert np.linalg.norm(place - moved) <= distance + 1e-9
+
+
+def test_beside_the_edge_and_in_an_open_cut_there_is_no_material() -> None:
+    flat = rectangle_mesh((5, 5))
+    mesh = SimplexMesh(np.pad(flat.points, ((0, 0), (0, 1))), flat.cells)
+    cutter, _ = stroked(mesh, THROUGH)
+    side = cutter.virtual_mesh().node_side[:, :1]
+    apart = np.where(side == side[0], -0.1, 0.1) * [0.0, 1.0, 0.0]  # the part of node 0 goes down
+    places = [[0.31, 0.15, 0.2], [-0.01, 0.15, 0.0], [0.5, 0.49, 0.1], [0.0, 0.1, 0.3]]
+    start = [int(cutter.body.first_piece[0])] * 4
+    material, piece = pull_back(cutter, apart, places, start)
+    assert piece[0] >= 0
+    assert material[0] == pytest.approx([0.31, 0.25, 0.0], abs=1e-12)
+    assert piece[1] == -1  # beside the membrane
+    assert piece[2] == -1  # over the gap
+    assert piece[3] >= 0  # exactly over the edge
+
+
+def test_shapes_that_do_not_match_a_membrane_are_refused() -> None:
+    cutter, _ = stroked(curved())
+    with pytest.raises(XfemError, match="expected"):
+        pull_back(cutter, np.zeros((3, 3)), [[0.0, 0.0, 0.0]], [0])
+    with pytest.raises(XfemError, match="starting piece"):
+        pull_back(cutter, np.zeros((cutter.body.node_count, 3)), [[0.0, 0.0, 0.0]], [10_000])
