@@ -16,7 +16,16 @@ def test_the_compact_solver_conforms_in_every_basis(basis):
     assert exit_code_of(results) == 0, [r for r in results if r.state is not State.KEPT]
     kept = {result.name for result in results if result.state is State.KEPT}
     # the three bases share the mesh; none may hide behind refusals
-    assert {"cut-patch", "rigid-rotation-3d", "renumbering", "mirrored-cut"} <= kept
+    wanted = {"cut-patch", "rigid-rotation-3d", "parted-3d", "renumbering", "mirrored-cut"}
+    if basis == "sidewise":
+        wanted |= {"finite-rotation-2d", "finite-rotation-3d", "free-fall"}
+    assert wanted <= kept
+
+
+def test_a_scheme_of_first_order_in_time_conforms_and_that_is_said():
+    (found,) = conform("xfem", {"scheme": "implicit_euler"}, only=["free-fall"])
+    assert found.state is State.KEPT
+    assert found.reason == "of first order in time"
 
 
 @pytest.mark.fenicsx

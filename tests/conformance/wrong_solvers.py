@@ -67,6 +67,44 @@ class SpinsFreely(XfemSolver):
         return replace(solution, displacement=solution.displacement + 1e-5 * solution.points)
 
 
+class TurnsALittle(XfemSolver):
+    """Takes a finite rotation for an infinitesimal one."""
+
+    def solve(self, scene, level, repetitions=1):
+        linear = scene.analysis.model_copy(update={"kinematics": "linear"})
+        solution = super().solve(changed(scene, analysis=linear), level, repetitions)
+        # x + θ × x in place of R x: stretches what it turns
+        turn = scene.supports[0].rotation
+        skew = np.deg2rad(turn.angle) * turn._spin()
+        moved = (solution.points - turn.centre) @ skew.T + scene.supports[0].displacement
+        return replace(solution, displacement=moved[None])
+
+
+class LumpsAsTheThesis(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        return super().solve(scene, level, repetitions, mass="thesis")
+
+
+class StatesStrainOfRotation(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        return replace(solution, ledger={"strain": np.array([1e-3])})
+
+
+class ForgetsOutputs(XfemSolver):
+    def solve(self, scene, level, repetitions=1):
+        solution = super().solve(scene, level, repetitions)
+        if scene.analysis.kind == "static":
+            return solution
+        return replace(
+            solution,
+            times=solution.times[-1:],
+            displacement=solution.displacement[-1:],
+            velocity=None,
+            ledger={},
+        )
+
+
 class KnowsOnlyUpright(XfemSolver):
     """Loses the horizontal part of tractions."""
 

@@ -27,6 +27,7 @@ from verify.solution import Solution
 __all__ = ["EXACT", "checks"]
 
 EXACT = 1e-7
+_RIGID = 1e-6  # of the height of the fall: what 40 steps of an iterative solver may add up to
 Solutions = Mapping[str, Solution]
 
 
@@ -39,11 +40,15 @@ def checks(folder: Path) -> list[Check]:
         _rigid("rotation", 2),
         _rigid("translation", 3),
         _rigid("rotation", 3),
+        _turned(2),
+        _turned(3),
+        _parted_halves(),
         _strained_sides(),
         _energy_account(),
         _closed_cut(),
         _pulled_halves(),
         _hanging_halves(),
+        _freed_half(),
         _mirrored_cut(),
         _renumbering(folder),
         _repeatability(),
@@ -105,6 +110,63 @@ def _rigid(kind: str, dimension: int) -> Check:
     claim = f"{words} of a cut body costs no energy ({dimension}D)"
     check = _is_field(*scenes.rigid(kind, dimension), 0.0)
     return _named(check, f"rigid-{kind}-{dimension}d", claim)
+
+
+def _turned(dimension: int) -> Check:
+    """At finite rotation the engineering strain does not vanish: the field is all that is judged.
+
+    The strain energy is the solver's own account, if it keeps one.
+    """
+    scene, field = scenes.turned(dimension)
+    judge_field = _is_field(scene, field).judge
+    assert judge_field is not None
+
+    def judge(solutions: Solutions) -> Finding:
+        found = judge_field(solutions)
+        (solution,) = solutions.values()
+        stated = solution.ledger.get("strain")
+        if stated is None or (found.limit is not None and found.observed > found.limit):
+            return found
+        energy = abs(float(stated[-1]))
+        allowed = 400 * EXACT**2 * scenes.YOUNG * float(np.abs(solution.displacement).max()) ** 2
+        note = f"strain energy {energy:.3g} where there is none"
+        return found if energy <= allowed else Finding(energy, allowed, note)
+
+    claim = f"a finite rotation of a cut body costs no energy ({dimension}D, corotational)"
+    return Check(f"finite-rotation-{dimension}d", claim, [Trial(scene.name, scene)], judge)
+
+
+def _parted_halves() -> Check:
+    claim = "the halves of a cut cube part without strain"
+    return _named(_is_field(*scenes.parted_halves(), 0.0), "parted-3d", claim)
+
+
+def _freed_half() -> Check:
+    scene, gravity = scenes.freed_half()
+    end, step = scene.analysis.duration, scene.analysis.time_step
+    assert end is not None
+    assert step is not None
+
+    def judge(solutions: Solutions) -> Finding:
+        (solution,) = solutions.values()
+        wanted = np.array(scene.analysis.output_times)
+        if len(solution.times) != len(wanted) or np.abs(solution.times - wanted).max() > 1e-9:
+            return Finding(float("inf"), 0.0, f"output times {solution.times.tolist()}")
+        corners = solution.points[solution.cells]
+        middle = corners[:, :3].mean(axis=1)
+        freed = middle[:, 1] < 0.47 + 0.24 * (middle[:, 0] - 0.5)
+        fallen = solution.displacement[:, np.unique(solution.cells[freed])]
+        scale = 0.5 * float(np.linalg.norm(gravity)) * end**2
+        spread = float(np.abs(fallen - fallen.mean(axis=1, keepdims=True)).max()) / scale
+        if not spread <= _RIGID:
+            return Finding(spread, _RIGID, "the freed half does not stay as it is")
+        parabola = 0.5 * wanted[:, None, None] ** 2 * gravity
+        off = float(np.linalg.norm(fallen - parabola, axis=2).max()) / scale
+        # a scheme of first order is off by g t Δt / 2
+        return Finding(off, 1.001 * step / end, "" if off <= EXACT else "of first order in time")
+
+    claim = "the freed half of a cut body falls with g, wherever the cut passes"
+    return Check("free-fall", claim, [Trial(scene.name, scene)], judge)
 
 
 def _strained_sides() -> Check:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import Scene, restore_scene
+from verify.scene import Rotation, Scene, restore_scene
 
 __all__ = [
     "DENSITY",
@@ -22,12 +22,15 @@ __all__ = [
     "Field",
     "closed_cut",
     "free_piece",
+    "freed_half",
     "given_mesh",
     "hanging_halves",
+    "parted_halves",
     "pulled_halves",
     "rigid",
     "sheared_halves",
     "strained_sides",
+    "turned",
     "uncut_linear",
     "unusual",
 ]
@@ -44,7 +47,7 @@ _MIDDLE, _SLOPE = (0.5, 0.47), 0.24
 _INCLINED = {"kind": "polyline", "points": [[-0.1, 0.326], [1.1, 0.614]]}
 _UPRIGHT_AT = 0.37
 _UPRIGHT = {"kind": "polyline", "points": [[_UPRIGHT_AT, -0.1], [_UPRIGHT_AT, 1.1]]}
-_TILTED_PLANE = {
+_TILTED_PLANE: dict[str, Any] = {
     "kind": "polygon",
     "points": [[-0.1, -0.1, 0.37], [1.1, -0.1, 0.37], [1.1, 1.1, 0.61], [-0.1, 1.1, 0.61]],
 }
@@ -101,6 +104,58 @@ def rigid(kind: str, dimension: int = 2) -> tuple[Scene, Field]:
     exact = {"solution": "linear", "parameters": {"matrix": spin.tolist()}}
     scene = _scene(name, supports=_BOUNDARY_EXACT, exact=exact, **parts)
     return scene, lambda points, near: points @ spin.T
+
+
+def turned(dimension: int) -> tuple[Scene, Field]:
+    """Turn the whole boundary of a cut body by a finite angle and shift it."""
+    parts = _in_space([_TILTED_PLANE]) if dimension == 3 else {"cuts": [_INCLINED]}
+    centre, shift = [0.4, 0.3, 0.6][:dimension], [0.2, -0.1, 0.3][:dimension]
+    rotation = Rotation(
+        angle=50.0, centre=centre, axis=(1.0, 2.0, -1.0) if dimension == 3 else None
+    )
+    support = {"where": "boundary", "displacement": shift, "rotation": rotation.model_dump()}
+    scene = _scene(
+        f"turned-{dimension}d",
+        supports=[support],
+        analysis={"kinematics": "corotational"},
+        **parts,
+    )
+    turn = rotation.matrix() - np.eye(dimension)
+    return scene, lambda points, near: (points - centre) @ turn.T + shift
+
+
+def parted_halves() -> tuple[Scene, Field]:
+    """Lift the upper half of a cube off the lower one, along a tilted plane."""
+    lift = np.array([0.05, 0.0, 0.2])
+    scene = _scene(
+        "parted-halves",
+        supports=[
+            {"where": "bottom", "displacement": [0.0, 0.0, 0.0]},
+            {"where": "top", "displacement": lift.tolist()},
+        ],
+        **_in_space([_TILTED_PLANE]),
+    )
+    corner, end = _TILTED_PLANE["points"][0], _TILTED_PLANE["points"][2]
+    slope = (end[2] - corner[2]) / (end[1] - corner[1])
+
+    def field(points: Array, near: Array) -> Array:
+        above = near[:, 2] > corner[2] + slope * (near[:, 1] - corner[1])
+        return above[:, None] * lift
+
+    return scene, field
+
+
+def freed_half() -> tuple[Scene, Array]:
+    """Let the lower half of a square fall (m/s², second value) while the upper one is held."""
+    gravity = np.array([0.5, -2.0])
+    scene = _scene(
+        "freed-half",
+        cuts=[_INCLINED],
+        supports=[{"where": "top", "displacement": [0.0, 0.0]}],
+        loads=[{"kind": "gravity", "acceleration": gravity.tolist()}],
+        analysis={"kind": "dynamic", "duration": 0.4, "time_step": 0.01, "outputs": 5},
+    )
+    return scene, gravity
 
 
 def strained_sides() -> tuple[Scene, Field, float]:
