@@ -11,7 +11,10 @@ from reference.exact.hooke import Hooke, hooke
 from reference.exact.linear import Linear
 from reference.exact.parameters import Parameters
 from reference.exact.patch import Patch
+from reference.exact.penny import Penny
 from reference.exact.sinusoidal import Sinusoidal
+from reference.exact.solid_patch import SolidPatch
+from reference.exact.solid_sinusoidal import SolidSinusoidal
 from reference.exact.solution import ExactSolution
 from verify.errors import InputError
 from verify.scene import Material
@@ -45,7 +48,22 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         Griffith,
         "crack in an infinite plate: centre, a, angle, remote stress (sxx, syy, sxy)",
     ),
+    "solid_patch": (
+        SolidPatch,
+        "3D: uniform strain on each side of a plane cut: point, normal, axis, strain and shift "
+        "(rows above, below)",
+    ),
+    "solid_smooth": (
+        SolidSinusoidal,
+        "3D: plane waves with a body force on each side of a plane cut: point, normal, axis, above "
+        "and below (rows A, k1, k2, phase of U1, U2, V), shift",
+    ),
+    "penny": (
+        Penny,
+        "3D: penny-shaped crack in infinite space under tension: centre, normal, a, tension",
+    ),
 }
+_IN_SPACE = ("linear", "solid_patch", "solid_smooth", "penny")
 
 
 def exact_solution_names() -> dict[str, str]:
@@ -73,10 +91,12 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
         raise InputError(f"no exact solution '{name}'{nearest(name, _CATALOGUE)}")
     make, _ = _CATALOGUE[name]
     law = hooke(material)
-    if law.dimension == 3 and name != "linear":
+    if law.dimension == 3 and name not in _IN_SPACE:
         raise InputError(
             f"exact solution '{name}' is plane; material.plane = 'strain' or 'stress' is missing"
         )
+    if law.dimension == 2 and name in _IN_SPACE and name != "linear":
+        raise InputError(f"exact solution '{name}' is one of space; this scene is plane")
     given = Parameters(name, parameters)
     solution = make(law, given)
     given.close()

@@ -18,6 +18,7 @@ _SHAPES = {
     (2, 2): "two rows of two numbers",
     (2, 3): "two rows of three numbers",
     (3, 3): "three rows of three numbers",
+    (3, 4): "three rows of four numbers",
 }
 
 

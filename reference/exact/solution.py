@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from reference.exact.energy import boundary_work, elastic_energy, outline_of
 from reference.exact.hooke import Hooke
+from reference.exact.solid_energy import box_energy, box_of, surface_work
 from verify.scene import Scene
 
-__all__ = ["Array", "ExactSolution"]
+__all__ = ["Array", "ExactSolution", "Plane"]
 
 Array = NDArray[np.float64]
+Plane = tuple[Array, Array]
 
 
 class ExactSolution(ABC):
@@ -40,6 +42,11 @@ class ExactSolution(ABC):
     def singular_points(self) -> Array:
         """Points (k, d) near which derivatives are unbounded."""
         return np.zeros((0, self.dimension))
+
+    @property
+    def cut_plane(self) -> Plane | None:
+        """In space: point and normal of the plane across which the field jumps, if it does."""
+        return None
 
     @abstractmethod
     def displacement(self, points: Array, near: Array | None = None) -> Array:
@@ -73,16 +80,22 @@ class ExactSolution(ABC):
         return []
 
     def strain_energy(self, body: Array | Scene) -> float:
-        """Strain energy of a polygonal body, J per metre of thickness; computed, to 1e-11.
+        """Strain energy of a body, J (in the plane per metre of thickness), to 1e-11.
 
-        Half the work of the tractions on the outline; with a body force, half the integral of
-        stress times strain.
+        Half the work of the tractions on the surface; with a body force, or a plane cut through
+        the body in space, half the integral of stress times strain.
 
         Parameters
         ----------
-        body : (k, 2) array or Scene
-            Corners in order, or a scene whose geometry is a rectangle or polygon.
+        body : array or Scene
+            In the plane: corners (k, 2) in order, or a scene whose geometry is a rectangle or
+            polygon. In space: both corners (2, 3) of a box, or a scene with one.
         """
+        if self.dimension == 3:
+            corners = box_of(body)
+            if self.cut_plane is None and not self.has_body_force:
+                return surface_work(self, corners)
+            return box_energy(self, corners)
         outline = outline_of(body)
         integrate = elastic_energy if self.has_body_force else boundary_work
         return integrate(self, outline)

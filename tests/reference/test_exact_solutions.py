@@ -50,7 +50,8 @@ def points():
 
 
 def test_every_named_solution_is_checked_here():
-    assert set(SOLUTIONS) == set(exact_solution_names())
+    plane = {name for name, text in exact_solution_names().items() if not text.startswith("3D")}
+    assert set(SOLUTIONS) == plane  # the others: test_exact_solutions_in_space.py
 
 
 @pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])

@@ -57,9 +57,9 @@ def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
     if plane and straight and mesh == "imprinted":
         return _imprinted(scene, counts, size)
     if counts is not None:
-        # equal mean size: a square is two triangles and a cube six tetrahedra, equilateral ones
-        # of that area or volume have edges of
-        edge = np.sqrt(2 / np.sqrt(3)) if plane else 2 ** (1 / 6)
+        # equal mean size: two equilateral triangles of this edge are a square of 1, and with it
+        # HXT was measured to make six tetrahedra per cube of 1
+        edge = np.sqrt(2 / np.sqrt(3)) if plane else 0.88
         sides = np.subtract(scene.geometry.upper, scene.geometry.lower)  # type: ignore[union-attr]
         size = float(np.prod(sides / counts) ** (1 / len(sides)) * edge)
     return conforming_mesh(scene, Grading(size, np.zeros((0, scene.dimension))))

@@ -1,0 +1,183 @@
+"""Exact solutions in space: held to the equations they claim to solve, then to known energies."""
+
+import numpy as np
+import pytest
+
+from reference.exact import exact_solution, exact_solution_names
+from verify.errors import InputError
+from verify.scene import Material
+
+SOLID = Material(young=1.0, poisson=0.3)
+CUBE = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+INCLINED = {"point": [0.5, 0.5, 0.5], "normal": [-1.0, -2.0, 3.0], "axis": [2.0, -1.0, 0.0]}
+NORMAL = np.array([-1.0, -2.0, 3.0]) / np.sqrt(14)
+
+SOLUTIONS = {
+    "solid_patch": {
+        **INCLINED,
+        "strain": [[0.1, -0.03], [-0.05, 0.02]],
+        "shift": [[0, 0, 0], [0, 0, -0.02]],
+    },
+    "solid_smooth": {
+        **INCLINED,
+        "above": [[0.1, 2.0, 1.0, 20.0], [0.05, -1.0, 3.0, 0.0], [0.04, 3.0, 1.5, 90.0]],
+        "below": [[-0.1, 1.0, 2.5, 0.0], [0.08, 2.0, 0.5, 40.0], [0.05, 1.0, -2.0, 10.0]],
+    },
+    "penny": {"centre": [0.4, 0.5, 0.45], "normal": [1.0, 2.0, 2.0], "a": 0.3, "tension": 1.5},
+}
+
+
+def solution(name, material=SOLID):
+    return exact_solution(name, SOLUTIONS[name], material)
+
+
+def difference(field, points, h):
+    """Central differences of order 4; the last axis is the direction."""
+    columns = []
+    for step in h * np.eye(3):
+        near, far = (field(points + k * step) - field(points - k * step) for k in (1, 2))
+        columns.append((8 * near - far) / (12 * h))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.fixture
+def points():
+    return np.random.default_rng(5).uniform(-0.2, 1.2, (80, 3))
+
+
+def test_every_solution_in_space_is_checked_here():
+    assert set(SOLUTIONS) == {n for n, t in exact_solution_names().items() if t.startswith("3D")}
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.0, 0.49])
+@pytest.mark.parametrize("name", SOLUTIONS)
+def test_the_gradient_is_the_derivative_and_the_stress_is_in_equilibrium(name, poisson, points):
+    u = solution(name, Material(young=1.0, poisson=poisson))
+    expected = difference(u.displacement, points, 1e-3)
+    error = np.abs(u.gradient(points) - expected).max(axis=(1, 2))
+    scale = 1 + np.abs(u.stress(points)).max()
+    # truncation h⁴ u⁽⁵⁾; some points lie within the stencil of the cut or next to the front
+    assert np.median(error) < 1e-10
+    assert np.quantile(error, 0.9) < 1e-7
+    divergence = np.trace(difference(u.stress, points, 1e-3), axis1=2, axis2=3)
+    residual = np.abs(divergence + u.body_force(points)).max(axis=1)
+    assert np.median(residual) < 1e-9 * scale
+    assert np.quantile(residual, 0.9) < 1e-6 * scale
+
+
+@pytest.mark.parametrize("name", ["solid_patch", "solid_smooth"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_faces_of_a_plane_cut_are_free_of_traction(name, sign, points):
+    u = solution(name)
+    face = points - ((points - 0.5) @ NORMAL)[:, None] * NORMAL
+    traction = u.stress(face, face + sign * 0.01 * NORMAL) @ NORMAL
+    assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
+
+
+def penny_ring(radius):
+    """Points on a circle in the plane of the penny of SOLUTIONS, and its normal."""
+    turn = np.linspace(0.0, 6.0, 7)
+    normal = np.array([1.0, 2.0, 2.0]) / 3
+    one, two = np.array([2.0, -2.0, 1.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
+    ring = radius * (np.outer(np.cos(turn), one) + np.outer(np.sin(turn), two))
+    return np.array([0.4, 0.5, 0.45]) + ring, normal
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("radius", [0.0, 0.1, 0.25, 0.29])
+def test_faces_of_a_penny_are_free_of_traction(sign, radius):
+    face, normal = penny_ring(radius)
+    traction = solution("penny").stress(face, face + sign * 1e-3 * normal) @ normal
+    assert np.abs(traction).max() < 1e-12
+
+
+def test_a_penny_opens_by_its_ellipsoid_and_far_away_there_is_tension_only():
+    u = solution("penny")
+    for radius in (0.0, 0.17, 0.2999):
+        face, normal = penny_ring(radius)
+        jump = u.displacement(face, face + normal) - u.displacement(face, face - normal)
+        opening = 8 * (1 - 0.3**2) * 1.5 / np.pi * np.sqrt(0.3**2 - radius**2)
+        assert jump == pytest.approx(opening * np.tile(normal, (len(jump), 1)), abs=1e-12)
+    far, normal = penny_ring(300.0)
+    # the crack's own stress decays like (a/r)³
+    assert u.stress(far) == pytest.approx(
+        np.tile(1.5 * np.outer(normal, normal), (len(far), 1, 1)), abs=1e-8
+    )
+
+
+def test_the_field_ahead_of_a_penny_has_its_stress_intensity():
+    u = solution("penny")
+    assert u.stress_intensity == pytest.approx(2 * 1.5 * np.sqrt(0.3 / np.pi))
+    ahead, normal = penny_ring(0.3 + 1e-8)
+    across = np.einsum("nij,i,j->n", u.stress(ahead), normal, normal)
+    # the next term is √(r/a) smaller: 2e-4
+    assert across * np.sqrt(2 * np.pi * 1e-8) == pytest.approx(u.stress_intensity, rel=1e-3)
+
+
+def test_a_penny_is_finite_and_continuous_at_its_front():
+    u = solution("penny")
+    front, normal = penny_ring(0.3)
+    at = u.displacement(front)
+    assert np.isfinite(at).all()
+    assert at == pytest.approx(u.displacement(front + 1e-12 * normal), abs=1e-5)
+
+
+def test_round_off_across_the_faces_does_not_change_the_side():
+    u = solution("penny")
+    face, normal = penny_ring(0.2)
+    for side in (1.0, -1.0):
+        on = u.displacement(face + 1e-16 * normal, face + side * 1e-2 * normal)
+        off = u.displacement(face - 1e-16 * normal, face + side * 1e-2 * normal)
+        inside = u.displacement(face + side * 1e-10 * normal)
+        assert on == pytest.approx(inside, abs=1e-8)
+        assert off == pytest.approx(inside, abs=1e-8)
+
+
+def test_known_energies_in_cubes():
+    patch = exact_solution("solid_patch", SOLUTIONS["solid_patch"], SOLID)
+    assert patch.strain_energy(CUBE) == pytest.approx(3.131868132e-3, rel=1e-9)
+    penny = exact_solution("penny", {"a": 1.0, "tension": 1.0}, SOLID)
+    assert penny.strain_energy(4 * CUBE - 2) == pytest.approx(32.244473884, rel=3e-11)
+
+
+@pytest.mark.parametrize("name", ["solid_patch", "solid_smooth", "penny"])
+def test_energies_of_parts_add_up(name):
+    u = solution(name)
+    if name == "penny":  # boxes around it, whose surfaces it does not reach
+        with pytest.raises(InputError, match="does the crack reach it"):
+            u.strain_energy(np.array([[0, 0, 0], [0.4, 1, 1.0]]))
+        # with the tension reversed all strains are: the energy is the same
+        other = exact_solution("penny", SOLUTIONS["penny"] | {"tension": -1.5}, SOLID)
+        assert other.strain_energy(CUBE) == pytest.approx(u.strain_energy(CUBE), rel=1e-12)
+        return
+    parts = [np.array([[0, 0, 0], [0.3, 1, 1.0]]), np.array([[0.3, 0, 0], [1.0, 1, 1.0]])]
+    total = sum(u.strain_energy(part) for part in parts)
+    assert total == pytest.approx(u.strain_energy(CUBE), rel=1e-10)
+
+
+def test_the_boundary_work_of_a_linear_field_is_its_energy_by_volume():
+    from reference.exact.solid_energy import box_energy
+
+    u = exact_solution("linear", {"matrix": [[0.1, 0, 0.2], [0.3, 0.2, 0], [0, 0, 0.1]]}, SOLID)
+    assert box_energy(u, CUBE) == pytest.approx(u.strain_energy(CUBE), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name, parameters, words",
+    [
+        ("penny", {"a": 0.0, "tension": 1.0}, "expected a positive number"),
+        ("penny", {"a": 1.0}, "parameters.tension is missing"),
+        ("penny", {"a": 1.0, "tension": 1.0, "normal": [0, 0, 0]}, "normal is zero"),
+        ("solid_patch", {**INCLINED, "strain": [0.1, 0.2]}, "two rows of two numbers"),
+        ("solid_patch", {**INCLINED, "axis": NORMAL.tolist(), "strain": [[0, 0], [0, 0]]}, "para"),
+    ],
+)
+def test_wrong_parameters_are_named(name, parameters, words):
+    with pytest.raises(InputError, match=words):
+        exact_solution(name, parameters, SOLID)
+
+
+def test_a_solution_in_space_is_refused_in_the_plane():
+    plane = Material(young=1.0, poisson=0.3, plane="strain")
+    with pytest.raises(InputError, match="is one of space"):
+        exact_solution("penny", {"a": 1.0, "tension": 1.0}, plane)
