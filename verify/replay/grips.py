@@ -9,7 +9,7 @@ from verify.replay.stage import Hold, Hook
 from verify.xfem.dynamics import MovingSupports
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Grips", "gripped"]
+__all__ = ["Grips", "gripped", "held_unknowns"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -25,6 +25,33 @@ def gripped(virtual: VirtualMesh, hook: Hook) -> _Ints:
         return on_side
     away = np.linalg.norm(virtual.node_points[on_side] - hook.at, axis=1)
     return on_side[away <= max(hook.radius, float(away.min()))]
+
+
+def held_unknowns(virtual: VirtualMesh, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Unknown nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
+
+    The unknown of the material at a node is held. Another one there, of material beyond a cut, is
+    held only if that material reaches a held facet: else a part that is cut free would hang on a
+    node that is no part of it.
+    """
+    mesh = virtual.mesh
+    held = np.zeros(virtual.node_count, dtype=bool)
+    held[: len(nodes)] = nodes
+    cell, local = mesh.boundary_facets.T
+    facet = nodes[mesh.cells[cell]]
+    facet[np.arange(len(cell)), local] = True
+    on_held = np.zeros(mesh.cells.shape, dtype=bool)
+    on_held[cell[facet.all(axis=1)], local[facet.all(axis=1)]] = True
+    sub = virtual.sub_cells
+    parent = virtual.parent[sub.piece]
+    near = np.flatnonzero(on_held[parent].any(axis=1))
+    for opposite in range(mesh.dim + 1):
+        # a sub-simplex lies on the facet if all its corners but one do
+        flat = (sub.barycentric[near][:, :, opposite] == 0.0).sum(axis=1) == mesh.dim
+        piece = sub.piece[near[flat & on_held[parent[near], opposite]]]
+        others = [corner for corner in range(mesh.dim + 1) if corner != opposite]
+        held[virtual.cells[piece][:, others]] = True
+    return held
 
 
 class Grips:
@@ -52,7 +79,7 @@ class Grips:
         shape = virtual.node_points.shape
         self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
         for hold in holds:
-            at = hold.nodes[virtual.node_parent]
+            at = held_unknowns(virtual, hold.nodes)
             for axis, value in zip(hold.components, hold.values, strict=True):
                 self._fixed[at, axis], self._values[at, axis] = True, value
         self._moved: list[tuple[Hook, _Ints, _Floats]] = []

@@ -12,7 +12,7 @@ from verify.replay.session import Session
 from verify.xfem.mapping.moving_surface import MovingSurface
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Quality", "deformation_gradients", "quality"]
+__all__ = ["Quality", "deformation_gradients", "quality_of"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -52,7 +52,7 @@ class Quality:
     stray_facets: int
 
 
-def quality(session: Session) -> Quality:
+def quality_of(session: Session) -> Quality:
     """Measure the body of a session as it is now."""
     virtual, displacement = session.virtual, session.state.displacement
     whole = float(virtual.mesh.measures.sum())
