@@ -37,8 +37,17 @@ class NodalCut:
     values: _Floats
 
     def level_set(self, points: _Floats) -> _Floats:
-        """Return the nodal values at the nodes, the level set of the cut elsewhere."""
-        return self.values if points is self.points else self.cut.level_set(points)
+        """Return the nodal values at the nodes, the level set of the cut elsewhere.
+
+        At single nodes through which the cut goes it is zero too, however far off they are.
+        """
+        if points is self.points:
+            return self.values
+        values = np.asarray(self.cut.level_set(points))
+        on_cut = self.points[self.values == 0.0]
+        if len(on_cut) and len(points):
+            values = np.where(np.isin(_rows(points), _rows(on_cut)), 0.0, values)
+        return values
 
     def depth(self, points: _Floats) -> _Floats:
         """Depth of the cut itself."""
@@ -54,6 +63,12 @@ class NodalCut:
     def on(mesh: SimplexMesh, cuts: Iterable[Cut]) -> list["NodalCut"]:
         """Return cuts with their own values at the nodes of a mesh."""
         return [NodalCut(cut, mesh.points, np.asarray(cut.level_set(mesh.points))) for cut in cuts]
+
+
+def _rows(points: _Floats) -> NDArray:
+    """Each row as one item to compare, bit by bit."""
+    rows = np.ascontiguousarray(points + 0.0)  # no negative zeros
+    return rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1]))).ravel()
 
 
 @dataclass(frozen=True)

@@ -10,25 +10,22 @@ from time import perf_counter
 
 from verify.methods.cut_body import CutBody, make_body
 from verify.methods.snapped_mesh import snap_nodes, take_near_nodes
+from verify.methods.whole_cells import whole_cells
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.split import TipRule
 from verify.xfem.virtual import cut_mesh
 
 __all__ = ["snapping"]
 
 
-def snapping(
-    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside", quality: float = 0.2
-) -> CutBody:
+def snapping(mesh: SimplexMesh, cuts: Sequence[Cut], quality: float = 0.2) -> CutBody:
     """Snap the nearer end of every crossed edge onto the cut, and open the mesh there.
 
     Parameters
     ----------
     mesh : SimplexMesh
     cuts : sequence of Cut
-    tip : {"inside", "through", "nearest"}
-        Has no effect on edges that the cut crosses; see `verify.xfem.split.split_cells`.
+        An end inside an element goes back to the edges that are crossed before it.
     quality : float
         A node goes only as far as every cell keeps this share of its volume. Where it cannot reach
         the cut, the cut goes through the node: reported as "taken as on it", with the distance.
@@ -36,6 +33,8 @@ def snapping(
     start = perf_counter()
     snapped = take_near_nodes(snap_nodes(mesh, cuts, 0.5, quality), 0.5)
     moved = perf_counter()
-    virtual = cut_mesh(snapped.mesh, snapped.cuts, tip)
+    virtual = cut_mesh(snapped.mesh, snapped.cuts)
+    assert len(virtual.cells) == len(mesh.cells)  # every crossed edge has an end on the cut
+    virtual = whole_cells(virtual)
     seconds = {"snapping": moved - start, "cutting": perf_counter() - moved}
     return make_body(mesh, virtual, tuple(snapped.changes), seconds=seconds)

@@ -1,0 +1,45 @@
+"""What the conformance suite says of each method: which checks it keeps, and which it cannot."""
+
+import pytest
+
+from verify.conformance import State, conform
+
+# A cut that loses material, a body without its cut and springs are wrong by construction; the
+# reasons are in docs/methods.md.
+LOSES_MATERIAL = {
+    "rigid-translation-2d", "rigid-rotation-2d", "rigid-translation-3d", "rigid-rotation-3d",
+    "cut-patch", "energy-account", "closed-cut", "traction",
+}  # fmt: skip
+BREAKS: dict[str, set[str]] = {
+    "subdivision": set(),
+    "snapping": set(),
+    "snapping_subdivision": set(),
+    "virtual_node": set(),
+    "virtual_node_arbitrary": set(),
+    "removal": LOSES_MATERIAL,
+    "removal_refined": LOSES_MATERIAL,
+    "uncut": {"cut-patch", "energy-account", "traction", "free-piece"},
+    "mass_spring": {"cut-patch", "energy-account", "closed-cut", "traction", "weight"},
+}
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("method", BREAKS)
+def test_a_method_keeps_all_checks_but_those_that_it_cannot(method):
+    results = conform(method)
+    broken = {result.name for result in results if result.state is State.BROKEN}
+    assert broken == BREAKS[method], [r for r in results if r.state is State.BROKEN]
+
+
+@pytest.mark.parametrize(
+    "method, parameters, broken",
+    [
+        ("snapping", {}, set()),
+        ("removal", {}, {"cut-patch"}),
+        ("virtual_node", {"weights": "whole"}, {"cut-patch"}),
+        ("mass_spring", {"cut": "virtual_node"}, {"cut-patch"}),
+    ],
+)
+def test_some_checks_are_kept_and_some_broken(method, parameters, broken):
+    results = conform(method, parameters, only=["uncut-2d", "cut-patch", "free-piece"])
+    assert {result.name for result in results if result.state is State.BROKEN} == broken

@@ -1,0 +1,126 @@
+"""Snapping: nodes go onto the cut, and no cell turns inside out for it."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from verify.methods.catalogue import cut_by
+from verify.methods.snapped_mesh import snap_nodes, take_near_nodes
+from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.errors import XfemError
+from verify.xfem.polyline import Polyline
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+
+number = st.floats(-1.0, 1.0)
+FEW = settings(max_examples=40, deadline=None, derandomize=True)
+
+
+def random_mesh(dim):
+    mesh = rectangle_mesh((5, 5)) if dim == 2 else box_mesh((3, 3, 3))
+    points = mesh.points.copy()
+    inner = (np.abs(points - 0.5) < 0.49).all(axis=1)
+    shift = np.random.default_rng(dim).uniform(-1, 1, (inner.sum(), dim))
+    points[inner] += shift * (0.05 if dim == 2 else 0.06)
+    return type(mesh)(points, mesh.cells)
+
+
+@FEW
+@given(
+    dim=st.sampled_from([2, 3]),
+    direction=st.tuples(number, number, number),
+    other=st.tuples(number, number, number),
+    offset=st.floats(-0.3, 0.3),
+    threshold=st.sampled_from([0.1, 0.3, 0.5]),
+    move=st.sampled_from(["partly", "wholly"]),
+)
+def test_snapping_to_any_two_planes_never_inverts_a_cell_and_never_changes_the_body(
+    dim, direction, other, offset, threshold, move
+):
+    mesh = random_mesh(dim)
+    normals = [np.array(n)[:dim] + 1e-3 for n in (direction, other)]
+    cuts = [Plane(np.full(dim, 0.5 + k * offset), n) for k, n in enumerate(normals)]
+    snapped = snap_nodes(mesh, cuts, threshold, 0.2, move)
+
+    def signed(points):
+        corners = points[mesh.cells]
+        return np.linalg.det(corners[:, 1:] - corners[:, :1])
+
+    ratio = signed(snapped.mesh.points) / signed(mesh.points)
+    assert ratio.min() >= 0.2 * (1 - 1e-9)
+    assert snapped.mesh.measures.sum() == pytest.approx(1.0, rel=1e-12)
+    outside = np.maximum(-snapped.mesh.points, snapped.mesh.points - 1.0).max()
+    assert outside < 1e-14
+
+
+@FEW
+@given(dim=st.sampled_from([2, 3]), direction=st.tuples(number, number, number))
+def test_snapping_leaves_no_cell_split_and_both_sides_apart(dim, direction):
+    mesh = random_mesh(dim)
+    body = cut_by("snapping", mesh, [Plane(np.full(dim, 0.52), np.array(direction)[:dim] + 1e-3)])
+    assert body.counts.elements == body.counts.elements_before
+    assert not body.virtual.split.any()
+    assert (body.virtual.fraction == 1.0).all()
+    assert body.virtual.bodies.max() == 1
+
+
+def test_nodes_on_the_boundary_slide_along_it_and_corners_stay():
+    mesh = rectangle_mesh((8, 8))
+    cuts = [Polyline([[-1.0, 0.1], [2.0, 0.67]]), Polyline([[0.11, -1.0], [0.71, 2.0]])]
+    snapped = snap_nodes(mesh, cuts)
+    moved = np.linalg.norm(snapped.mesh.points - mesh.points, axis=1)
+    corners = [0, 8, 72, 80]
+    assert (moved[corners] == 0.0).all()
+    for axis in (0, 1):
+        for side in (0.0, 1.0):
+            on_side = mesh.points[:, axis] == side
+            assert (snapped.mesh.points[on_side, axis] == side).all()
+            assert moved[on_side].max() > 0.0
+
+
+def test_a_node_that_is_reported_as_moved_lies_on_the_cut():
+    circle = ImplicitCut(lambda p: 0.31 - np.linalg.norm(p - 0.5, axis=1))
+    mesh = rectangle_mesh((9, 9))
+    snapped = take_near_nodes(snap_nodes(mesh, [circle]), 0.5)
+    moved = np.linalg.norm(snapped.mesh.points - mesh.points, axis=1) > 0
+    on = snapped.cuts[0].values == 0.0
+    off = np.abs(circle.level_set(snapped.mesh.points[on]))
+    count = {change.kind: change for change in snapped.changes}
+    assert moved.sum() == count["node moved onto the cut"].count
+    taken = count["node off the cut taken as on it"]
+    assert (off > 1e-9).sum() == taken.count
+    assert off.max() == pytest.approx(taken.size)
+    assert taken.count < 0.2 * on.sum()
+
+
+def test_a_snapped_circle_has_its_radius_up_to_the_facets():
+    circle = ImplicitCut(lambda p: 0.31 - np.linalg.norm(p - 0.5, axis=1))
+    errors = []
+    for n in (10, 20, 40):
+        body = cut_by("snapping", rectangle_mesh((n, n)), [circle])
+        inside = np.bincount(
+            body.virtual.bodies[body.virtual.cells[:, 0]], body.virtual.volumes
+        ).min()
+        errors.append(abs(inside - np.pi * 0.31**2))
+    # chords of length h: an area of h²/12 per radius is missing at least; nodes that cannot
+    # move all the way add as much
+    assert errors[2] < errors[0] / 4
+    assert errors[2] < 2e-3
+
+
+@pytest.mark.parametrize(
+    "parameters, said",
+    [
+        ({"threshold": 0.6}, "threshold 0.6"),
+        ({"quality": 1.0}, "quality 1"),
+        ({"quality": 0.0}, "quality 0"),
+    ],
+)
+def test_wrong_parameters_are_named(parameters, said):
+    with pytest.raises(XfemError, match=said):
+        cut_by("snapping_subdivision", rectangle_mesh((3, 3)), [], **parameters)
+
+
+def test_an_unknown_method_is_named_with_those_that_there_are():
+    with pytest.raises(XfemError, match="no method 'sawing'; expected one of subdivision, "):
+        cut_by("sawing", rectangle_mesh((3, 3)), [])

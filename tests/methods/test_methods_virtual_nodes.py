@@ -1,0 +1,94 @@
+"""Virtual nodes: copies of cells, one for each part that has a node, or for each part."""
+
+import numpy as np
+import pytest
+from method_bodies import hang
+
+from verify.methods.catalogue import cut_by
+from verify.xfem.cuts import Plane
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.polyline import Polyline
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.virtual import cut_mesh
+
+TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
+TETRAHEDRON = SimplexMesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
+CROSS = [Plane([0.3, 0.3], [1.0, 0.1]), Plane([0.3, 0.3], [0.1, 1.0])]
+
+
+def test_a_triangle_can_be_in_three_copies_but_not_in_four():
+    # two lines that cross inside make four parts; the one without a node stays with a sibling
+    assert cut_by("virtual_node_arbitrary", TRIANGLE, CROSS).counts.elements == 4
+    body = cut_by("virtual_node", TRIANGLE, CROSS)
+    assert body.counts.elements == 3
+    merged = next(c for c in body.changes if c.kind.startswith("part without a node"))
+    smallest = cut_mesh(TRIANGLE, CROSS)
+    assert merged.count == 1
+    assert merged.size in smallest.fraction
+    assert body.virtual.volumes.sum() == pytest.approx(0.5, rel=1e-14)
+
+
+def test_a_tetrahedron_in_eight_parts_has_at_most_four_copies():
+    cuts = [Plane([0.2, 0.2, 0.2], np.eye(3)[k] + 0.05) for k in range(3)]
+    arbitrary = cut_by("virtual_node_arbitrary", TETRAHEDRON, cuts)
+    assert arbitrary.counts.elements == 8
+    body = cut_by("virtual_node", TETRAHEDRON, cuts)
+    assert body.counts.elements <= 4
+    assert body.virtual.volumes.sum() == pytest.approx(1 / 6, rel=1e-13)
+
+
+def test_a_slab_between_two_cuts_without_a_node_is_no_copy_of_its_own():
+    cuts = [Plane([0.3, 0.0], [1.0, 0.0]), Plane([0.4, 0.0], [1.0, 0.0])]
+    assert cut_by("virtual_node_arbitrary", TRIANGLE, cuts).counts.elements == 3
+    body = cut_by("virtual_node", TRIANGLE, cuts)
+    assert body.counts.elements == 2
+    assert body.virtual.bodies.max() == 1
+
+
+@pytest.mark.parametrize("method", ["virtual_node", "virtual_node_arbitrary"])
+def test_every_copy_has_a_node_of_its_own_part_or_is_counted(method):
+    mesh = rectangle_mesh((6, 6))
+    body = cut_by(method, mesh, [Polyline([[-0.1, 0.31], [0.62, 0.55]])])
+    virtual = body.virtual
+    first = virtual.cells < len(mesh.points)
+    assert (first.sum(axis=1) >= 1).all()
+
+
+def test_one_cut_makes_both_algorithms_the_same_as_xfem():
+    mesh, cuts = box_mesh((3, 3, 3)), [Plane([0.5, 0.5, 0.47], [0.1, 0.2, 1.0])]
+
+    def ends(points):
+        return (points[:, 2] < 1e-9) | (points[:, 2] > 1 - 1e-9)
+
+    energies = [
+        hang(method, mesh, cuts, ends)[1].strain_energy
+        for method in ("virtual_node", "virtual_node_arbitrary")
+    ]
+    assert energies[0] == energies[1]
+    virtual = cut_mesh(mesh, cuts)
+    body = cut_by("virtual_node", mesh, cuts)
+    assert np.array_equal(body.virtual.cells, virtual.cells)
+    assert np.array_equal(body.virtual.fraction, virtual.fraction)
+
+
+def test_copies_that_resist_as_whole_cells_add_the_volume_of_the_cut_cells():
+    mesh, cut = rectangle_mesh((6, 6)), Polyline([[-1.0, 0.31], [2.0, 0.55]])
+    body = cut_by("virtual_node", mesh, [cut], weights="whole")
+    touched = np.bincount(body.virtual.parent, minlength=len(mesh.cells)) > 1
+    added = body.resisting.volumes.sum() - body.virtual.volumes.sum()
+    assert added == pytest.approx(mesh.measures[touched].sum(), rel=1e-12)
+    said = next(c for c in body.changes if "material added" in c.kind)
+    assert said.size == pytest.approx(added, rel=1e-12)
+
+    def ends(points):
+        return (points[:, 1] < 1e-9) | (points[:, 1] > 1 - 1e-9)
+
+    # more material resists, the load is the same: less energy
+    whole = hang("virtual_node", mesh, [cut], ends, weights="whole")[1].strain_energy
+    assert whole < hang("virtual_node", mesh, [cut], ends)[1].strain_energy
+
+
+def test_unknown_weights_are_named():
+    with pytest.raises(XfemError, match="'half'; expected share or whole"):
+        cut_by("virtual_node", TRIANGLE, [], weights="half")
