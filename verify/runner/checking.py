@@ -2,6 +2,7 @@
 
 from verify.errors import InputError
 from verify.scene import MeshFile, Scene, read_mesh
+from verify.scene.empty_parts import check_parts_of_mesh
 from verify.scene.nearest import nearest
 from verify.solvers import solver_names
 
@@ -12,7 +13,12 @@ def check_scene(scene: Scene) -> None:
     """Raise `InputError` if something that `scene` names is not there or is bad."""
     where = str(scene.file or scene.name)
     if isinstance(scene.geometry, MeshFile):
-        read_mesh(scene)
+        try:
+            check_parts_of_mesh(scene, *read_mesh(scene))
+        except InputError:
+            raise
+        except ValueError as error:
+            raise InputError(str(error), where) from None
     if scene.exact is not None:
         from reference.exact import exact_solution
 

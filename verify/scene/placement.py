@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from verify.scene.acceptance import METRICS
 from verify.scene.cut_placement import check_cuts, check_points
 from verify.scene.cuts import ArcCut
+from verify.scene.empty_parts import check_parts_act
 from verify.scene.geometry import MeshFile, Polygon
 from verify.scene.initial import Moving
 from verify.scene.nearest import nearest
@@ -24,6 +25,7 @@ def check_placement(scene: "Scene") -> None:
     _check_regions(scene)
     _check_exact(scene)
     _check_names(scene)
+    check_parts_act(scene)
     _check_times(scene)
     check_cuts(scene)
     check_points(scene)

@@ -1,0 +1,209 @@
+"""Cuts in space: their triangulation, and where they lie in a box."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from verify.errors import InputError
+from verify.scene import CylinderCut, DiscCut, PolygonCut, SweptCut, load_scene
+from verify.scene.spatial import area_inside, distance_to_triangles, ear_clipping, overlap_area
+
+CUBE = """
+title = "A cube"
+requirement = "It shall be cut."
+[geometry]
+kind = "box"
+lower = [0.0, 0.0, 0.0]
+upper = [1.0, 1.0, 1.0]
+[mesh]
+cells = [[2, 2, 2]]
+[material]
+young = 1.0
+poisson = 0.3
+[[supports]]
+where = "boundary"
+displacement = [0.0, 0.0, 0.0]
+"""
+DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 0.0, 2.0], "radius": 0.3}
+PIPE = {
+    "kind": "cylinder", "base": [0.5, 0.5, 0.2], "axis": [0.0, 0.0, 1.0], "radius": 0.3,
+    "height": 0.5,
+}  # fmt: skip
+SWEPT = {
+    "kind": "swept", "points": [[0.2, 0.3, 0.2], [0.5, 0.5, 0.2], [0.8, 0.3, 0.2]],
+    "along": [0.0, 0.0, 0.5],
+}  # fmt: skip
+SQUARE = {
+    "kind": "polygon",
+    "points": [[0.2, 0.2, 0.5], [0.8, 0.2, 0.5], [0.8, 0.8, 0.5], [0.2, 0.8, 0.5]],
+}
+LOOP = [[0.2, 0.3, 0.2], [0.8, 0.3, 0.2], [0.5, 0.6, 0.2], [0.5, 0.1, 0.2]]
+BOW = [[0.2, 0.2, 0.5], [0.8, 0.8, 0.5], [0.8, 0.2, 0.5], [0.2, 0.8, 0.5]]
+
+
+def table(cut):
+    def value(x):
+        return f'"{x}"' if isinstance(x, str) else str(x).replace("(", "[").replace(")", "]")
+
+    return "[[cuts]]\n" + "".join(f"{key} = {value(x)}\n" for key, x in cut.items())
+
+
+def load(folder, *cuts, more=""):
+    (folder / "cube.toml").write_text(CUBE + "".join(table(cut) for cut in cuts) + more)
+    return load_scene(folder / "cube.toml")
+
+
+def area_vectors(surface):
+    points, triangles = surface
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return 0.5 * np.cross(b - a, c - a)
+
+
+def test_the_normal_of_every_cut_is_that_of_its_triangles():
+    """A plane cut's points along its normal; a cylinder's towards its axis; a sweep's t × along."""
+    disc = DiscCut(**DISC)
+    assert (area_vectors(disc.surface())[:, 2] > 0.0).all()
+    polygon = PolygonCut(**SQUARE)
+    assert (area_vectors(polygon.surface())[:, 2] > 0.0).all()
+    pipe = CylinderCut(**PIPE).surface()
+    middle = pipe[0][pipe[1]].mean(axis=1) - [0.5, 0.5, 0.0]
+    assert ((area_vectors(pipe) * middle)[:, :2].sum(axis=1) < 0.0).all()
+    swept = SweptCut(**SWEPT).surface()
+    wanted = np.cross([0.3, 0.2, 0.0], [0.0, 0.0, 0.5])
+    np.testing.assert_allclose(area_vectors(swept)[0], 0.5 * wanted)
+
+
+def test_areas_of_the_triangulations_are_those_of_the_cuts():
+    """A regular n-gon in a circle loses (2π/n)²/6 of its area, the mantle (2π/n)²/24."""
+    step = (2 * np.pi / 64) ** 2
+
+    def area(cut):
+        return np.linalg.norm(area_vectors(cut.surface()), axis=1).sum()
+
+    assert area(DiscCut(**DISC)) == pytest.approx(np.pi * 0.09 * (1 - step / 6), rel=1e-4)
+    ellipse = {**DISC, "radii": (0.3, 0.1), "axis": (0.0, 1.0, 0.0)}
+    del ellipse["radius"]
+    assert area(DiscCut(**ellipse)) == pytest.approx(np.pi * 0.03 * (1 - step / 6), rel=1e-4)
+    assert area(CylinderCut(**PIPE)) == pytest.approx(0.3 * np.pi * (1 - step / 24), rel=1e-4)
+    sector = CylinderCut(**PIPE, towards=(1.0, 0.0, 0.0), sweep=90.0)
+    assert area(sector) == pytest.approx(0.075 * np.pi * (1 - step / 24), rel=1e-4)
+    assert area(SweptCut(**SWEPT)) == pytest.approx(2 * np.hypot(0.3, 0.2) * 0.5)
+
+
+@given(seed=st.integers(0, 10**6), corners=st.integers(3, 12))
+@settings(max_examples=50, deadline=None)
+def test_a_star_shaped_polygon_is_triangulated_without_overlap(seed, corners):
+    """All triangles turn the same way and their areas add up to that of the polygon."""
+    rng = np.random.default_rng(seed)
+    angle = 2 * np.pi * (np.arange(corners) + rng.uniform(0.1, 0.9, corners)) / corners
+    plane = rng.uniform(0.2, 1.0, (corners, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])
+    u, v = np.linalg.qr(rng.normal(size=(3, 2)))[0].T
+    points = plane[:, :1] * u + plane[:, 1:] * v
+    vectors = area_vectors((points, ear_clipping(points)))
+    normal = vectors.sum(axis=0)
+    x, y = plane.T
+    shoelace = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    assert np.linalg.norm(normal) == pytest.approx(abs(shoelace), rel=1e-9)
+    assert (vectors @ normal >= -1e-12).all()
+
+
+def test_the_area_in_a_box_is_that_of_clipping():
+    surface = PolygonCut(
+        kind="polygon", points=[(-1, -1, 0.5), (0.5, -1, 0.5), (0.5, 2, 0.5), (-1, 2, 0.5)]
+    ).surface()
+    assert area_inside(surface, np.zeros(3), np.ones(3)) == pytest.approx(0.5)
+    on_face = (surface[0] + [0.0, 0.0, 0.5], surface[1])
+    assert area_inside(on_face, np.zeros(3), np.ones(3)) == 0.0
+
+
+def test_the_distance_to_a_cut_is_that_to_its_nearest_point():
+    surface = PolygonCut(**SQUARE).surface()
+    for point, distance in (((0.5, 0.4, 0.9), 0.4), ((0.9, 0.5, 0.5), 0.1), ((1.1, 1.2, 0.5), 0.5)):
+        assert distance_to_triangles(np.array(point), surface) == pytest.approx(distance)
+
+
+@pytest.mark.parametrize(
+    "cut, kind",
+    [
+        (DISC, "inner"),
+        ({**DISC, "radius": 3.0}, "through"),
+        ({**DISC, "centre": [0.0, 0.5, 0.5]}, "edge"),
+        (PIPE, "inner"),
+        ({**PIPE, "base": [0.5, 0.5, -0.1], "height": 1.2}, "through"),
+        ({**PIPE, "base": [0.5, 0.5, -0.1], "height": 0.5}, "edge"),
+        (SWEPT, "inner"),
+        (SQUARE, "inner"),
+    ],
+)
+def test_how_a_cut_meets_a_box_is_told_by_its_rim(tmp_path, cut, kind):
+    load(tmp_path, {**cut, "expected": kind})
+    wrong = "edge" if kind != "edge" else "inner"
+    with pytest.raises(InputError, match=f"expected '{wrong}' but it is '{kind}'"):
+        load(tmp_path, {**cut, "expected": wrong})
+
+
+@pytest.mark.parametrize(
+    "cut, said",
+    [
+        ({**DISC, "centre": [0.5, 0.5, 1.0]}, "lies outside the body or along its boundary"),
+        ({**DISC, "centre": [0.5, 0.5, 3.0]}, "lies outside the body"),
+        ({**DISC, "normal": [0.0, 0.0, 0.0]}, "cuts[0]: the normal of the disc is zero"),
+        ({**DISC, "radius": 0.0}, "cuts[0].radius: expected a number > 0"),
+        ({**DISC, "radii": [0.3, 0.1]}, "a disc has either a radius or radii"),
+        ({**PIPE, "axis": [0.0, 0.0, 0.0]}, "the axis of the cylinder is zero"),
+        ({**PIPE, "sweep": 90.0}, "a sector needs the direction of its angle 0"),
+        ({**PIPE, "sweep": 90.0, "towards": [0.0, 0.0, 2.0]}, "towards [0.0, 0.0, 2.0] is zero or"),
+        ({**SWEPT, "along": [0.0, 0.0, 0.0]}, "along is zero"),
+        ({**SWEPT, "along": [0.6, 0.4, 0.0]}, "segment 0 is parallel to `along`"),
+        (
+            {**SWEPT, "points": LOOP},
+            "seen along the sweep, intersects itself (segments 0 and 2)",
+        ),
+        (
+            {**SQUARE, "points": BOW},
+            "the polygon intersects itself",
+        ),
+        ({**SQUARE, "points": [[0.2, 0.2, 0.5], [0.8, 0.8, 0.5], [0.5, 0.5, 0.5]]}, "has no area"),
+        ({"kind": "polyline", "points": [[0.0, 0.0], [1.0, 1.0]]}, "a polyline cut in a 3D scene"),
+        ({**DISC, "opens_at": 1.0}, "cuts[0].opens_at: belongs to a dynamic analysis"),
+    ],
+)  # fmt: skip
+def test_a_cut_that_cannot_be_is_named(tmp_path, cut, said):
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, cut)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_cuts_that_lie_on_each_other_are_named(tmp_path):
+    other = {**SQUARE, "name": "other"}
+    with pytest.raises(InputError, match=r"'cut' and 'other' lie on each other over 0\.282"):
+        load(tmp_path, DISC, other)  # the disc lies within the square: π 0.3², as a 64-gon
+    beside = {**SQUARE, "name": "other", "points": [[x, y, 0.51] for x, y, _ in SQUARE["points"]]}
+    load(tmp_path, DISC, beside)
+    across = {**SWEPT, "name": "other"}
+    load(tmp_path, DISC, across)
+    assert overlap_area(DiscCut(**DISC).surface(), SweptCut(**SWEPT).surface()) == 0.0
+
+
+@pytest.mark.parametrize(
+    "asked, said",
+    [
+        ('kind = "opening"\nname = "q"\nat = 0.5', "quantities[0].point: an opening in 3D is at"),
+        ('kind = "opening"\nname = "q"\npoint = [0.5, 0.5, 0.7]', "is 0.2 m away from cut 'cut'"),
+        ('kind = "opening"\nname = "q"\npoint = [0.5, 0.5, 1.7]', "which is not in the body"),
+        (
+            'kind = "displacement"\nname = "q"\ncomponent = "z"\npoint = [0.5, 0.6, 0.5]',
+            "lies on cut 'cut', where the displacement has two values",
+        ),
+        ('kind = "stress_intensity"\nname = "q"\nend = "start"', "asked for in 2D scenes only"),
+    ],
+)
+def test_what_is_measured_in_space_lies_where_it_can_be(tmp_path, asked, said):
+    load(
+        tmp_path, DISC, more='[[quantities]]\nkind = "opening"\nname = "q"\npoint = [0.6, 0.5, 0.5]'
+    )
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, DISC, more=f"[[quantities]]\n{asked}\n")
+    assert said in str(caught.value)

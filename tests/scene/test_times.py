@@ -1,0 +1,187 @@
+"""What a scene says of time: histories, output times, openings, the state at the beginning."""
+
+import numpy as np
+import pytest
+
+from verify.errors import InputError
+from verify.scene import Rotation, Support, load_scene
+from verify.scene.history import factor_at, first_factor, jumps, slope_at
+
+MOVING = """
+title = "A square"
+requirement = "It shall move."
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+[mesh]
+cells = [[4, 4]]
+[material]
+young = 1.0
+poisson = 0.3
+density = 1.0
+plane = "strain"
+[analysis]
+kind = "dynamic"
+duration = 2.0
+"""
+STATIC = MOVING.replace('[analysis]\nkind = "dynamic"\nduration = 2.0\n', "")
+HELD = '[[supports]]\nwhere = "left"\ndisplacement = [0.0, 0.0]\n'
+
+
+def load(folder, text):
+    (folder / "case.toml").write_text(text)
+    return load_scene(folder / "case.toml")
+
+
+def test_output_times_are_evenly_spaced_and_eleven_unless_said_otherwise(tmp_path):
+    assert load(tmp_path, MOVING).analysis.output_times == pytest.approx(np.linspace(0, 2, 11))
+    assert load(tmp_path, MOVING + "outputs = 3\n").analysis.output_times == (0.0, 1.0, 2.0)
+    assert load(tmp_path, STATIC + HELD).analysis.output_times == (0.0,)
+
+
+def test_finite_rotation_is_another_name_of_the_corotational_kinematics(tmp_path):
+    found = load(tmp_path, MOVING + 'kinematics = "finite_rotation"\n')
+    assert found.analysis.kinematics == "corotational"
+
+
+@pytest.mark.parametrize(
+    "time, factor, slope",
+    [(0.0, 0.0, 0.0), (1.0, 0.0, 2.0), (1.5, 1.0, 2.0), (2.0, -1.0, 0.0), (3.0, -1.0, 0.0)],
+)
+def test_a_history_is_linear_between_its_times_and_constant_outside(time, factor, slope):
+    """After a jump (at 2) the new factor holds; the rate is that of what follows."""
+    history = [(1.0, 0.0), (2.0, 2.0), (2.0, -1.0)]
+    assert (factor_at(history, time), slope_at(history, time)) == (factor, slope)
+    assert (first_factor(history), jumps(history)) == (0.0, [2.0])
+
+
+def test_a_load_that_jumps_at_the_beginning_was_there_before():
+    history = [(0.0, 1.0), (0.0, 0.0)]
+    assert (first_factor(history), factor_at(history, 0.0)) == (1.0, 0.0)
+
+
+def test_without_a_history_everything_is_there_always():
+    assert (factor_at(None, 3.0), slope_at(None, 3.0), first_factor(None)) == (1.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("axis", [None, (1.0, 2.0, -2.0)])
+def test_a_support_turns_by_a_rotation_whose_rate_is_its_derivative(axis):
+    dimension = 2 if axis is None else 3
+    rotation = Rotation(angle=70.0, centre=[0.2] * dimension, axis=axis)
+    matrix = rotation.matrix(0.4)
+    np.testing.assert_allclose(matrix @ matrix.T, np.eye(dimension), atol=1e-15)
+    assert np.trace(matrix) == pytest.approx(2 * np.cos(np.deg2rad(28.0)) + dimension - 2)
+    support = Support(where="boundary", displacement=[0.5] * dimension, rotation=rotation)
+    points = np.random.default_rng(5).random((4, dimension))
+    step = 1e-6
+    slope = (support.values(points, 0.4 + step) - support.values(points, 0.4 - step)) / (2 * step)
+    np.testing.assert_allclose(support.rates(points, 0.4), slope, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        (STATIC, "supports: a static scene needs at least one"),
+        (STATIC + HELD + "history = [[0.0, 1.0]]", "supports[0].history: belongs to a dynamic"),
+        (STATIC + HELD + '[initial]\nkind = "equilibrium"', "initial: belongs to a dynamic"),
+        (STATIC + HELD + "[analysis]\noutputs = 3", "outputs belong to a dynamic analysis"),
+        (STATIC + HELD + "[analysis]\ndamping = [1.0, 0.0]", "damping belongs to a dynamic"),
+        (MOVING + "outputs = 1", "analysis.outputs: expected a number ≥ 2, got 1"),
+        (MOVING + HELD + "history = [[1.0, 1.0], [0.5, 0.0]]", "times must ascend"),
+        (MOVING + HELD + "history = [[1.0, 1.0], [1.0, 2.0], [1.0, 0.0]]", "three are too many"),
+        (
+            MOVING
+            + '[[cuts]]\nkind = "polyline"\npoints = [[0.2, 0.5], [0.7, 0.5]]\nopens_at = 3.0',
+            "cuts[0].opens_at: 3 s is after the end, 2 s",
+        ),
+        (
+            MOVING + '[[quantities]]\nkind = "maximum_displacement"\ntime = 2.5',
+            "quantities[0].time: 2.5 s is after the end, 2 s",
+        ),
+        (
+            STATIC + HELD + '[[quantities]]\nkind = "maximum_displacement"\ntime = 0.5',
+            "quantities[0].time: belongs to a dynamic analysis",
+        ),
+        (MOVING + '[initial]\nkind = "moving"', "initial: a moving body needs a velocity, a spin"),
+        (MOVING + '[initial]\nkind = "moving"\nvelocity = [1.0, 0.0, 0.0]', "initial.velocity: 3"),
+        (MOVING + '[initial]\nkind = "moving"\nspin = [1.0, 0.0, 0.0]', "initial.spin: expected a"),
+        (MOVING + '[initial]\nkind = "still"', "initial.kind: no 'still'"),
+        (MOVING + HELD + "rotation = { angle = 9.0, centre = [0.0] }", "expected at least 2"),
+        (
+            MOVING + HELD + "rotation = { angle = 9.0, centre = [0.0, 0.0], axis = [0, 0, 1] }",
+            "supports[0].rotation.axis: belongs to 3D scenes",
+        ),
+        (
+            MOVING + '[[supports]]\nwhere = "left"\ndisplacement = [0.0]\ncomponents = ["x"]\n'
+            "rotation = { angle = 9.0, centre = [0.0, 0.0] }",
+            "supports[0]: a rotation goes with a displacement of all components",
+        ),
+        (
+            STATIC.replace("density = 1.0", "thickness = 0.1") + HELD,
+            "material.thickness: belongs to membranes",
+        ),
+    ],
+)
+def test_what_does_not_fit_together_is_said_in_one_line(tmp_path, text, said):
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, text)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+ARCS = """
+[[cuts]]
+kind = "arc"
+name = "outer"
+centre = [0.5, 0.5]
+radius = 0.4
+{outer}
+[[cuts]]
+kind = "arc"
+name = "inner"
+centre = {centre}
+radius = {radius}
+{inner}
+"""
+
+
+@pytest.mark.parametrize(
+    "part, touches",
+    [
+        ({"centre": [0.7, 0.5], "radius": 0.2}, True),  # from inside, at (0.9, 0.5)
+        ({"centre": [0.5, 0.5], "radius": 0.3}, True),
+        ({"centre": [0.5, 0.5], "radius": 0.4}, False),
+        ({"centre": [0.5, 0.5], "radius": 0.4, "inner": "start = 90.0\nsweep = 90.0"}, False),
+        (
+            {
+                "centre": [0.5, 0.5], "radius": 0.4, "outer": "start = 0.0\nsweep = 90.0",
+                "inner": "start = 90.0\nsweep = 180.0",
+            },
+            True,
+        ),
+        (
+            {
+                "centre": [0.5, 0.5], "radius": 0.4, "outer": "start = 300.0\nsweep = 120.0",
+                "inner": "start = 20.0\nsweep = 90.0",
+            },
+            False,
+        ),
+    ],
+)  # fmt: skip
+def test_arcs_that_touch_do_not_lie_on_each_other(tmp_path, part, touches):
+    """Only arcs of one circle can; their chords may be parallel at a point where they touch."""
+    text = STATIC + HELD + ARCS.format(**{"outer": "", "inner": "", **part})
+    if touches:
+        load(tmp_path, text)
+        return
+    with pytest.raises(InputError, match="'outer' and 'inner' lie on each other"):
+        load(tmp_path, text)
+
+
+def test_polylines_that_touch_at_an_end_within_round_off_do_not_lie_on_each_other(tmp_path):
+    """1/3 + 1/3 + … is a unit of the last place beyond, as sums are."""
+    cuts = ""
+    for name, (a, b) in {"one": (0.1, 0.30000000000000004), "two": (0.3, 0.7)}.items():
+        cuts += f'[[cuts]]\nkind = "polyline"\nname = "{name}"\npoints = [[{a}, 0.5], [{b}, 0.5]]\n'
+    load(tmp_path, STATIC + HELD + cuts)
