@@ -159,7 +159,7 @@ def join_across_faces(
                     cell, across, skip, pieces[starts[here]], pieces[starts[there]], cells, towards
                 )
                 continue
-            level[0], k, top = 0, 0, 0
+            level[0], k, top = 0, 0, np.int64(0)
             for a in range(corners):
                 if a != skip:
                     stack[0, k] = cells[cell, a]

@@ -96,7 +96,9 @@ def find_row(row, table, known):
 @njit(cache=True)
 def point_on_edge(cut, plus, minus, edges):
     """Give the zero point of a cut on an edge, -1 if nobody has asked for it yet."""
-    number = find_row((cut, plus, minus), edges.table, edges.known)
+    row = np.empty(3, dtype=np.int64)
+    row[0], row[1], row[2] = cut, plus, minus
+    number = find_row(row, edges.table, edges.known)
     return edges.point[number] if number >= 0 else -1
 
 

@@ -83,7 +83,7 @@ def divide_simplices(simplices, values, cut, active, below, stairs, edges):
     piece, points, barycentric, fraction, sign = simplices
     count, corners = points.shape
     whole = (1 << corners) - 1
-    kept, total = 0, 0
+    kept, total = np.int64(0), np.int64(0)
     for s in range(count):
         parts = 0
         if active[piece[s]]:
@@ -97,7 +97,7 @@ def divide_simplices(simplices, values, cut, active, below, stairs, edges):
     new_fraction, new_sign = np.empty(total), np.empty(total, dtype=np.int8)
     new = (new_piece, new_points, new_barycentric, new_fraction, new_sign)
     order = np.empty(corners, dtype=np.int64)
-    at, end = 0, kept
+    at, end = np.int64(0), kept
     for s in range(count):
         pattern = _pattern(points[s], values, cut) if active[piece[s]] else whole
         if pattern == 0 or pattern == whole:

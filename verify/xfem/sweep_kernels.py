@@ -28,7 +28,10 @@ def probe(x, sweep, room):
         distance = squared_distance(x, foot)
         if distance < best:
             best, nearest = distance, t
-            best_weights[:], best_foot[:] = weights, foot
+            for k in range(size):
+                best_weights[k] = weights[k]
+            for i in range(space):
+                best_foot[i] = foot[i]
     zeros, last, only, travel = 0, 0, 0, 0.0
     for k in range(size):
         if best_weights[k] == 0.0:
@@ -72,7 +75,8 @@ def probe_points(points, sweep):
             gap = np.inf
             for r in range(len(sweep.rim)):
                 if size == 1:
-                    corner[:] = sweep.rim[r, 0]
+                    for i in range(space):
+                        corner[i] = sweep.rim[r, 0, i]
                 else:
                     nearest_on_facet(x, sweep.rim[r], weights)
                     foot_on_facet(sweep.rim[r], weights, corner)

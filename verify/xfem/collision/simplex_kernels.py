@@ -27,22 +27,16 @@ def squared_distance(a, b):
 
 
 @njit(cache=True)
-def _project(x, corners, origin, along, other):
-    """(x − origin)·(along − origin) and (other − origin)·(along − origin)."""
-    p, q = 0.0, 0.0
-    for i in range(len(x)):
-        edge = corners[along, i] - corners[origin, i]
-        p += (x[i] - corners[origin, i]) * edge
-        q += (corners[other, i] - corners[origin, i]) * edge
-    return p, q
-
-
-@njit(cache=True)
 def nearest_on_facet(x, corners, weights):
     """Write the weights (k,) of the point of a facet that is nearest to x."""
-    weights[:] = 0.0
+    for k in range(len(weights)):
+        weights[k] = 0.0
     if corners.shape[0] == 2:
-        p, q = _project(x, corners, 0, 1, 1)
+        p, q = 0.0, 0.0
+        for i in range(len(x)):
+            along = corners[1, i] - corners[0, i]
+            p += (x[i] - corners[0, i]) * along
+            q += along * along
         if p <= 0.0:
             weights[0] = 1.0
         elif p >= q:
@@ -51,9 +45,14 @@ def nearest_on_facet(x, corners, weights):
             weights[1] = p / q
             weights[0] = 1.0 - weights[1]
         return
-    ab, ab2 = _project(x, corners, 0, 1, 1)
-    ac, ac2 = _project(x, corners, 0, 2, 2)
-    _, abac = _project(x, corners, 0, 1, 2)
+    ab, ac, ab2, ac2, abac = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(len(x)):
+        first, second = corners[1, i] - corners[0, i], corners[2, i] - corners[0, i]
+        ab += (x[i] - corners[0, i]) * first
+        ac += (x[i] - corners[0, i]) * second
+        ab2 += first * first
+        ac2 += second * second
+        abac += first * second
     if ab <= 0.0 and ac <= 0.0:
         weights[0] = 1.0
         return

@@ -30,14 +30,13 @@ _DEEP = 128  # deeper than any heap: twice its height is what a depth-first stac
 def morton_codes(low, high):
     """Place (n,) of the boxes' centres on the Z-order curve of their common box."""
     count, space = low.shape
-    floor, ceiling = np.full(space, np.inf), np.full(space, -np.inf)
-    for n in range(count):
-        for i in range(space):
-            centre = 0.5 * (low[n, i] + high[n, i])
-            floor[i], ceiling[i] = min(floor[i], centre), max(ceiling[i], centre)
-    widest = 0.0
+    floor, widest = np.empty(space), 0.0
     for i in range(space):
-        widest = max(widest, ceiling[i] - floor[i])
+        least, most = np.inf, -np.inf
+        for n in range(count):
+            centre = 0.5 * (low[n, i] + high[n, i])
+            least, most = min(least, centre), max(most, centre)
+        floor[i], widest = least, max(widest, most - least)
     scale = 1023.0 / widest if widest > 0.0 else 0.0
     codes = np.zeros(count, dtype=np.int64)
     for n in range(count):
@@ -123,13 +122,15 @@ def nearest_facet(x, points, facets, body, wanted, low, high, order, limit, weig
         if wanted >= 0 and body[facet] != wanted:
             continue
         for k in range(size):
-            corners[k] = points[facets[facet, k]]
+            for i in range(space):
+                corners[k, i] = points[facets[facet, k], i]
         nearest_on_facet(x, corners, trial)
         foot_on_facet(corners, trial, foot)
         distance = squared_distance(x, foot)
         if distance < best or (found < 0 and distance <= best):
             best, found = distance, facet
-            weights[:] = trial
+            for k in range(size):
+                weights[k] = trial[k]
     return found, np.sqrt(best)
 
 

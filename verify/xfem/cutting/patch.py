@@ -85,7 +85,8 @@ def _nodes_of(mesh_cells, cells, place):
             if place[node] < 0:
                 place[node], found[count] = 0, node
                 count += 1
-    place[found[:count]] = -1
+    for k in range(count):
+        place[found[k]] = -1
     return found[:count]
 
 
@@ -102,7 +103,8 @@ def _cells_around(starts, around, nodes, place):
             if place[cell] < 0:
                 place[cell], found[count] = 0, cell
                 count += 1
-    place[found[:count]] = -1
+    for k in range(count):
+        place[found[k]] = -1
     return found[:count]
 
 
@@ -119,6 +121,8 @@ def _local(mesh_cells, neighbours, cells, nodes, cell_place, node_place):
             local[k, a] = node_place[mesh_cells[cells[k], a]]
             other = neighbours[cells[k], a]
             across[k, a] = cell_place[other] if other >= 0 else -1
-    node_place[nodes] = -1
-    cell_place[cells] = -1
+    for node in nodes:
+        node_place[node] = -1
+    for cell in cells:
+        cell_place[cell] = -1
     return local, across

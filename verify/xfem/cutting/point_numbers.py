@@ -104,27 +104,28 @@ def _merge(row, begin, end, value):
 
 @njit(cache=True)
 def _number_points(ends, cut, local, nodes, numbers, supports, table, known, count):
-    none = np.iinfo(np.int64).max
+    none, start, middle = np.iinfo(np.int64).max, np.int64(0), np.int64(_NODES)
     row = np.empty(_WIDTH, dtype=np.int64)
-    edge = np.full(_WIDTH, -1, dtype=np.int64)
+    edge = -np.ones(_WIDTH, dtype=np.int64)
     for z in range(len(ends)):
-        row[:] = none
+        for k in range(_WIDTH):
+            row[k] = none
         for e in range(2):
             number = numbers[ends[z, e]]
             if number < nodes:
-                _merge(row, 0, _NODES, number)
+                _merge(row, start, _NODES, number)
                 continue
             for k in range(_NODES):
                 if supports[number - nodes, k] < none:
-                    _merge(row, 0, _NODES, supports[number - nodes, k])
-        _merge(row, _NODES, _WIDTH, cut[z])
+                    _merge(row, start, _NODES, supports[number - nodes, k])
+        _merge(row, middle, _WIDTH, cut[z])
         first, second = numbers[ends[z, 0]] - nodes, numbers[ends[z, 1]] - nodes
         if first >= 0 and second >= 0:
             for i in range(_NODES, _WIDTH):
                 for j in range(_NODES, _WIDTH):
                     common = supports[first, i]
                     if common < none and common == supports[second, j]:
-                        _merge(row, _NODES, _WIDTH, common)
+                        _merge(row, middle, _WIDTH, common)
         support, on = 0, 0
         for k in range(_NODES):
             support += row[k] < none
@@ -137,6 +138,7 @@ def _number_points(ends, cut, local, nodes, numbers, supports, table, known, cou
             edge[0], edge[1], edge[2] = cut[z], first + nodes, second + nodes
             number, count = number_of_row(edge, table, known, count)
         if count > before:
-            supports[number] = row
+            for k in range(_WIDTH):
+                supports[number, k] = row[k]
         numbers[local + z] = nodes + number
     return count

@@ -46,9 +46,10 @@ def number_unknowns(
     `number` (groups,) is written for groups at touched nodes, and -1 for others.
     """
     groups = len(number)
-    ancestor = np.full(groups, -1, dtype=np.int64)
+    ancestor = np.empty(groups, dtype=np.int64)
     at_home = np.zeros(groups, dtype=np.bool_)
-    number[:] = -1
+    for g in range(groups):
+        ancestor[g] = number[g] = -1
     for p in range(len(group)):
         for a in range(group.shape[1]):
             if not (alive[p] and touched[p, a]):
@@ -58,9 +59,12 @@ def number_unknowns(
                 return -1 - p
             ancestor[g] = unknown
             at_home[g] = at_home[g] or (home[p, a] and unknown < mesh_nodes)
-    order = ancestor * groups + np.arange(groups)
+    order = np.empty(groups, dtype=np.int64)
+    for g in range(groups):
+        order[g] = ancestor[g] * groups + g
     sort_short(order)
-    order %= groups
+    for k in range(groups):
+        order[k] %= groups
     before = count
     k = 0
     while k < groups and ancestor[order[k]] < 0:
@@ -108,9 +112,9 @@ def write_pieces(
     The first part of a stored piece takes its place, further ones are appended. `place` (p,) is
     the stored piece of each, -1 for those without volume; `moved` (p,) if it has new unknowns.
     """
-    owner = np.full(len(old), -1, dtype=np.int64)
+    owner = np.empty(len(old), dtype=np.int64)
     for p in range(len(old)):
-        place[p] = -1
+        place[p] = owner[p] = -1
         if not solid[p]:
             continue
         stored, first = old[p], True
@@ -125,7 +129,8 @@ def write_pieces(
             place[p] = stored
         else:
             place[p] = count
-            piece_cells[count] = piece_cells[stored]
+            for a in range(group.shape[1]):
+                piece_cells[count, a] = piece_cells[stored, a]
             piece_parent[count] = cell[p]
             next_piece[count] = next_piece[stored]
             next_piece[stored] = count
@@ -140,7 +145,8 @@ def write_pieces(
                 piece_cells[row, a] = number[group[p, a]]
         if changed[p]:
             piece_fraction[row] = fraction[p]
-            piece_label[row] = label[p]
+            for k in range(label.shape[1]):
+                piece_label[row, k] = label[p, k]
     return count
 
 

@@ -20,19 +20,22 @@ def cells_hit(sweep, after, front, margin, low, high, order):
     """Items of a tree near the facets swept between two travels; may hold doubles."""
     found = [np.int64(0) for _ in range(0)]
     corners = sweep.corners
+    floor, ceiling = np.empty(corners.shape[2]), np.empty(corners.shape[2])
     for t in range(len(corners)):
-        if sweep.travel[t].max() < after or sweep.travel[t].min() > front:
+        first, last = np.inf, -np.inf
+        for k in range(corners.shape[1]):
+            first, last = min(first, sweep.travel[t, k]), max(last, sweep.travel[t, k])
+        if last < after or first > front:
             continue
-        floor, ceiling = corners[t, 0].copy(), corners[t, 0].copy()
-        for k in range(1, corners.shape[1]):
-            for i in range(corners.shape[2]):
-                floor[i] = min(floor[i], corners[t, k, i])
-                ceiling[i] = max(ceiling[i], corners[t, k, i])
-        items = items_near_plane(
-            low, high, order, floor - margin, ceiling + margin, sweep.normals[t], corners[t, 0],
-            margin,
-        )  # fmt: skip
-        found.extend(items)
+        for i in range(corners.shape[2]):
+            floor[i], ceiling[i] = np.inf, -np.inf
+            for k in range(corners.shape[1]):
+                floor[i] = min(floor[i], corners[t, k, i] - margin)
+                ceiling[i] = max(ceiling[i], corners[t, k, i] + margin)
+        for item in items_near_plane(
+            low, high, order, floor, ceiling, sweep.normals[t], corners[t, 0], margin
+        ):
+            found.append(item)  # noqa: PERF402 - `extend` takes longer to compile
     return np.array(found, dtype=np.int64)
 
 

@@ -71,8 +71,7 @@ class BodySurface:
         self.surface.retire(ranges(self._facet_range[cells]))
         self._facet_range[cells] = 0
         ids, at, piece, cell, inner = self._facets_of(cells)
-        ids, source, share = self._edges.bisect(ids)
-        at = share @ at[source]
+        ids, at, source = self._edges.bisect(ids, at)
         piece, cell = piece[source], cell[source]
         corners = ids.shape[1]
         row = np.repeat(np.arange(len(ids)), corners)

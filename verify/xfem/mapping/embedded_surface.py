@@ -196,13 +196,12 @@ class EmbeddedSurface:
         wrong = np.linalg.det(at) < 0.0
         ids[wrong, 0], ids[wrong, 1] = ids[wrong, 1], ids[wrong, 0].copy()
         at[wrong, 0], at[wrong, 1] = at[wrong, 1], at[wrong, 0].copy()
-        ids, origin, share = self._edges.bisect(ids)
+        ids, at, origin = self._edges.bisect(ids, at)
         order = np.argsort(source[origin], kind="stable")
         origin = origin[order]
         alone = np.bincount(origin, minlength=len(source)) == 1
         is_whole = (origin < len(whole)) & alone[origin]
-        at = share[order] @ at[origin]
-        return ids[order], facets[source[origin]], at, label[origin], is_whole
+        return ids[order], facets[source[origin]], at[order], label[origin], is_whole
 
     def _patch(self, facets: _Ints) -> MeshPatch:
         nodes = distinct(self.facets[facets])

@@ -53,7 +53,7 @@ def exposed_facets(
     inner = np.empty(room, dtype=np.bool_)
     count = 0
     for cell in wanted:
-        begin, end = sub_range[cell]
+        begin, end = sub_range[cell, 0], sub_range[cell, 1]
         if not split[cell]:
             piece = first_piece[cell]
             for a in range(corners):
@@ -96,7 +96,8 @@ def exposed_facets(
                 for b in range(corners):
                     if b != skip:
                         ids[count, k] = sub_points[s, b]
-                        at[count, k] = sub_barycentric[s, b]
+                        for a in range(corners):
+                            at[count, k, a] = sub_barycentric[s, b, a]
                         k += 1
                 piece_of[count], cell_of[count] = sub_piece[s], cell
                 inner[count] = face < 0 or neighbours[cell, face] >= 0

@@ -133,8 +133,9 @@ def corner_cells(corners, reach, low, high, order, cells, points, gradients):
     for q in range(count):
         for k in range(size):
             for i in range(space):
-                centre = corners[q, :, i].sum() / size
-                inside[i] = corners[q, k, i] + _INWARDS * (centre - corners[q, k, i])
+                inside[i] = (1.0 - _INWARDS) * corners[q, k, i]
+                for j in range(size):
+                    inside[i] += _INWARDS / size * corners[q, j, i]
             cell = locate(inside, reach, low, high, order, cells, points, gradients)
             found[q, k] = cell
             barycentric(inside, cell, cells, points, gradients, at[q, k])
@@ -144,7 +145,8 @@ def corner_cells(corners, reach, low, high, order, cells, points, gradients):
                 if abs(weights[q, k, a]) <= _SNAP:
                     weights[q, k, a] = 0.0
                 total += weights[q, k, a]
-            weights[q, k] /= total
+            for a in range(cells.shape[1]):
+                weights[q, k, a] /= total
     return found, weights, at
 
 

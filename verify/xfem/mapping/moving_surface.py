@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.errors import XfemError
 from verify.xfem.growing_array import GrowingArray
-from verify.xfem.row_numbers import RowNumbers
+from verify.xfem.row_numbers import RowNumbers, number_of_row
 
 __all__ = ["MovingSurface"]
 
@@ -67,14 +67,11 @@ class MovingSurface:
         nodes, weights : (q, corners) arrays
             Unknown nodes and weights; weights of exactly zero do not count.
         """
-        key = np.empty((len(point), nodes.shape[1] + 1), dtype=np.int64)
-        key[:, 0] = point
-        key[:, 1:] = np.sort(np.where(weights != 0.0, nodes, -1), axis=1)
-        before = len(self._keys)
-        vertex = self._keys.number(key)
-        first = np.empty(len(self._keys) - before, dtype=np.int64)
-        new = np.flatnonzero(vertex >= before)
-        first[vertex[new[::-1]] - before] = new[::-1]
+        vertex, first = np.empty_like(point), np.empty_like(point)
+        table, known, before = self._keys.open_for(len(point))
+        count = _weld(point, nodes, weights, table, known, before, vertex, first)
+        self._keys.close(count)
+        first = first[: count - before]
         self.material.append(material[first])
         self.nodes.append(nodes[first])
         self.weights.append(weights[first])
@@ -160,6 +157,26 @@ class MovingSurface:
             seen = (len(self.nodes), max(seen[1], int(self.nodes.rows[seen[0] :].max())))
             self._largest = seen
         return seen[1]
+
+
+@njit(cache=True)
+def _weld(point, nodes, weights, table, known, count, vertex, first):
+    """Write the vertex of each corner, and the corner that is the first of each new vertex."""
+    before, size = count, nodes.shape[1]
+    key = np.empty(size + 1, dtype=np.int64)
+    for q in range(len(point)):
+        key[0] = point[q]
+        for a in range(size):
+            node, k = nodes[q, a] if weights[q, a] != 0.0 else -1, a
+            while k > 0 and key[k] > node:
+                key[k + 1] = key[k]
+                k -= 1
+            key[k + 1] = node
+        vertex[q], after = number_of_row(key, table, known, count)
+        if after > count:
+            first[count - before] = q
+        count = after
+    return count
 
 
 @njit(cache=True)
