@@ -55,8 +55,8 @@ class Metric:
     Parameters
     ----------
     name : str
-        ``displacement_l2``, ``energy_norm``, ``jump_l2`` (relative errors), ``strain_energy``
-        or the name of a quantity of interest.
+        A relative error (``displacement_l2``, ``energy_norm``, ``jump_l2`` … see
+        `verify.verdict.ERROR_METRICS`), ``strain_energy`` or the name of a quantity of interest.
     value : float
     unit : str
         ``"1"`` for relative errors.
@@ -103,6 +103,8 @@ class SolveRecord:
     regularisations: list[dict[str, Any]] = field(default_factory=list)
     notes: dict[str, str] = field(default_factory=dict)
     solution: str | None = None  # path of the stored solution, relative to the run directory
+    # relative errors over time, by metric, with "time" in s; empty for a static scene
+    series: dict[str, list[float]] = field(default_factory=dict)
 
     def metric(self, name: str) -> Metric | None:
         """Return the metric called `name`, if it was measured."""

@@ -11,6 +11,8 @@ from math import isfinite
 
 from verify.result import Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
+from verify.study.energy_account import ACCOUNT
+from verify.study.error_history import ERROR_NAMES
 from verify.study.rates import ROUND_OFF
 
 __all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge"]
@@ -18,7 +20,7 @@ __all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "j
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
 
 # metrics that are relative errors themselves; all others are quantities with a reference
-ERROR_METRICS = ("displacement_l2", "energy_norm", "jump_l2")
+ERROR_METRICS = (*ERROR_NAMES, *ACCOUNT)
 
 # "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
 _SAME_SIZE = 0.1

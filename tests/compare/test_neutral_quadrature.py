@@ -8,8 +8,6 @@ from verify.compare.body import _inner_parts, body_of
 from verify.compare.curves import Segment
 from verify.compare.cut_line import cut_rule, place_on_cut
 from verify.compare.slabs import area_rule, graded_breaks, slab_angles
-from verify.errors import UnsupportedSceneError
-from verify.scene import Scene
 from verify.scene.planar import inside_polygon
 
 
@@ -165,7 +163,7 @@ def test_random_cuts_through_a_body_with_a_notch_lose_no_area(seed):
     parts = [part for name in pieces for part in _inner_parts(name, pieces, outline)]
     body = replace(body, outline=outline, cuts=pieces, parts=parts, singular=outline)
     rule = area_rule(body, 0.1, slab_angles(body)[seed % 3])
-    assert abs(rule.weights.sum() - body.area) < 1e-13
+    assert abs(rule.weights.sum() - body.measure) < 1e-13
     assert rule.weights.min() >= 0
     # each point is well inside: no point on a cut or outside
     assert inside_polygon(rule.points, outline).all()
@@ -180,14 +178,3 @@ def test_a_cut_from_corner_or_along_a_mesh_line_keeps_its_length(ends):
     body = body_of(scene([{"kind": "polyline", "points": points.tolist()}]))
     length = np.linalg.norm(points[1] - points[0])
     assert cut_rule(body, 0.03).weights.sum() == pytest.approx(length, rel=1e-13)
-
-
-def test_a_box_is_refused_by_name():
-    content = scene([]).model_dump(by_alias=True) | {
-        "geometry": {"kind": "box", "lower": [0, 0, 0], "upper": [1, 1, 1]},
-        "mesh": {"cells": [[2, 2, 2]]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "supports": [{"where": "left", "displacement": [0.0, 0.0, 0.0]}],
-    }
-    with pytest.raises(UnsupportedSceneError, match="box"):
-        body_of(Scene.model_validate(content))

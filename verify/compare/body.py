@@ -1,4 +1,4 @@
-"""The body and its cuts as asked, as the comparison sees them (2D)."""
+"""The body and its cuts as asked, as the comparison sees them in the plane."""
 
 from dataclasses import dataclass
 
@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.curves import Piece, closed_pieces, cut_pieces, meeting_parameters
+from verify.compare.facet_kernels import distance_to_segments
+from verify.compare.solid import SolidBody, solid_of
 from verify.errors import UnsupportedSceneError
-from verify.scene import Polygon, PolygonCut, Rectangle, Scene
+from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["Body", "CutPart", "body_of"]
+__all__ = ["AnyBody", "Body", "CutPart", "body_of"]
 
 Array = NDArray[np.float64]
 
@@ -63,9 +65,10 @@ class Body:
     parts: list[CutPart]
     singular: Array
     tips: Array
+    dimension = 2
 
     @property
-    def area(self) -> float:
+    def measure(self) -> float:
         """Area, m²."""
         x, y = (self.outline - self.outline[0]).T
         return abs(float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
@@ -75,22 +78,55 @@ class Body:
         """Diagonal of the bounding box, m."""
         return float(np.linalg.norm(np.ptp(self.outline, axis=0)))
 
+    @property
+    def has_cuts(self) -> bool:
+        """Whether anything is cut."""
+        return bool(self.parts)
 
-def body_of(scene: Scene, singular: Array | None = None) -> Body:
-    """Take the body of a scene, with further `singular` points (k, 2).
+    def tip_distance(self, points: Array) -> Array:
+        """Distance (n,) of points (n, 2) to the nearest tip; infinite without one."""
+        return np.asarray(distance_to_segments(points, self.tips, self.tips))
+
+    def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Nearest points (n, 2) on the cuts as asked, and whether they are tips (n,)."""
+        best = np.full(len(points), np.inf)
+        foot = np.array(points, copy=True)
+        for pieces in self.cuts.values():
+            for piece in pieces:
+                candidate = piece.point(piece.nearest(points))
+                distance = np.linalg.norm(points - candidate, axis=1)
+                closer = distance < best
+                foot[closer], best[closer] = candidate[closer], distance[closer]
+        return foot, self.tip_distance(foot) <= 1e-10 * self.size
+
+
+AnyBody = Body | SolidBody
+
+
+def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
+    """Take the body of a scene, with further `singular` points (k, d).
+
+    In space these play no part: cells are graded to the fronts of the cuts.
 
     Raises
     ------
     UnsupportedSceneError
-        If the scene is not a plane rectangle or polygon.
+        If the scene is neither a rectangle, a polygon, a box nor a mesh of tetrahedra, or a
+        cut is no curve or surface of a known kind.
     """
+    if scene.dimension == 3:
+        return solid_of(scene)
     if not isinstance(scene.geometry, Rectangle | Polygon):
         raise UnsupportedSceneError(
             f"comparison on a body of kind '{scene.geometry.kind}' is not possible yet; "
             "rectangles and polygons are"
         )
     outline = scene.geometry.outline()
-    cuts = {cut.name: cut_pieces(cut) for cut in scene.cuts if not isinstance(cut, PolygonCut)}
+    cuts = {}
+    for cut in scene.cuts:
+        if not isinstance(cut, PolylineCut | ArcCut):
+            raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
+        cuts[cut.name] = cut_pieces(cut)
     parts = [part for name in cuts for part in _inner_parts(name, cuts, outline)]
     extra = np.zeros((0, 2)) if singular is None else np.asarray(singular, float).reshape(-1, 2)
     size = float(np.linalg.norm(np.ptp(outline, axis=0)))

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from verify.compare.body import Body
 from verify.compare.slabs import graded_breaks
 
-__all__ = ["CutRule", "cut_rule", "place_on_cut"]
+__all__ = ["AWAY", "CutRule", "cut_rule", "place_on_cut"]
 
 Array = NDArray[np.float64]
 
 # Distance of `near` from the cut over the body's size. The direction to it is good to
 # round-off over this, 1e-10: enough to tell the two sides of a sliver of 1e-9.
-_AWAY = 1e-6
+AWAY = 1e-6
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def cut_rule(body: Body, spacing: float, order: int = 3, depth: float = 1e-4) ->
         step = np.diff(breaks)
         t = (breaks[:-1, None] + step[:, None] * 0.5 * (x + 1)).ravel()
         weights = (step[:, None] * length * 0.5 * w).ravel()
-        away = np.repeat(np.maximum(1e-3 * step * length, _AWAY * body.size), order)
+        away = np.repeat(np.maximum(1e-3 * step * length, AWAY * body.size), order)
         rows.append((part.piece.point(t), weights, part.piece.tangent(t), away))
     if not rows:
         return CutRule(*(np.zeros(shape) for shape in ((0, 2), (0,), (0, 2), (0, 2), (0, 2))))
@@ -82,7 +82,7 @@ def place_on_cut(body: Body, cut: str, fraction: float) -> CutRule:
     t = np.array([np.clip((where - starts[index]) / lengths[index], 0.0, 1.0)])
     point, tangent = pieces[index].point(t), pieces[index].tangent(t)
     normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-    shift = _AWAY * body.size * normal
+    shift = AWAY * body.size * normal
     return CutRule(point, np.ones(1), normal, point + shift, point - shift)
 
 

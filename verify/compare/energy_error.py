@@ -3,18 +3,21 @@
 import numpy as np
 
 from verify.compare.error_norm import ErrorNorm
-from verify.compare.hooke import Hooke
+from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.slabs import Rule
 
 __all__ = ["energy_error"]
 
 
-def energy_error(field: Field, reference: Field, rule: Rule, law: Hooke) -> ErrorNorm:
-    """Square roots of ∫(σ−σ_ref):(ε−ε_ref) and ∫σ_ref:ε_ref over the body, in √J."""
+def energy_error(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorNorm:
+    """Square roots of ∫(σ−σ_ref):(ε−ε_ref) and ∫σ_ref:ε_ref over the body, in √J.
+
+    With the corotated energy: of twice its `error_density`, and twice the reference's energy.
+    """
     expected = reference.gradient(rule.points, rule.points)
     difference = field.gradient(rule.points, rule.points) - expected
     return ErrorNorm(
-        float(np.sqrt(2 * rule.weights @ law.energy_density(difference))),
+        float(np.sqrt(2 * rule.weights @ law.error_density(difference, expected))),
         float(np.sqrt(2 * rule.weights @ law.energy_density(expected))),
     )

@@ -1,13 +1,17 @@
-"""Isotropic linear elasticity as the comparison needs it: stress and energy of a gradient."""
+"""Isotropic elasticity as the comparison needs it: energy densities of a gradient.
+
+Linear: ½ σ:ε. Corotated: μ‖U − I‖² + ½ λ tr²(U − I), the energy whose gradient the corotational
+formulation with polar rotations is; U is the stretch of F = I + ∇u = R U.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import Material
+from verify.scene import Material, Scene
 
-__all__ = ["Hooke", "hooke"]
+__all__ = ["Corotated", "Hooke", "Law", "corotated", "hooke", "law_of"]
 
 Array = NDArray[np.float64]
 
@@ -27,11 +31,94 @@ class Hooke:
         density: Array = 0.5 * self.lame * trace**2 + self.shear * square
         return density
 
+    def error_density(self, difference: Array, expected: Array) -> Array:
+        """Energy density (n,) of the difference of a gradient from an `expected` one."""
+        return self.energy_density(difference)
+
+
+@dataclass(frozen=True)
+class Corotated(Hooke):
+    """The same constants, with the energy of the stretch."""
+
+    def energy_density(self, gradient: Array) -> Array:
+        """μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, d)."""
+        stretch = _principal_stretches(gradient) - 1.0
+        density: Array = self.shear * np.sum(stretch**2, axis=1)
+        density += 0.5 * self.lame * np.sum(stretch, axis=1) ** 2
+        return density
+
+    def error_density(self, difference: Array, expected: Array) -> Array:
+        """Energy density (n,) of sym(Rᵀ δ), δ the difference and R the expected rotation.
+
+        It is the linear one in the frame that turns with the expected field: it does not
+        change if both fields are turned, and is the exact one to second order.
+        """
+        turned = np.swapaxes(_rotations(expected), 1, 2) @ difference
+        return super().energy_density(turned)
+
+
+Law = Hooke | Corotated
+
 
 def hooke(material: Material) -> Hooke:
     """Lamé constants of a scene's material."""
+    return Hooke(*_constants(material))
+
+
+def corotated(material: Material) -> Corotated:
+    """Corotated energy of a scene's material."""
+    return Corotated(*_constants(material))
+
+
+def law_of(scene: Scene) -> Law:
+    """Elasticity that a scene asks for."""
+    make = corotated if scene.analysis.kinematics == "corotational" else hooke
+    return make(scene.material)
+
+
+def _constants(material: Material) -> tuple[float, float]:
+    """λ and μ; in plane stress the λ that is left when the thickness gives way.
+
+    That λ is the same in both energies: each is quadratic in its strain measure.
+    """
     shear = material.young / (2 * (1 + material.poisson))
     lame = 2 * shear * material.poisson / (1 - 2 * material.poisson)
     if material.plane == "stress":
         lame = 2 * lame * shear / (lame + 2 * shear)
-    return Hooke(lame, shear)
+    return lame, shear
+
+
+def _principal_stretches(gradient: Array) -> Array:
+    """Principal stretches (n, d); the smallest is negative where the material is inverted.
+
+    With a sum and a difference from the gradient itself in the plane, and from C − I, not from
+    C, in space: 1 is never added to a small strain before it counts.
+    """
+    d = gradient.shape[1]
+    if d == 2:
+        (a, b), (c, e) = gradient[:, 0].T, gradient[:, 1].T
+        # σ₁ ± σ₂ = |F ± cof F|; hypot(2 + s, t) − 2 without cancellation
+        s, t = a + e, c - b
+        total = (s * (4.0 + s) + t * t) / (np.hypot(2.0 + s, t) + 2.0)
+        apart = np.hypot(a - e, b + c)
+        return 1.0 + 0.5 * np.column_stack([total - apart, total + apart])
+    strain = gradient + np.swapaxes(gradient, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
+    excess = np.maximum(np.linalg.eigvalsh(strain), -1.0)
+    stretch = 1.0 + excess / (1.0 + np.sqrt(1.0 + excess))
+    stretch[:, 0] *= np.where(np.linalg.det(np.eye(d) + gradient) < 0.0, -1.0, 1.0)
+    return np.asarray(stretch)
+
+
+def _rotations(gradient: Array) -> Array:
+    """Proper rotations (n, d, d) of the polar decomposition of I + gradient."""
+    d = gradient.shape[1]
+    deformation = np.eye(d) + gradient
+    if d == 2:
+        angle = np.arctan2(
+            deformation[:, 1, 0] - deformation[:, 0, 1], deformation[:, 0, 0] + deformation[:, 1, 1]
+        )
+        c, s = np.cos(angle), np.sin(angle)
+        return np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
+    left, _, right = np.linalg.svd(deformation)
+    left[:, :, -1] *= np.sign(np.linalg.det(left @ right))[:, None]
+    return np.asarray(left @ right)

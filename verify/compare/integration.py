@@ -8,18 +8,24 @@ largest difference among them, although the finest rule is the one that counts.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from verify.compare.body import Body
+from verify.compare.body import AnyBody, Body
 from verify.compare.cut_line import CutRule, cut_rule
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.slabs import Rule, area_rule, slab_angles
+from verify.compare.surface_rule import surface_rule
+from verify.compare.volume_rule import volume_rule
 
-__all__ = ["MeasuredNorm", "cut_rules", "integrate_norm", "rules"]
+__all__ = ["MeasuredNorm", "cut_rules", "integrate_norm", "rules", "spread_of"]
 
 # spacings over the wanted one, without small common multiples
 _FAMILY = (1.0, 1.31, 1.73)
 # The few elements at a tip hold most of the error; finer cells around it make the integration
 # error of the energy norm there three to ten times smaller for twice the points.
 _GRADING = 0.3
+_MOST = 150_000  # cells in space before grading: bounds memory and time
+# In space the rules are coarser, and their errors have a common part, which falls at least like
+# the spacing: then it is at most 1 / (1.73 − 1) of the largest difference.
+_SAFETY = {2: 1.0, 3: 1.5}
 
 
 @dataclass(frozen=True)
@@ -30,24 +36,35 @@ class MeasuredNorm:
     integration_error: float
 
 
-def rules(body: Body, size: float) -> list[Rule]:
-    """Area rules for fields on elements of size `size` m, the finest first."""
+def rules(body: AnyBody, size: float, count: int = 3) -> list[Rule]:
+    """Rules of a body for fields on elements of size `size` m, the finest first."""
+    if isinstance(body, Body):
+        return [
+            area_rule(body, factor * size / 3, angle, grading=_GRADING)
+            for factor, angle in list(zip(_FAMILY, slab_angles(body), strict=True))[:count]
+        ]
+    spacing = max(size / 3, (6 * body.measure / _MOST) ** (1 / 3))
     return [
-        area_rule(body, factor * size / 3, angle, grading=_GRADING)
-        for factor, angle in zip(_FAMILY, slab_angles(body), strict=True)
+        volume_rule(body, factor * spacing, seed) for seed, factor in enumerate(_FAMILY[:count])
     ]
 
 
-def cut_rules(body: Body, size: float) -> list[CutRule]:
-    """Rules along the cuts for fields on elements of size `size` m, the finest first."""
-    return [cut_rule(body, factor * size / 8) for factor in _FAMILY]
+def cut_rules(body: AnyBody, size: float, count: int = 3) -> list[CutRule]:
+    """Rules on the cuts for fields on elements of size `size` m, the finest first."""
+    if isinstance(body, Body):
+        return [cut_rule(body, factor * size / 8) for factor in _FAMILY[:count]]
+    return [surface_rule(body, factor * size / 3) for factor in _FAMILY[:count]]
 
 
 def integrate_norm[R: (Rule, CutRule)](
     measure: Callable[[R], ErrorNorm], family: Sequence[R]
 ) -> MeasuredNorm:
     """Apply `measure` with each rule of a family."""
-    norms = [measure(rule) for rule in family]
+    return spread_of([measure(rule) for rule in family], family[0].points.shape[1])
+
+
+def spread_of(norms: Sequence[ErrorNorm], dimension: int) -> MeasuredNorm:
+    """Take the norm by the finest rule, with the largest difference of the others from it."""
     values = [norm.relative for norm in norms]
     spread = max(abs(value - values[0]) for value in values) if values[0] < float("inf") else 0.0
-    return MeasuredNorm(norms[0], spread)
+    return MeasuredNorm(norms[0], _SAFETY[dimension] * spread)

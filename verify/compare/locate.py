@@ -5,7 +5,8 @@ Sides are decided by geometry alone. On a cut a point has two values; the caller
 as asked (an arc in facets, a snapped cut) is asked through `verify.compare.realised`.
 """
 
-from typing import Protocol
+from copy import copy
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,6 @@ class SolutionField:
 
     def __init__(self, solution: Solution, step: int = -1) -> None:
         self.solution = solution
-        self._nodal = np.ascontiguousarray(solution.displacement[step])
         self._cells = np.ascontiguousarray(solution.cells)
         if solution.order == 2:
             straight_or_raise(solution.points, self._cells)
@@ -68,20 +68,30 @@ class SolutionField:
         shape = simplices(solution.points, self._cells)
         if shape.degenerate.all():
             raise InputError("all cells of a solution are without volume")
-        self._shape = shape
+        self.shape = shape
         self.degenerate_cells = int(shape.degenerate.sum())
         lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
         lower[shape.degenerate] = np.nan
         self._tree = build_cell_tree(lower, upper)
         self._centres = shape.corners.mean(axis=1)
         self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
-        if solution.order == 1:
+        self._origin = np.ascontiguousarray(shape.corners[:, 0])
+        self._set_nodal(solution.displacement[step])
+
+    def _set_nodal(self, displacement: Array) -> None:
+        self._nodal = np.ascontiguousarray(displacement)
+        if self.solution.order == 1:
             values = self._nodal[self._cells]
             self._first = np.ascontiguousarray(values[:, 0])
-            self._origin = np.ascontiguousarray(shape.corners[:, 0])
             self._slope = np.einsum(
-                "mkc,mka->mca", values[:, 1:] - values[:, :1], shape.gradients[:, 1:]
+                "mkc,mka->mca", values[:, 1:] - values[:, :1], self.shape.gradients[:, 1:]
             )
+
+    def with_nodal(self, displacement: Array) -> Self:
+        """Return the field of other nodal displacements (n, d) on the same mesh and tree."""
+        other = copy(self)
+        other._set_nodal(displacement)
+        return other
 
     def cells_at(self, points: Array, near: Array | None = None) -> NDArray[np.int64]:
         """Find the cell (n,) that holds each of `points` (n, d).
@@ -98,8 +108,8 @@ class SolutionField:
             self._tree.lower,
             self._tree.upper,
             self._tree.cells,
-            self._shape.corners,
-            self._shape.normals,
+            self.shape.corners,
+            self.shape.normals,
             self._centres,
             ROUND_OFF * self.scale,
         )
@@ -112,7 +122,7 @@ class SolutionField:
             u = evaluate_linear(points, cells, self._origin, self._first, self._slope)
             return u, self._slope[cells]
         u, gradient = evaluate_quadratic(
-            points, cells, self._cells, self._nodal, self._shape.corners, self._shape.gradients
+            points, cells, self._cells, self._nodal, self.shape.corners, self.shape.gradients
         )
         return u, gradient
 

@@ -1,21 +1,39 @@
 """Opening of a cut at a point of it."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from verify.compare.body import Body
-from verify.compare.cut_line import place_on_cut
+from verify.compare.body import AnyBody, Body
+from verify.compare.cut_line import CutRule, place_on_cut
 from verify.compare.jump_error import displacement_jump
 from verify.compare.locate import Field
+from verify.compare.surface_rule import nearest_on_cut
 
 __all__ = ["opening"]
 
 
-def opening(field: Field, body: Body, cut: str, fraction: float, component: str) -> float:
-    """Jump in m at a fraction of a cut's length, along its normal or its tangent.
+def opening(
+    field: Field, body: AnyBody, cut: str, place: float | Sequence[float], component: str
+) -> float:
+    """Jump in m at a place of a cut, along its normal or its tangent.
 
-    The normal points into the positive side, the tangent along the cut's direction.
+    In the plane the place is a fraction of the cut's length, and the tangent goes along the
+    cut's direction; in space the place is a point, of which the nearest on the cut is taken,
+    and the tangential jump is the length of what is left of the jump without its normal part.
+    The normal points into the positive side.
     """
-    place = place_on_cut(body, cut, fraction)
-    normal = place.normals[0]
-    direction = normal if component == "normal" else np.array([normal[1], -normal[0]])
-    return float(displacement_jump(field, place)[0] @ direction)
+    at = _rule(body, cut, place)
+    normal, jump = at.normals[0], displacement_jump(field, at)[0]
+    if component == "normal":
+        return float(jump @ normal)
+    if body.dimension == 2:
+        return float(jump @ np.array([normal[1], -normal[0]]))
+    return float(np.linalg.norm(jump - (jump @ normal) * normal))
+
+
+def _rule(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRule:
+    if isinstance(body, Body):
+        assert isinstance(place, float)
+        return place_on_cut(body, cut, place)
+    return nearest_on_cut(body, cut, np.array(place, dtype=float))

@@ -2,39 +2,39 @@
 
 import numpy as np
 
-from verify.compare.hooke import Hooke
+from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field, SolutionField
-from verify.compare.simplices import simplices
+from verify.compare.simplex_rule import simplex_rule
 from verify.compare.slabs import Rule
 from verify.solution import Solution
 
-__all__ = ["field_strain_energy", "strain_energy"]
+__all__ = ["field_strain_energy", "nodal_strain_energy", "strain_energy"]
 
-# barycentric points of rules that are exact for quadratic polynomials, equal weights
-_QUADRATIC = {2: (1 / 6, 2 / 3), 3: ((5 - 5**0.5) / 20, (5 + 3 * 5**0.5) / 20)}
+# points per direction where the density is no polynomial of the gradient
+_FINE = 4
 
 
-def strain_energy(solution: Solution, law: Hooke, step: int = -1) -> float:
-    """½ ∫ σ:ε over the cells of the solution, J (2D: per metre), exact for its field.
+def strain_energy(solution: Solution, law: Law, step: int = -1) -> float:
+    """Energy of the cells of the solution, J (2D: per metre), exact for its field.
 
-    It needs no reference and no neutral quadrature: it is a functional of the field.
+    It needs no reference and no neutral quadrature: it is a functional of the field. Only the
+    corotated energy of a quadratic field is no polynomial: there the rule is of degree 7.
     """
-    d = solution.dimension
-    shape = simplices(solution.points, solution.cells)
-    field = SolutionField(solution, step)
+    return nodal_strain_energy(SolutionField(solution, step), law)
+
+
+def nodal_strain_energy(field: SolutionField, law: Law) -> float:
+    """Energy of the cells of a solution's field, J (2D: per metre)."""
+    solution, shape = field.solution, field.shape
+    order = 1 if solution.order == 1 else _FINE if isinstance(law, Corotated) else 2
     every = np.arange(len(solution.cells))
-    small, large = (1 / (d + 1),) * 2 if solution.order == 1 else _QUADRATIC[d]
-    corners = range(1 if solution.order == 1 else d + 1)
     total = 0.0
-    for k in corners:
-        weights = np.full(d + 1, small)
-        weights[k] = large
+    for weights, share in zip(*simplex_rule(solution.dimension, order), strict=True):
         points = np.einsum("k,mka->ma", weights, shape.corners)
-        density = law.energy_density(field.in_cells(points, every)[1])
-        total += float(shape.volume @ density) / len(corners)
+        total += share * float(shape.volume @ law.energy_density(field.in_cells(points, every)[1]))
     return total
 
 
-def field_strain_energy(field: Field, rule: Rule, law: Hooke) -> float:
-    """½ ∫ σ:ε over the body by quadrature, J (2D: per metre); for exact fields."""
+def field_strain_energy(field: Field, rule: Rule, law: Law) -> float:
+    """Energy of the body by quadrature, J (2D: per metre); for exact fields."""
     return float(rule.weights @ law.energy_density(field.gradient(rule.points, rule.points)))

@@ -5,24 +5,23 @@ A pure function of the scene and the stored solutions: it solves nothing and wri
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from verify.compare.body import Body, body_of
-from verify.compare.cut_line import CutRule
-from verify.compare.hooke import Hooke, hooke
-from verify.compare.integration import cut_rules, integrate_norm, rules
-from verify.compare.sampled import Sampled
-from verify.compare.slabs import Rule
+from verify.compare.body import AnyBody, body_of
+from verify.compare.errors import Rules
+from verify.compare.hooke import Law, law_of
+from verify.compare.integration import spread_of
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 from verify.scene import Scene, scene_hash
 from verify.solution import Solution
+from verify.study.energy_account import ACCOUNT, account_metrics
+from verify.study.error_history import ERROR_NAMES, History, compared_times, error_history
 from verify.study.quantities import Measured, unit_of
 from verify.study.rates import observed_rate
 from verify.study.reference import (
-    ERRORS,
+    OTHER,
     ExactField,
     Reference,
     conforming_reference,
@@ -37,6 +36,7 @@ REFERENCE = "reference"
 
 # A solver may drop slivers; a mesh that misses more of the body than this is another body.
 _COVERED = 0.01
+_SAME_TIME = 1e-6  # of the duration
 
 
 def assess_accuracy(
@@ -70,21 +70,21 @@ def assess_accuracy(
     """
     if scene.judged_by_exact and exact is None:
         raise InputError("the scene is judged by its exact solution, which was not given")
-    law = hooke(scene.material)
+    law = law_of(scene)
     reference, missing, body = _reference(scene, solutions, exact, law)
     measured: list[SolveRecord] = list(records)
     for level in sorted({record.level for record in records}):
         rows = [i for i, record in enumerate(records) if record.level == level]
         own = {i: s for i in rows if (s := _solved(records[i], solutions)) is not None}
         if body is None:
-            names = [*ERRORS, *(q.name for q in scene.quantities)]
-            measured = [_noted(r, dict.fromkeys(names, missing)) for r in measured]
+            measured = [_noted(r, dict.fromkeys(_names(scene), missing)) for r in measured]
         elif own:
             # the same points for all solvers of a level: their errors are compared
-            ruler = _Ruler(body, min(size_of(s) for s in own.values()), reference)
+            rules = Rules(body, min(size_of(s) for s in own.values())) if reference else None
+            judge_of = replace(reference, motion=reference.motion.afresh()) if reference else None
             for i, solution in own.items():
-                one = Measured(solution, body, law)
-                measured[i] = _measure(scene, records[i], one, reference, missing, ruler)
+                one = Measured(solution, body, law, scene)
+                measured[i] = _measure(records[i], one, judge_of, missing, rules)
     rates = _rates(scene, measured)
     record = reference.record if reference else {"kind": "none", "reason": missing}
     return CaseResult(
@@ -104,8 +104,8 @@ def _reference(
     scene: Scene,
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: ExactField | None,
-    law: Hooke,
-) -> tuple[Reference | None, str, Body | None]:
+    law: Law,
+) -> tuple[Reference | None, str, AnyBody | None]:
     """Find the reference, or say why there is none, and the body if it can be compared on."""
     try:
         body = body_of(scene, None if exact is None else np.asarray(exact.singular_points))
@@ -118,17 +118,15 @@ def _reference(
         levels = solutions.get(REFERENCE, {})
         judged = [s for name, own in solutions.items() if name != REFERENCE for s in own.values()]
         finest = min((size_of(s) for s in judged or levels.values()), default=body.size / 50)
-        return conforming_reference(scene, levels, body, law, finest), "", body
+        others = solutions.get(OTHER)
+        return conforming_reference(scene, levels, body, law, finest, others), "", body
     except InputError as problem:
         return None, str(problem), body
 
 
-class _Ruler:
-    """Quadrature for one mesh level, and the reference at its points."""
-
-    def __init__(self, body: Body, size: float, reference: Reference | None) -> None:
-        self.families: dict[type, Any] = {Rule: rules(body, size), CutRule: cut_rules(body, size)}
-        self.reference = Sampled(reference.field) if reference else None
+def _names(scene: Scene) -> list[str]:
+    """Names of all that is measured against a reference."""
+    return [*ERROR_NAMES, *(q.name for q in scene.quantities)]
 
 
 def _solved(
@@ -144,64 +142,104 @@ def _noted(record: SolveRecord, notes: dict[str, str]) -> SolveRecord:
 
 
 def _measure(
-    scene: Scene,
     record: SolveRecord,
     one: Measured,
     reference: Reference | None,
     missing: str,
-    ruler: _Ruler,
+    rules: Rules | None,
 ) -> SolveRecord:
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
+    scene = one.scene
+    assert scene is not None
+    if defect := _defect(scene, one):
+        return _noted(record, dict.fromkeys([*_names(scene), *ACCOUNT], defect))
     covered = one.coverage
-    if abs(covered - 1) > _COVERED:
-        text = f"the cells of the solution cover {covered:.4g} of the body"
-        return _noted(record, dict.fromkeys([*ERRORS, *(q.name for q in scene.quantities)], text))
     if abs(covered - 1) > 1e-9:
         record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
     # the reference does not judge itself: its finest level would have no error
     own = record.solver == REFERENCE and not scene.judged_by_exact
-    judge_of = None if own else reference
-    metrics = []
-    for asked in scene.quantities:
-        known, width = judge_of.quantities[asked.name] if judge_of else (None, 0.0)
-        source = judge_of.source if judge_of else ""
-        unit = unit_of(asked, scene.dimension)
-        metrics.append(Metric(asked.name, one.quantity(asked), unit, known, width, source))
+    metrics, notes = _quantities(scene, one, None if own else reference)
+    if scene.analysis.kind == "dynamic":
+        kept, why = account_metrics(scene, one.solution, one.law)
+        metrics, notes = metrics + kept, notes | why
     if reference is None:
-        names = [*ERRORS, *(q.name for q in scene.quantities)]
-        return _noted(replace(record, metrics=metrics), dict.fromkeys(names, missing))
-    if own:
-        return replace(record, metrics=metrics)
-    errors, notes = _errors(one, reference, ruler)
-    return _noted(replace(record, metrics=errors + metrics), notes)
+        notes = dict.fromkeys(_names(scene), missing) | notes
+    elif not own:
+        assert rules is not None
+        errors, why, record = _errors(one, reference, rules, record)
+        metrics, notes = errors + metrics, notes | why
+    return _noted(replace(record, metrics=metrics), notes)
+
+
+def _defect(scene: Scene, one: Measured) -> str:
+    """Say why a solution is of another body or of another time than the scene."""
+    covered, times = one.coverage, one.solution.times
+    if abs(covered - 1) > _COVERED:
+        return f"the cells of the solution cover {covered:.4g} of the body"
+    duration = scene.analysis.duration
+    if duration is not None and abs(times[-1] - duration) > _SAME_TIME * duration:
+        return f"the solution ends at {times[-1]:.6g} s; the scene at {duration:.6g} s"
+    return ""
+
+
+def _quantities(
+    scene: Scene, one: Measured, reference: Reference | None
+) -> tuple[list[Metric], dict[str, str]]:
+    metrics, notes = [], {}
+    for asked in scene.quantities:
+        try:
+            value = one.quantity(asked)
+        except (UnsupportedSceneError, InputError) as problem:
+            notes[asked.name] = str(problem)
+            continue
+        known, width = (
+            reference.quantities.get(asked.name, (None, 0.0)) if reference else (None, 0.0)
+        )
+        source = reference.source if reference else ""
+        unit = unit_of(asked, scene.dimension)
+        metrics.append(Metric(asked.name, value, unit, known, width, source))
+    return metrics, notes
 
 
 def _errors(
-    one: Measured, reference: Reference, ruler: _Ruler
-) -> tuple[list[Metric], dict[str, str]]:
-    metrics, notes = [], {}
-    for name, (measure, kind, _) in ERRORS.items():
-        if kind is CutRule and not one.body.parts:
-            continue
-
-        def norm(rule: Any, measure: Any = measure) -> Any:
-            return measure(one.field, ruler.reference, rule, one.law)
-
-        found = integrate_norm(norm, ruler.families[kind])
+    one: Measured, reference: Reference, rules: Rules, record: SolveRecord
+) -> tuple[list[Metric], dict[str, str], SolveRecord]:
+    assert one.scene is not None
+    times = compared_times(one.scene, one.solution)
+    try:
+        history = error_history(one.motion, reference.motion, times, rules, one.law)
+    except InputError as problem:  # the reference does not reach that far in time
+        return [], dict.fromkeys(ERROR_NAMES, str(problem)), record
+    metrics, notes = [], _time_note(history, reference)
+    for name, norms in history.reported().items():
+        found = spread_of(norms, one.body.dimension)
         value = found.norm.relative
         if not np.isfinite(value):
             notes[name] = f"the reference is zero; the absolute error is {found.norm.absolute:.3e}"
+            continue
+        if name not in reference.norms:
+            notes[name] = "the reference's own error in this norm is not known"
             continue
         known = reference.norms[name] / found.norm.scale if found.norm.scale else 0.0
         # the scale is as uncertain as the reference: (1 + value), to first order
         width = known * (1 + value) + found.integration_error
         metrics.append(Metric(name, value, "1", None, width, reference.source))
-    return metrics, notes
+    return metrics, notes, replace(record, series=history.series())
+
+
+def _time_note(history: History, reference: Reference) -> dict[str, str]:
+    times = [time for time in history.times if time is not None]
+    between = sum(not reference.motion.known_at(time) for time in times)
+    if not between:
+        return {}
+    return {
+        "times": f"the reference is interpolated linearly at {between} of {len(times)} output times"
+    }
 
 
 def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
     """Rates of every error, and of every quantity that is not exact on some level."""
-    names = [*ERRORS, *(q.name for q in scene.quantities)]
+    names = _names(scene)
     rates = []
     for solver in dict.fromkeys(record.solver for record in records):
         own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
@@ -211,7 +249,7 @@ def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
                 for record in own
                 if record.size
                 and (metric := record.metric(name)) is not None
-                and (name in ERRORS or metric.reference)
+                and (name in ERROR_NAMES or metric.reference)
             ]
             if rows:
                 sizes, errors = zip(*rows, strict=True)

@@ -1,17 +1,28 @@
-"""Quantities of interest of a scene, measured on one field."""
+"""Quantities of interest of a scene, measured on one solution."""
 
-from verify.compare.body import Body
-from verify.compare.hooke import Hooke
+import numpy as np
+
+from verify.compare.body import AnyBody
+from verify.compare.hooke import Law
+from verify.compare.locate import Field
+from verify.compare.motion import SolutionMotion
 from verify.compare.opening import opening
 from verify.compare.point_displacement import point_displacement
-from verify.compare.realised import field_of
-from verify.compare.sampled import Sampled
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import strain_energy
-from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity, Quantity
+from verify.errors import UnsupportedSceneError
+from verify.scene import Scene
+from verify.scene.acceptance import (
+    DisplacementQuantity,
+    MaximumDisplacementQuantity,
+    OpeningQuantity,
+    Quantity,
+    StressIntensityQuantity,
+)
 from verify.solution import Solution
+from verify.study.stress_intensity import solution_intensity
 
-__all__ = ["Measured", "unit_of"]
+__all__ = ["Measured", "field_quantity", "unit_of"]
 
 
 class Measured:
@@ -20,31 +31,66 @@ class Measured:
     Parameters
     ----------
     solution : Solution
-    body : Body
-    law : Hooke
+    body : Body or SolidBody
+    law : Law
+    scene : Scene, optional
+        Only stress-intensity factors need it.
     """
 
-    def __init__(self, solution: Solution, body: Body, law: Hooke) -> None:
-        self.solution, self.body, self.law = solution, body, law
-        self.field = Sampled(field_of(solution, body))
+    def __init__(
+        self, solution: Solution, body: AnyBody, law: Law, scene: Scene | None = None
+    ) -> None:
+        self.solution, self.body, self.law, self.scene = solution, body, law, scene
+        self.motion = SolutionMotion(solution, body)
+
+    @property
+    def field(self) -> Field:
+        """Field at the last output time."""
+        return self.motion.at()
 
     @property
     def coverage(self) -> float:
         """Volume of the cells over that of the body: 1, or something is missing or twice there."""
         shape = simplices(self.solution.points, self.solution.cells)
-        return float(shape.volume.sum()) / self.body.area
+        return float(shape.volume.sum()) / self.body.measure
 
     def quantity(self, asked: Quantity) -> float:
-        """Value of a quantity of interest, in the unit that `unit_of` gives."""
-        if isinstance(asked, DisplacementQuantity):
-            return point_displacement(self.field, asked.point, asked.component)
-        if isinstance(asked, OpeningQuantity):
-            return opening(self.field, self.body, asked.cut, asked.at, asked.component)
-        return strain_energy(self.solution, self.law)
+        """Value of a quantity of interest, in the unit that `unit_of` gives.
+
+        Raises
+        ------
+        UnsupportedSceneError
+            If it cannot be had from this solution, with the reason.
+        InputError
+            If it is asked for at a time that the solution does not reach.
+        """
+        if isinstance(asked, StressIntensityQuantity):
+            if self.scene is None:
+                raise UnsupportedSceneError("a stress-intensity factor needs the scene")
+            return solution_intensity(self.scene, self.solution, asked)
+        if isinstance(asked, MaximumDisplacementQuantity):
+            u = self.motion.nodal(asked.time)
+            return float(np.linalg.norm(u, axis=1).max())
+        if asked.kind == "strain_energy":
+            return strain_energy(self.solution, self.law)
+        return field_quantity(self.motion.at(asked.time), self.body, asked)
+
+
+def field_quantity(
+    field: Field, body: AnyBody, asked: DisplacementQuantity | OpeningQuantity
+) -> float:
+    """Value of a displacement or an opening of a field, m."""
+    if isinstance(asked, DisplacementQuantity):
+        return point_displacement(field, asked.point, asked.component)
+    place = asked.at if body.dimension == 2 else asked.point
+    assert place is not None  # the scene was checked
+    return opening(field, body, asked.cut, place, asked.component)
 
 
 def unit_of(asked: Quantity, dimension: int) -> str:
     """SI unit of a quantity; energies of plane scenes are per metre of thickness."""
+    if asked.kind == "stress_intensity":
+        return "Pa √m"
     if asked.kind == "strain_energy":
         return "J/m" if dimension == 2 else "J"
     return "m"

@@ -1,43 +1,39 @@
 """References that carry their own error bar: an exact solution, or conforming levels."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import factorial
 from typing import Any, Protocol
 
 import numpy as np
 
-from verify.compare.body import Body
-from verify.compare.cut_line import CutRule
-from verify.compare.displacement_error import displacement_error
-from verify.compare.energy_error import energy_error
-from verify.compare.error_norm import ErrorNorm
-from verify.compare.hooke import Hooke
-from verify.compare.integration import cut_rules, rules
-from verify.compare.jump_error import jump_error
+from verify.compare.body import AnyBody, Body
+from verify.compare.errors import ERRORS, Rules
+from verify.compare.hooke import Law
 from verify.compare.locate import Field
-from verify.compare.opening import opening
-from verify.compare.point_displacement import point_displacement
+from verify.compare.motion import ExactMotion, Motion
+from verify.compare.near_tip import NEAR, near_radius
+from verify.compare.simplices import simplices
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy
-from verify.errors import InputError
+from verify.compare.volume_rule import volume_rule
+from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
-from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity, Quantity
+from verify.scene.acceptance import (
+    MaximumDisplacementQuantity,
+    Quantity,
+    StressIntensityQuantity,
+)
 from verify.solution import Solution
-from verify.study.quantities import Measured
+from verify.study.error_history import ERROR_NAMES, base_of, compared_times, error_history
+from verify.study.quantities import Measured, field_quantity
 from verify.study.richardson import Extrapolation, extrapolate, field_uncertainty
+from verify.study.stress_intensity import exact_intensity
 
-__all__ = ["ERRORS", "Reference", "conforming_reference", "exact_reference", "size_of"]
+__all__ = ["ExactField", "Reference", "conforming_reference", "exact_reference", "size_of"]
 
-Measure = Callable[[Field, Field, Any, Hooke], ErrorNorm]
-
-# error metrics: how they are measured, along the cuts or over the body, and the order in
-# element size that P_p can be counted on for, beyond p
-ERRORS: dict[str, tuple[Measure, type, int]] = {
-    "displacement_l2": (lambda f, r, rule, law: displacement_error(f, r, rule), Rule, 1),
-    "energy_norm": (energy_error, Rule, 0),
-    "jump_l2": (lambda f, r, rule, law: jump_error(f, r, rule), CutRule, 1),
-}
+OTHER = "conforming"  # solver whose levels give a second estimate of quantities, if it was run
 
 
 class ExactField(Field, Protocol):
@@ -55,19 +51,19 @@ class Reference:
 
     Parameters
     ----------
-    field : Field
-        The field.
+    motion : Motion
+        The field, over time.
     source : str
         What it is, in words.
     norms : dict of str to float
         Bound of the absolute norm of its error, per error metric.
     quantities : dict of str to (float, float)
-        Value and half-width per quantity of interest.
+        Value and half-width per quantity of interest that it has.
     record : dict
         What the result says about it (JSON).
     """
 
-    field: Field
+    motion: Motion
     source: str
     norms: dict[str, float]
     quantities: dict[str, tuple[float, float]]
@@ -78,45 +74,75 @@ def size_of(solution: Solution) -> float:
     """Element size of a solution, m; from the mean cell volume where it says none."""
     if np.isfinite(solution.size) and solution.size > 0:
         return float(solution.size)
-    spans = np.ptp(solution.points, axis=0)
     d = solution.dimension
-    return float((np.prod(spans) * (2 if d == 2 else 6) / len(solution.cells)) ** (1 / d))
+    volume = simplices(solution.points, solution.cells).volume
+    return float((factorial(d) * volume.sum() / len(volume)) ** (1 / d))
 
 
-def exact_reference(scene: Scene, exact: ExactField, body: Body, law: Hooke) -> Reference:
+def exact_reference(scene: Scene, exact: ExactField, body: AnyBody, law: Law) -> Reference:
     """Make the reference from an exact solution; its quantities are integrated here."""
     assert scene.exact is not None
-    quantities = {q.name: _exact_quantity(q, exact, body, law) for q in scene.quantities}
+    motion = ExactMotion(exact)
+    found = {q.name: _exact_quantity(q, motion, exact, body, law) for q in scene.quantities}
+    quantities = {name: pair for name, pair in found.items() if pair is not None}
     source = f"exact: {scene.exact.solution}"
     record = {
         "kind": "exact",
         "source": source,
         "levels": [],
+        "near": _near_text(body),
         "metrics": {
             name: {"values": [value], "uncertainty": width, "order": None, "reason": "exact"}
             for name, (value, width) in quantities.items()
         },
     }
-    return Reference(exact, source, dict.fromkeys(ERRORS, 0.0), quantities, record)
+    return Reference(motion, source, dict.fromkeys(ERROR_NAMES, 0.0), quantities, record)
 
 
 def _exact_quantity(
-    asked: Quantity, exact: ExactField, body: Body, law: Hooke
-) -> tuple[float, float]:
-    if isinstance(asked, DisplacementQuantity):
-        return point_displacement(exact, asked.point, asked.component), 0.0
-    if isinstance(asked, OpeningQuantity):
-        return opening(exact, body, asked.cut, asked.at, asked.component), 0.0
-    # spectral away from the tips; at a tip, halving cells down to 1e-8 of the others
-    fine, check = (
-        field_strain_energy(exact, area_rule(body, body.size / n, angle, 7, 1e-8), law)
-        for n, angle in zip((14, 10), slab_angles(body)[:2], strict=True)
-    )
+    asked: Quantity, motion: ExactMotion, exact: ExactField, body: AnyBody, law: Law
+) -> tuple[float, float] | None:
+    if isinstance(asked, StressIntensityQuantity):
+        stated = exact_intensity(exact, asked)
+        return None if stated is None else (stated, 0.0)
+    if isinstance(asked, MaximumDisplacementQuantity):
+        found = [
+            float(
+                np.linalg.norm(motion.at(asked.time).displacement(r.points, r.points), axis=1).max()
+            )
+            for r in _exact_rules(body)
+        ]
+        return max(found), 3 * abs(found[0] - found[1])  # the maximum lies between points
+    if asked.kind != "strain_energy":
+        return field_quantity(motion.at(asked.time), body, asked), 0.0
+    fine, check = (field_strain_energy(motion.at(), rule, law) for rule in _exact_rules(body))
     return fine, abs(fine - check) + 1e-14 * abs(fine)
 
 
+def _exact_rules(body: AnyBody) -> Sequence[Rule]:
+    """Two rules for fields that are smooth away from tips and fronts, the finer first.
+
+    Spectral away from the tips; at a tip, halving cells down to 1e-8 of the others. In space
+    a front takes many more cells than a tip: down to 1e-2 of the others only.
+    """
+    if isinstance(body, Body):
+        return [
+            area_rule(body, body.size / n, angle, 7, 1e-8)
+            for n, angle in zip((14, 10), slab_angles(body)[:2], strict=True)
+        ]
+    return [
+        volume_rule(body, body.size / n, seed, order, 1e-2)
+        for seed, (n, order) in enumerate(((14, 5), (10, 4)))
+    ]
+
+
 def conforming_reference(
-    scene: Scene, levels: Mapping[int, Solution], body: Body, law: Hooke, size: float
+    scene: Scene,
+    levels: Mapping[int, Solution],
+    body: AnyBody,
+    law: Law,
+    size: float,
+    others: Mapping[int, Solution] | None = None,
 ) -> Reference:
     """Make the reference from conforming solutions of at least three levels.
 
@@ -125,11 +151,13 @@ def conforming_reference(
     scene : Scene
     levels : mapping of int to Solution
         The reference solver's solutions by level.
-    body : Body
-    law : Hooke
+    body : Body or SolidBody
+    law : Law
     size : float
         Element size for the quadrature of differences, m: that of the finest solution that
         will be judged.
+    others : mapping of int to Solution, optional
+        Solutions of an independent discretisation, for a second estimate of the quantities.
 
     Raises
     ------
@@ -142,41 +170,100 @@ def conforming_reference(
             f"the reference has {len(solutions)} solved levels; its uncertainty needs at least 3"
         )
     sizes = [size_of(solution) for solution in solutions]
-    measured = [Measured(solution, body, law) for solution in solutions]
+    measured = [Measured(solution, body, law, scene) for solution in solutions]
     order = solutions[-1].order
-    known: dict[str, Extrapolation] = {}
-    record_metrics: dict[str, Any] = {}
+    second = [Measured(s, body, law, scene) for _, s in sorted((others or {}).items())]
+    metrics: dict[str, Any] = {}
+    quantities: dict[str, tuple[float, float]] = {}
+    missing: dict[str, str] = {}
     for asked in scene.quantities:
-        values = [one.quantity(asked) for one in measured]
-        # energies converge with twice the order (Galerkin); for the others one more is sane
-        best = 2 * order if asked.kind == "strain_energy" else order + 1
-        known[asked.name] = extrapolate(values, sizes, order, best)
-        record_metrics[asked.name] = _entry(values, known[asked.name])
-    norms = {}
-    families: dict[type, Any] = {Rule: rules(body, size)[0], CutRule: cut_rules(body, size)[0]}
-    for name, (measure, kind, extra) in ERRORS.items():
-        if kind is CutRule and not body.parts:
+        try:
+            values = [one.quantity(asked) for one in measured]
+        except UnsupportedSceneError as problem:
+            missing[asked.name] = str(problem)
             continue
-        steps = [
-            measure(one.field, other.field, families[kind], law)
-            for one, other in pairwise(measured)
-        ]
-        found = field_uncertainty([step.absolute for step in steps], sizes, order + extra)
-        norms[name] = found.half_width
-        scale = steps[-1].scale or 1.0
-        record_metrics[name] = _entry([step.absolute / scale for step in steps], found, scale)
+        # functionals of a Galerkin solution converge with up to twice its order
+        known = extrapolate(values, sizes, order, 2 * order)
+        quantities[asked.name] = known.value, known.half_width
+        metrics[asked.name] = _entry(values, known) | _second_opinion(asked, second, known)
+    norms, entries = _field_norms(scene, measured, sizes, order, size)
+    metrics |= entries
     source = f"conforming P{order}, {len(solutions)} levels, GCI"
     record = {
         "kind": "conforming",
         "source": source,
+        "near": _near_text(body),
         "levels": [
             {"level": level, "size": h, "unknowns": int(levels[level].unknowns)}
             for level, h in zip(sorted(levels), sizes, strict=True)
         ],
-        "metrics": record_metrics,
+        "metrics": metrics,
     }
-    quantities = {q.name: (known[q.name].value, known[q.name].half_width) for q in scene.quantities}
-    return Reference(measured[-1].field, source, norms, quantities, record)
+    if missing:
+        record["missing"] = missing
+    return Reference(measured[-1].motion, source, norms, quantities, record)
+
+
+def _field_norms(
+    scene: Scene, measured: Sequence[Measured], sizes: Sequence[float], order: int, size: float
+) -> tuple[dict[str, float], dict[str, Any]]:
+    """Bounds of the error norms of the finest level, and what the record says of each."""
+    rules = Rules(measured[0].body, size, count=1)
+    times = compared_times(scene, measured[-1].solution)
+    steps = [
+        error_history(one.motion, other.motion, times, rules, one.law).reported()
+        for one, other in pairwise(measured)
+    ]
+    norms, entries = {}, {}
+    for name in steps[-1]:
+        counted = order + ERRORS[base_of(name)].beyond
+        absolute = [step[name][0].absolute for step in steps]
+        found = field_uncertainty(absolute, sizes, counted)
+        norms[name] = found.half_width
+        scale = steps[-1][name][0].scale or 1.0
+        entries[name] = _entry([value / scale for value in absolute], found, scale)
+        # what the levels before said of the error of the last but one, against what it was
+        said = absolute[-2] / ((sizes[-3] / sizes[-2]) ** counted - 1)
+        entries[name] |= {
+            "second": {
+                "source": "difference of the last two levels, over the estimate without the last",
+                "value": absolute[-1] / scale,
+                "uncertainty": said / scale,
+            },
+            "disagreement": absolute[-1] / said if said > 0.0 else None,
+        }
+    return norms, entries
+
+
+def _second_opinion(
+    asked: Quantity, others: Sequence[Measured], known: Extrapolation
+) -> dict[str, Any]:
+    """Richardson's value from other levels, and its distance over the sum of the half-widths.
+
+    It is shown and does not move the reference: those levels are judged by it.
+    """
+    if len(others) < 3:
+        return {}
+    try:
+        values = [one.quantity(asked) for one in others]
+        sizes, order = [size_of(one.solution) for one in others], others[-1].solution.order
+        found = extrapolate(values, sizes, order, 2 * order)
+    except (InputError, UnsupportedSceneError):
+        return {}
+    apart = abs(found.value - known.value)
+    width = found.half_width + known.half_width
+    source = f"{OTHER} P{order}, {len(others)} levels, GCI"
+    return {
+        "second": {"source": source, "value": found.value, "uncertainty": found.half_width},
+        "disagreement": apart / width if width > 0.0 else None,
+    }
+
+
+def _near_text(body: AnyBody) -> dict[str, Any]:
+    """State what near a tip means."""
+    radius = near_radius(body)
+    return {"radius": radius, "reason": f"{NEAR:g} of the shortest cut with a tip, in space of the "
+            "root of the area of the cuts"} if radius else {}  # fmt: skip
 
 
 def _entry(values: list[float], known: Extrapolation, scale: float = 1.0) -> dict[str, Any]:

@@ -1,0 +1,95 @@
+"""Is energy kept? A ledger's total over time: drift, trend, oscillation, jumps at cuts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Balance", "balance", "energy_scale", "total_energy"]
+
+Array = NDArray[np.float64]
+
+# Parts of a ledger and the sign with which they enter what stays constant: what is stored and
+# what dampers take count, what loads and supports have put in is taken off.
+_SIGNS = {
+    "kinetic": 1.0, "strain": 1.0, "gravity": 1.0, "damping": 1.0, "work_of_loads": -1.0,
+    "work_of_supports": -1.0,
+}  # fmt: skip
+_SCHEME = "algorithmic"  # what the time scheme itself takes: counts only where it is asked about
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What a total does over time, in its own unit.
+
+    Parameters
+    ----------
+    drift : float
+        Largest distance from the first value.
+    slope : float
+        Secular change per second: least squares, together with the jumps.
+    slope_error : float
+        Its standard error, 1/s; zero if nothing is left to estimate it from.
+    oscillation : float
+        Largest distance from trend and jumps: what stays bounded if the slope is zero.
+    jumps : (c,) array
+        Step at each cut beside the trend.
+    """
+
+    drift: float
+    slope: float
+    slope_error: float
+    oscillation: float
+    jumps: Array
+
+
+def total_energy(ledger: Mapping[str, Array], scheme: bool = False) -> Array | None:
+    """Sum (t,) of a ledger's parts that physics keeps constant; None without any of them.
+
+    The solver's own ``total`` is not read. With `scheme`, what the time scheme dissipates is
+    added: then it is an identity of the solver's steps, and its changes are errors of account.
+    """
+    signs = {**_SIGNS, **({_SCHEME: 1.0} if scheme else {})}
+    parts = [sign * np.asarray(ledger[name]) for name, sign in signs.items() if name in ledger]
+    return np.sum(parts, axis=0) if parts else None
+
+
+def energy_scale(ledger: Mapping[str, Array]) -> float:
+    """Energy that drifts are measured against, J: the largest that moved from part to part.
+
+    The largest kinetic or strain energy, or change of any other part: a potential has no zero.
+    """
+    stored = [np.abs(ledger[name]).max() for name in ("kinetic", "strain") if name in ledger]
+    moved = [np.ptp(ledger[name]) for name in _SIGNS if name in ledger]
+    return float(max([*stored, *moved], default=0.0))
+
+
+def balance(times: Array, total: Array, cuts: Sequence[float] = ()) -> Balance:
+    """Separate trend, jumps and oscillation of a total.
+
+    Parameters
+    ----------
+    times : (t,) array
+        s.
+    total : (t,) array
+    cuts : sequence of float
+        Times at which something was cut; those not inside the range of `times` count not. A
+        value at the time of a cut is taken as before it.
+    """
+    inner = sorted({cut for cut in cuts if times[0] <= cut < times[-1]})
+    steps = [(times > cut).astype(float) for cut in inner]
+    span = max(float(np.ptp(times)), 1e-300)
+    columns = np.column_stack([np.ones_like(times), (times - times[0]) / span, *steps])
+    start = total - total[0]  # a potential may be large: its zero is of no interest
+    solved, _, rank, _ = np.linalg.lstsq(columns, start, rcond=None)
+    rest = start - columns @ solved
+    spare = len(times) - rank
+    error = 0.0
+    if spare > 0:
+        inverse = np.linalg.pinv(columns.T @ columns)
+        error = float(np.sqrt(rest @ rest / spare * inverse[1, 1]))
+    return Balance(
+        float(np.abs(start).max()), float(solved[1] / span), error / span,
+        float(np.abs(rest).max()), np.asarray(solved[2:]),
+    )  # fmt: skip

@@ -1,0 +1,152 @@
+"""Fields over time: a solution's between its output times, an exact one, one that stands still.
+
+Between two output times a solution is linear in time: nothing else is known of it.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.compare.body import AnyBody
+from verify.compare.locate import Field, SolutionField
+from verify.compare.realised import SidedField, field_of
+from verify.compare.sampled import Sampled
+from verify.errors import InputError
+from verify.solution import Solution
+
+__all__ = ["ExactMotion", "Motion", "SolutionMotion"]
+
+Array = NDArray[np.float64]
+
+_SAME_TIME = 1e-9  # of the duration: two output times this close are one
+
+
+class Motion(Protocol):
+    """A displacement field over time."""
+
+    def at(self, time: float | None = None) -> Field:
+        """Field at a time in s; None is the last."""
+        ...
+
+    def known_at(self, time: float) -> bool:
+        """Whether the field is known at that time, not interpolated."""
+        ...
+
+    def afresh(self) -> "Motion":
+        """Return the same motion, without what it remembers of points."""
+        ...
+
+
+class SolutionMotion:
+    """The field of a solution over time; the cells of an array of points are found once.
+
+    Parameters
+    ----------
+    solution : Solution
+    body : Body or SolidBody
+        Its cuts as asked say where the sides are.
+    """
+
+    def __init__(self, solution: Solution, body: AnyBody) -> None:
+        self.solution = solution
+        self._field = field_of(solution, body)
+        self._found: _Found = {}
+        self._last: tuple[float, Sampled] | None = None
+
+    def afresh(self) -> "SolutionMotion":
+        """Return the same motion, without what it remembers of points."""
+        other = object.__new__(SolutionMotion)
+        other.solution, other._field = self.solution, self._field
+        other._found, other._last = {}, None
+        return other
+
+    def known_at(self, time: float) -> bool:
+        """Whether `time` is an output time."""
+        times = self.solution.times
+        close: bool = bool(np.abs(times - time).min() <= _SAME_TIME * max(np.ptp(times), 1e-300))
+        return close
+
+    def at(self, time: float | None = None) -> Field:
+        """Field at a time in s; None is the last.
+
+        Raises
+        ------
+        InputError
+            If the solution does not reach that time.
+        """
+        times = self.solution.times
+        when = float(times[-1] if time is None else time)
+        if self._last is None or self._last[0] != when:
+            field = self._field.with_nodal(self.nodal(when))
+            self._last = when, Sampled(_Located(field, self._found))
+        return self._last[1]
+
+    def nodal(self, time: float | None = None) -> Array:
+        """Nodal displacements (n, d) in m at a time in s; None is the last.
+
+        Raises
+        ------
+        InputError
+            If the solution does not reach that time.
+        """
+        times, u = self.solution.times, self.solution.displacement
+        time = float(times[-1] if time is None else time)
+        slack = _SAME_TIME * float(np.ptp(times))
+        if not times[0] - slack <= time <= times[-1] + slack:
+            raise InputError(
+                f"a field at {time:.6g} s was asked for; the solution's output times are from "
+                f"{times[0]:.6g} to {times[-1]:.6g} s"
+            )
+        nearest = int(np.argmin(np.abs(times - time)))
+        if abs(times[nearest] - time) <= slack:
+            return u[nearest]
+        after = int(np.searchsorted(times, time))
+        share = (time - times[after - 1]) / (times[after] - times[after - 1])
+        between: Array = (1 - share) * u[after - 1] + share * u[after]
+        return between
+
+
+class ExactMotion:
+    """An exact field, over time if it offers ``at(time)``; else it stands still."""
+
+    def __init__(self, exact: Any) -> None:
+        self._exact = exact
+        self._last: tuple[float | None, Sampled] | None = None
+
+    def afresh(self) -> "ExactMotion":
+        """Return the same motion, without what it remembers of points."""
+        return ExactMotion(self._exact)
+
+    def known_at(self, time: float) -> bool:
+        """Whether the field is known: always."""
+        return True
+
+    def at(self, time: float | None = None) -> Field:
+        """Field at a time in s; None is its last or only one."""
+        if self._last is None or self._last[0] != time:
+            moving = time is not None and hasattr(self._exact, "at")
+            self._last = time, Sampled(self._exact.at(time) if moving else self._exact)
+        return self._last[1]
+
+
+_Found = dict[tuple[int, int], tuple[Array, Array | None, NDArray[np.int64]]]
+
+
+class _Located:
+    """A solution's field that keeps the cells of arrays of points, which must not change."""
+
+    def __init__(self, field: SolutionField | SidedField, found: _Found) -> None:
+        self._field, self._found = field, found
+
+    def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:
+        key = id(points), id(near)
+        if key not in self._found:  # holds the arrays, so that their ids stay theirs
+            self._found[key] = points, near, self._field.cells_at(points, near)
+        return self._field.in_cells(points, self._found[key][2])
+
+    def displacement(self, points: Array, near: Array | None = None) -> Array:
+        return self.evaluate(points, near)[0]
+
+    def gradient(self, points: Array, near: Array | None = None) -> Array:
+        return self.evaluate(points, near)[1]

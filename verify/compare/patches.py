@@ -1,0 +1,253 @@
+"""Pieces of cuts in space as asked: plane polygons, elliptical discs, parts of cylinders.
+
+Each is a chart: parameters (n, 2) to points (n, 3), with normals into the positive side. A
+cylinder stays a cylinder and a disc a disc; they are not cut into facets.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.compare.curves import Arc
+from verify.scene.spatial import ear_clipping, frame
+from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut
+
+__all__ = ["CylinderPatch", "DiscPatch", "Patch", "PlanePatch", "patches_of"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlanePatch:
+    """Triangles in a plane.
+
+    Parameters
+    ----------
+    origin : (3,) array
+    axes : (3, 3) array
+        Rows: two directions in the plane, and the normal into the positive side.
+    cells : (m, 3, 2) array
+        Corners of the triangles in the two directions, relative to the origin.
+    """
+
+    origin: Array
+    axes: Array
+    cells: Array
+    plane = True
+    curvature = 0.0
+
+    @classmethod
+    def of(cls, triangles: Array, normal: Array) -> "PlanePatch":
+        """Make it of triangles (m, 3, 3) in a plane with the given normal."""
+        axes = frame(normal)
+        origin = triangles[0, 0]
+        return cls(origin, axes, (triangles - origin) @ axes[:2].T)
+
+    def point(self, uv: Array) -> Array:
+        """Points (n, 3)."""
+        return self.origin + uv @ self.axes[:2]
+
+    def normal(self, uv: Array) -> Array:
+        """Return unit normals (n, 3)."""
+        return np.tile(self.axes[2], (len(uv), 1))
+
+    def stretch(self, uv: Array) -> Array:
+        """Area (n,) per area of parameters."""
+        return np.ones(len(uv))
+
+    def level(self, x: Array) -> Array:
+        """Distance (n,) from the plane, positive on the positive side."""
+        height: Array = (x - self.origin) @ self.axes[2]
+        return height
+
+    def nearest(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Nearest points (n, 3), and whether they lie on the rim (n,)."""
+        uv = (x - self.origin) @ self.axes[:2].T
+        foot, best = np.zeros_like(uv), np.full(len(uv), np.inf)
+        rim = np.ones(len(uv), dtype=bool)
+        for triangle in self.cells:
+            inside = np.ones(len(uv), dtype=bool)
+            turn = np.sign(np.linalg.det(triangle[1:] - triangle[0]))
+            for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+                edge, off = b - a, uv - a
+                inside &= turn * (edge[0] * off[:, 1] - edge[1] * off[:, 0]) >= 0.0
+                t = np.clip(off @ edge / (edge @ edge), 0.0, 1.0)
+                candidate = a + t[:, None] * edge
+                away = np.linalg.norm(uv - candidate, axis=1)
+                closer = away < best
+                foot[closer], best[closer] = candidate[closer], away[closer]
+            foot[inside], best[inside], rim[inside] = uv[inside], 0.0, False
+        return self.point(foot), rim
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of the bounding box."""
+        corners = self.point(self.cells.reshape(-1, 2))
+        return corners.min(axis=0), corners.max(axis=0)
+
+
+@dataclass(frozen=True)
+class DiscPatch:
+    """An elliptical disc; parameters are the share of the radius and the angle.
+
+    Parameters
+    ----------
+    origin : (3,) array
+        Centre.
+    axes : (3, 3) array
+        Rows: directions of the semi-axes, and the normal into the positive side.
+    semi_axes : (float, float)
+    """
+
+    origin: Array
+    axes: Array
+    semi_axes: tuple[float, float]
+    plane = False  # in its parameters: what is straight in space is not straight there
+    curvature = 0.0
+
+    @property
+    def cells(self) -> Array:
+        """Triangles (m, 3, 2) of the parameters."""
+        return _rectangle(1.0, 0.0, 2 * np.pi, 8)
+
+    def point(self, uv: Array) -> Array:
+        """Points (n, 3)."""
+        share, angle = uv.T
+        a, b = self.semi_axes
+        flat = np.column_stack([a * share * np.cos(angle), b * share * np.sin(angle)])
+        return self.origin + flat @ self.axes[:2]
+
+    def normal(self, uv: Array) -> Array:
+        """Return unit normals (n, 3)."""
+        return np.tile(self.axes[2], (len(uv), 1))
+
+    def stretch(self, uv: Array) -> Array:
+        """Area (n,) per area of parameters."""
+        return self.semi_axes[0] * self.semi_axes[1] * np.abs(uv[:, 0])
+
+    def level(self, x: Array) -> Array:
+        """Distance (n,) from the plane, positive on the positive side."""
+        height: Array = (x - self.origin) @ self.axes[2]
+        return height
+
+    def nearest(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Nearest points (n, 3), and whether they lie on the rim (n,)."""
+        flat = (x - self.origin) @ self.axes[:2].T
+        squares = np.square(self.semi_axes)
+        outside = np.sum(flat**2 / squares, axis=1) >= 1.0
+        # the foot p_i a_i² / (t + a_i²) lies on the ellipse for one t ≥ 0 only
+        low = np.zeros(len(x))
+        high = np.linalg.norm(flat, axis=1) * max(self.semi_axes)
+        for _ in range(60):
+            t = 0.5 * (low + high)
+            reach = np.sum((flat / (t[:, None] + squares)) ** 2 * squares, axis=1)
+            low, high = np.where(reach > 1, t, low), np.where(reach > 1, high, t)
+        on_rim = flat * squares / (0.5 * (low + high)[:, None] + squares)
+        foot = np.where(outside[:, None], on_rim, flat)
+        return self.origin + foot @ self.axes[:2], outside
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of the bounding box."""
+        half = np.linalg.norm(np.array(self.semi_axes)[:, None] * self.axes[:2], axis=0)
+        return self.origin - half, self.origin + half
+
+
+@dataclass(frozen=True)
+class CylinderPatch:
+    """A part of a cylinder's mantle; its axis is on the positive side.
+
+    Parameters
+    ----------
+    origin : (3,) array
+        Point of the axis at the lower end.
+    axes : (3, 3) array
+        Rows: directions of the angles 0° and 90°, and of the axis.
+    arc : Arc
+        Its cross-section; parameters are the share of the arc and the height.
+    height : float
+    """
+
+    origin: Array
+    axes: Array
+    arc: Arc
+    height: float
+    plane = False
+
+    @property
+    def curvature(self) -> float:
+        """One over the radius, 1/m."""
+        return 1.0 / self.arc.radius
+
+    @property
+    def cells(self) -> Array:
+        """Triangles (m, 3, 2) of the parameters."""
+        return _rectangle(1.0, 0.0, self.height, 4)
+
+    def point(self, uv: Array) -> Array:
+        """Points (n, 3)."""
+        return self.origin + np.column_stack([self.arc.point(uv[:, 0]), uv[:, 1]]) @ self.axes
+
+    def normal(self, uv: Array) -> Array:
+        """Return unit normals (n, 3)."""
+        inward = (self.arc.centre - self.arc.point(uv[:, 0])) / self.arc.radius
+        return np.asarray(inward @ self.axes[:2])
+
+    def stretch(self, uv: Array) -> Array:
+        """Area (n,) per area of parameters."""
+        return np.full(len(uv), self.arc.length)
+
+    def level(self, x: Array) -> Array:
+        """Distance (n,) from the mantle, positive on the side of the axis."""
+        flat = (x - self.origin) @ self.axes[:2].T
+        inside: Array = self.arc.radius - np.linalg.norm(flat, axis=1)
+        return inside
+
+    def nearest(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Nearest points (n, 3), and whether they lie on the rim (n,)."""
+        local = (x - self.origin) @ self.axes.T
+        share, along = self.arc.nearest(local[:, :2]), np.clip(local[:, 2], 0.0, self.height)
+        rim = along != local[:, 2]
+        if self.arc.sweep < 2 * np.pi:
+            rim |= (share == 0.0) | (share == 1.0)
+        return self.point(np.column_stack([share, along])), rim
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of a box around it."""
+        half = self.arc.radius * np.linalg.norm(self.axes[:2], axis=0)
+        ends = self.origin + np.array([[0.0], [self.height]]) * self.axes[2]
+        return ends.min(axis=0) - half, ends.max(axis=0) + half
+
+
+Patch = PlanePatch | DiscPatch | CylinderPatch
+
+
+def patches_of(cut: SpatialCut) -> list[Patch]:
+    """Patches of a cut as asked; their normals point into its positive side."""
+    if isinstance(cut, DiscCut):
+        return [DiscPatch(np.array(cut.centre, dtype=float), cut.axes(), cut.semi_axes)]
+    if isinstance(cut, CylinderCut):
+        start, sweep = np.deg2rad(cut.start), np.deg2rad(cut.sweep)
+        arc = Arc(np.zeros(2), cut.radius, float(start), float(sweep))
+        return [CylinderPatch(np.array(cut.base, dtype=float), cut.axes(), arc, cut.height)]
+    points = np.array(cut.points, dtype=float)
+    if isinstance(cut, PolygonCut):
+        triangles = points[ear_clipping(points)]
+        spokes = points - points[0]
+        return [PlanePatch.of(triangles, np.cross(spokes[1:-1], spokes[2:]).sum(axis=0))]
+    along = np.array(cut.along, dtype=float)
+    return [
+        PlanePatch.of(
+            np.array([[a, b, b + along], [a, b + along, a + along]]), np.cross(b - a, along)
+        )
+        for a, b in pairwise(points)
+    ]
+
+
+def _rectangle(width: float, low: float, high: float, strips: int) -> Array:
+    """Triangles (2 strips, 3, 2) of the rectangle [0, width] × [low, high]."""
+    v = np.linspace(low, high, strips + 1)
+    o, w = np.zeros(strips), np.full(strips, width)
+    a, b = np.column_stack([o, v[:-1]]), np.column_stack([w, v[:-1]])
+    c, d = np.column_stack([w, v[1:]]), np.column_stack([o, v[1:]])
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])

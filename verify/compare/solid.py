@@ -1,0 +1,176 @@
+"""The body and its cuts as asked, as the comparison sees them in space."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.compare.cell_tree import build_cell_tree
+from verify.compare.facet_kernels import distance_to_segments
+from verify.compare.locate_kernels import find_cells
+from verify.compare.patches import Patch, patches_of
+from verify.compare.simplices import simplices
+from verify.compare.splitting import measures
+from verify.errors import UnsupportedSceneError
+from verify.scene import Scene
+from verify.scene.geometry import Box, MeshFile
+from verify.scene.mesh_file import read_mesh
+from verify.scene.spatial import rim_edges
+from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SweptCut
+
+__all__ = ["SolidBody", "solid_of"]
+
+Array = NDArray[np.float64]
+Inside = Callable[[Array], NDArray[np.bool_]]
+
+_RIM = 64  # pieces that a rim is divided into per body's size, where it is trimmed to the body
+_MARGIN = 1e-9  # of the body's size: closer to its surface is on it
+
+
+@dataclass(frozen=True)
+class SolidBody:
+    """A box, or the tetrahedra of a mesh file, with cuts.
+
+    Parameters
+    ----------
+    corners : (m, 4, 3) array
+        Tetrahedra that make up the body.
+    box : (2, 3) array, optional
+        Lower and upper corner, if it is a box.
+    cuts : dict of str to list of Patch
+        The cuts as asked, not trimmed.
+    front : (f, 2, 3) array
+        Pieces of the cuts' rims inside the body.
+    inside : callable
+        Whether points (n, 3) lie inside the body or on its surface.
+    """
+
+    corners: Array
+    box: Array | None
+    cuts: dict[str, list[Patch]]
+    front: Array
+    inside: Inside
+    dimension = 3
+
+    @property
+    def measure(self) -> float:
+        """Volume, m³."""
+        return float(measures(self.corners).sum())
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box, m."""
+        return float(np.linalg.norm(np.ptp(self.corners.reshape(-1, 3), axis=0)))
+
+    @property
+    def patches(self) -> list[Patch]:
+        """Patches of all cuts."""
+        return [patch for patches in self.cuts.values() for patch in patches]
+
+    @property
+    def has_cuts(self) -> bool:
+        """Whether anything is cut."""
+        return bool(self.cuts)
+
+    def tip_distance(self, points: Array) -> Array:
+        """Distance (n,) of points (n, 3) to the nearest front; infinite without one."""
+        starts, ends = (np.ascontiguousarray(self.front[:, k]) for k in (0, 1))
+        return np.asarray(distance_to_segments(np.ascontiguousarray(points), starts, ends))
+
+    def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Nearest points (n, 3) on the cuts as asked, and whether they are ends of these (n,)."""
+        best, end = np.full(len(points), np.inf), np.zeros(len(points), dtype=bool)
+        foot = np.array(points, copy=True)
+        for patch in self.patches:
+            candidate, rim = patch.nearest(points)
+            distance = np.linalg.norm(points - candidate, axis=1)
+            closer = distance < best
+            foot[closer], best[closer], end[closer] = (
+                candidate[closer], distance[closer], rim[closer],
+            )  # fmt: skip
+        return foot, end
+
+
+def solid_of(scene: Scene) -> SolidBody:
+    """Take the body of a scene in space.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If it is a membrane, or a cut is no surface of a known kind.
+    """
+    corners, box, inside = _material(scene)
+    size = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+    cuts, fronts = {}, [np.zeros((0, 2, 3))]
+    for cut in scene.cuts:
+        if not isinstance(cut, PolygonCut | DiscCut | CylinderCut | SweptCut):
+            raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
+        cuts[cut.name] = patches_of(cut)
+        fronts.append(_trimmed(rim_edges(cut.surface(size / _RIM)), inside, size))
+    return SolidBody(corners, box, cuts, np.concatenate(fronts), inside)
+
+
+def _material(scene: Scene) -> tuple[Array, Array | None, Inside]:
+    geometry = scene.geometry
+    if isinstance(geometry, Box):
+        box = np.array([geometry.lower, geometry.upper], dtype=float)
+        margin = _MARGIN * float(np.linalg.norm(box[1] - box[0]))
+
+        def in_box(points: Array) -> NDArray[np.bool_]:
+            within = (points >= box[0] - margin) & (points <= box[1] + margin)
+            return np.asarray(within.all(axis=1))
+
+        return _box_tetrahedra(box), box, in_box
+    if isinstance(geometry, MeshFile) and geometry.cells == "surface":
+        raise UnsupportedSceneError("comparison on membranes is not possible yet")
+    if not isinstance(geometry, MeshFile):
+        raise UnsupportedSceneError(
+            f"comparison on a body of kind '{geometry.kind}' is not possible yet; boxes and mesh "
+            "files of tetrahedra are"
+        )
+    points, cells = read_mesh(scene)
+    return points[cells], None, _in_mesh(points, cells)
+
+
+def _box_tetrahedra(box: Array) -> Array:
+    """Six tetrahedra (6, 4, 3) around the diagonal of a box (Kuhn)."""
+    unit = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dtype=float)
+    paths = [[0, *path, 7] for path in ([1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6])]
+    return np.asarray((box[0] + unit * (box[1] - box[0]))[np.array(paths)])
+
+
+def _in_mesh(points: Array, cells: NDArray[np.int64]) -> Inside:
+    shape = simplices(points, cells)
+    tree = build_cell_tree(shape.corners.min(axis=1), shape.corners.max(axis=1))
+    centres = shape.corners.mean(axis=1)
+    margin = _MARGIN * float(np.linalg.norm(np.ptp(points, axis=0)))
+
+    def inside(x: Array) -> NDArray[np.bool_]:
+        x = np.ascontiguousarray(x, dtype=float)
+        at = find_cells(
+            x, np.zeros((0, 3)), tree.lower, tree.upper, tree.cells, shape.corners,
+            shape.normals, centres, margin,
+        )  # fmt: skip
+        height = np.sum(shape.normals[at] * (x[:, None] - np.roll(shape.corners[at], -1, 1)), 2)
+        return np.asarray(height.min(axis=1) >= -margin)
+
+    return inside
+
+
+def _trimmed(rim: Array, inside: Inside, size: float) -> Array:
+    """Pieces (f, 2, 3) of the segments of a rim that run inside the body, not on its surface."""
+    pieces = []
+    for a, b in rim:
+        n = max(1, int(np.ceil(_RIM * np.linalg.norm(b - a) / size)))
+        stops = a + np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a)
+        pieces.append(np.stack([stops[:-1], stops[1:]], axis=1))
+    if not pieces:
+        return np.zeros((0, 2, 3))
+    found = np.concatenate(pieces)
+    middle = found.mean(axis=1)
+    step = 1e-6 * size
+    within = inside(middle)
+    for way in step * np.vstack([np.eye(3), -np.eye(3)]):
+        within &= inside(middle + way)
+    return found[within]
