@@ -36,7 +36,7 @@ from verify.xfem.slivers import SliverReport, treat_slivers
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
-__all__ = ["MotionChoice", "move"]
+__all__ = ["MotionChoice", "Mover", "move"]
 
 _Floats = NDArray[np.float64]
 _SAME = 1e-12  # of the duration: times that close are one
@@ -80,11 +80,14 @@ def move(
     XfemError, StepFailedError, NotInEquilibriumError
         From the library.
     """
-    return _Mover(scene, mesh, size, exact, choice).run(trial)
+    return Mover(scene, mesh, size, exact, choice).run(trial)
 
 
-class _Mover:
-    """One motion, stage by stage."""
+class Mover:
+    """One motion, stage by stage.
+
+    Other ways to cut override `_cut`, `_law` and `_inherited`.
+    """
 
     def __init__(
         self, scene: Scene, mesh: SimplexMesh, size: float, exact: Any, choice: MotionChoice
@@ -106,7 +109,9 @@ class _Mover:
 
     def run(self, trial: bool) -> Answer:
         """Run all stages and carry the fields of each to the finally cut mesh."""
-        virtual = self._cut(0)
+        initial = self.scene.initial
+        open_before = isinstance(initial, Equilibrium) and initial.cuts == "open"
+        virtual = self._cut(self.opens.count(0.0) if open_before else 0)
         body = self._body(virtual)
         state = self._initial(body)
         starts = sorted({0.0, *self.opens})
@@ -162,7 +167,7 @@ class _Mover:
             return total
 
         body = DynamicBody(
-            InternalForce(virtual, material_of(scene), scene.analysis.kinematics),
+            self._law(virtual),
             mass,
             weight,
             load_at if driven else None,
@@ -172,8 +177,12 @@ class _Mover:
         self.timings["loading"] += perf_counter() - clock
         return body
 
+    def _law(self, virtual: VirtualMesh) -> InternalForce:
+        """Return the elasticity of a cut mesh."""
+        return InternalForce(virtual, material_of(self.scene), self.scene.analysis.kinematics)
+
     def _initial(self, body: DynamicBody) -> MotionState:
-        """Return the state at the time 0, with every cut closed."""
+        """Return the state at the time 0, before what opens then."""
         clock = perf_counter()
         state, initial = body.rest(), self.scene.initial
         if isinstance(initial, Moving):
