@@ -15,17 +15,21 @@ from verify.methods.cut_body import CutBody
 from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
+from verify.solvers.methods_motion import MethodMover, refuses_motion
+from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import loads_of
+from verify.solvers.xfem_motion import MotionChoice
 from verify.solvers.xfem_scene import background_mesh, material_of
 from verify.solvers.xfem_static import in_load_steps
+from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_supports import supports_of
 from verify.xfem.corotational import InternalForce
-from verify.xfem.corotational_static import NotInEquilibriumError
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.static import solve_static
 from verify.xfem.supports import check_bodies
+from verify.xfem.virtual import VirtualMesh
 
 __all__ = [
     "MassSpringSolver",
@@ -41,23 +45,49 @@ __all__ = [
 
 _Floats = NDArray[np.float64]
 
+_SHEETS = ("subdivision", "removal", "virtual_node", "virtual_node_arbitrary", "uncut")
+
+
+_SCHEMES = tuple(SCHEMES)
+_EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
+
 
 @dataclass(frozen=True)
-class _Equilibrium:
-    """What every way to solve gives."""
+class _Choice:
+    """Parameters of a solve that do not concern the cut."""
 
+    load_steps: int
+    motion: MotionChoice
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A cut body and its fields (t, N, d)."""
+
+    body: CutBody
+    times: _Floats
     displacement: _Floats
-    energy: float
+    velocity: _Floats | None
+    ledger: dict[str, _Floats]
     timings: dict[str, float]
     iterations: dict[str, int]
-    changes: dict[str, int]
+    notes: dict[str, str]
+    clamped: int
 
 
 class _MethodSolver:
-    """A method of `verify.methods`: P1 elements, static, linear or corotational.
+    """A method of `verify.methods` on P1 elements: statics and motion, linear and corotational.
 
-    Parameters of `solve` are those of the method, and ``load_steps`` of corotational statics
-    (0: as few as converge).
+    Parameters of `solve`
+    ---------------------
+    load_steps : int
+        Corotational statics: equal parts of the load; 0: as few as converge.
+    scheme : str
+        Dynamics: as of the solver ``xfem``.
+    step_factor : float
+        Dynamics: share of the critical step.
+    further parameters
+        Those of the method, in `verify.methods`.
     """
 
     name: ClassVar[str]
@@ -69,17 +99,26 @@ class _MethodSolver:
         return self.name
 
     def refuses(self, scene: Scene) -> str | None:
-        """Refuse what these adapters do not offer."""
-        if scene.analysis.kind == "dynamic":
-            return "dynamics is not offered by this adapter yet"
-        return None
+        """Refuse what ``xfem`` refuses, and what no changed mesh can do."""
+        if reason := XfemSolver().refuses(scene):
+            return reason
+        if scene.material.thickness is not None and self.name not in _SHEETS:
+            return f"membranes in space are not offered by {self.name}"
+        return refuses_motion(scene) if scene.analysis.kind == "dynamic" else None
 
     def levels(self, scene: Scene) -> int:
         """Return the number of mesh levels of the scene."""
         return scene.mesh.count
 
     def solve(
-        self, scene: Scene, level: int, repetitions: int = 1, load_steps: int = 0, **parameters: Any
+        self,
+        scene: Scene,
+        level: int,
+        repetitions: int = 1,
+        load_steps: int = 0,
+        scheme: str = "newmark",
+        step_factor: float = 0.9,
+        **parameters: Any,
     ) -> Solution:
         """Solve `scene` on mesh `level`.
 
@@ -90,68 +129,98 @@ class _MethodSolver:
         InputError
             If a parameter is unknown, a mesh file bad, a support nowhere, a piece not held, or the
             method cannot make the cut.
+        NotInEquilibriumError, StepFailedError
+            If a Newton iteration does not converge, or a motion blows up.
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
         if not 0 <= level < self.levels(scene):
             raise InputError(f"mesh level {level}; expected 0..{self.levels(scene) - 1}")
-        self._check(parameters)
+        if load_steps < 0 or not step_factor > 0.0 or scheme not in _SCHEMES:
+            raise InputError(
+                f"load_steps {load_steps}, step_factor {step_factor}, scheme '{scheme}'; expected "
+                f"at least 0, a positive number, one of {', '.join(_SCHEMES)}"
+            )
+        self._check(scene, scheme, parameters)
+        choice = _Choice(
+            load_steps, MotionChoice(scheme, "sidewise", step_factor, "inside", "keep")
+        )
         try:
             start = perf_counter()
             mesh, size = background_mesh(scene, level)
             meshing = perf_counter() - start
+            if repetitions:  # what compiles, compiles here
+                self._run(scene, mesh, size, choice, parameters, trial=True)
             runs = [
-                self._run(scene, mesh, size, load_steps, parameters) for _ in range(1 + repetitions)
+                self._run(scene, mesh, size, choice, parameters) for _ in range(max(1, repetitions))
             ]
-        except (XfemError, NotInEquilibriumError) as error:
+        except XfemError as error:
             raise InputError(str(error), str(scene.file or scene.name)) from None
-        body, result = runs[-1]
-        timings = {phase: [run[1].timings[phase] for run in runs[1:]] for phase in result.timings}
-        return _solution(self.name, body, result, size, {"meshing": [meshing], **timings})
+        timings: dict[str, list[float]] = {}
+        if repetitions:
+            timings = {phase: [run.timings[phase] for run in runs] for phase in runs[0].timings}
+        return _solution(self.name, runs[-1], size, {"meshing": [meshing], **timings})
 
-    def _check(self, parameters: dict[str, Any]) -> None:
+    def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         known = list(signature(METHODS[self.method]).parameters)[2:]
         for name in parameters:
             if name not in known:
-                text = f"parameter '{name}' of {self.name}"
-                raise InputError(f"{text}; expected one of {', '.join([*known, 'load_steps'])}")
+                further = ", ".join([*known, "load_steps", "scheme", "step_factor"])
+                raise InputError(f"parameter '{name}' of {self.name}; expected one of {further}")
+        if scene.analysis.kind == "dynamic" and parameters.get("weights") == "whole":
+            raise UnsupportedSceneError(
+                "copies that resist as whole cells, with the mass of their share, have no "
+                "critical step; expected weights = 'share'"
+            )
 
     def _run(
         self,
         scene: Scene,
         mesh: SimplexMesh,
         size: float,
-        load_steps: int,
+        choice: _Choice,
         parameters: dict[str, Any],
-    ) -> tuple[CutBody, _Equilibrium]:
+        trial: bool = False,
+    ) -> _Run:
         """Cut, load, solve: all of it, nothing kept from the run before."""
         mesh = SimplexMesh(mesh.points, mesh.cells)
         body = METHODS[self.method](mesh, cuts_of(scene, size), **parameters)
+        exact, material = _exact(scene), body.material(material_of(scene))
+        kinematics = scene.analysis.kinematics
+        if scene.analysis.kind == "dynamic":
+
+            def law(virtual: VirtualMesh) -> InternalForce:
+                force: InternalForce = self._force(virtual, material, kinematics)
+                return force
+
+            mover = MethodMover(body, law, scene, mesh, size, exact, choice.motion)
+            moved = mover.run(trial)
+            return _Run(
+                body, moved.times, moved.displacement, moved.velocity, moved.ledger,
+                moved.timings, moved.iterations, moved.notes, 0,
+            )  # fmt: skip
         start = perf_counter()
-        exact = _exact(scene)
         supports = supports_of(scene, body.virtual, exact)
         load = loads_of(scene, body.virtual, exact)
         timings = {**body.seconds, "loading": perf_counter() - start}
-        material = body.material(material_of(scene))
-        if scene.analysis.kinematics == "linear" and self._force is InternalForce:
+        if kinematics == "linear" and self._force is InternalForce:
             static = solve_static(body.resisting, material, supports, load)
+            u, energy, iterations, clamped = static.displacement, static.strain_energy, {}, 0
             timings |= static.timings
-            return body, _Equilibrium(static.displacement, static.strain_energy, timings, {}, {})
-        check_bodies(body.resisting, supports)
-        start = perf_counter()
-        force = self._force(body.resisting, material, scene.analysis.kinematics)
-        found, steps = in_load_steps(
-            force,
-            supports.fixed,
-            lambda share: supports_of(scene, body.virtual, exact, share).values,
-            load,
-            load_steps,
-        )
-        timings["solve"] = perf_counter() - start
-        iterations = {"newton": sum(found.iterations), "load steps": steps}
-        clamped = getattr(force, "clamped", 0)
-        changes = {"spring that the fit would make negative left out": clamped}
-        return body, _Equilibrium(found.displacement, found.energy, timings, iterations, changes)
+        else:
+            check_bodies(body.resisting, supports)
+            start = perf_counter()
+            force = self._force(body.resisting, material, kinematics)
+
+            def prescribed(share: float) -> _Floats:
+                return supports_of(scene, body.virtual, exact, share).values
+
+            found, steps = in_load_steps(force, supports.fixed, prescribed, load, choice.load_steps)
+            u, energy, clamped = found.displacement, found.energy, getattr(force, "clamped", 0)
+            iterations = {"newton": sum(found.iterations), "load steps": steps}
+            timings["solve"] = perf_counter() - start
+        ledger = {"strain": np.array([energy])}
+        return _Run(body, np.zeros(1), u[None], None, ledger, timings, iterations, {}, clamped)
 
 
 class SubdivisionSolver(_MethodSolver):
@@ -229,6 +298,8 @@ class MassSpringSolver(_MethodSolver):
         level: int,
         repetitions: int = 1,
         load_steps: int = 0,
+        scheme: str = "newmark",
+        step_factor: float = 0.9,
         cut: str = "snapping",
         fit: str = "fitted",
         **parameters: Any,
@@ -240,7 +311,17 @@ class MassSpringSolver(_MethodSolver):
                 raise InputError(f"{name} '{value}'; expected one of {', '.join(known)}")
         self._cut = cut
         self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
-        return super().solve(scene, level, repetitions, load_steps, **parameters)
+        return super().solve(
+            scene, level, repetitions, load_steps, scheme, step_factor, **parameters
+        )
+
+    def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
+        super()._check(scene, scheme, parameters)
+        if scene.analysis.kind == "dynamic" and scheme in (*_EXPLICIT, "energy_momentum"):
+            raise UnsupportedSceneError(
+                f"{scheme} of springs: their critical step is not that of the elements, and they "
+                "have no stress; expected newmark or implicit_euler"
+            )
 
 
 def _exact(scene: Scene) -> Any:
@@ -252,27 +333,27 @@ def _exact(scene: Scene) -> Any:
     return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
-def _solution(
-    name: str, body: CutBody, result: _Equilibrium, size: float, timings: dict[str, list[float]]
-) -> Solution:
-    shown, counts = body.conforming, body.counts
+def _solution(name: str, run: _Run, size: float, timings: dict[str, list[float]]) -> Solution:
+    body, shown, counts = run.body, run.body.conforming, run.body.counts
     regularisations = [
         Regularisation(change.kind, change.count, change.size, change.unit)
         for change in body.changes
     ]
-    regularisations += [
-        Regularisation(kind, count, 0.0, "N/m") for kind, count in result.changes.items() if count
-    ]
+    if run.clamped:
+        kind = "spring that the fit would make negative left out"
+        regularisations.append(Regularisation(kind, run.clamped, 0.0, "N/m"))
     return Solution(
         points=shown.points,
         cells=shown.cells,
-        displacement=(shown.interpolation @ result.displacement)[None],
+        displacement=_at_points(body, run.displacement),
+        times=run.times,
+        velocity=None if run.velocity is None else _at_points(body, run.velocity),
         cut_facets=shown.cut_facets,
-        ledger={"strain": np.array([result.energy])},
-        unknowns=result.displacement.size,
+        ledger=run.ledger,
+        unknowns=run.displacement[0].size,
         size=size,
         timings=timings,
-        iterations=result.iterations,
+        iterations=run.iterations,
         regularisations=regularisations,
         notes={
             "method": name,
@@ -280,5 +361,10 @@ def _solution(
             "elements": f"{counts.elements_before} before the cut, {counts.elements} after",
             "smallest volume fraction": f"{body.smallest_fraction:.3g}",
             "timed": "every phase as listed; first call (compilation) excluded; writing excluded",
+            **run.notes,
         },
     )
+
+
+def _at_points(body: CutBody, values: _Floats) -> _Floats:
+    return np.stack([body.conforming.interpolation @ one for one in values])
