@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.assembly_kernels import constrain
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.cholesky import Cholesky
 from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.dynamics.body import DynamicBody, MotionState
@@ -53,6 +53,8 @@ class RealTimeEuler:
         self._internal = np.empty(body.shape)
         self._last: _Floats | None = None
         self._any_fixed = bool(body.fixed.any())
+        self._held = _held_entries(body.pattern, body.fixed)
+        self._change = np.empty(body.shape)
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
@@ -116,20 +118,52 @@ class RealTimeEuler:
 
     def _support(self, state: MotionState) -> None:
         """Let fixed components move as prescribed; what that does to the others goes right."""
-        body, h = self.body, self.step_size
-        change = None
-        fixed = body.fixed
-        where, _ = body.prescribed(state.time + h)
-        wanted = (where - state.displacement)[fixed] / h - state.velocity[fixed]
-        if wanted.any():
-            change = np.zeros(body.shape)
-            change[fixed] = wanted
-            self.load -= (body.pattern.matrix(self.blocks) @ change.ravel()).reshape(body.shape)
-        constrain(body.pattern.starts, body.pattern.columns, body.fixed, self.blocks)
-        self.load[body.fixed] = 0.0
-        if change is not None:
-            diagonal = np.einsum("nkk->nk", self.blocks[body.pattern.diagonal])
-            self.load[body.fixed] = (diagonal * change)[body.fixed]
+        body = self.body
+        where, _ = body.prescribed(state.time + self.step_size)
+        driven = _driven_change(
+            body.fixed, where, state.displacement, state.velocity, self.step_size, self._change
+        )
+        if driven:
+            self.load -= (body.pattern.matrix(self.blocks) @ self._change.ravel()).reshape(
+                body.shape
+            )
+        _hold(body.pattern.diagonal, body.fixed, self._held, self._change, self.blocks, self.load)
+
+
+def _held_entries(pattern: BlockPattern, fixed: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Entries of the blocks, flat, in a row or column of a fixed component, but the diagonal's."""
+    rows = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
+    held = fixed[rows][:, :, None] | fixed[pattern.columns][:, None, :]
+    axes = np.arange(fixed.shape[1])
+    held[pattern.diagonal[:, None], axes, axes] = False
+    return np.flatnonzero(held)
+
+
+@njit(cache=True)
+def _driven_change(fixed, where, displacement, velocity, step_size, change):
+    """Write the change of velocity (N, d) that brings supports where they are to be; any?"""
+    driven = False
+    for i in range(fixed.shape[0]):
+        for k in range(fixed.shape[1]):
+            change[i, k] = 0.0
+            if fixed[i, k]:
+                change[i, k] = (where[i, k] - displacement[i, k]) / step_size - velocity[i, k]
+                driven |= change[i, k] != 0.0
+    return driven
+
+
+@njit(cache=True)
+def _hold(diagonal, fixed, held, change, blocks, load):
+    """Decouple fixed components, and let their change be what it is to be."""
+    flat = blocks.reshape(-1)
+    for at in held:
+        flat[at] = 0.0
+    for i in range(fixed.shape[0]):
+        for k in range(fixed.shape[1]):
+            if fixed[i, k]:
+                if blocks[diagonal[i], k, k] == 0.0:  # a flat membrane
+                    blocks[diagonal[i], k, k] = 1.0
+                load[i, k] = blocks[diagonal[i], k, k] * change[i, k]
 
 
 @njit(cache=True)
