@@ -16,12 +16,14 @@ class AtRest(Strict):
 
 
 class Equilibrium(Strict):
-    """Static equilibrium, at rest, with every cut still closed.
-
-    Supports and loads have the first factor of their history.
-    """
+    """Static equilibrium, at rest. Supports and loads have the first factor of their history."""
 
     kind: Literal["equilibrium"]
+    cuts: Literal["closed", "open"] = Field(
+        default="closed",
+        description="whether the cuts that open at the time 0 are open in it; closed: it is the "
+        "equilibrium of the uncut body",
+    )
 
 
 class Moving(Strict):
