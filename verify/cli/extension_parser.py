@@ -4,6 +4,8 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from verify.cli.argument_types import count, positive
+
 __all__ = ["add_extension_commands"]
 
 Add = Callable[[str, str, str], argparse.ArgumentParser]
@@ -70,11 +72,11 @@ def _add_import(add: Add) -> None:
         "(default: xfem)",
     )  # fmt: skip
     command.add_argument(
-        "--timeout", metavar="S", type=_positive, default=600.0,
+        "--timeout", metavar="S", type=positive, default=600.0,
         help="wall seconds after which a solve beside it is killed (default: 600)",
     )  # fmt: skip
     command.add_argument(
-        "--repetitions", metavar="N", type=_count, default=1,
+        "--repetitions", metavar="N", type=count, default=1,
         help="timed repetitions of the solves beside it (default: 1)",
     )  # fmt: skip
     command.add_argument(
@@ -106,7 +108,7 @@ def _add_conform(add: Add) -> None:
         help="only this check; repeat for several (default: all)",
     )  # fmt: skip
     command.add_argument(
-        "--timeout", metavar="S", type=_positive, default=120.0,
+        "--timeout", metavar="S", type=positive, default=120.0,
         help="wall seconds after which a solve is killed (default: 120)",
     )  # fmt: skip
     command.add_argument("--json", action="store_true", help="print the checks as JSON")
@@ -161,19 +163,3 @@ def _add_baseline(add: Add) -> None:
     action.add_argument("run", metavar="OLD", type=Path, help="directory of a finished run")
     action.add_argument("other", metavar="NEW", type=Path, help="directory of a finished run")
     action.add_argument("--json", action="store_true", help="print JSON")
-
-
-def _count(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, got '{text}'")
-    return int(text)
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected a positive number, got '{text}'")
-    return value

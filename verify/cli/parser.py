@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from verify import __version__
+from verify.cli.argument_types import count, positive
 from verify.cli.cache_parser import add_cache_command
 from verify.cli.extension_parser import add_extension_commands
 from verify.cli.study_parser import add_study_command
@@ -152,15 +153,15 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     weight.add_argument("--quick", action="store_true", help="only cases tagged quick")
     weight.add_argument("--heavy", action="store_true", help="also cases tagged heavy")
     command.add_argument(
-        "-j", metavar="N", dest="jobs", type=_count, default=1,
+        "-j", metavar="N", dest="jobs", type=count, default=1,
         help="processes at the same time (default: 1)",
     )  # fmt: skip
     command.add_argument(
-        "--timeout", metavar="S", type=_positive, default=600.0,
+        "--timeout", metavar="S", type=positive, default=600.0,
         help="wall seconds after which a solve is killed (default: 600)",
     )  # fmt: skip
     command.add_argument(
-        "--memory", metavar="GB", type=_positive,
+        "--memory", metavar="GB", type=positive,
         help="resident memory above which a solve is killed "
         "(default: 80 %% of the machine's, shared by the processes)",
     )  # fmt: skip
@@ -170,7 +171,7 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "(default: those that the case names)",
     )  # fmt: skip
     command.add_argument(
-        "--repetitions", metavar="N", type=_count, default=3,
+        "--repetitions", metavar="N", type=count, default=3,
         help="timed repetitions of each solve (default: 3)",
     )  # fmt: skip
     command.add_argument(
@@ -201,19 +202,3 @@ def _late(name: str) -> Callable[[argparse.Namespace], int]:
         return code
 
     return command
-
-
-def _count(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, got '{text}'")
-    return int(text)
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected a positive number, got '{text}'")
-    return value

@@ -4,6 +4,8 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from verify.cli.argument_types import count
+
 __all__ = ["add_study_command"]
 
 
@@ -11,10 +13,12 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
     """Add ``study`` to the command line."""
     command = add(
         "study",
-        "measure what slivers do, or whether energy and momenta are kept",
+        "measure what slivers do, whether energy is kept, or what accuracy costs",
         "examples:\n  verify study slivers --quick --out studies\n"
         "  verify study slivers --dimension 2 --out studies\n"
-        "  verify study energy --out studies\n\n"
+        "  verify study energy --out studies\n"
+        "  verify study cost statics/tissue_strip --steps 4 --solver xfem --solver conforming "
+        "--out studies\n\n"
         "Writes NAME.json, NAME.csv and NAME.html into the directory. Exit code 0 whatever the\n"
         "findings say: they compare methods, most of which are known to fail somewhere.",
     )
@@ -33,3 +37,30 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
             "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
         )
         kind.add_argument("--json", action="store_true", help="print the findings as JSON")
+    _add_cost(kinds.add_parser)
+
+
+def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
+    text = "work against precision while the first cut of a case grows, at equal accuracy"
+    kind = add("cost", help=text, description=f"{text[0].upper()}{text[1:]}.")
+    kind.add_argument("case", metavar="CASE", help="name of a case, or a case file")
+    kind.add_argument(
+        "--steps", metavar="N", type=count, default=4, help="steps of the cut (default: 4)"
+    )
+    kind.add_argument(
+        "--solver", metavar="NAME", action="append", dest="solvers", default=[],
+        help="solver to compare; repeat for several (default: xfem and conforming, which "
+        "remeshes at every step)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--metric", default="energy_norm", choices=("displacement_l2", "energy_norm", "jump_l2"),
+        help="the error that is held equal (default: energy_norm)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--repetitions", metavar="N", type=count, default=5,
+        help="timed repetitions of each solve (default: 5)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
+    )
+    kind.add_argument("--json", action="store_true", help="print the findings as JSON")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.report.cost_study_figures import cost_section
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import number
 from verify.report.sliver_figures import sliver_curves, sliver_maps
@@ -20,7 +21,11 @@ __all__ = ["render_study"]
 
 _SCHEMA = 1
 _ACCOUNT = ("mechanical", "kinetic", "strain", "algorithmic")
-_TITLES = {"slivers": "What slivers do", "energy": "Whether energy and momenta are kept"}
+_TITLES = {
+    "slivers": "What slivers do",
+    "energy": "Whether energy and momenta are kept",
+    "cost": "What accuracy costs while a cut grows",
+}
 
 
 def render_study(directory: Path, kind: str) -> Path:
@@ -59,7 +64,7 @@ def _page(record: Mapping[str, Any], kind: str) -> Markup:
         tag("title", _TITLES[kind]),
         tag("style", Markup(style + MAP_STYLE)),
     )
-    body = _slivers(record) if kind == "slivers" else _energy(record)
+    body = {"slivers": _slivers, "energy": _energy, "cost": cost_section}[kind](record)
     shortened = tag(
         "p", "Note: quick: fewer sizes and shorter runs than the whole study.", class_="warning"
     )

@@ -18,6 +18,7 @@ def time_panel(
     time: Sequence[float],
     curves: Sequence[tuple[str, Sequence[float]]],
     marks: Sequence[float] = (),
+    x_title: str = "time, s",
 ) -> Markup:
     """Return a figure of several curves over a common time.
 
@@ -31,6 +32,8 @@ def time_panel(
         At most four; they differ in dashes as well as in colour.
     marks : sequence of float
         Instants to be marked by a vertical line.
+    x_title : str
+        What the curves are drawn over, if not time.
     """
     values = [v for _, curve in curves for v in curve if math.isfinite(v)]
     low, high = min([0.0, *values]), max([*values, 0.0])
@@ -69,10 +72,10 @@ def time_panel(
         parts.append(tag("path", d=sample, class_="curve", stroke=colour, stroke_dasharray=dash))
         parts.append(text(x1 + 30, at, name, class_="note", fill=colour))
     parts.append(tag("path", d=f"M{x0} {y1}V{y0}H{x1}", class_="frame"))
-    parts.append(text((x0 + x1) / 2, y0 + 34, "time, s", class_="axis", text_anchor="middle"))
+    parts.append(text((x0 + x1) / 2, y0 + 34, x_title, class_="axis", text_anchor="middle"))
     parts.append(text(2, 12, title, class_="axis"))
     ends = "; ".join(f"{name}: {curve[0]:.4g} to {curve[-1]:.4g}" for name, curve in curves)
-    label = f"{title} over {length:.3g} s. {ends}"
+    label = f"{title} over {x_title}, {length:.3g}. {ends}"
     return tag(
         "svg", tag("title", label), *parts, viewBox=f"0 0 {WIDTH} {HEIGHT}", class_="time",
         role="img", aria_label=label,

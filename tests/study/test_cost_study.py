@@ -1,0 +1,114 @@
+"""What accuracy costs: fabricated solvers of known cost are found out; cuts grow as asked."""
+
+import math
+
+import numpy as np
+import pytest
+
+from verify.errors import InputError
+from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
+from verify.scene import load_scene
+from verify.study.cost import cost_study, growing_scenes
+from verify.study.cost.work import pareto_front, time_at, work_points
+
+STRIP = "statics/tissue_strip"
+
+
+def solve(solver, level, error, seconds, spread=0.0, status=Status.SOLVED, meshing=0.0):
+    metrics = [Metric("energy_norm", error, "1")] if status is Status.SOLVED else []
+    timings = {"solve": [seconds * (1 - spread), seconds, seconds * (1 + spread)]}
+    if meshing:
+        timings["meshing"] = [meshing] * 3
+    return SolveRecord(
+        "case", solver, level, status, "" if status is Status.SOLVED else "it broke",
+        metrics=metrics, timings=timings, unknowns=100 * 4**level,
+    )  # fmt: skip
+
+
+def result(*solves):
+    return CaseResult("case", "", "", "", {}, {}, list(solves), [], [])
+
+
+def ladder(solver, error, seconds, order=1.0, **others):
+    """Levels of half the size each: error falls with `order`, time grows fourfold."""
+    return [
+        solve(solver, k, error * 2.0 ** (-order * k), seconds * 4.0**k, **others) for k in range(3)
+    ]
+
+
+def test_the_time_of_an_error_between_levels_is_that_of_the_power_law():
+    points = work_points(ladder("one", 0.4, 0.01), "energy_norm")
+    # error e takes 0.01 (0.4/e)²
+    for error in (0.4, 0.3, 0.123, 0.1):
+        assert time_at(points, error)[0] == pytest.approx(0.01 * (0.4 / error) ** 2, rel=1e-12)
+    assert time_at(points, 0.5)[0] == pytest.approx(0.01)  # the coarsest does it
+    assert time_at(points, 0.09) is None
+
+
+def test_a_solver_ten_times_slower_at_equal_accuracy_is_said_to_be_that():
+    steps = [result(*ladder("xfem", 0.4, 0.01), *ladder("other", 0.4, 0.1))] * 3
+    study = cost_study("case", steps, "energy_norm")
+    assert study.running["xfem"][-1][0] == pytest.approx(3 * 0.16)
+    (finding,) = [f for f in study.findings if f.topic.endswith(", other")]
+    assert "10 times as much" in finding.sentence
+    assert finding.verdict is Verdict.PASS
+
+
+def test_a_faster_solver_of_lower_order_is_compared_at_the_error_that_both_reach():
+    """Ten times faster per level, but of order ½: at the common error it is the slower."""
+    steps = [result(*ladder("xfem", 0.4, 0.01), *ladder("hasty", 0.4, 0.001, order=0.5))]
+    study = cost_study("case", steps, "energy_norm")
+    assert study.steps[0]["error"] == pytest.approx(0.2)  # hasty's best
+    xfem, hasty = (study.steps[0]["times"][name][0] for name in ("xfem", "hasty"))
+    assert (xfem, hasty) == (pytest.approx(0.04), pytest.approx(0.016))
+
+
+def test_what_lies_within_the_spread_is_undecided():
+    steps = [result(*ladder("xfem", 0.4, 0.01, spread=0.3), *ladder("o", 0.4, 0.012, spread=0.3))]
+    study = cost_study("case", steps, "energy_norm")
+    assert study.findings[0].verdict is Verdict.UNDECIDED
+
+
+def test_a_background_mesh_is_paid_once_and_a_conforming_one_at_every_step():
+    one = result(
+        *ladder("xfem", 0.4, 0.01, meshing=1.0), *ladder("conforming", 0.4, 0.01, meshing=1.0)
+    )
+    study = cost_study("case", [one] * 4, "energy_norm")
+    assert study.running["xfem"][-1][0] == pytest.approx(1.0 + 4 * 0.16)
+    assert study.running["conforming"][-1][0] == pytest.approx(4 * 1.16)
+
+
+def test_a_solver_that_failed_is_left_out_with_its_reason_and_not_averaged():
+    broken = solve("other", 2, 0.0, 0.0, status=Status.FAILED)
+    steps = [result(*ladder("xfem", 0.4, 0.01), *ladder("other", 0.4, 0.01)[:2], broken)] * 2
+    steps[1] = result(*ladder("xfem", 0.4, 0.01), broken)
+    study = cost_study("case", steps, "energy_norm")
+    assert study.running["other"] == [pytest.approx((0.04, 0.04, 0.04)), None]
+    assert {one["reason"] for one in study.left_out} == {"it broke"}
+    assert any("no time at step 2" in finding.sentence for finding in study.findings)
+
+
+def test_the_pareto_front_has_only_what_nothing_beats():
+    points = work_points(
+        [*ladder("good", 0.4, 0.01), *ladder("bad", 0.8, 0.02), solve("best", 0, 0.01, 1.0)],
+        "energy_norm",
+    )
+    front = [(p.solver, p.level) for p in pareto_front(points)]
+    assert front == [("good", 0), ("good", 1), ("good", 2), ("best", 0)]
+
+
+def test_the_cut_grows_by_equal_lengths_to_the_whole():
+    scene = load_scene(STRIP)
+    scenes = growing_scenes(scene, 4)
+    lengths = [
+        np.linalg.norm(np.diff(np.array(s.cuts[0].points), axis=0), axis=1).sum() for s in scenes
+    ]
+    whole = math.dist(*scene.cuts[0].points)
+    np.testing.assert_allclose(lengths, whole * np.arange(1, 5) / 4, rtol=1e-14)
+    assert scenes[-1].cuts == scene.cuts
+    assert len({s.name for s in scenes}) == 4
+
+
+def test_a_scene_whose_cut_cannot_grow_is_refused():
+    with pytest.raises(InputError, match="no shorter cuts"):
+        growing_scenes(load_scene("statics/f3_inclined"), 2)

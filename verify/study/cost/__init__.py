@@ -1,0 +1,6 @@
+"""What accuracy costs, once and over a cut that grows."""
+
+from verify.study.cost.sequence import growing_scenes
+from verify.study.cost.study import CostStudy, cost_study
+
+__all__ = ["CostStudy", "cost_study", "growing_scenes"]

@@ -1,0 +1,209 @@
+"""The cost study: a cut grows, every solver follows it, and they are compared at equal accuracy."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from verify.result import CaseResult, SolveRecord, Status, Verdict
+from verify.study.cost.work import WorkPoint, pareto_front, time_at, work_points
+from verify.study.finding import Finding
+
+__all__ = ["CostStudy", "cost_study"]
+
+REFERENCE = "reference"
+
+
+@dataclass(frozen=True)
+class CostStudy:
+    """What the cost study found.
+
+    Attributes
+    ----------
+    case, metric : str
+    steps : list of dict
+        Per step of the cut: the error at which the solvers are compared, and per solver the
+        time that it takes (median, least, most; s), None if it does not reach the error.
+    running : dict of str to list of (float, float, float)
+        Time so far, per solver and step: what is paid once, and the steps; None from the first
+        step that a solver does not reach.
+    points : list of dict
+        Every solve of the last step.
+    front : list of (str, int)
+        Solver and level of those of them that no other beats in time and error.
+    left_out : list of dict
+        Solves that failed or were refused, with reasons.
+    findings : list of Finding
+    contended : str
+        Why times may be off, if they may.
+    """
+
+    case: str
+    metric: str
+    steps: list[dict[str, Any]]
+    running: dict[str, list[tuple[float, float, float] | None]]
+    points: list[dict[str, Any]]
+    front: list[tuple[str, int]]
+    left_out: list[dict[str, Any]]
+    findings: list[Finding]
+    contended: str
+    seconds: float = 0.0
+
+    def as_record(self) -> dict[str, Any]:
+        """Return all of it as plain data."""
+        return asdict(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a line per solver and step, for a table."""
+        return [
+            {"step": step["step"], "error": step["error"], "solver": solver,
+             "median_s": times[0] if times else "", "least_s": times[1] if times else "",
+             "most_s": times[2] if times else ""}
+            for step in self.steps
+            for solver, times in step["times"].items()
+        ]  # fmt: skip
+
+
+def cost_study(
+    case: str, results: Sequence[CaseResult], metric: str, seconds: float = 0.0
+) -> CostStudy:
+    """Compare the cost of the solvers over the steps of a growing cut.
+
+    At each step the wanted error is the least that every solver reaches on some level; the time
+    that it takes a solver is interpolated between its levels.
+
+    Parameters
+    ----------
+    case : str
+    results : sequence of CaseResult
+        Of the steps, in order.
+    metric : str
+        The relative error that is held equal.
+    seconds : float
+        Wall time of all solves, for the record.
+    """
+    steps, sums = [], _Running()
+    for number, result in enumerate(results, start=1):
+        own = [record for record in result.solves if record.solver != REFERENCE]
+        points = _by_solver(work_points(own, metric))
+        names = list(dict.fromkeys(record.solver for record in own))
+        reached = [min(p.error for p in points[name]) for name in names if name in points]
+        wanted = max(reached, default=float("nan"))
+        times = {name: time_at(points.get(name, []), wanted) for name in names}
+        once = {name: max((p.once for p in points.get(name, [])), default=0.0) for name in names}
+        steps.append({"step": number, "error": wanted, "times": times})
+        sums.add(times, once)
+    last = [record for record in results[-1].solves if record.solver != REFERENCE]
+    final = work_points(last, metric)
+    notes = [r.notes.get("timing", "") for result in results for r in result.solves]
+    contended = next((note for note in notes if note), "")
+    running = sums.sums
+    return CostStudy(
+        case=case,
+        metric=metric,
+        steps=steps,
+        running=running,
+        points=[asdict(point) for point in final],
+        front=[(p.solver, p.level) for p in pareto_front(final)],
+        left_out=[_reason(r) for result in results for r in result.solves if _failed(r)],
+        findings=_findings(running, steps, metric, contended, final),
+        contended=contended,
+        seconds=seconds,
+    )
+
+
+class _Running:
+    """Time so far, per solver."""
+
+    def __init__(self) -> None:
+        self.sums: dict[str, list[tuple[float, float, float] | None]] = {}
+
+    def add(
+        self,
+        times: Mapping[str, tuple[float, float, float] | None],
+        once: Mapping[str, float],
+    ) -> None:
+        """Add a step."""
+        for name, step in times.items():
+            own = self.sums.setdefault(name, [])
+            before = own[-1] if own else (once[name],) * 3
+            together = None
+            if before is not None and step is not None:
+                a, b, c = (x + y for x, y in zip(before, step, strict=True))
+                together = (a, b, c)
+            own.append(together)
+
+
+def _by_solver(points: Sequence[WorkPoint]) -> dict[str, list[WorkPoint]]:
+    found: dict[str, list[WorkPoint]] = {}
+    for point in points:
+        found.setdefault(point.solver, []).append(point)
+    return found
+
+
+def _failed(record: SolveRecord) -> bool:
+    return record.status is not Status.SOLVED
+
+
+def _reason(record: SolveRecord) -> dict[str, Any]:
+    return {
+        "case": record.case,
+        "solver": record.solver,
+        "level": record.level,
+        "status": str(record.status),
+        "reason": record.reason,
+    }
+
+
+def _findings(
+    running: Mapping[str, Sequence[tuple[float, float, float] | None]],
+    steps: Sequence[Mapping[str, Any]],
+    metric: str,
+    contended: str,
+    final: Sequence[WorkPoint],
+) -> list[Finding]:
+    ends = {name: sums[-1] for name, sums in running.items() if sums and sums[-1] is not None}
+    found = []
+    if "xfem" in ends:
+        own = ends["xfem"]
+        for name, other in ends.items():
+            if name == "xfem" or own is None or other is None:
+                continue
+            least, most = other[1] / own[2], other[2] / own[1]
+            verdict = Verdict.PASS if least > 1 else Verdict.FAIL if most < 1 else Verdict.UNDECIDED
+            if contended and verdict is Verdict.PASS and least < 2.0:
+                verdict = Verdict.UNDECIDED
+            found.append(
+                Finding(
+                    f"running cost over {len(steps)} steps, {name}",
+                    f"At equal {metric.replace('_', ' ')} ({steps[-1]['error']:.2g} at the last "
+                    f"step) {name} takes {other[0]:.3g} s and XFEM {own[0]:.3g} s: "
+                    f"{other[0] / own[0]:.3g} times as much (between {least:.3g} and {most:.3g} "
+                    "over the repetitions)." + (f" Times are {contended}." if contended else ""),
+                    "XFEM is the cheaper, with all of the spread",
+                    verdict,
+                )
+            )
+    for name, sums in running.items():
+        if sums and sums[-1] is None:
+            step = next(i for i, entry in enumerate(sums, start=1) if entry is None)
+            found.append(
+                Finding(
+                    f"running cost, {name}",
+                    f"{name} has no time at step {step}: none of its levels was solved, measured "
+                    "and accurate enough.",
+                    "a time at every step",
+                    Verdict.UNDECIDED,
+                )
+            )
+    front = pareto_front(final)
+    if front:
+        said = ", ".join(f"{p.solver} level {p.level}" for p in front)
+        found.append(
+            Finding(
+                "Pareto front at the last step",
+                f"No other solve is both faster and more accurate than {said}.",
+                "shown, not judged",
+                Verdict.PASS,
+            )
+        )
+    return found
