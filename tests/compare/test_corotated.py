@@ -1,0 +1,124 @@
+"""The corotated energy does not see rotations; the linear one does."""
+
+import numpy as np
+import pytest
+from cut_meshes import grid, quadratic, solution
+from solid_meshes import cube_grid
+
+from verify.compare.hooke import corotated, hooke, law_of
+from verify.compare.simplex_rule import points_in
+from verify.compare.strain_energy import strain_energy
+from verify.scene import Material
+
+PLANE = Material(young=1e4, poisson=0.3, plane="strain")
+SPACE = Material(young=1e4, poisson=0.3)
+
+
+def turn(d, angle=0.7):
+    c, s = np.cos(angle), np.sin(angle)
+    if d == 2:
+        return np.array([[c, -s], [s, c]])
+    about_z = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+    about_x = np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
+    return about_z @ about_x
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_rotation_costs_nothing_and_a_turned_stretch_what_the_stretch_does(d):
+    law = corotated(PLANE if d == 2 else SPACE)
+    rotation = turn(d)
+    assert law.energy_density((rotation - np.eye(d))[None])[0] < 1e-28 * 1e4
+    stretch = np.diag([0.2, -0.1, 0.05][:d])
+    moved = rotation @ (np.eye(d) + stretch) - np.eye(d)
+    expected = law.shear * np.sum(stretch**2) + 0.5 * law.lame * np.trace(stretch) ** 2
+    assert law.energy_density(moved[None])[0] == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize(("angle", "energy"), [(30.0, 162.233085), (90.0, 9038.461538)])
+def test_linear_kinematics_charge_for_a_rotation_what_is_known(angle, energy):
+    """2 (λ + μ)(1 − cos θ)² per area; the upper part of the catalogue's square is .47."""
+    moved = turn(2, np.deg2rad(angle)) - np.eye(2)
+    found = 0.47 * hooke(PLANE).energy_density(moved[None])[0]
+    assert found == pytest.approx(energy, rel=1e-8)
+
+
+def test_the_energy_of_a_uniaxial_stretch_is_the_catalogues():
+    law = corotated(Material(young=1.0, poisson=0.3, plane="strain"))
+    s = 1.5
+    other = (2 * (law.lame + law.shear) - law.lame * s) / (law.lame + 2 * law.shear)
+    stretched = turn(2) @ np.diag([s, other]) - np.eye(2)
+    assert law.energy_density(stretched[None])[0] == pytest.approx(0.137362637, rel=1e-8)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_both_energies_agree_for_small_strains_down_to_round_off(d):
+    random = np.random.default_rng(3)
+    material = PLANE if d == 2 else SPACE
+    for size in (1e-3, 1e-6, 1e-9):
+        gradient = size * random.normal(size=(50, d, d))
+        ratio = corotated(material).energy_density(gradient) / hooke(material).energy_density(
+            gradient
+        )
+        # they differ by the square of the rotation over the strain, of the order of `size`
+        assert np.abs(ratio - 1).max() < 100 * size + 1e-6
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_an_inverted_cell_has_a_negative_stretch(d):
+    flat = np.eye(d)
+    flat[-1, -1] = -0.5
+    moved = (turn(d) @ flat - np.eye(d))[None]
+    law = corotated(PLANE if d == 2 else SPACE)
+    stretch = 1.5  # from 1 to −0.5
+    expected = (law.shear + 0.5 * law.lame) * stretch**2
+    assert law.energy_density(moved)[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_norm_of_an_error_does_not_change_when_both_fields_are_turned(d):
+    random = np.random.default_rng(5)
+    law = corotated(PLANE if d == 2 else SPACE)
+    one, other = np.eye(d) + 0.1 * random.normal(size=(2, 20, d, d))
+    rotation = turn(d)
+    still = law.error_density(one - other, other - np.eye(d))
+    turned = law.error_density(rotation @ (one - other), rotation @ other - np.eye(d))
+    assert turned == pytest.approx(still, rel=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_norm_of_a_small_error_is_what_the_energy_says(d):
+    """From rest, the energy of a small displacement is that of its difference from none."""
+    random = np.random.default_rng(6)
+    law = corotated(PLANE if d == 2 else SPACE)
+    small = 1e-5 * random.normal(size=(20, d, d))
+    assert law.error_density(small, 0 * small) == pytest.approx(law.energy_density(small), rel=1e-3)
+
+
+def test_the_corotated_energy_of_a_quadratic_field_is_integrated():
+    points, cells = quadratic(*grid(3, 3))
+    x, y = points.T
+    law = corotated(PLANE)
+    # a bent square: rotations up to one radian
+    u = np.column_stack([-0.5 * y * x, 0.5 * x * x])
+    found = strain_energy(solution(points, cells, u, order=2), law)
+    at, weights = points_in(grid(3, 3)[0][grid(3, 3)[1]], 12)
+    o = np.zeros(len(at))
+    gradient = np.array([[-0.5 * at[:, 1], -0.5 * at[:, 0]], [at[:, 0], o]]).transpose(2, 0, 1)
+    assert found == pytest.approx(weights @ law.energy_density(gradient), rel=1e-8)
+
+
+def test_a_rigidly_turned_solution_in_space_has_no_energy():
+    points, cells = cube_grid(2, 2, 2)
+    u = points @ turn(3).T - points
+    one = solution(points, cells, u)
+    # round-off of unit displacements: (1e-16)² of the modulus
+    assert strain_energy(one, corotated(SPACE)) < 1e-27 * 1e4
+    assert strain_energy(one, hooke(SPACE)) > 1e3
+
+
+def test_the_scene_says_which_energy_is_meant():
+    from cut_meshes import scene
+
+    assert type(law_of(scene([]))).__name__ == "Hooke"
+    turned = scene([], analysis={"kinematics": "corotational"})
+    assert type(law_of(turned)).__name__ == "Corotated"

@@ -1,0 +1,112 @@
+"""A ledger fed with a known drift gives that drift; momenta of known motions are theirs."""
+
+import numpy as np
+import pytest
+from cut_meshes import grid, quadratic
+from solid_meshes import cube_grid
+
+from verify.compare.kinetic import kinetic
+from verify.compare.ledger import balance, energy_scale, total_energy
+from verify.errors import InputError
+from verify.solution import Solution
+
+TIMES = np.linspace(0.0, 2.0, 401)
+
+
+def test_a_linear_drift_is_a_slope_without_oscillation():
+    found = balance(TIMES, 5.0 - 3e-4 * TIMES)
+    # the total is 5, its round-off 1e-15
+    assert found.slope == pytest.approx(-3e-4, rel=1e-9)
+    assert found.drift == pytest.approx(6e-4, rel=1e-9)
+    assert found.oscillation < 1e-14
+    assert found.slope_error < 1e-14
+
+
+def test_a_bounded_oscillation_is_no_slope():
+    wave = 1e-3 * np.cos(40 * np.pi * TIMES)  # whole periods
+    found = balance(TIMES, 5.0 + wave)
+    assert abs(found.slope) <= 2 * found.slope_error
+    assert found.oscillation == pytest.approx(1e-3, rel=0.02)
+    both = balance(TIMES, 5.0 + wave + 2e-3 * TIMES)
+    assert both.slope == pytest.approx(2e-3, abs=2 * both.slope_error)
+
+
+def test_jumps_at_cuts_are_told_from_the_trend():
+    total = 5.0 - 1e-3 * TIMES + 0.02 * (TIMES > 0.5) - 0.07 * (TIMES > 1.3)
+    found = balance(TIMES, total, [0.5, 1.3])
+    assert found.jumps == pytest.approx([0.02, -0.07], rel=1e-9)
+    assert found.slope == pytest.approx(-1e-3, rel=1e-9)
+    assert found.oscillation < 1e-14
+    # who does not know of the cuts sees them as oscillation
+    assert balance(TIMES, total).oscillation > 0.01
+
+
+def test_cuts_outside_of_the_time_or_at_its_start_are_no_jumps_to_fit():
+    assert len(balance(TIMES, TIMES, [-1.0, 2.0, 7.0]).jumps) == 0
+    found = balance(TIMES, np.where(TIMES > 0, 1.0, 0.0), [0.0])
+    assert found.jumps == pytest.approx([1.0], rel=1e-12)
+    assert found.drift == pytest.approx(1.0)
+
+
+def test_two_output_times_are_enough_to_say_something():
+    found = balance(np.array([0.0, 1.0]), np.array([1.0, 1.5]))
+    assert found.slope == pytest.approx(0.5)
+    assert found.slope_error == 0.0
+
+
+def test_the_total_takes_off_what_was_put_in_and_never_reads_the_stated_one():
+    ledger = {
+        "kinetic": np.array([0.0, 1.0]),
+        "strain": np.array([0.0, 2.0]),
+        "work_of_loads": np.array([0.0, 4.0]),
+        "algorithmic": np.array([0.0, 1.0]),
+        "total": np.array([9.0, 9.0]),
+    }
+    assert total_energy(ledger) == pytest.approx([0.0, -1.0])
+    assert total_energy(ledger, scheme=True) == pytest.approx([0.0, 0.0])
+    assert total_energy({"total": np.zeros(2)}) is None
+    assert energy_scale(ledger) == 4.0
+
+
+def spinning(points, spin, centre, push):
+    """Velocity of a rigid motion."""
+    d = points.shape[1]
+    arm = points - centre
+    turn = np.cross(spin, arm) if d == 3 else spin * np.column_stack([-arm[:, 1], arm[:, 0]])
+    return turn + push
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_spinning_body_has_the_energy_and_momenta_of_a_rigid_one(d, order):
+    points, cells = grid(3, 2) if d == 2 else cube_grid(2, 2, 2)
+    if order == 2:
+        points, cells = quadratic(points, cells)
+    centre, push = np.full(d, 0.5), np.array([0.3, -0.2, 0.7])[:d]
+    spin = 2.0 if d == 2 else np.array([1.0, -2.0, 0.5])
+    v = spinning(points, spin, centre, push)
+    shift = np.ones(d)  # the displacement moves the arm of the momentum
+    one = Solution(
+        points=points, cells=cells, displacement=np.stack([0 * v, 0 * v + shift]),
+        times=np.array([0.0, 1.0]), velocity=np.stack([v, v]), order=order,
+    )  # fmt: skip
+    density = 3.0
+    found = kinetic(one, density)
+    # unit square or cube about its centre: 1/6 in the plane and about any axis in space
+    inertia = density / 6
+    rate = np.array([spin]) if d == 2 else spin
+    energy = 0.5 * density * push @ push + 0.5 * inertia * rate @ rate
+    assert found.energy == pytest.approx([energy] * 2, rel=1e-13)
+    assert found.linear == pytest.approx(np.tile(density * push, (2, 1)), rel=1e-13)
+    for step, place in enumerate((centre, centre + shift)):
+        orbit = np.cross(place, density * push) if d == 3 else [
+            density * (place[0] * push[1] - place[1] * push[0])
+        ]  # fmt: skip
+        assert found.angular[step] == pytest.approx(inertia * rate + orbit, rel=1e-12)
+
+
+def test_a_solution_without_velocities_is_refused():
+    points, cells = grid(1, 1)
+    one = Solution(points=points, cells=cells, displacement=np.zeros((1, 4, 2)))
+    with pytest.raises(InputError, match="no kinetic energy"):
+        kinetic(one, 1.0)
