@@ -11,6 +11,7 @@ from verify import __version__
 from verify.cli.argument_types import count, positive
 from verify.cli.cache_parser import add_cache_command
 from verify.cli.extension_parser import add_extension_commands
+from verify.cli.play_parser import add_play_commands
 from verify.cli.study_parser import add_study_command
 
 __all__ = ["build_parser"]
@@ -85,6 +86,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run(add("run", "solve, compare and judge cases, and render the report", _RUN))
     add_extension_commands(add)
     add_study_command(add)
+    add_play_commands(add)
     add_cache_command(add)
     add(
         "doctor",

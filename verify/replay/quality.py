@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from verify.replay.session import Session
 from verify.xfem.mapping.moving_surface import MovingSurface
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["Quality", "deformation_gradients", "quality_of"]
 
@@ -56,7 +56,10 @@ def quality_of(session: Session) -> Quality:
     """Measure the body of a session as it is now."""
     virtual, displacement = session.virtual, session.state.displacement
     whole = float(virtual.mesh.measures.sum())
-    gradients = deformation_gradients(virtual, displacement)
+    body = session.cutter.body  # surfaces count pieces as it does
+    gradients = deformation_gradients(
+        body.mesh, body.piece_parent.rows, body.piece_cells.rows, displacement
+    )
     stretch = float(np.linalg.svd(gradients, compute_uv=False)[:, 0].max())
     solid = virtual.mesh.dim == virtual.mesh.space
     inverted = int((np.linalg.det(gradients) < 0.0).sum()) if solid else 0
@@ -75,11 +78,12 @@ def quality_of(session: Session) -> Quality:
     )  # fmt: skip
 
 
-def deformation_gradients(virtual: VirtualMesh, displacement: _Floats) -> _Floats:
+def deformation_gradients(
+    mesh: SimplexMesh, parent: _Ints, nodes: _Ints, displacement: _Floats
+) -> _Floats:
     """(p, s, s) deformation gradient of each piece; of a membrane that within its plane."""
-    gradients = virtual.mesh.gradients[virtual.parent]
-    corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent]] + displacement[virtual.cells]
-    return np.einsum("pki,pkj->pij", corners, gradients)
+    corners = mesh.points[mesh.cells[parent]] + displacement[nodes]
+    return np.einsum("pki,pkj->pij", corners, mesh.gradients[parent])
 
 
 def _enclosed(surface: MovingSurface) -> float:

@@ -22,11 +22,22 @@ _Ints = NDArray[np.int64]
 
 
 class Picture:
-    """Triangles to be drawn: corners (q, 3), triangles (f, 3), and which lie on a cut (f,)."""
+    """Triangles to be drawn.
 
-    def __init__(self, points: _Floats, triangles: _Ints, inner: NDArray[np.bool_]) -> None:
-        flat = points.shape[1] == 2
-        self.points = np.pad(points, ((0, 0), (0, 1))) if flat else points
+    Attributes
+    ----------
+    points, material : (q, 3) float array
+        Corners as they are now, and in the uncut body, m.
+    triangles : (f, 3) int array
+    inner : (f,) bool array
+        Whether a triangle lies on a cut.
+    """
+
+    def __init__(
+        self, points: _Floats, material: _Floats, triangles: _Ints, inner: NDArray[np.bool_]
+    ) -> None:
+        beyond = ((0, 0), (0, 3 - points.shape[1]))
+        self.points, self.material = np.pad(points, beyond), np.pad(material, beyond)
         self.triangles, self.inner = triangles, inner
 
 
@@ -91,20 +102,25 @@ class Surfaces:
         if self.visual is not None:
             shown = inside.used[inside.inner.rows[inside.used]]
             parts = [(inside, shown), (self.visual.surface, self.visual.surface.used)]
-        points, triangles, inner, begin = [], [], [], 0
+        points, material, triangles, inner, begin = [], [], [], [], 0
         for number, (surface, used) in enumerate(parts):
             points.append(surface.positions(displacement))
+            material.append(surface.material.rows)
             triangles.append(surface.facets.rows[used] + begin)
             inner.append(surface.inner.rows[used] & (number == 0))
             begin += len(points[-1])
-        return Picture(*(np.concatenate(rows) for rows in (points, triangles, inner)))
+        return Picture(*(np.concatenate(rows) for rows in (points, material, triangles, inner)))
 
 
 def _pieces(virtual: VirtualMesh, displacement: _Floats) -> Picture:
     """Draw a plane body or a membrane: its whole triangles and the parts of the split ones."""
     piece, at, _ = virtual.solid_simplices
     corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
-    corners = corners + displacement[virtual.cells[piece]]
-    points = np.einsum("qki,qis->qks", at, corners).reshape(-1, corners.shape[2])
-    triangles = np.arange(len(points)).reshape(-1, 3)
-    return Picture(points, triangles, np.zeros(len(triangles), dtype=bool))
+    turned = np.linalg.det(at) < 0.0  # sub-simplices come in the order of their numbers
+    at = np.where(turned[:, None, None], at[:, ::-1], at)
+    moved = corners + displacement[virtual.cells[piece]]
+    now, before = (
+        np.einsum("qki,qis->qks", at, x).reshape(-1, corners.shape[2]) for x in (moved, corners)
+    )
+    triangles = np.arange(len(now)).reshape(-1, 3)
+    return Picture(now, before, triangles, np.zeros(len(triangles), dtype=bool))

@@ -1,0 +1,115 @@
+"""``verify play``: a cutting scene step by step, drawn off-screen or shown in a window."""
+
+import argparse
+import csv
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.scene import load_scene
+
+if TYPE_CHECKING:
+    from verify.replay import Stage
+
+__all__ = ["execute"]
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Play a case."""
+    out: Path | None = arguments.out
+    if arguments.frames < 2:
+        raise InputError(f"--frames {arguments.frames}: expected at least 2")
+    if out is not None and out.suffix not in (".gif", ".png"):
+        raise InputError(f"--out {out}: expected a name that ends in .gif or .png")
+    for path in (out, arguments.records):
+        if path is not None and not path.resolve().parent.is_dir():
+            raise InputError(f"no directory '{path.parent}' to write into")
+    has_display = bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    if arguments.window and not has_display:
+        raise InputError("--window: there is no display; use --out FILE.gif")
+    if out is None and not has_display and arguments.records is None:
+        raise InputError("there is no display to show it on; use --out FILE.gif")
+    scene = load_scene(arguments.case)
+    from verify.replay import stage_of
+
+    try:
+        stage = stage_of(scene)
+    except UnsupportedSceneError as reason:
+        raise InputError(f"cannot be played: {reason}", str(scene.file or scene.name)) from None
+    if arguments.window or (out is None and has_display):
+        from verify.replay.window import play_in_window
+
+        play_in_window(stage, scene.title, arguments.stroke)
+        return 0
+    return _play(stage, scene.name, arguments)
+
+
+def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
+    from verify.replay import PHASES, Session, quality_of
+    from verify.replay.animation import Frame, view_of, write_animation, write_picture
+    from verify.replay.timings import timings_of
+
+    session = Session(stage)
+    every = max(1, round(stage.steps / (arguments.frames - 1)))
+    frames = [Frame(0.0, session.picture(), session.blades())]
+    while not session.finished:
+        record = session.step()
+        if arguments.out is not None and (record.step % every == 0 or session.finished):
+            frames.append(Frame(record.time, session.picture(), session.blades()))
+    records, quality, timings = session.records, quality_of(session), timings_of(session.records)
+    if arguments.out is not None:
+        view = view_of(frames)
+        if arguments.out.suffix == ".png":
+            write_picture(frames[-1], view, arguments.out)
+        else:
+            # as fast as it happened, but no faster than a screen shows
+            write_animation(frames, view, arguments.out, min(50.0, len(frames) / stage.duration))
+    if arguments.records is not None:
+        with arguments.records.open("w", newline="", encoding="utf-8") as file:
+            table = csv.writer(file)
+            table.writerow(
+                ["step", "time", *PHASES, "split", "unknowns", "mean_delay", "kinetic", "strain",
+                 "potential", "work", "dissipated", "contacts"]
+            )  # fmt: skip
+            for r in records:
+                delay = r.delay.mean() if len(r.delay) else ""
+                table.writerow(
+                    [r.step, r.time, *r.seconds.values(), r.split, r.unknowns, delay, r.kinetic,
+                     r.strain, r.potential, r.work, r.dissipated, r.contacts]
+                )  # fmt: skip
+    last = records[-1]
+    summary = {
+        "case": name,
+        "steps": len(records),
+        "elements": len(stage.mesh.cells),
+        "split": last.split,
+        "unknowns": last.unknowns,
+        "median_seconds": timings.median,
+        "median_seconds_of_a_cutting_step": timings.cutting_median,
+        "steps_within": timings.within,
+        "volume_error": quality.volume_error,
+        "loose_edges": quality.loose_edges,
+        "inverted_elements": quality.inverted_elements,
+        "inverted_facets": quality.inverted_facets,
+        "stray_facets": quality.stray_facets,
+        "largest_stretch": quality.largest_stretch,
+        "out": str(arguments.out) if arguments.out else None,
+    }
+    print(json.dumps(summary, indent=2) if arguments.json else _words(summary))
+    return 0
+
+
+def _words(summary: dict[str, Any]) -> str:
+    median = summary["median_seconds"]["step"]
+    shares = ", ".join(f"{share:.0%} within {n}" for n, share in summary["steps_within"].items())
+    lines = [
+        f"{summary['case']}: {summary['steps']} steps, {summary['split']} of "
+        f"{summary['elements']} elements split, {summary['unknowns']} unknowns",
+        f"a step took {median * 1e3:.2f} ms (median, compilation and account included): {shares}",
+        f"volume off by {summary['volume_error']:.0e}, {summary['loose_edges']} loose edges, "
+        f"{summary['inverted_elements']} elements and {summary['inverted_facets']} facets inside "
+        f"out, {summary['stray_facets']} facets astray",
+    ]
+    return "\n".join([*lines, *([f"drawn: {summary['out']}"] if summary["out"] else [])])

