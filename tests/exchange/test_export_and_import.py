@@ -1,6 +1,7 @@
 """Cases go out as files, answers come back, and are judged as those of the own solvers are."""
 
 import json
+import re
 import stat
 import sys
 
@@ -72,6 +73,100 @@ def test_exporting_again_leaves_answers_alone(tmp_path):
     answer(tmp_path / "f1", 0)
     export_case(load_scene(CASE), tmp_path / "f1")
     assert (tmp_path / "f1/level-0/solution.vtu").is_file()
+
+
+SPACE = """
+title = "A cube that falls apart"
+requirement = "It shall fall."
+[geometry]
+kind = "box"
+lower = [0.0, 0.0, 0.0]
+upper = [1.0, 1.0, 1.0]
+[mesh]
+cells = [[2, 2, 2]]
+[material]
+young = 1e4
+poisson = 0.3
+density = 1000.0
+[analysis]
+kind = "dynamic"
+duration = 0.4
+time_step = 0.1
+outputs = 3
+[initial]
+kind = "equilibrium"
+[[supports]]
+where = "top"
+displacement = [0.0, 0.0, 0.1]
+history = [[0.0, 0.0], [0.4, 1.0]]
+[[loads]]
+kind = "gravity"
+acceleration = [0.0, 0.0, -9.8]
+[[cuts]]
+kind = "disc"
+centre = [0.5, 0.5, 0.45]
+normal = [0.0, 0.0, 1.0]
+radius = 3.0
+opens_at = 0.2
+[[quantities]]
+kind = "displacement"
+name = "fall"
+point = [0.5, 0.5, 0.1]
+component = "z"
+"""
+
+
+def test_a_motion_in_space_goes_out_and_its_time_series_comes_back(tmp_path):
+    """Another program's answer: here the compact solver's, through the files alone."""
+    from verify.solution import write_solution
+    from verify.solvers.xfem import XfemSolver
+
+    (tmp_path / "fall.toml").write_text(SPACE)
+    scene = load_scene(tmp_path / "fall.toml")
+    export_case(scene, tmp_path / "out")
+    case = json.loads((tmp_path / "out/case.json").read_text())
+    assert case["output_times"] == [0.0, 0.2, 0.4]
+    assert case["initial"] == {"kind": "equilibrium", "cuts": "closed"}
+    (cut,) = case["cuts"]
+    assert (cut["opens_at"], cut["kind"]) == (0.2, "disc")
+    assert np.shape(cut["triangles"])[1] == np.shape(cut["points"])[1] == 3
+    drawn = meshio.read(tmp_path / "out/cuts.vtu")
+    assert len(drawn.cells_dict["triangle"]) == len(cut["triangles"])
+    problem = json.loads((tmp_path / "out/level-0/problem.json").read_text())
+    assert problem["held"][0]["history"] == [[0.0, 0.0], [0.4, 1.0]]
+    assert meshio.read(tmp_path / "out/level-0/mesh.vtu").cells_dict["tetra"].shape == (48, 4)
+
+    solved = XfemSolver().solve(scene, 0, 0)
+    write_solution(solved, tmp_path / "out/level-0/solution")
+    answers = read_answers(scene, tmp_path / "out")
+    assert not answers.missing
+    back = answers.solutions[0]
+    np.testing.assert_array_equal(back.times, [0.0, 0.2, 0.4])
+    for name in ("displacement", "velocity", "points", "cut_facets"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(solved, name))
+    for name, column in solved.ledger.items():
+        np.testing.assert_array_equal(back.ledger[name], column)
+
+
+@pytest.mark.parametrize(
+    "times, said",
+    [
+        ([0.0, 0.4, 0.2], "expected ascending"),
+        ([0.0, 0.2], "times .* for 3 files; expected one each"),
+    ],
+)
+def test_a_time_series_out_of_order_is_a_failed_level(tmp_path, times, said):
+    from verify.solution import write_solution
+    from verify.solvers.xfem import XfemSolver
+
+    (tmp_path / "fall.toml").write_text(SPACE)
+    scene = load_scene(tmp_path / "fall.toml")
+    write_solution(XfemSolver().solve(scene, 0, 0), tmp_path / "level-0/solution")
+    file = tmp_path / "level-0/solution.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "times": times}))
+    (status, reason) = read_answers(scene, tmp_path).missing[0]
+    assert status is Status.FAILED
+    assert re.search(said, reason)
 
 
 def test_right_answers_pass_and_wrong_ones_fail_the_checks_that_the_case_makes(tmp_path, capsys):

@@ -1,12 +1,16 @@
 """A scene as arrays carries the scene's physics: forces sum up, values lie on the right side."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import UnsupportedSceneError
 from verify.exchange import problem_of
 from verify.exchange.quadrature import simplex_rule
 from verify.scene import Scene, load_scene
+
+needs_gmsh = pytest.mark.skipif(find_spec("gmsh") is None, reason="needs gmsh")
 
 
 def scene(**parts):
@@ -117,18 +121,59 @@ def test_the_rule_is_exact_to_degree_seven(dimension, volume):
         assert volume * weights @ term == pytest.approx(exact, rel=1e-13)
 
 
-def test_conforming_meshes_are_refused_where_there_are_none():
+def test_a_conforming_mesh_of_a_given_one_in_space_is_refused(tmp_path):
+    import meshio
+
+    from verify.xfem.structured_meshes import box_mesh
+
+    mesh = box_mesh([2, 2, 2])
+    meshio.Mesh(mesh.points, [("tetra", mesh.cells)]).write(tmp_path / "cube.vtu")
+    given = {"kind": "file", "file": str(tmp_path / "cube.vtu"), "dimension": 3}
+    held = [{"where": "x < 1e-9", "displacement": [0.0, 0.0, 0.0]}]
+    parts = {**BOX, "geometry": given, "mesh": {"pattern": "given"}, "supports": held}
+    assert len(problem_of(scene(**parts), 0).points) == 27
     with pytest.raises(UnsupportedSceneError, match="plane scenes with polyline cuts only"):
-        problem_of(scene(**BOX), 0, conforming=True)
+        problem_of(scene(**parts), 0, conforming=True)
+
+
+@needs_gmsh
+def test_a_conforming_mesh_in_space_is_torn_along_the_cut():
+    plane = [[-0.1, -0.1, 0.2], [2.1, -0.1, 0.2], [2.1, 1.1, 0.3], [-0.1, 1.1, 0.3]]
+    weight = [{"kind": "gravity", "acceleration": [0.0, 0.0, -2.0]}]
+    cut = [{"kind": "polygon", "points": plane, "expected": "through"}]
+    problem = problem_of(scene(**{**BOX, "cuts": cut}, loads=weight), 0, conforming=True)
+    edges = problem.cut_facets[:, 1:] - problem.cut_facets[:, :1]
+    area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum()
+    assert area == pytest.approx(2.0 * np.hypot(1.0, 0.1 / 1.2), rel=1e-9)
+    np.testing.assert_allclose(problem.nodal_forces().sum(axis=0), [0, 0, -6.0], atol=1e-12)
+    assert len(problem.free_pieces()) == 0  # both halves reach the left face, which is held
+
+
+@needs_gmsh
+def test_a_conforming_mesh_along_an_arc_is_made_anew():
     arc = {"kind": "arc", "centre": [1.0, 0.5], "radius": 0.2}
-    with pytest.raises(UnsupportedSceneError, match="polyline"):
-        problem_of(scene(cuts=[arc]), 0, conforming=True)
+    problem = problem_of(scene(cuts=[arc]), 0, conforming=True)
+    radius = np.linalg.norm(problem.cut_facets - [1.0, 0.5], axis=2)
+    np.testing.assert_allclose(radius, 0.2, rtol=1e-9)
 
 
-def test_a_traction_on_no_facet_is_refused():
-    loads = [{"kind": "traction", "where": "x < 1e-9 and y < 1e-9", "traction": [1.0, 0.0]}]
-    with pytest.raises(InputError, match="no boundary facet lies in"):
-        problem_of(scene(loads=loads), 0)
+def test_loads_and_supports_carry_their_history():
+    history = [(0.0, 0.0), (0.5, 1.0)]
+    moving = {"kind": "dynamic", "duration": 1.0}
+    turned = {
+        "where": "left", "displacement": [0.1, 0.0], "history": history,
+        "rotation": {"angle": 90.0, "centre": [0.0, 0.0]},
+    }  # fmt: skip
+    loads = [{"kind": "traction", "where": "top", "traction": [1.0, 0.0], "history": history}]
+    problem = problem_of(scene(analysis=moving, supports=[turned], loads=loads), 0)
+    assert problem.loads[0].history == history
+    held = problem.held[0]
+    at = problem.points[held.nodes]
+    np.testing.assert_allclose(
+        held.values, np.column_stack([0.1 - at[:, 1], -at[:, 1]]), atol=1e-15
+    )
+    half = held.support.values(at, 0.5)
+    np.testing.assert_allclose(half[:, 1], (np.cos(np.pi / 4) - 1) * at[:, 1], atol=1e-15)
 
 
 def test_a_piece_that_too_little_holds_is_found_where_it_is():

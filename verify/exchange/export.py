@@ -3,7 +3,7 @@
 ::
 
     DIR/case.json                 the case: material, cuts, quantities, levels (`EXPORT_SCHEMA`)
-    DIR/cuts.vtu                  the cuts as asked: polylines or polygons
+    DIR/cuts.vtu                  the cuts as asked: lines or triangles
     DIR/level-0/mesh.vtu          background mesh, ignorant of the cuts
     DIR/level-0/problem.json      held nodes and loads on that mesh
     DIR/level-0/conforming.vtu    the same mesh with the cuts imprinted and opened, if asked for
@@ -14,7 +14,6 @@ Every field of the JSON files is described in ``docs/extending.md``.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from verify.errors import InputError
 from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
 from verify.runner.fingerprint import physics_digest
 from verify.runner.storage import write_json
-from verify.scene import Scene
+from verify.scene import Scene, SpatialCut
 
 __all__ = ["EXPORT_SCHEMA", "export_case", "level_folder"]
 
@@ -117,25 +116,34 @@ def _case(scene: Scene, levels: list[dict[str, Any]]) -> dict[str, Any]:
         "dimension": scene.dimension,
         "material": {**content["material"], "lame": law.lame, "shear": law.shear},
         "analysis": content["analysis"],
-        "cuts": [
-            {
-                "name": cut.name,
-                "kind": cut.kind,
-                "opens_at": cut.opens_at,
-                "points": _vertices(cut).tolist(),
-                "asked": asked,
-            }
-            for cut, asked in zip(scene.cuts, content["cuts"], strict=True)
-        ],
+        "output_times": list(scene.analysis.output_times),
+        "initial": content["initial"],
+        "cuts": [_cut(cut, asked) for cut, asked in zip(scene.cuts, content["cuts"], strict=True)],
         "quantities": content["quantities"],
         "levels": levels,
         "scene": content,
     }
 
 
-def _vertices(cut: Any) -> NDArray[np.float64]:
-    given: Any = cut.points if cut.kind == "polygon" else cut.vertices()
-    return np.asarray(given, dtype=float)
+def _cut(cut: Any, asked: dict[str, Any]) -> dict[str, Any]:
+    points, facets = _facets(cut)
+    content = {
+        "name": cut.name,
+        "kind": cut.kind,
+        "opens_at": getattr(cut, "opens_at", 0.0),
+        "points": points.tolist(),
+        "asked": asked,
+    }
+    return content if facets.shape[1] == 2 else {**content, "triangles": facets.tolist()}
+
+
+def _facets(cut: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the cut as asked: points, and lines (k, 2) in 2D or triangles (k, 3) in 3D."""
+    if isinstance(cut, SpatialCut):
+        return cut.surface()
+    points = np.asarray(cut.vertices(), dtype=float)
+    along = np.arange(len(points) - 1)
+    return points, np.column_stack([along, along + 1])
 
 
 def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
@@ -147,7 +155,7 @@ def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
         conditions = folder / "problem.json"
     points = np.zeros((len(problem.points), 3))
     points[:, :d] = problem.points
-    cell_type = {2: "triangle", 3: "tetra"}[d]
+    cell_type = {2: "triangle", 3: "tetra"}[problem.scene.cell_dimension]
     meshio.Mesh(points, [(cell_type, problem.cells)]).write(mesh, file_format="vtu")
     content = {
         "schema": EXPORT_SCHEMA,
@@ -157,7 +165,7 @@ def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
         "boundary": problem.boundary,
         "cut_facets": problem.cut_facets,
         "held": [_held(entry) for entry in problem.held],
-        "loads": [_load(load, d) for load in problem.loads],
+        "loads": [_load(load, problem.cells.shape[1]) for load in problem.loads],
     }
     if problem.conforming:  # on a background mesh they would ignore the cuts
         content["nodal_forces"] = problem.nodal_forces()
@@ -167,7 +175,13 @@ def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
 
 
 def _held(entry: HeldNodes) -> dict[str, Any]:
+    asked = entry.support
+    in_time: dict[str, Any] = {}
+    if asked is not None and asked.history is not None:
+        turn = None if asked.rotation is None else asked.rotation.model_dump()
+        in_time = {"history": asked.history, "shift": asked.displacement, "rotation": turn}
     return {
+        **in_time,
         "nodes": entry.nodes,
         "components": entry.components,
         "values": entry.values,
@@ -178,9 +192,11 @@ def _held(entry: HeldNodes) -> dict[str, Any]:
     }
 
 
-def _load(load: Load, dimension: int) -> dict[str, Any]:
-    on_cells = load.simplices.shape[1] == dimension + 1
+def _load(load: Load, corners: int) -> dict[str, Any]:
+    on_cells = load.simplices.shape[1] == corners
     content: dict[str, Any] = {"kind": "body_force" if on_cells else "traction"}
+    if load.history is not None:
+        content["history"] = load.history
     if not on_cells:
         content["facets"] = load.simplices
     if load.uniform is not None:
@@ -189,20 +205,14 @@ def _load(load: Load, dimension: int) -> dict[str, Any]:
 
 
 def _write_cuts(scene: Scene, path: Path) -> None:
-    """Write each cut as lines or as a polygon, with its index as cell data ``cut``."""
+    """Write each cut as lines or triangles, with its index as cell data ``cut``."""
     import meshio
 
     points, blocks, index, first = [], [], [], 0
     for i, cut in enumerate(scene.cuts):
-        vertices = _vertices(cut)
-        nodes = first + np.arange(len(vertices))
-        if cut.kind == "polygon":
-            # a fan of triangles, which every reader knows; fit for pictures of a convex cut
-            block = [(nodes[0], a, b) for a, b in pairwise(nodes[1:])]
-            blocks.append(("triangle", np.array(block)))
-        else:
-            blocks.append(("line", np.column_stack([nodes[:-1], nodes[1:]])))
-        index.append(np.full(len(blocks[-1][1]), i, dtype=np.int32))
+        vertices, facets = _facets(cut)
+        blocks.append(({2: "line", 3: "triangle"}[facets.shape[1]], first + facets))
+        index.append(np.full(len(facets), i, dtype=np.int32))
         points.append(np.pad(vertices, ((0, 0), (0, 3 - vertices.shape[1]))))
         first += len(vertices)
     meshio.Mesh(np.vstack(points), blocks, cell_data={"cut": index}).write(path, file_format="vtu")

@@ -15,7 +15,17 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange.quadrature import simplex_rule
-from verify.scene import BodyForce, Gravity, PolylineCut, Scene, Support, Traction
+from verify.scene import (
+    BodyForce,
+    Box,
+    Gravity,
+    Polygon,
+    PolylineCut,
+    Rectangle,
+    Scene,
+    Support,
+    Traction,
+)
 from verify.scene.parts import on_part
 from verify.solvers.xfem_scene import background_mesh
 
@@ -39,12 +49,15 @@ class HeldNodes:
     across : list of (node, side point (d,), values)
         Background mesh only: for a node of a boundary facet that a cut crosses, the value of the
         prescribed field on the other side of the cut, continued to the node.
+    support : Support, optional
+        What the scene says: its ``values(points, factor)`` are those of a factor in time.
     """
 
     nodes: NDArray[np.int64]
     components: tuple[int, ...]
     values: Array
     across: list[tuple[int, Array, Array]] = field(default_factory=list)
+    support: Support | None = None
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,8 @@ class Load:
         Its values at quadrature points; the weights contain the measure.
     barycentric : (q, k) array
         The quadrature points in each simplex.
+    history : list of (time, factor), optional
+        By what the load is multiplied in time; see `verify.scene.history`.
     """
 
     simplices: NDArray[np.int64]
@@ -69,6 +84,7 @@ class Load:
     weights: Array
     values: Array
     barycentric: Array
+    history: list[tuple[float, float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -132,7 +148,7 @@ class Problem:
         link = coo_array((np.ones(m * corners), (cell, self.cells.ravel())))
         _, node_piece = connected_components(link.T @ link, directed=False)
         held = np.bincount(node_piece, self.prescribed()[0].sum(axis=1))
-        loose = np.flatnonzero(held < (3 if corners == 3 else 6))
+        loose = np.flatnonzero(held < (3 if self.points.shape[1] == 2 else 6))
         cell_piece, middle = node_piece[self.cells[:, 0]], self.points[self.cells].mean(axis=1)
         return np.array([middle[cell_piece == k].mean(axis=0) for k in loose]).reshape(
             -1, self.points.shape[1]
@@ -155,7 +171,7 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
     level : int
         0 is the coarsest.
     conforming : bool
-        Whether the mesh shall conform to the cuts; plane scenes with polyline cuts only.
+        Whether the mesh shall conform to the cuts; not offered for meshes given in space.
 
     Raises
     ------
@@ -166,9 +182,9 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
     """
     background, size = background_mesh(scene, level)
     points, cells, facet_cell = background.points, background.cells, background.boundary_facets
-    cut_facets = np.zeros((0, scene.dimension, scene.dimension))
+    cut_facets = np.zeros((0, scene.cell_dimension, scene.dimension))
     if conforming:
-        points, cells, facet_cell, cut_facets = _opened(scene, points, cells)
+        points, cells, facet_cell, cut_facets = _opened(scene, level, points, cells)
     exact = _exact(scene)
     corners = np.ones((len(facet_cell), cells.shape[1]), dtype=bool)
     corners[np.arange(len(facet_cell)), facet_cell[:, 1]] = False
@@ -209,19 +225,23 @@ class _Mesh:
 
 
 def _opened(
-    scene: Scene, points: Array, cells: NDArray[np.int64]
+    scene: Scene, level: int, points: Array, cells: NDArray[np.int64]
 ) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]:
+    """Imprint polylines on the mesh as it is; else mesh the cut body anew, about as fine."""
     from reference.meshing import imprint, open_cut
 
     polylines = [cut.vertices() for cut in scene.cuts if isinstance(cut, PolylineCut)]
-    if scene.dimension != 2 or len(polylines) != len(scene.cuts):
+    if scene.dimension == 2 and len(polylines) == len(scene.cuts):
+        mesh = open_cut(*imprint(points, cells, polylines))
+    elif isinstance(scene.geometry, Rectangle | Polygon | Box):
+        from verify.solvers.conforming_meshes import peer_mesh
+
+        mesh = peer_mesh(scene, level, "imprinted")
+    else:
         raise UnsupportedSceneError(
-            "a conforming mesh is offered for plane scenes with polyline cuts only"
+            "a conforming mesh of a mesh file is offered for plane scenes with polyline cuts only"
         )
-    mesh = open_cut(*imprint(points, cells, polylines))
-    first = np.zeros(int(mesh.parent.max()) + 1, dtype=np.int64)
-    first[mesh.parent[::-1]] = np.arange(len(mesh.parent))[::-1]
-    return mesh.points, mesh.cells, mesh.boundary, mesh.points[first[mesh.cut_facets]]
+    return mesh.points, mesh.cells, mesh.boundary, mesh.realised_cut
 
 
 def _exact(scene: Scene) -> Any:
@@ -237,16 +257,17 @@ def _held(scene: Scene, mesh: _Mesh, i: int, support: Support, exact: Any) -> He
     components = support.held(scene.dimension)
     if support.displacement != "exact":
         values = support.values(mesh.points[nodes])
-        return HeldNodes(nodes, components, values)
+        return HeldNodes(nodes, components, values, support=support)
     at = mesh.points[nodes]
     columns = list(components)
     if mesh.conforming:  # a node on the cut belongs to the side of its own cells
         owner = np.zeros(len(mesh.points), dtype=np.int64)
         owner[mesh.cells.ravel()] = np.repeat(np.arange(len(mesh.cells)), mesh.cells.shape[1])
         values = exact.displacement(at, mesh.centroids(owner[nodes]))[:, columns]
-        return HeldNodes(nodes, components, values)
+        return HeldNodes(nodes, components, values, support=support)
     values = exact.displacement(at)[:, columns]
-    return HeldNodes(nodes, components, values, _across(mesh, nodes, columns, values, exact))
+    across = _across(mesh, nodes, columns, values, exact)
+    return HeldNodes(nodes, components, values, across, support)
 
 
 def _across(
@@ -282,11 +303,13 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
     barycentric, weights = simplex_rule(simplices.shape[1] - 1, _POINTS_PER_DIRECTION)
     corners = mesh.points[simplices]
     points = np.einsum("qi,kic->kqc", barycentric, corners)
-    measured = _measures(corners)[:, None] * weights
+    # a membrane's forces per volume and area count times its thickness
+    measured = _measures(corners)[:, None] * weights * (scene.material.thickness or 1.0)
+    history = getattr(load, "history", None)
     if not isinstance(given, str):
         uniform = np.asarray(given, dtype=float)
         values = np.broadcast_to(uniform, points.shape)
-        return Load(simplices, uniform, points, measured, values, barycentric)
+        return Load(simplices, uniform, points, measured, values, barycentric, history)
     # a point of a conforming mesh belongs to the side of its own cell; else to its own
     near = np.repeat(mesh.centroids(cells), len(weights), axis=0) if mesh.conforming else None
     flat = points.reshape(-1, points.shape[2])
@@ -296,7 +319,7 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
         values = np.einsum("kqij,kj->kqi", stress, normals)
     else:
         values = exact.body_force(flat, near).reshape(points.shape)
-    return Load(simplices, None, points, measured, values, barycentric)
+    return Load(simplices, None, points, measured, values, barycentric, history)
 
 
 def _weight(scene: Scene, load: Gravity) -> Array:
