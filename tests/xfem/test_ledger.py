@@ -145,7 +145,7 @@ def test_central_differences_hold_the_energy_of_small_strains_over_ten_thousand_
 
 
 def test_central_differences_stay_bounded_at_large_strain_and_spin():
-    """15 % strain at .7 of the linear critical step; at .9 slivers invert without a policy."""
+    """15 % strain at .7 of the linear critical step, below which the time grid cannot resonate."""
     body = _free(cut_square(4))
     state = _moving(body, 0.15, 1.0)
     account = run(CentralDifferences(body, 0.7 * _critical(body)), body, state, 10_000)

@@ -109,7 +109,8 @@ def test_without_a_policy_slivers_of_the_cube_invert_at_nine_tenths():
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_cube_with_slivers_swings_at_seven_tenths_of_the_critical_step(seed):
     """Cuts askew through 3×3×3 cubes. Nine tenths is too much for some of them at this amplitude,
-    as it is for the uncut cube when it is let go from a uniform stretch: not a matter of slivers.
+    as it is for the uncut cube when it is let go from a uniform stretch: not a matter of slivers,
+    see `test_nonlinear_steps`.
     """
     treated, report = treat_slivers(cube(seed))
     assert report.merged > 0
