@@ -123,16 +123,17 @@ def _exact_rules(body: AnyBody) -> Sequence[Rule]:
     """Two rules for fields that are smooth away from tips and fronts, the finer first.
 
     Spectral away from the tips; at a tip, halving cells down to 1e-8 of the others. In space
-    a front takes many more cells than a tip: down to 1e-2 of the others only.
+    a front takes many more cells than a tip: down to 1/32 of the others only, good to 1e-4 of
+    the energy, and of a lower order, which does not matter there.
     """
     if isinstance(body, Body):
         return [
             area_rule(body, body.size / n, angle, 7, 1e-8)
             for n, angle in zip((14, 10), slab_angles(body)[:2], strict=True)
         ]
+    order = 3 if len(body.front) else 5
     return [
-        volume_rule(body, body.size / n, seed, order, 1e-2)
-        for seed, (n, order) in enumerate(((14, 5), (10, 4)))
+        volume_rule(body, body.size / n, seed, order, 1 / 32) for seed, n in enumerate((14, 10))
     ]
 
 
