@@ -1,5 +1,6 @@
-"""Displacement gradients of a plane finite element field at quadrature points."""
+"""Displacement gradients of a finite element field at quadrature points."""
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,10 @@ from verify.solution import Solution
 __all__ = ["CellGradients", "cell_gradients"]
 
 Array = NDArray[np.float64]
-_ORDER = 6  # Gauss points per direction of the collapsed square: exact to degree 10
+# Gauss points per direction of the collapsed square or cube: exact to degree 10 in the plane and
+# 4 in space, where a tube has a hundred times the cells of a ring
+_ORDER = {2: 6, 3: 3}
+_EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # of VTK; the first three in the plane
 
 
 class CellGradients(NamedTuple):
@@ -18,24 +22,27 @@ class CellGradients(NamedTuple):
 
     Attributes
     ----------
-    points : (m, q, 2) array
+    points : (m, q, d) array
         m.
     weights : (m, q) array
-        m².
-    gradient : (m, q, 2, 2) array
+        Areas or volumes, m^d.
+    gradient : (m, q, d, d) array
         ∂u_i/∂x_j.
-    hats : (m, q, 3, 2) array
-        Gradients of the linear hat functions of the three corners, 1/m.
+    hats : (m, q, d + 1, d) array
+        Gradients of the linear hat functions of the corners, 1/m.
+    corner_shares : (q, d + 1) array
+        Values of the hat functions.
     """
 
     points: Array
     weights: Array
     gradient: Array
     hats: Array
+    corner_shares: Array
 
 
 def cell_gradients(solution: Solution, cells: NDArray[np.int64], step: int = -1) -> CellGradients:
-    """Evaluate the gradient in some cells of a plane solution, isoparametric if it is quadratic.
+    """Evaluate the gradient in some cells of a solution, isoparametric if it is quadratic.
 
     Parameters
     ----------
@@ -45,43 +52,55 @@ def cell_gradients(solution: Solution, cells: NDArray[np.int64], step: int = -1)
     step : int
         Which output time; default the last.
     """
+    d = solution.dimension
     nodes = solution.cells[cells]
     x, u = solution.points[nodes], solution.displacement[step][nodes]
-    xi, weight = _triangle_rule(_ORDER)
-    shape, slope = _linear(xi) if solution.order == 1 else _quadratic(xi)
+    xi, weight = _rule(d, _ORDER[d])
+    corner, corner_slope = _linear(xi)
+    shape, slope = (corner, corner_slope) if solution.order == 1 else _quadratic(xi)
     jacobian = np.einsum("qka,mki->mqia", slope, x)  # ∂x_i/∂ξ_a
     inverse = np.linalg.inv(jacobian)
-    gradient = np.einsum("qka,mki,mqaj->mqij", slope, u, inverse)
-    hats = np.einsum("qka,mqaj->mqkj", _linear(xi)[1], inverse)
+    gradient = np.einsum("mqib,mqbj->mqij", np.einsum("qka,mki->mqia", slope, u), inverse)
+    hats = np.einsum("qka,mqaj->mqkj", corner_slope, inverse)
     return CellGradients(
         np.einsum("qk,mki->mqi", shape, x),
         np.abs(np.linalg.det(jacobian)) * weight,
         gradient,
         hats,
+        corner,
     )
 
 
-def _triangle_rule(order: int) -> tuple[Array, Array]:
-    """Gauss points of the square collapsed onto the triangle (0,0), (1,0), (0,1)."""
+def _rule(dimension: int, order: int) -> tuple[Array, Array]:
+    """Gauss points of the square or cube collapsed onto the unit simplex."""
     nodes, weights = np.polynomial.legendre.leggauss(order)
     s, w = 0.5 * (nodes + 1), 0.5 * weights
-    a, b = np.repeat(s, order), np.tile(s, order)
-    return np.column_stack([a, (1 - a) * b]), np.repeat(w * (1 - s), order) * np.tile(w, order)
+    grids = np.meshgrid(*[s] * dimension, indexing="ij")
+    total = np.ones_like(grids[0])
+    for k, factor in enumerate(np.meshgrid(*[w] * dimension, indexing="ij")):
+        total = total * factor * (1 - grids[k]) ** (dimension - 1 - k)
+    left, columns = np.ones_like(grids[0]), []
+    for grid in grids:
+        columns.append((left * grid).ravel())
+        left = left * (1 - grid)
+    return np.column_stack(columns), total.ravel()
 
 
 def _linear(xi: Array) -> tuple[Array, Array]:
-    slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    n, d = xi.shape
+    slope = np.vstack([-np.ones(d), np.eye(d)])
     shape = np.column_stack([1 - xi.sum(axis=1), xi])
-    return shape, np.broadcast_to(slope, (len(xi), 3, 2))
+    return shape, np.broadcast_to(slope, (n, d + 1, d))
 
 
 def _quadratic(xi: Array) -> tuple[Array, Array]:
-    """VTK's order: corners, then the mid-nodes of edges 01, 12, 20."""
+    """VTK's order: corners, then the mid-nodes of the edges."""
     corner, slope = _linear(xi)
-    ends = [(0, 1), (1, 2), (2, 0)]
-    shape = [corner[:, k] * (2 * corner[:, k] - 1) for k in range(3)]
+    d = xi.shape[1]
+    ends = _EDGES[: len(list(combinations(range(d + 1), 2)))]
+    shape = [corner[:, k] * (2 * corner[:, k] - 1) for k in range(d + 1)]
     shape += [4 * corner[:, i] * corner[:, j] for i, j in ends]
-    slopes = [(4 * corner[:, k] - 1)[:, None] * slope[:, k] for k in range(3)]
+    slopes = [(4 * corner[:, k] - 1)[:, None] * slope[:, k] for k in range(d + 1)]
     slopes += [
         4 * (corner[:, i, None] * slope[:, j] + corner[:, j, None] * slope[:, i]) for i, j in ends
     ]

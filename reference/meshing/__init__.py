@@ -4,7 +4,9 @@ from reference.meshing.background import background_mesh
 from reference.meshing.conforming import conforming_mesh
 from reference.meshing.grading import Grading, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
+from reference.meshing.imprint_solid import imprint_polygons, structured_tetrahedra
 from reference.meshing.opening import ConformingMesh, open_cut
+from reference.meshing.refinement import refine_uniformly
 
 __all__ = [
     "ConformingMesh",
@@ -12,7 +14,10 @@ __all__ = [
     "background_mesh",
     "conforming_mesh",
     "imprint",
+    "imprint_polygons",
     "open_cut",
+    "refine_uniformly",
     "singular_points",
+    "structured_tetrahedra",
     "structured_triangles",
 ]

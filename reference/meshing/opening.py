@@ -215,7 +215,7 @@ def _check_volumes(points: NDArray[np.float64], cells: NDArray[np.int64]) -> Non
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
     volume = np.linalg.det(edges) / (2 if d == 2 else 6)
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    if not (volume > (1e-10 if d == 2 else 1e-14) * longest**d).all():
+    if not (volume > (1e-10 if d == 2 else 1e-15) * longest**d).all():
         unit = "area {:.3g} m²" if d == 2 else "volume {:.3g} m³"
         raise InputError(f"the mesh generator made a cell of {unit.format(volume.min())}")
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.box_lines import clamped_edges, part_lines
-from reference.meshing.edge_splitting import mesh_edges, split_edges
+from reference.meshing.front_edges import loosen_front
 from reference.meshing.grading import Grading
-from reference.meshing.opening import ConformingMesh, doubled_nodes, open_cut
+from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.session import gmsh_session, simplices
 from reference.meshing.solid_cuts import CutFaces, add_surface, imprint_surfaces
 from verify.errors import InputError
@@ -61,7 +61,7 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         raise
     except Exception as error:  # gmsh raises bare Exception
         raise InputError(f"gmsh could not mesh the body with its cuts ({error})", where) from None
-    points, cells, facets = _loosen_front(points, cells, facets)
+    points, cells, facets = loosen_front(points, cells, facets)
     mesh = open_cut(points * scale + lower, cells, facets)
     _check_volume(mesh, float(np.prod(upper - lower)), where)
     return mesh
@@ -116,30 +116,6 @@ def _face_facets(gmsh: ModuleType, cut: CutFaces, number: NDArray[np.int64]) -> 
         if nodes:
             found.append(number[np.asarray(nodes[0], dtype=np.int64)].reshape(-1, 3))
     return np.concatenate(found)
-
-
-def _loosen_front(
-    points: Array, cells: NDArray[np.int64], facets: NDArray[np.int64]
-) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-    """Split each edge inside the cut whose two ends both lie on a front.
-
-    Its ends stay single, so the cut could not open along it, nor could a facet in a corner of a
-    front open at all.
-    """
-    if not len(facets):
-        return points, cells, facets
-    opened = np.zeros(len(points), dtype=bool)
-    opened[doubled_nodes(cells, facets)] = True
-    edges = mesh_edges(facets)
-    of_facets = np.sort(
-        np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1
-    )
-    keys = edges[:, 0] * len(points) + edges[:, 1]
-    times = np.bincount(
-        np.searchsorted(keys, of_facets[:, 0] * len(points) + of_facets[:, 1]), minlength=len(edges)
-    )
-    tied = edges[~opened[edges].any(axis=1) & (times > 1)]
-    return split_edges(points, cells, facets, tied, points[tied].mean(axis=1))
 
 
 def _check_volume(mesh: ConformingMesh, expected: float, where: str) -> None:

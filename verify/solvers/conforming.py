@@ -15,9 +15,9 @@ from reference.large_strain import solve_large_strain
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Box, Polygon, Rectangle, Scene
+from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene
 from verify.solution import Solution
-from verify.solvers.conforming_meshes import graded_mesh, peer_mesh, structure
+from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 
 __all__ = ["ConformingSolver", "ReferenceSolver"]
 
@@ -25,8 +25,14 @@ import_dolfinx()  # fail here, by name, and not in the middle of a solve
 
 
 def _refusal(scene: Scene) -> str | None:
-    if not isinstance(scene.geometry, Rectangle | Polygon | Box):
-        return f"conforming meshes of a '{scene.geometry.kind}' geometry are not offered yet"
+    geometry = scene.geometry
+    if isinstance(geometry, MeshFile):
+        if geometry.cells == "surface":
+            return "membranes are not offered by the reference yet"
+        if reason := not_imprinted(scene):
+            return reason
+    elif not isinstance(geometry, Rectangle | Polygon | Box):
+        return f"conforming meshes of a '{geometry.kind}' geometry are not offered yet"
     if scene.analysis.kind == "dynamic":
         return "dynamics is not offered by the reference yet"
     if scene.dimension == 3 and scene.analysis.kinematics != "linear":
@@ -115,7 +121,7 @@ class ReferenceSolver:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
         return _solve(
             scene,
-            lambda level: graded_mesh(scene, level),
+            lambda level: reference_mesh(scene, level),
             level,
             scene.reference.degree,
             min(repetitions, 1),

@@ -1,8 +1,10 @@
 """Meshes on which the FEniCSx side solves a scene: at equal h, and the reference's own levels."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reference.meshing import (
     ConformingMesh,
@@ -10,13 +12,31 @@ from reference.meshing import (
     background_mesh,
     conforming_mesh,
     imprint,
+    imprint_polygons,
     open_cut,
+    refine_uniformly,
     singular_points,
+    structured_tetrahedra,
     structured_triangles,
 )
-from verify.scene import Box, Polygon, PolylineCut, Rectangle, Scene
+from reference.meshing.edge_splitting import mesh_edges
+from verify.scene import (
+    Box,
+    MeshFile,
+    Polygon,
+    PolygonCut,
+    PolylineCut,
+    Rectangle,
+    Scene,
+    SweptCut,
+    read_mesh,
+)
+from verify.scene.cuts import Cut
 
-__all__ = ["Structure", "graded_mesh", "peer_mesh", "structure"]
+__all__ = ["Structure", "not_imprinted", "peer_mesh", "reference_mesh", "structure"]
+
+Array = NDArray[np.float64]
+Cells = NDArray[np.int64]
 
 
 class Structure(NamedTuple):
@@ -37,6 +57,10 @@ class Structure(NamedTuple):
 def structure(scene: Scene, level: int) -> Structure:
     """Give the cell counts and the element size of a level of the scene."""
     geometry = scene.geometry
+    if isinstance(geometry, MeshFile):
+        points, cells = read_mesh(scene)
+        edges = mesh_edges(cells)
+        return Structure(None, float(np.linalg.norm(np.diff(points[edges], axis=1), axis=2).mean()))
     if scene.mesh.pattern == "unstructured" or not isinstance(geometry, Rectangle | Box):
         assert scene.mesh.sizes is not None
         return Structure(None, scene.mesh.sizes[level])
@@ -49,24 +73,39 @@ def structure(scene: Scene, level: int) -> Structure:
     return Structure(tuple(counts.tolist()), float((sides / counts).max()))
 
 
+def not_imprinted(scene: Scene) -> str | None:
+    """Why the cuts cannot be imprinted on a given mesh, or None if they can."""
+    for cut in scene.cuts:
+        if not isinstance(cut, PolylineCut | PolygonCut | SweptCut):
+            return f"a {cut.kind} cut is not plane in parts: it is not imprinted on a given mesh"
+    return None
+
+
 def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
     """Make the mesh of a level, imprinted or remeshed, that is the peer of an unfitted one."""
+    if isinstance(scene.geometry, MeshFile) or (mesh == "imprinted" and not not_imprinted(scene)):
+        return open_cut(*_imprinted(scene, structure(scene, level)))
     counts, size = structure(scene, level)
-    plane = isinstance(scene.geometry, Rectangle | Polygon)
-    straight = all(isinstance(cut, PolylineCut) for cut in scene.cuts)
-    if plane and straight and mesh == "imprinted":
-        return _imprinted(scene, counts, size)
     if counts is not None:
         # equal mean size: two equilateral triangles of this edge are a square of 1, and with it
         # HXT was measured to make six tetrahedra per cube of 1
-        edge = np.sqrt(2 / np.sqrt(3)) if plane else 0.88
+        edge = np.sqrt(2 / np.sqrt(3)) if scene.dimension == 2 else 0.88
         sides = np.subtract(scene.geometry.upper, scene.geometry.lower)  # type: ignore[union-attr]
         size = float(np.prod(sides / counts) ** (1 / len(sides)) * edge)
     return conforming_mesh(scene, Grading(size, np.zeros((0, scene.dimension))))
 
 
-def graded_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
-    """Make a level of the reference and give its size far from what is singular, m."""
+def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
+    """Make a level of the reference and give its size far from what is singular, m.
+
+    A given mesh is refined uniformly after the cuts are imprinted; others are made anew, graded.
+    """
+    if isinstance(scene.geometry, MeshFile):
+        size = structure(scene, 0)
+        mesh = _imprinted(scene, size)
+        for _ in range(level):
+            mesh = refine_uniformly(*mesh)
+        return open_cut(*mesh), size.size / 2**level
     grading = _plane_grading(scene) if scene.dimension == 2 else _solid_grading(scene)
     grading = grading.halved(level)
     return conforming_mesh(scene, grading), grading.size
@@ -87,14 +126,29 @@ def _solid_grading(scene: Scene) -> Grading:
     return Grading(size, np.zeros((0, 3)), extent / 2, exponent=2 / 3, curves=True)
 
 
-def _imprinted(scene: Scene, counts: tuple[int, ...] | None, size: float) -> ConformingMesh:
-    """Imprint the polylines of the scene on its background mesh, and open them."""
+def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
+    """Imprint the cuts of the scene on its background mesh."""
     geometry = scene.geometry
-    assert isinstance(geometry, Rectangle | Polygon)
-    if counts is None:
-        points, cells = background_mesh(geometry.outline(), size)
+    if isinstance(geometry, MeshFile):
+        points, cells = read_mesh(scene)
+    elif level.counts is None:
+        assert isinstance(geometry, Rectangle | Polygon)
+        points, cells = background_mesh(geometry.outline(), level.size)
+    elif isinstance(geometry, Box):
+        points, cells = structured_tetrahedra(geometry.lower, geometry.upper, level.counts)
     else:
         assert isinstance(geometry, Rectangle)
-        points, cells = structured_triangles(geometry.lower, geometry.upper, (counts[0], counts[1]))
-    polylines = [cut.vertices() for cut in scene.cuts if isinstance(cut, PolylineCut)]
-    return open_cut(*imprint(points, cells, polylines))
+        n, m = level.counts
+        points, cells = structured_triangles(geometry.lower, geometry.upper, (n, m))
+    if scene.dimension == 2:
+        return imprint(points, cells, [c.vertices() for c in scene.cuts if c.kind == "polyline"])
+    return imprint_polygons(points, cells, [p for cut in scene.cuts for p in _polygons(cut)])
+
+
+def _polygons(cut: Cut) -> list[Array]:
+    """Plane parts of a cut in space."""
+    if isinstance(cut, PolygonCut):
+        return [np.array(cut.points, dtype=float)]
+    assert isinstance(cut, SweptCut)
+    along = np.array(cut.along, dtype=float)
+    return [np.stack([a, b, b + along, a + along]) for a, b in pairwise(np.array(cut.points))]
