@@ -16,13 +16,14 @@ from verify.xfem.corotational_kernels import corotational_kernels
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.linearisation import Linearisation
+from verify.xfem.membrane_tension import add_tension
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["InternalForce", "Kinematics", "TangentKind"]
 
 _Floats = NDArray[np.float64]
 Kinematics = Literal["corotational", "linear"]
-TangentKind = Literal["frozen", "exact"]
+TangentKind = Literal["frozen", "tensioned", "exact"]
 
 
 class InternalForce:
@@ -90,6 +91,11 @@ class InternalForce:
     def turning(self) -> bool:
         """Whether pieces have rotations of their own."""
         return self.kinematics == "corotational"
+
+    @property
+    def is_membrane(self) -> bool:
+        """Whether the body is of triangles in space."""
+        return self.virtual.mesh.dim < self.virtual.mesh.space
 
     @property
     def geometry(self) -> tuple[_Floats, NDArray[np.int64], _Floats, _Floats, _Floats, _Floats]:
@@ -200,27 +206,68 @@ class InternalForce:
         pattern : BlockPattern
             Its first cells must be those of the body.
         blocks : (B, d, d) float array
-        kind : {"frozen", "exact"}
-            Rotations held, or the second derivative of the potential.
+        kind : {"frozen", "tensioned", "exact"}
+            Rotations held; the same and what tension gives membranes across their plane, which
+            has no negative mode either; or the second derivative of the potential.
         displacement : (N, d) float array, optional
-            That of the last `evaluate`; needed for the exact stiffness.
+            That of the last `evaluate`; needed for all but the frozen stiffness.
 
         Raises
         ------
         XfemError
-            If the kind is unknown or the exact stiffness is asked for without a displacement.
+            If the kind is unknown or needs a displacement that is not given.
         """
-        if kind not in ("frozen", "exact"):
-            raise XfemError(f"stiffness '{kind}'; expected frozen or exact")
+        if kind not in ("frozen", "tensioned", "exact"):
+            raise XfemError(f"stiffness '{kind}'; expected frozen, tensioned or exact")
         targets = pattern.targets[: len(self.virtual.cells)]
         self._kernels.add_frozen_stiffness(targets, *self.geometry, self.rotations, scale, blocks)
         if kind == "frozen" or not self.turning:
             return
         if displacement is None:
-            raise XfemError("exact stiffness without the displacement at which it is wanted")
+            raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
+        if kind == "tensioned":
+            if self.is_membrane:
+                nothing = np.zeros(self._shape)
+                self.add_tension(pattern, displacement, nothing, 0.0, scale, nothing, blocks)
+            return
         self.left_out = self._kernels.add_spin_stiffness(
             self.virtual.cells, targets, *self.geometry, self.rotations, displacement, scale, blocks
         )
+
+    def add_tension(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats,
+        vector: _Floats,
+        share: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+    ) -> None:
+        """Add the stiffness of a membrane across its plane, at the last evaluation.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+        displacement : (N, 3) float array
+            That of the last evaluation.
+        vector : (N, 3) float array
+        share : float
+            Times the stiffness times the vector is added to `force` (N, 3).
+        scale : float
+            Times the stiffness is added to `blocks` (B, 3, 3).
+
+        Raises
+        ------
+        XfemError
+            If the body is no membrane.
+        """
+        if not self.is_membrane:
+            raise XfemError("stiffness from tension of a solid; expected a membrane in space")
+        add_tension(
+            self.virtual.cells, pattern.targets[: len(self.virtual.cells)], *self.geometry,
+            self.rotations, displacement, vector, share, scale, force, blocks,
+        )  # fmt: skip
 
     def stiffness(
         self, pattern: BlockPattern, displacement: _Floats, kind: TangentKind = "exact"

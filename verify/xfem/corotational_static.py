@@ -165,7 +165,7 @@ class _Newton:
     ) -> _Floats:
         pattern, blocks = self._pattern, self._blocks
         blocks[:] = 0.0
-        kind = "exact" if exact else "frozen"
+        kind = "exact" if exact else "tensioned"
         self._force.evaluate(displacement)
         self._force.add_stiffness(pattern, blocks, 1.0, kind, displacement)  # type: ignore[arg-type]
         load = residual.copy()

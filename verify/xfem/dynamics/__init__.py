@@ -5,7 +5,7 @@ from verify.xfem.dynamics.explicit import CentralDifferences, ForwardEuler, Symp
 from verify.xfem.dynamics.implicit import EnergyMomentum, ImplicitEuler, Trapezoidal
 from verify.xfem.dynamics.inheritance import ancestors, inherit_state
 from verify.xfem.dynamics.integrator import Integrator, StepFailedError, StepForces
-from verify.xfem.dynamics.linear_solver import LinearSolver, SparseLU
+from verify.xfem.dynamics.linear_solver import LinearSolver, NearlySymmetric, SparseLU
 from verify.xfem.dynamics.real_time import RealTimeEuler
 from verify.xfem.dynamics.sliver_treatment import TreatedBody, treat_moving_body
 from verify.xfem.dynamics.step_control import MeasuredPace, StepPerUnknown
@@ -21,6 +21,7 @@ __all__ = [
     "MeasuredPace",
     "MotionState",
     "MovingSupports",
+    "NearlySymmetric",
     "RayleighDamping",
     "RealTimeEuler",
     "SparseLU",

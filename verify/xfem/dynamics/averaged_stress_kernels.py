@@ -18,15 +18,22 @@ from numba import njit
 
 from verify.xfem.polar_kernels import nearest_rotation
 
-__all__ = ["add_averaged_stiffness", "averaged_force"]
+__all__ = [
+    "averaged_force",
+    "deformation",
+    "inner",
+    "invert",
+    "is_moving",
+    "product",
+    "stress",
+]
 
 _REGULAR = 1e-6  # smallest pivot of U₀ + U₁ over its trace
 _STILL = 1e-26  # square of a relative change of C that is round-off
-_DIFFERENCE = 3e-8  # of F; the error of a one-sided difference costs Newton nothing
 
 
 @njit(cache=True)
-def _product(A, B, transposed, out):
+def product(A, B, transposed, out):
     """Write A B, or Aᵀ B, to `out`."""
     size = len(out)
     for k in range(size):
@@ -38,7 +45,8 @@ def _product(A, B, transposed, out):
 
 
 @njit(cache=True)
-def _inner(A, B):
+def inner(A, B):
+    """Sum of the products of entries."""
     total = 0.0
     for k in range(len(A)):
         for l in range(len(A)):
@@ -47,7 +55,7 @@ def _inner(A, B):
 
 
 @njit(cache=True)
-def _invert(A, out):
+def invert(A, out):
     """Write the inverse of the symmetric part of A (3, 3); False if not positive definite."""
     a, b, c = A[0, 0], A[1, 1], A[2, 2]
     d, e, f = 0.5 * (A[0, 1] + A[1, 0]), 0.5 * (A[0, 2] + A[2, 0]), 0.5 * (A[1, 2] + A[2, 1])
@@ -65,6 +73,12 @@ def _invert(A, out):
         for l in range(3):
             out[k, l] /= determinant
     return True
+
+
+@njit(cache=True)
+def is_moving(square, size):
+    """Whether a change of C, squared, is more than round-off of C, squared."""
+    return square > _STILL * size
 
 
 @njit(cache=True)
@@ -87,28 +101,28 @@ def _secant(F0, F1, R0, R1, t0, t1, normal, substituted, work, T):
         for l in range(3):
             middle[k, l] = F0[k, l] + F1[k, l]
     if not substituted:
-        _product(R0, F0, True, A)
-        _product(R1, F1, True, B)
+        product(R0, F0, True, A)
+        product(R1, F1, True, B)
         for k in range(3):
             for l in range(3):
                 A[k, l] += B[k, l] + 2.0 * normal[k] * normal[l]
-        if _invert(A, B):
-            _product(middle, B, False, T)
+        if invert(A, B):
+            product(middle, B, False, T)
             return False
     q = np.zeros(4)
     q[0] = 1.0
     nearest_rotation(middle, q, T)
-    _product(F0, F0, True, A)
-    _product(F1, F1, True, B)
-    size = _inner(B, B)
+    product(F0, F0, True, A)
+    product(F1, F1, True, B)
+    size = inner(B, B)
     excess = t1 - t0
     for k in range(3):
         for l in range(3):
             B[k, l] -= A[k, l]
             excess -= T[k, l] * (F1[k, l] - F0[k, l])
-    square = _inner(B, B)
-    if square > _STILL * size:
-        _product(middle, B, False, A)
+    square = inner(B, B)
+    if is_moving(square, size):
+        product(middle, B, False, A)
         for k in range(3):
             for l in range(3):
                 T[k, l] += excess / square * A[k, l]
@@ -116,9 +130,9 @@ def _secant(F0, F1, R0, R1, t0, t1, normal, substituted, work, T):
 
 
 @njit(cache=True)
-def _stress(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, P):
+def stress(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, P):
     """Write P; whether the substitute was taken."""
-    t0, t1 = _inner(R0, F0), _inner(R1, F1)
+    t0, t1 = inner(R0, F0), inner(R1, F1)
     if len(F0) == 2:
         taken = _secant_in_plane(R0, R1, t0, t1, P)
     else:
@@ -131,7 +145,8 @@ def _stress(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, P):
 
 
 @njit(cache=True)
-def _deformation(nodes, b, displacement, normal, F):
+def deformation(nodes, b, displacement, normal, F):
+    """Write the deformation gradient; that of a membrane without its normal."""
     for k in range(len(F)):
         for l in range(len(F)):
             F[k, l] = 1.0 if k == l else 0.0
@@ -168,9 +183,9 @@ def averaged_force(
         if membrane:
             normal = normals[cell]
         b = gradients[cell]
-        _deformation(cells[piece], b, start, normal, F0)
-        _deformation(cells[piece], b, end, normal, F1)
-        substituted[piece] = _stress(
+        deformation(cells[piece], b, start, normal, F0)
+        deformation(cells[piece], b, end, normal, F1)
+        substituted[piece] = stress(
             F0, F1, first[piece], second[piece], lam[cell], mu[cell], corners - 1, normal,
             substituted[piece], work, P,
         )  # fmt: skip
@@ -178,49 +193,3 @@ def averaged_force(
             for k in range(space):
                 for l in range(space):
                     force[cells[piece, i], k] += volumes[piece] * P[k, l] * b[i, l]
-
-
-@njit(cache=True)
-def add_averaged_stiffness(
-    cells, targets, gradients, parent, volumes, normals, lam, mu, first, second, start, end,
-    substituted, blocks,
-):  # fmt: skip
-    """Add the derivative of `averaged_force` by the end of the step to the nodal blocks.
-
-    The derivative is not symmetric; arguments as there.
-    """
-    count, corners = cells.shape
-    space = gradients.shape[2]
-    membrane = corners == space
-    F0, F1 = np.empty((space, space)), np.empty((space, space))
-    P, D, work = np.empty((space, space)), np.empty((space, space)), np.empty((3, 3, 3))
-    R, q, normal = np.empty((space, space)), np.zeros(4), np.zeros(3)
-    column = np.empty((corners, space))
-    for piece in range(count):
-        cell = parent[piece]
-        if membrane:
-            normal = normals[cell]
-        b = gradients[cell]
-        la, mm, taken = lam[cell], mu[cell], substituted[piece]
-        _deformation(cells[piece], b, start, normal, F0)
-        _deformation(cells[piece], b, end, normal, F1)
-        _stress(F0, F1, first[piece], second[piece], la, mm, corners - 1, normal, taken, work, P)
-        scale = volumes[piece] / _DIFFERENCE
-        q[0] = 1.0
-        q[1] = q[2] = q[3] = 0.0
-        for l in range(space):
-            for m in range(space):
-                kept = F1[l, m]
-                F1[l, m] = kept + _DIFFERENCE
-                nearest_rotation(F1, q, R)
-                _stress(F0, F1, first[piece], R, la, mm, corners - 1, normal, taken, work, D)
-                F1[l, m] = kept
-                for i in range(corners):
-                    for k in range(space):
-                        column[i, k] = 0.0
-                        for n in range(space):
-                            column[i, k] += scale * (D[k, n] - P[k, n]) * b[i, n]
-                for j in range(corners):
-                    for i in range(corners):
-                        for k in range(space):
-                            blocks[targets[piece, i, j], k, l] += column[i, k] * b[j, m]

@@ -4,13 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.corotational import TangentKind
-from verify.xfem.dynamics.averaged_stress_kernels import (
-    add_averaged_stiffness,
-    averaged_force,
-)
+from verify.xfem.dynamics.averaged_stress_kernels import averaged_force
+from verify.xfem.dynamics.averaged_stress_tangent import add_averaged_stiffness
 from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.dynamics.integrator import StepForces
-from verify.xfem.dynamics.linear_solver import LinearSolver, SparseLU
+from verify.xfem.dynamics.linear_solver import LinearSolver, NearlySymmetric
 from verify.xfem.dynamics.newton import NewtonIntegrator
 from verify.xfem.penalised_force import PenalisedForce
 
@@ -93,7 +91,7 @@ class EnergyMomentum(NewtonIntegrator):
         self.substituted = np.zeros(len(self._first), dtype=bool)
 
     def _default_solver(self) -> LinearSolver:
-        return SparseLU(self.body.pattern)
+        return NearlySymmetric(self.body.pattern, self.body.shape[1])
 
     def _prepare(self) -> None:
         force = self.body.force

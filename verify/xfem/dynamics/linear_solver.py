@@ -1,4 +1,4 @@
-"""The linear solver that an implicit step needs: factorise nodal blocks, solve."""
+"""The linear solvers that an implicit step needs: factorise nodal blocks, solve."""
 
 from typing import Protocol
 
@@ -8,11 +8,15 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.cholesky import SingularStiffnessError
+from verify.xfem.cholesky import Cholesky, SingularStiffnessError
 
-__all__ = ["LinearSolver", "SparseLU"]
+__all__ = ["LinearSolver", "NearlySymmetric", "SparseLU"]
 
 _Floats = NDArray[np.float64]
+
+_REFINED = 1e-9  # residual over load: the rounding of a Newton correction, not of a solution
+_REFINEMENTS = 12
+_RESPITE = 16  # factorisations that go straight to LU after one that needed it
 
 
 class LinearSolver(Protocol):
@@ -63,3 +67,95 @@ class SparseLU:
         if self._factor is None:
             raise RuntimeError("solve before factorize")
         return self._factor.solve(load.ravel()).reshape(load.shape)
+
+
+class NearlySymmetric:
+    """Cholesky factorisation of the symmetric part, and refinement; LU where that does not do.
+
+    The stiffness of a conserving step is symmetric but for the square of the step; with the mass
+    its symmetric part is positive definite as long as the step resolves the motion.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+
+    Attributes
+    ----------
+    pivoted : int
+        Factorisations so far that needed the LU.
+    """
+
+    def __init__(self, pattern: BlockPattern, block: int) -> None:
+        self._pattern = pattern
+        self._symmetric = Cholesky(pattern, block)
+        self._general = SparseLU(pattern)
+        self._blocks: _Floats | None = None
+        self._is_general = False
+        self._respite = 0
+        self.pivoted = 0
+
+    def factorize(self, blocks: _Floats) -> None:
+        """Factorise the matrix with these nodal blocks (B, d, d), kept by reference.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If it is singular or not finite.
+        """
+        self._blocks, self._is_general = blocks, False
+        if self._respite > 0:
+            self._respite -= 1
+            self._pivot()
+            return
+        transposed = blocks[self._pattern.mirror].transpose(0, 2, 1)
+        try:
+            self._symmetric.factorize(0.5 * (blocks + transposed))
+        except SingularStiffnessError:
+            self._respite = _RESPITE
+            self._pivot()
+
+    def _pivot(self) -> None:
+        assert self._blocks is not None
+        self._general.factorize(self._blocks)
+        self._is_general = True
+        self.pivoted += 1
+
+    def solve(self, load: _Floats) -> _Floats:
+        """Solution (N, d) for a right-hand side (N, d).
+
+        Raises
+        ------
+        SingularStiffnessError
+            If it is singular.
+        RuntimeError
+            If nothing was factorised before.
+        """
+        if self._blocks is None:
+            raise RuntimeError("solve before factorize")
+        if not self._is_general:
+            solution = self._refine(load)
+            if solution is not None:
+                return solution
+            self._respite = _RESPITE
+            self._pivot()
+        return self._general.solve(load)
+
+    def _refine(self, load: _Floats) -> _Floats | None:
+        """Solution by refinement, or nothing where that does not halve the residual each time."""
+        assert self._blocks is not None
+        matrix = self._pattern.matrix(self._blocks)
+        size = float(np.linalg.norm(load))
+        solution = self._symmetric.solve(load)
+        before = np.inf
+        for _ in range(_REFINEMENTS):
+            residual = load - (matrix @ solution.ravel()).reshape(load.shape)
+            norm = float(np.linalg.norm(residual))
+            if norm <= _REFINED * size:
+                return solution
+            if not norm < 0.5 * before:
+                return None
+            solution += self._symmetric.solve(residual)
+            before = norm
+        return None

@@ -118,7 +118,7 @@ class NewtonIntegrator(ABC):
         displacement[body.fixed] = prescribed[body.fixed]
         residual, forces, scale = self._residual(displacement)
         norm = np.linalg.norm(residual)
-        floor = 0.0
+        floor, leaps = 0.0, 0
         for _ in range(self.iterations):
             if norm <= max(self.tolerance * scale, floor):
                 return displacement, self._velocity(displacement), forces
@@ -138,22 +138,38 @@ class NewtonIntegrator(ABC):
                 return displacement, self._velocity(displacement), forces
             if not accepted:
                 # a dead end of the residual, not a root: leap over it
+                leaps += 1
                 trial = displacement + correction
                 residual, forces, scale = self._residual(trial)
             displacement, norm = trial, np.linalg.norm(residual)
         raise StepFailedError(
             f"{type(self).__name__}: step from t = {self._start.time:.6g} s by "
             f"{self.step_size:.6g} s not solved: residual {norm:.3g} N against forces of "
-            f"{scale:.3g} N; expected {self.tolerance:g} of them"
+            f"{scale:.3g} N; expected {self.tolerance:g} of them. {self._why(displacement, leaps)}"
         )
+
+    def _why(self, displacement: _Floats, leaps: int) -> str:
+        """Say what stood in the way of Newton's method."""
+        if not np.isfinite(displacement).all():
+            return "The iterates left the finite numbers: the step is far too long"
+        force = self.body.force
+        found = [f"{leaps} of {self.iterations} corrections did not lower the residual"]
+        if force.virtual.mesh.dim == force.virtual.mesh.space:
+            inverted = force.inverted(displacement)
+            if len(inverted) > 0:
+                found.append(
+                    f"{len(inverted)} of {len(force.virtual.cells)} pieces are inside out, the "
+                    f"first number {inverted[0]}, where the force has no continuous stiffness"
+                )
+        return f"{'; '.join(found)}. A shorter step may help"
 
     def _correction(self, displacement: _Floats, residual: _Floats) -> _Floats:
         try:
             self._assemble(displacement, "exact")
             self._solver.factorize(self._blocks)
         except SingularStiffnessError:
-            # the exact stiffness may be indefinite far from equilibrium; the frozen one is not
-            self._assemble(displacement, "frozen")
+            # the exact stiffness may be indefinite far from equilibrium; that without turns is not
+            self._assemble(displacement, "tensioned")
             try:
                 self._solver.factorize(self._blocks)
             except SingularStiffnessError as failure:

@@ -1,7 +1,8 @@
 """Implicit Euler with one linearisation per step: the scheme of real-time simulation.
 
-(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v), K with frozen rotations: symmetric positive
-definite, so that the step always has a solution. Nothing is allocated per step but what the linear
+(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v), K with frozen rotations, and for membranes
+with what their tension resists across their plane: symmetric positive definite, so that the step
+always has a solution. Nothing is allocated per step but what the linear
 solver returns.
 """
 
@@ -60,12 +61,17 @@ class RealTimeEuler:
         """Advance by one step."""
         force, h = self.body.force, self.step_size
         external = self.body.external(state.time + h).copy()
-        before = state.velocity.copy()
+        before = state.copy()
         self.advance(state)
         # rotations are still those at the start of the step, with which it was linearised
         internal = self._internal.copy()
-        force.add_frozen_product(before, -(h + self.body.damping.stiffness), internal)
+        force.add_frozen_product(before.velocity, -(h + self.body.damping.stiffness), internal)
         force.add_frozen_product(state.velocity, h, internal)
+        if force.is_membrane:
+            force.add_tension(
+                self.body.pattern, before.displacement, state.velocity - before.velocity, h, 0.0,
+                internal, self.blocks,
+            )  # fmt: skip
         return StepForces(internal, external, self.body.viscous(state.velocity))
 
     def advance(self, state: MotionState) -> None:
@@ -110,6 +116,12 @@ class RealTimeEuler:
             body.pattern, state.displacement, state.velocity, implicit, h * implicit,
             self._internal, self.blocks,
         )  # fmt: skip
+        if body.force.is_membrane:
+            # what tension holds it with across its plane is as stiff as it is thin: implicit too
+            body.force.add_tension(
+                body.pattern, state.displacement, state.velocity, h, h * h, self._internal,
+                self.blocks,
+            )  # fmt: skip
         _add_mass(self.blocks, self._places, self._values, 1.0 + h * damping.mass)
         np.subtract(body.external(state.time + h), self._internal, out=self.load)
         if damping.mass > 0.0:
@@ -141,7 +153,7 @@ def _held_entries(pattern: BlockPattern, fixed: NDArray[np.bool_]) -> NDArray[np
 
 @njit(cache=True)
 def _driven_change(fixed, where, displacement, velocity, step_size, change):
-    """Write the change of velocity (N, d) that brings supports where they are to be; any?"""
+    """Write the change of velocity (N, d) that brings supports to their place; whether any does."""
     driven = False
     for i in range(fixed.shape[0]):
         for k in range(fixed.shape[1]):

@@ -1,0 +1,94 @@
+"""Stress averaged over a step: its work is the change of energy, and its derivative is exact."""
+
+import numpy as np
+import pytest
+
+from verify.xfem.dynamics.averaged_stress_kernels import stress
+from verify.xfem.dynamics.averaged_stress_tangent import stress_slope
+from verify.xfem.polar_kernels import nearest_rotation
+
+LAM, MU = 1.3, 0.7
+
+
+def _rotation(F):
+    R = np.empty_like(F)
+    nearest_rotation(F, np.array([1.0, 0.0, 0.0, 0.0]), R)
+    return R
+
+
+def _stress(F0, F1, dim, normal, substituted):
+    P = np.empty_like(F0)
+    taken = stress(
+        F0, F1, _rotation(F0), _rotation(F1), LAM, MU, dim, normal, substituted,
+        np.empty((3, 3, 3)), P,
+    )  # fmt: skip
+    return P, taken
+
+
+def _energy(F, dim):
+    t = np.sum(_rotation(F) * F)
+    return MU * (np.sum(F * F) - 2.0 * t + dim) + 0.5 * LAM * (t - dim) ** 2
+
+
+def _pairs(kind, size, seed=3):
+    """Deformations at the start and at the end; of a membrane, without a normal component."""
+    rng = np.random.default_rng(seed)
+    dim = 2 if kind == "plane" else 3
+    normal = np.zeros(3)
+    if kind == "membrane":
+        normal = np.array([2.0, -1.0, 2.0]) / 3.0
+    across = np.outer(normal, normal)[:dim, :dim]
+    for _ in range(20):
+        F0, F1 = (np.eye(dim) + size * rng.normal(size=(dim, dim)) for _ in range(2))
+        yield F0 @ (np.eye(dim) - across), F1 @ (np.eye(dim) - across), normal
+
+
+KINDS = ("plane", "membrane", "solid")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("substituted", [False, True])
+def test_the_work_of_the_averaged_stress_is_the_change_of_energy(kind, substituted):
+    dim = 3 if kind == "solid" else 2
+    for F0, F1, normal in _pairs(kind, 0.3):
+        P, _ = _stress(F0, F1, dim, normal, substituted)
+        change = _energy(F1, dim) - _energy(F0, dim)
+        assert np.sum(P * (F1 - F0)) == pytest.approx(change, abs=1e-13)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("substituted", "size"), [(False, 0.3), (True, 0.3), (False, 1.5)])
+def test_the_derivative_of_the_averaged_stress_equals_central_differences(kind, substituted, size):
+    """Also of the substitute that inverted pieces take."""
+    dim = 3 if kind == "solid" else 2
+    taken_somewhere, compared = False, 0
+    h = 1e-6
+    for F0, F1, normal in _pairs(kind, size):
+        _, taken = _stress(F0, F1, dim, normal, substituted)
+        taken_somewhere |= taken
+        # the substitute is kept once taken, as it is in a step
+        space = len(F0)
+        slope = np.empty((space,) * 4)
+        stress_slope(
+            F0, F1, _rotation(F0), _rotation(F1), LAM, MU, dim, normal, taken,
+            np.empty((10, 3, 3)), slope,
+        )  # fmt: skip
+        # differences see curvature and round-off, both 1/gap³ times what they are at gap 1
+        gap = min(np.linalg.svd(F)[1][:dim].min() for F in (F0 + F1, F1))
+        if gap < 0.1:
+            continue
+        compared += 1
+        across = np.outer(normal, normal)[:space, :space]
+        for l in range(space):
+            for m in range(space):
+                D = np.zeros_like(F1)
+                D[l, m] = h
+                D = D @ (np.eye(space) - across)
+                if not D.any():
+                    continue
+                plus, minus = (_stress(F0, F1 + s * D, dim, normal, taken)[0] for s in (1, -1))
+                expected = (plus - minus) / (2.0 * h)
+                got = np.einsum("knlm,lm->kn", slope, D / h)
+                assert np.abs(got - expected).max() < 1e-8 * (1.0 + 1.0 / gap**3) * 10.0
+    assert compared >= 5
+    assert taken_somewhere == (substituted and kind != "plane")
