@@ -3,17 +3,16 @@
 import argparse
 import json
 from dataclasses import asdict
-from typing import Any
 
+from verify.cli.solver_parameters import of_one_solver
 from verify.conformance import CheckResult, conform, exit_code_of
-from verify.errors import InputError
 
 __all__ = ["execute"]
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the suite on one solver and print a line per check."""
-    parameters = dict(_parameter(text) for text in arguments.parameters)
+    parameters = of_one_solver(arguments.parameters)
     results = conform(arguments.solver, parameters, arguments.timeout, arguments.checks)
     code = exit_code_of(results)
     if arguments.json:
@@ -35,13 +34,3 @@ def _number(result: CheckResult) -> str:
     return f"{result.observed:.1e} ≤ {result.limit:.1e}" if result.state == "kept" else (
         f"{result.observed:.1e} > {result.limit:.1e}"
     )  # fmt: skip
-
-
-def _parameter(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not equals or not name.isidentifier():
-        raise InputError(f"--set {text}: expected NAME=VALUE, e.g. --set basis=shifted")
-    try:
-        return name, json.loads(value)
-    except json.JSONDecodeError:
-        return name, value

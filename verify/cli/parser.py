@@ -173,6 +173,10 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "(default: those that the case names)",
     )  # fmt: skip
     command.add_argument(
+        "--set", metavar="SOLVER.NAME=VALUE", dest="parameters", action="append", default=[],
+        help="parameter of a solver, e.g. xfem.scheme=implicit_euler; repeat for several",
+    )  # fmt: skip
+    command.add_argument(
         "--repetitions", metavar="N", type=count, default=3,
         help="timed repetitions of each solve (default: 3)",
     )  # fmt: skip

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from verify.cli.progress import progress_on
+from verify.cli.solver_parameters import of_solvers
 from verify.cli.verdict_text import verdict_lines
 from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
 from verify.runner.checking import check_solver_name
@@ -22,6 +23,9 @@ def execute(arguments: argparse.Namespace) -> int:
     names = [name for entry in arguments.solvers for name in entry.split(",") if name]
     for name in names:
         check_solver_name(name, "--solver")
+    parameters = of_solvers(arguments.parameters)
+    for name in parameters:
+        check_solver_name(name, "--set")
     weight = "quick" if arguments.quick else "heavy" if arguments.heavy else "normal"
     scenes = select_cases(arguments.cases, arguments.expression, weight)
     if not scenes:
@@ -30,6 +34,7 @@ def execute(arguments: argparse.Namespace) -> int:
     options = Options(
         solvers=tuple(dict.fromkeys(names)),
         repetitions=arguments.repetitions,
+        parameters=parameters,
         jobs=arguments.jobs,
         timeout=arguments.timeout,
         memory=arguments.memory * 1e9 if arguments.memory else None,

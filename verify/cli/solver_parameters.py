@@ -1,0 +1,53 @@
+"""Parameters of solvers on the command line: ``--set NAME=VALUE``."""
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from verify.errors import InputError
+
+__all__ = ["of_one_solver", "of_solvers"]
+
+
+def of_one_solver(given: Iterable[str]) -> dict[str, Any]:
+    """Read ``basis=shifted`` … as the parameters of one solver.
+
+    Raises
+    ------
+    InputError
+        If one is not of this form.
+    """
+    return dict(_split(text, text, "--set basis=shifted") for text in given)
+
+
+def of_solvers(given: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Read ``xfem.basis=shifted`` … as the parameters of several solvers.
+
+    The solver ends at the last dot before the equals sign, so that ``module:Class`` works too.
+
+    Raises
+    ------
+    InputError
+        If one is not of this form.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for text in given:
+        example = "--set xfem.scheme=implicit_euler"
+        key, equals, value = text.partition("=")
+        solver, dot, name = key.rpartition(".")
+        if not dot or not solver:
+            raise InputError(f"--set {text}: expected SOLVER.NAME=VALUE, e.g. {example}")
+        name, parsed = _split(f"{name}{equals}{value}", text, example)
+        found.setdefault(solver, {})[name] = parsed
+    return found
+
+
+def _split(text: str, given: str, example: str) -> tuple[str, Any]:
+    """Split ``name=value``; a value that is JSON (a number, true) is that, else it is text."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.isidentifier():
+        raise InputError(f"--set {given}: expected NAME=VALUE, e.g. {example}")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
