@@ -17,6 +17,7 @@ _Ints = NDArray[np.int64]
 
 _SWEEPS = 12  # of smoothing; angles change by less than a degree after that
 _CLEARANCE = 0.62  # of an element size, between the border and the first inner points
+_ATTEMPTS, _FINER = 12, 0.97
 _FLAT = 0.05  # least shape of a triangle, 1 is equilateral
 
 
@@ -64,12 +65,28 @@ def mesh_of_about(
     area = _area(outline) - sum(_area(hole) for hole in holes)
     size = float(np.sqrt(area / triangles * 4.0 / np.sqrt(3.0)))
     for _ in range(3):
-        mesh = plane_mesh(outline, holes, size)
+        mesh, size = _next_finer(outline, holes, size)
         got = len(mesh[1])
         if abs(got / triangles - 1.0) < 0.01:
             break
         size *= float(np.sqrt(got / triangles))
     return mesh
+
+
+def _next_finer(
+    outline: _Floats, holes: list[_Floats], size: float
+) -> tuple[tuple[_Floats, _Ints, int], float]:
+    """Mesh with the first size that does, from the one asked for downwards, and that size.
+
+    Where points happen to lie badly beside a narrow bend, a size a little smaller is right.
+    """
+    for attempt in range(_ATTEMPTS):
+        try:
+            return plane_mesh(outline, holes, size * _FINER**attempt), size * _FINER**attempt
+        except InputError:
+            if attempt == _ATTEMPTS - 1:
+                raise
+    raise AssertionError
 
 
 def inside(points: _Floats, rings: list[_Floats]) -> NDArray[np.bool_]:

@@ -35,7 +35,7 @@ _FACE_MIDDLE = [
     (9.0, 0.0, -78.0, 17.0, 11.0),  # chin
     (-1.8, 0.0, -30.0, 3.5, 6.0),  # philtrum
 ]
-# right hand from behind: wrist, little finger to index finger, thumb
+# left hand from behind: wrist, little finger to index finger, thumb
 _HAND_BORDER = [
     (-27, -52), (-36, -35), (-41, -10), (-43, 15), (-45, 32), (-46, 44), (-40, 51), (-31, 50),
     (-25.5, 42), (-22, 50), (-19, 60), (-10.5, 63), (-4, 58), (-1, 46), (2, 57), (7, 65),
@@ -54,7 +54,7 @@ def procedural_face() -> Patch:
 
 
 def procedural_hand() -> Patch:
-    """Skin of the back of a right hand up to the roots of the fingers, about 110 mm × 120 mm."""
+    """Skin of the back of a left hand up to the roots of the fingers, about 110 mm × 120 mm."""
     border = np.array(_HAND_BORDER, dtype=float)
     closed = np.concatenate([border, border[:1]])
     # clockwise as written down, for the eye to follow; the spline keeps the round of the fingers

@@ -38,7 +38,7 @@ def write_patch(path: Path, outline: _Floats, holes: list[_Floats], samples: _Fl
     os.replace(partial, path)
 
 
-def stored_patch(shape: str) -> Patch:
+def stored_patch(shape: str, folder: Path | None = None) -> Patch:
     """Read a patch.
 
     Raises
@@ -46,7 +46,7 @@ def stored_patch(shape: str) -> Patch:
     InputError
         If it is not there or cannot be read.
     """
-    path = patch_file(shape)
+    path = patch_file(shape, folder)
     if not path.is_file():
         raise InputError(
             "geometry.source: the anatomy is not here; fetch it once with 'verify data anatomy'",
