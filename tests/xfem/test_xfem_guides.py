@@ -1,0 +1,54 @@
+"""The examples of the guides to the compact solver run as printed, each page in one go."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def printed_by(page, capsys):
+    """What the examples of a page print; they share their names, in order."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    names = {}
+    for example in re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+        exec(compile(example, page, "exec"), names)
+    return capsys.readouterr().out.splitlines()
+
+
+def test_dynamics_cuts_a_moving_body_penalises_slivers_and_keeps_pace(capsys):
+    account, penalty, pace = printed_by("xfem-dynamics.md", capsys)
+    off, size = re.findall(r"by (\S+) J of (\S+) J", account)[0]
+    assert float(off) < 1e-10 * float(size)
+    assert "faces penalised with factor 0.01" in penalty
+    assert 0.0 < float(penalty.split()[-1]) < 0.1
+    assert 0.0 < float(re.findall(r"step of (\S+) s", pace)[0]) <= 0.02
+
+
+def test_slivers_are_merged_and_a_penalty_does_not_change_the_answer_much(capsys):
+    merged, energies = printed_by("xfem-slivers.md", capsys)
+    assert merged.startswith("16 slivers merged")
+    kept, penalised = map(float, re.findall(r"(\S+) J", energies))
+    assert kept > 0.0
+    assert penalised == pytest.approx(kept, rel=5e-3)
+
+
+def test_cutting_finds_the_tool_on_the_cut_body_and_on_the_cut_skin(capsys):
+    solid, skin = (
+        np.array(line.split(), dtype=float) for line in printed_by("xfem-cutting.md", capsys)
+    )
+    assert solid[0] > 0.0  # crossing an element takes time
+    assert 0.15 < solid[1] <= 0.2 + 1e-12  # the lifted top is 0.2 below the query
+    assert skin[0] > 0
+    # the nearest point of the skin and what is found in the material are the same place
+    assert skin[1] == pytest.approx(skin[2], rel=1e-9)
+
+
+@pytest.mark.parametrize("page", ["xfem-dynamics.md", "xfem-slivers.md", "xfem-cutting.md"])
+def test_every_page_has_examples_and_links_that_lead_somewhere(page):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    assert "```python" in text
+    for target in re.findall(r"\]\(([^)#]+\.md)", text):
+        assert (DOCS / target).exists(), target
