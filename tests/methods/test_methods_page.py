@@ -1,0 +1,44 @@
+"""The page on the methods is run: its commands and its example."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+from verify.methods import METHODS
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "methods.md"
+
+
+def blocks(language):
+    text = PAGE.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_every_command_of_the_page_succeeds(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(PAGE.parents[1]))
+    lines = [line for block in blocks("sh") for line in block.splitlines() if line.strip()]
+    assert len(lines) == 2
+    for line in lines:
+        words = shlex.split(line)
+        done = subprocess.run(
+            [sys.executable, "-m", *words],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+
+
+def test_the_example_of_the_page_prints_a_line_for_every_method(capsys):
+    (example,) = blocks("python")
+    exec(compile(example, str(PAGE), "exec"), {})
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in printed] == list(METHODS)
+
+
+def test_the_page_names_every_method():
+    text = PAGE.read_text(encoding="utf-8")
+    assert all(f"| `{name}` |" in text for name in [*METHODS, "mass_spring"])
