@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cut_bodies import DENSITY, GRAVITY, cut_body, material, rotation
+from cut_bodies import DENSITY, GRAVITY, cut_body, cut_membrane, material, rotation
 from test_sliver_motion import rest_step, stretched, swing
 
 from verify.xfem.block_pattern import block_pattern
@@ -181,6 +181,8 @@ def test_wrong_policies_and_penalties_of_other_bodies_are_refused():
         treat_moving_body(v, material(2), DENSITY, "penalise", factor=0.0)
     with pytest.raises(XfemError, match="another body"):
         PenalisedForce(v, material(2), GhostPenalty(cut_body(2), material(2)))
+    with pytest.raises(XfemError, match="membrane"):
+        GhostPenalty(cut_membrane(), material(2))
     ghost = GhostPenalty(v, material(2))
     pattern = block_pattern(v.cells, v.node_count)
     with pytest.raises(XfemError, match="lacks couplings"):

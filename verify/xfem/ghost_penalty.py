@@ -52,7 +52,8 @@ class GhostPenalty:
     Raises
     ------
     XfemError
-        If the factor is not positive.
+        If the factor is not positive, or the body is a membrane in space: across its creases
+        the gradient of a rigid turn jumps, so that turning would cost energy.
     """
 
     def __init__(
@@ -60,6 +61,8 @@ class GhostPenalty:
     ) -> None:
         if not (np.isfinite(factor) and factor > 0.0):
             raise XfemError(f"ghost penalty with factor {factor:g}; expected a positive one")
+        if virtual.mesh.dim < virtual.mesh.space:
+            raise XfemError("ghost penalty of a membrane in space; expected a body that fills it")
         self.virtual, self.factor = virtual, factor
         pieces = np.stack(face_contacts(virtual, near=True))
         pieces = pieces[:, virtual.split[pieces].any(axis=0)]
