@@ -187,3 +187,31 @@ def test_the_other_bases_are_for_linear_statics(tmp_path, basis):
     )
     with pytest.raises(UnsupportedSceneError, match="linear statics only"):
         XfemSolver().solve(asked, 0, basis=basis)
+
+
+def test_a_ghost_penalty_is_reported_with_its_share_of_the_energy(tmp_path):
+    """It stiffens: the strain energy under dead loads is less, by about its share."""
+    plain = XfemSolver().solve(scene(tmp_path), 1, 0)
+    found = XfemSolver().solve(scene(tmp_path), 1, 0, slivers="penalise")
+    (entry,) = [r for r in found.regularisations if "ghost penalty" in r.kind]
+    assert entry.unit == "of the strain energy"
+    assert entry.count > 0
+    assert 0.0 < entry.size < 0.2
+    assert 0.8 < found.ledger["strain"][0] / plain.ledger["strain"][0] < 1.0
+
+
+def test_a_part_may_end_at_a_cut_inside_an_element(tmp_path):
+    """Below the cut the left side is held, above it the right one: each half hangs by its own."""
+    parts = '"y < 0.0512 and x < 1e-9"\ndisplacement = [0.0, 0.0]\n[[supports]]\nwhere = '
+    parts += '"y > 0.0512 and x > 0.01999"\ndisplacement = [1e-4, 0.0]'
+    weightless = ("acceleration = [0.0, -9.8]", "acceleration = [0.0, 0.0]")
+    through = ("[[0.0, 0.05], [0.01, 0.05]]", "[[-0.1, 0.0512], [0.1, 0.0512]]")
+    strip = scene(tmp_path, ('"top"\ndisplacement = [0.0, 0.0]', parts), weightless, through)
+    found = XfemSolver().solve(strip, 0, 0)
+    above = found.points[found.cells].mean(axis=1)[:, 1] > 0.0512
+    moved = found.displacement[0][found.cells]
+    wanted = np.where(above[:, None, None], [1e-4, 0.0], [0.0, 0.0])
+    np.testing.assert_allclose(moved, np.broadcast_to(wanted, moved.shape), atol=1e-15)
+    # of the two unknowns of a node one side is held alone: which the shifted ones cannot say
+    with pytest.raises(UnsupportedSceneError, match="one side of a cut element and not the other"):
+        XfemSolver().solve(strip, 0, 0, basis="heaviside")

@@ -24,7 +24,7 @@ __all__ = ["XfemSolver"]
 
 _BASES = ("sidewise", "shifted", "heaviside")
 _TIPS = ("inside", "through", "nearest")
-_POLICIES = ("keep", "merge", "drop")
+_POLICIES = ("keep", "merge", "drop", "penalise")
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,10 @@ class XfemSolver:
         are for linear statics.
     tip : {"inside", "through", "nearest"}
         What happens to an element in which a cut ends; see `verify.xfem.split.split_cells`.
-    slivers : {"keep", "merge", "drop"}
+    slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
-        `verify.xfem.slivers`. A direct static solve does not mind them, so they are kept.
+        `verify.xfem.slivers`. A direct static solve does not mind them, so they are kept. The
+        last is a ghost penalty, of linear statics and of motion with the side-wise mass.
     load_steps : int
         Corotational statics: equal parts in which supports and loads grow; 0: as few as converge.
     scheme : {"newmark", "implicit_euler", "energy_momentum", "central_differences",
@@ -136,8 +137,21 @@ class XfemSolver:
         linear_static = scene.analysis.kind == "static" and scene.analysis.kinematics == "linear"
         if basis != "sidewise" and not linear_static:
             raise UnsupportedSceneError(f"the {basis} basis is offered for linear statics only")
+        if slivers == "penalise":
+            _check_penalty(scene, basis, mass)
         motion = MotionChoice(scheme, mass, step_factor, tip, slivers)
         return _solve(scene, level, repetitions, _Choice(basis, tip, slivers, load_steps, motion))
+
+
+def _check_penalty(scene: Scene, basis: str, mass: str) -> None:
+    """Refuse a ghost penalty where the library has none."""
+    static = scene.analysis.kind == "static"
+    if static and (scene.analysis.kinematics != "linear" or basis != "sidewise"):
+        raise UnsupportedSceneError(
+            "slivers = 'penalise' in statics is for linear kinematics and the sidewise basis"
+        )
+    if not static and mass != "sidewise":
+        raise UnsupportedSceneError("slivers = 'penalise' in motion is for the sidewise mass")
 
 
 def _solve(scene: Scene, level: int, repetitions: int, choice: _Choice) -> Solution:
@@ -183,10 +197,11 @@ def _run(
     start = perf_counter()
     virtual = cut_mesh(mesh, cuts_of(scene, size), choice.tip)  # type: ignore[arg-type]
     slivers = None
-    if choice.slivers != "keep":
+    if choice.slivers in ("merge", "drop"):
         virtual, slivers = treat_slivers(virtual, choice.slivers)  # type: ignore[arg-type]
     enrichment = perf_counter() - start
-    found = solve_equilibrium(scene, virtual, exact, choice.basis, choice.load_steps)
+    penalise = choice.slivers == "penalise"
+    found = solve_equilibrium(scene, virtual, exact, choice.basis, choice.load_steps, penalise)
     return Answer(
         virtual=virtual,
         times=np.zeros(1),
@@ -197,4 +212,5 @@ def _run(
         iterations=found.iterations,
         notes=found.notes,
         slivers=slivers,
+        further=found.regularisations,
     )

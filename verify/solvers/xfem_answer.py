@@ -1,6 +1,6 @@
 """What the compact XFEM solver found, as a neutral solution with everything that it changed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from verify.scene import Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.slivers import SliverReport
 from verify.xfem.subdivision import Subdivision, subdivide
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Answer", "solution_of"]
+__all__ = ["Answer", "penalised", "solution_of"]
 
 _Floats = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ class Answer:
     iterations: dict[str, int]
     notes: dict[str, str]
     slivers: SliverReport | None
+    further: list[Regularisation] = field(default_factory=list)
 
 
 def solution_of(
@@ -67,9 +69,21 @@ def solution_of(
         size=size,
         timings=timings,
         iterations=answer.iterations,
-        regularisations=[*_regularisations(scene, virtual, body), *_absorbed(answer.slivers)],
+        regularisations=[
+            *_regularisations(scene, virtual, body),
+            *_absorbed(answer.slivers),
+            *answer.further,
+        ],
         notes={**notes, **answer.notes},
     )
+
+
+def penalised(ghost: GhostPenalty | None, share: float | None = None) -> list[Regularisation]:
+    """Report a ghost penalty: its faces, and its share in the energy or else its factor."""
+    if ghost is None or not len(ghost.weights):
+        return []
+    size, unit = (ghost.factor, "factor") if share is None else (share, "of the strain energy")
+    return [Regularisation("face with a ghost penalty", len(ghost.weights), size, unit)]
 
 
 def _at_points(body: Subdivision, values: _Floats) -> _Floats:

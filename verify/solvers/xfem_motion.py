@@ -12,7 +12,7 @@ from verify.errors import InputError
 from verify.scene import Equilibrium, Gravity, Moving, Scene
 from verify.scene.history import factor_at, first_factor, jumps
 from verify.solvers.xfem_account import Account
-from verify.solvers.xfem_answer import Answer
+from verify.solvers.xfem_answer import Answer, penalised
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import nodal_forces
 from verify.solvers.xfem_scene import density_of, material_of
@@ -27,10 +27,13 @@ from verify.xfem.dynamics import (
     RayleighDamping,
     ancestors,
     inherit_state,
+    treat_moving_body,
 )
 from verify.xfem.dynamics.newton import NewtonIntegrator
 from verify.xfem.energy_ledger import EnergyLedger
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import SliverReport, treat_slivers
 from verify.xfem.supports import check_bodies
@@ -103,6 +106,7 @@ class Mover:
         self.cuts, self.opens = [cuts[k] for k in order], [opens[k] for k in order]
         self.account = Account()
         self.slivers: SliverReport | None = None
+        self.penalty: GhostPenalty | None = None
         self.steps = self.solves = 0
         self.step_sizes: set[float] = set()
         self.said = ""
@@ -142,7 +146,7 @@ class Mover:
         tip: Any = self.choice.tip
         policy: Any = self.choice.slivers
         virtual = cut_mesh(self.mesh, self.cuts[:count], tip)
-        if count and policy != "keep":
+        if count and policy in ("merge", "drop"):
             virtual, self.slivers = treat_slivers(virtual, policy)
         self.timings["enrichment"] += perf_counter() - clock
         return virtual
@@ -151,7 +155,7 @@ class Mover:
         """Give a cut mesh its elasticity, mass, supports and loads."""
         clock = perf_counter()
         scene, density = self.scene, density_of(self.scene)
-        mass = MASSES[self.choice.mass](virtual, density)
+        force, mass = self._inertia(virtual, density)
         weight = np.zeros_like(virtual.node_points)
         driven: list[tuple[_Floats, Any]] = []
         for load, forces in nodal_forces(scene, virtual, self.exact):
@@ -167,7 +171,7 @@ class Mover:
             return total
 
         body = DynamicBody(
-            self._law(virtual),
+            force,
             mass,
             weight,
             load_at if driven else None,
@@ -176,6 +180,17 @@ class Mover:
         )
         self.timings["loading"] += perf_counter() - clock
         return body
+
+    def _inertia(self, virtual: VirtualMesh, density: float) -> tuple[InternalForce, Mass]:
+        """Return elasticity and mass of a cut mesh, with the penalty if there is to be one."""
+        if self.choice.slivers != "penalise":
+            return self._law(virtual), MASSES[self.choice.mass](virtual, density)
+        kinematics = self.scene.analysis.kinematics
+        treated = treat_moving_body(
+            virtual, material_of(self.scene), density, "penalise", kinematics=kinematics
+        )
+        self.penalty = treated.ghost
+        return treated.force, treated.mass
 
     def _law(self, virtual: VirtualMesh) -> InternalForce:
         """Return the elasticity of a cut mesh."""
@@ -308,6 +323,7 @@ class Mover:
             iterations,
             notes,
             self.slivers,
+            penalised(self.penalty),
         )
 
 

@@ -1,7 +1,7 @@
 """Static equilibrium of a cut body, in linear and in corotational kinematics."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene import Scene
+from verify.solution import Regularisation
+from verify.solvers.xfem_answer import penalised
 from verify.solvers.xfem_bases import solve_in_basis
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_scene import material_of
@@ -19,6 +21,7 @@ from verify.xfem.corotational_static import (
     StaticEquilibrium,
     static_equilibrium,
 )
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.static import solve_static
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
@@ -40,12 +43,18 @@ class Equilibrium:
     timings: dict[str, float]
     iterations: dict[str, int] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    regularisations: list[Regularisation] = field(default_factory=list)
 
 
 def solve_equilibrium(
-    scene: Scene, virtual: VirtualMesh, exact: Any, basis: str, load_steps: int
+    scene: Scene,
+    virtual: VirtualMesh,
+    exact: Any,
+    basis: str,
+    load_steps: int,
+    penalise: bool = False,
 ) -> Equilibrium:
-    """Solve a static scene on a cut mesh.
+    """Solve a static scene on a cut mesh; with `penalise` with a ghost penalty (linear only).
 
     Raises
     ------
@@ -57,26 +66,33 @@ def solve_equilibrium(
     load = loads_of(scene, virtual, exact)
     loading = perf_counter() - clock
     if scene.analysis.kinematics == "linear":
-        found = _linear(scene, virtual, supports, load, basis)
+        found = _linear(scene, virtual, supports, load, basis, penalise)
     else:
         found = _corotational(scene, virtual, exact, supports, load, load_steps)
-    return Equilibrium(
-        found.displacement,
-        found.strain_energy,
-        {"loading": loading, **found.timings},
-        found.iterations,
-        found.notes,
-    )
+    return replace(found, timings={"loading": loading, **found.timings})
 
 
 def _linear(
-    scene: Scene, virtual: VirtualMesh, supports: Supports, load: _Floats, basis: str
+    scene: Scene,
+    virtual: VirtualMesh,
+    supports: Supports,
+    load: _Floats,
+    basis: str,
+    penalise: bool,
 ) -> Equilibrium:
     material = material_of(scene)
     if basis == "sidewise":
-        static = solve_static(virtual, material, supports, load)
+        ghost = GhostPenalty(virtual, material) if penalise else None
+        static = solve_static(virtual, material, supports, load, ghost=ghost)
+        share = static.penalty_energy / max(static.strain_energy, np.finfo(float).tiny)
         notes = {"linear solver": "own sparse Cholesky", "residual": f"{static.residual:.3e}"}
-        return Equilibrium(static.displacement, static.strain_energy, static.timings, notes=notes)
+        return Equilibrium(
+            static.displacement,
+            static.strain_energy,
+            static.timings,
+            notes=notes,
+            regularisations=penalised(ghost, share),
+        )
     other: Any = basis
     displacement, phases = solve_in_basis(virtual, material, supports, load, other)
     energy = LinearStiffness(virtual, material).force(displacement)[1]
