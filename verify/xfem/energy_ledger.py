@@ -148,7 +148,7 @@ class EnergyLedger:
         space = self.body.shape[1]
         turns = 1 if space == 2 else 3
         momentum, turning, impulse = np.split(table[9:-1].T, [space, space + turns], axis=1)
-        return Ledger(*table[:9], momentum, turning, impulse, table[-1])
+        return Ledger(*[*table[:9], momentum, turning, impulse, table[-1]])
 
 
 def _cross(position: _Floats, momenta: _Floats) -> _Floats:
