@@ -9,11 +9,12 @@ from verify.methods.catalogue import cut_by
 from verify.methods.spring_fit import spring_stiffness
 from verify.methods.spring_force import SpringForce
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.polyline import Polyline
-from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
 
@@ -137,6 +138,37 @@ def test_force_and_stiffness_are_derivatives_of_the_energy(dim, kinematics):
     # central differences of step 1e-6: 1e-12 of truncation, 1e-10 of round-off
     assert np.abs(gradient - found).max() < 1e-8
     assert np.abs(np.array(columns).T - K).max() < 1e-8
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_kernels_are_what_numpy_says(dim):
+    rng = np.random.default_rng(7)
+    mesh = rectangle_mesh((2, 3)) if dim == 2 else box_mesh((2, 1, 2))
+    cut = Plane(np.full(dim, 0.45), np.array([0.2, 1.0, 0.3])[:dim])
+    virtual = cut_by("virtual_node", mesh, [cut]).virtual
+    force = SpringForce(virtual, Material(np.array(0.4), np.array(0.7)))
+    u, v = 0.05 * rng.normal(size=(2, *virtual.node_points.shape))
+    pairs = [np.array(pair) for pair in combinations(range(dim + 1), 2)]
+    ends = np.stack([virtual.cells[:, pair] for pair in pairs], axis=1)
+    assert np.array_equal(ends[0], virtual.cells[0][np.array(pairs)])
+    rest = np.diff(virtual.node_points[ends], axis=2)[:, :, 0]
+    now = rest + np.diff(u[ends], axis=2)[:, :, 0]
+    stretch = np.linalg.norm(now, axis=2) - np.linalg.norm(rest, axis=2)
+    t = now / np.linalg.norm(now, axis=2, keepdims=True)
+    along = (t * np.diff(v[ends], axis=2)[:, :, 0]).sum(axis=2)
+    found, energy = force.evaluate(u)
+    assert energy == pytest.approx(0.5 * (force.springs * stretch**2).sum(), rel=1e-12)
+    product = np.zeros_like(u)
+    force.add_frozen_product(v, 2.0, product)
+    for got, pull in ((found, stretch), (product, 2.0 * along)):
+        wanted = np.zeros_like(u)
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            np.add.at(wanted, ends[:, :, side], sign * (force.springs * pull)[:, :, None] * t)
+        assert np.abs(got - wanted).max() < 1e-13
+    # pieces of cut cells bear their share only
+    whole = SpringForce(cut_mesh(mesh, []), Material(np.array(0.4), np.array(0.7))).springs
+    shares = virtual.fraction[:, None] * whole[virtual.parent]
+    assert force.springs == pytest.approx(shares, rel=1e-14)
 
 
 def test_springs_of_a_body_that_turns_and_opens_rigidly_bear_nothing():

@@ -188,16 +188,17 @@ class _MethodSolver:
         exact, material = _exact(scene), body.material(material_of(scene))
         kinematics = scene.analysis.kinematics
         if scene.analysis.kind == "dynamic":
+            forces: list[InternalForce] = []
 
             def law(virtual: VirtualMesh) -> InternalForce:
-                force: InternalForce = self._force(virtual, material, kinematics)
-                return force
+                forces.append(self._force(virtual, material, kinematics))
+                return forces[-1]
 
             mover = MethodMover(body, law, scene, mesh, size, exact, choice.motion)
             moved = mover.run(trial)
             return _Run(
                 body, moved.times, moved.displacement, moved.velocity, moved.ledger,
-                moved.timings, moved.iterations, moved.notes, 0,
+                moved.timings, moved.iterations, moved.notes, getattr(forces[-1], "clamped", 0),
             )  # fmt: skip
         start = perf_counter()
         supports = supports_of(scene, body.virtual, exact)
