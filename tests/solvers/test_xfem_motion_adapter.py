@@ -287,3 +287,16 @@ def test_cuts_that_cross_open_in_any_order_and_no_energy_is_lost(tmp_path, times
     scale = max(np.abs(ledger["gravity"]).max(), ledger["kinetic"].max())
     assert np.ptp(ledger["total"]) <= tolerance * scale
     assert len(np.unique(found.cell_sides)) >= 4
+
+
+def test_a_lumping_or_a_scheme_that_does_not_suit_the_scene_is_refused(tmp_path):
+    text = SQUARE + HELD + WEIGHT + CUT
+    with pytest.raises(UnsupportedSceneError, match=r"mass = 'thesis': node .* has 3 unknowns"):
+        solve(
+            tmp_path,
+            text + SECOND.replace("[0.47, -0.1], [0.52, 1.1]", "[-0.1, 0.46], [1.1, 0.42]"),
+            mass="thesis",
+        )
+    moved = HELD + "history = [[0.0, 0.0], [1.0, 1.0]]\n"
+    with pytest.raises(UnsupportedSceneError, match="scheme = 'central_differences': explicit"):
+        solve(tmp_path, SQUARE + moved + CUT, mass="consistent", scheme="central_differences")

@@ -31,6 +31,7 @@ def description(scene: Scene) -> str:
         ("supports", [_keys(support) for support in scene.supports]),
         ("loads", [_keys(load) for load in scene.loads]),
         ("analysis", [_keys(scene.analysis, "damping")]),
+        ("initially", [_keys(scene.initial)] if scene.analysis.kind == "dynamic" else []),
         ("measured", [_keys(quantity) for quantity in scene.quantities]),
         ("judged by", [_judge(scene)]),
         ("accepted if", [_demand(check) for check in scene.acceptance] or ["nothing is judged"]),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Equilibrium, Gravity, Moving, Scene
 from verify.scene.history import factor_at, first_factor, jumps
 from verify.solvers.xfem_account import Account
@@ -184,7 +184,11 @@ class Mover:
     def _inertia(self, virtual: VirtualMesh, density: float) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a cut mesh, with the penalty if there is to be one."""
         if self.choice.slivers != "penalise":
-            return self._law(virtual), MASSES[self.choice.mass](virtual, density)
+            try:
+                mass = MASSES[self.choice.mass](virtual, density)
+            except XfemError as error:  # a lumping of the thesis, where cuts cross
+                raise UnsupportedSceneError(f"mass = '{self.choice.mass}': {error}") from None
+            return self._law(virtual), mass
         kinematics = self.scene.analysis.kinematics
         treated = treat_moving_body(
             virtual, material_of(self.scene), density, "penalise", kinematics=kinematics
@@ -264,7 +268,7 @@ class Mover:
             size = float(f"{(b - a) / count:.14g}")  # the same up to round-off: one integrator
             self.step_sizes.add(size)
             if size not in integrators:
-                integrators[size] = SCHEMES[choice.scheme](body, size)
+                integrators[size] = self._integrator(body, size)
             for _ in range(1 if trial else count):
                 clock = perf_counter()
                 forces = integrators[size].step(state)
@@ -283,6 +287,12 @@ class Mover:
         newton = [one for one in integrators.values() if isinstance(one, NewtonIntegrator)]
         self.solves += sum(one.solves for one in newton)
         return outputs
+
+    def _integrator(self, body: DynamicBody, size: float) -> Integrator:
+        try:
+            return SCHEMES[self.choice.scheme](body, size)
+        except XfemError as error:  # explicit, with a mass that is not diagonal
+            raise UnsupportedSceneError(f"scheme = '{self.choice.scheme}': {error}") from None
 
     def _jumps(self, start: float, end: float) -> list[float]:
         """Return the times between the two at which a load or a support jumps."""
