@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from verify.report.notation import solver_title
+from verify.report.notation import SECONDARY, solver_title
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 
 __all__ = [
@@ -79,8 +79,13 @@ class Curve:
 
 
 def metric_names(result: CaseResult) -> list[str]:
-    """Return the names of the metrics that some solve has, in order of appearance."""
-    return list(dict.fromkeys(m.name for solve in result.solves for m in solve.metrics))
+    """Return the names of the metrics to show that some solve has, in order of appearance.
+
+    Of the errors beside the three main ones only those that the case judges are shown.
+    """
+    names = dict.fromkeys(m.name for solve in result.solves for m in solve.metrics)
+    judged = {verdict.metric for verdict in result.verdicts}
+    return [name for name in names if name not in SECONDARY or name in judged]
 
 
 def limits(point: Point) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 from verify.report.markup import Markup, joined, tag
 
 __all__ = [
+    "SECONDARY",
     "bytes_text",
     "error_title",
     "metric_title",
@@ -21,8 +22,30 @@ _METRICS = {
     "energy_norm": "relative energy-norm error",
     "jump_l2": "relative L² error of the jump across the cut",
     "strain_energy": "strain energy",
+    "displacement_max": "largest relative error of the displacement",
+    "opening_l2": "relative L² error of the opening profile",
+    "opening_max": "largest relative error of the opening profile",
+    "displacement_l2_near": "relative L² error of the displacement near tips",
+    "displacement_l2_far": "relative L² error of the displacement far from tips",
+    "energy_norm_near": "relative energy-norm error near tips",
+    "energy_norm_far": "relative energy-norm error far from tips",
+    "displacement_l2_max": "relative L² error of the displacement, largest over time",
+    "displacement_l2_mean": "relative L² error of the displacement, mean over time",
+    "energy_norm_max": "relative energy-norm error, largest over time",
+    "energy_norm_mean": "relative energy-norm error, mean over time",
+    "jump_l2_max": "relative L² error of the jump, largest over time",
+    "jump_l2_mean": "relative L² error of the jump, mean over time",
+    "energy_drift": "relative drift of the energy",
+    "energy_slope": "secular change of the energy, relative",
+    "energy_oscillation": "oscillation of the energy, relative",
+    "energy_jump": "relative jump of the energy at a cut",
+    "ledger_mismatch": "relative mismatch of the energy ledger",
+    "linear_momentum_drift": "relative change of the momentum",
+    "angular_momentum_drift": "relative change of the angular momentum",
 }
-_ERRORS = {"displacement_l2", "energy_norm", "jump_l2"}
+_ERRORS = set(_METRICS) - {"strain_energy"}
+# not drawn and not in tables unless the case judges them; they are in the exported files
+SECONDARY = _ERRORS - {"displacement_l2", "energy_norm", "jump_l2"}
 _SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference"}
 _MISSING = "–"
 

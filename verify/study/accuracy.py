@@ -77,7 +77,7 @@ def assess_accuracy(
         rows = [i for i, record in enumerate(records) if record.level == level]
         own = {i: s for i in rows if (s := _solved(records[i], solutions)) is not None}
         if body is None:
-            measured = [_noted(r, dict.fromkeys(_names(scene), missing)) for r in measured]
+            measured = [_noted(r, _named(scene, missing)) for r in measured]
         elif own:
             # the same points for all solvers of a level: their errors are compared
             rules = Rules(body, min(size_of(s) for s in own.values())) if reference else None
@@ -124,9 +124,10 @@ def _reference(
         return None, str(problem), body
 
 
-def _names(scene: Scene) -> list[str]:
-    """Names of all that is measured against a reference."""
-    return [*ERROR_NAMES, *(q.name for q in scene.quantities)]
+def _named(scene: Scene, reason: str) -> dict[str, str]:
+    """Say of everything that the case asks about why it was not measured."""
+    asked = [c.metric for c in scene.acceptance] + [q.name for q in scene.quantities]
+    return dict.fromkeys(["comparison", *asked], reason)
 
 
 def _solved(
@@ -152,7 +153,7 @@ def _measure(
     scene = one.scene
     assert scene is not None
     if defect := _defect(scene, one):
-        return _noted(record, dict.fromkeys([*_names(scene), *ACCOUNT], defect))
+        return _noted(record, _named(scene, defect))
     covered = one.coverage
     if abs(covered - 1) > 1e-9:
         record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
@@ -163,7 +164,8 @@ def _measure(
         kept, why = account_metrics(scene, one.solution, one.law)
         metrics, notes = metrics + kept, notes | why
     if reference is None:
-        notes = dict.fromkeys(_names(scene), missing) | notes
+        without = _named(scene, missing)
+        notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes
     elif not own:
         assert rules is not None
         errors, why, record = _errors(one, reference, rules, record)
@@ -209,7 +211,7 @@ def _errors(
     try:
         history = error_history(one.motion, reference.motion, times, rules, one.law)
     except InputError as problem:  # the reference does not reach that far in time
-        return [], dict.fromkeys(ERROR_NAMES, str(problem)), record
+        return [], _named(one.scene, str(problem)), record
     metrics, notes = [], _time_note(history, reference)
     for name, norms in history.reported().items():
         found = spread_of(norms, one.body.dimension)
@@ -239,7 +241,7 @@ def _time_note(history: History, reference: Reference) -> dict[str, str]:
 
 def _rates(scene: Scene, records: Sequence[SolveRecord]) -> list[Rate]:
     """Rates of every error, and of every quantity that is not exact on some level."""
-    names = _names(scene)
+    names = [*ERROR_NAMES, *(q.name for q in scene.quantities)]
     rates = []
     for solver in dict.fromkeys(record.solver for record in records):
         own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
