@@ -133,6 +133,7 @@ def test_two_cuts_at_one_instant_leave_the_step_and_the_account_of_time():
     clock.seconds += 0.5
     assert pace.after_cut(1e-3, 0.25) == pytest.approx(2e-3)
     assert pace.after_cut(2e-3, 0.25) == 2e-3
+    assert pace.after_cut(2e-3, 0.26) == 2e-3  # a clock too coarse to have moved
     clock.seconds += 0.5
     assert pace.after_cut(2e-3, 0.75) == pytest.approx(2e-3)
 

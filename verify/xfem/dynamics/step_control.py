@@ -157,7 +157,7 @@ class MeasuredPace:
         step_size : float
             That since the last cut.
         time : float
-            Simulated time. If it has not moved since the last cut the step stays.
+            Simulated time. If it or the clock has not moved since the last cut the step stays.
 
         Raises
         ------
@@ -171,7 +171,7 @@ class MeasuredPace:
                 f"{passed:g} s of wall and {simulated:g} s of simulated time since the last cut; "
                 "expected neither to go back"
             )
-        if simulated == 0.0:
+        if simulated == 0.0 or passed == 0.0:
             return self.limits.apply(step_size)
         self._last = (wall, time)
         return self.limits.apply(step_size * passed / simulated)
