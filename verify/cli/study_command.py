@@ -4,44 +4,9 @@ import argparse
 import json
 import shlex
 import sys
-from collections.abc import Callable
 from dataclasses import asdict
-from time import perf_counter
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from verify.study.cost import CostStudy
 
 __all__ = ["execute"]
-
-
-def _cost(arguments: argparse.Namespace, announce: Callable[[str], None]) -> "CostStudy":
-    """Solve every step of the cut through the runner, whose directory is kept, and compare."""
-    from verify.cli.progress import progress_on
-    from verify.runner import Options, run_cases
-    from verify.runner.checking import check_solver_name
-    from verify.runner.reference_cache import cache_folder
-    from verify.scene import load_scene
-    from verify.study.cost import cost_study, growing_scenes
-
-    scene = load_scene(arguments.case)
-    solvers = tuple(dict.fromkeys(arguments.solvers)) or ("xfem", "conforming")
-    for name in solvers:
-        check_solver_name(name, "--solver")
-    scenes = growing_scenes(scene, arguments.steps)
-    options = Options(
-        solvers=solvers,
-        repetitions=arguments.repetitions,
-        # on the other mesh of this solver only the cut cells are made anew
-        parameters={"conforming": {"mesh": "remeshed"}} if "conforming" in solvers else {},
-        cache=cache_folder(),
-    )
-    start = perf_counter()
-    folder = arguments.out / f"cost-{scene.name.replace('/', '__')}"
-    announce(f"{len(scenes)} steps of the cut '{scene.cuts[0].name}', into {folder}")
-    with progress_on(sys.stderr) as progress:
-        results = run_cases(scenes, folder, options, progress).results
-    return cost_study(scene.name, results, arguments.metric, perf_counter() - start)
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -55,9 +20,11 @@ def execute(arguments: argparse.Namespace) -> int:
 
     make_directory(arguments.out)  # before minutes of work
     command = shlex.join(["verify", *sys.argv[1:]])
-    if arguments.study == "cost":
-        cost = _cost(arguments, announce)
-        findings, record, rows = cost.findings, cost.as_record(), cost.rows()
+    if arguments.study in ("cost", "budget"):
+        from verify.cli import case_studies
+
+        study = getattr(case_studies, arguments.study)(arguments, announce)
+        findings, record, rows = study.findings, study.as_record(), study.rows()
     elif arguments.study == "slivers":
         from verify.study.slivers import sliver_study
 

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from verify.cli.argument_types import count
+from verify.cli.argument_types import count, positive
 
 __all__ = ["add_study_command"]
 
@@ -13,12 +13,13 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
     """Add ``study`` to the command line."""
     command = add(
         "study",
-        "measure what slivers do, whether energy is kept, or what accuracy costs",
+        "measure what slivers do, what accuracy costs, where an error comes from, and more",
         "examples:\n  verify study slivers --quick --out studies\n"
         "  verify study slivers --dimension 2 --out studies\n"
         "  verify study energy --out studies\n"
         "  verify study cost statics/tissue_strip --steps 4 --solver xfem --solver conforming "
-        "--out studies\n\n"
+        "--out studies\n"
+        "  verify study budget statics/tissue_strip --tolerance 0.05 --out studies\n\n"
         "Writes NAME.json, NAME.csv and NAME.html into the directory. Exit code 0 whatever the\n"
         "findings say: they compare methods, most of which are known to fail somewhere.",
     )
@@ -38,6 +39,7 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
         )
         kind.add_argument("--json", action="store_true", help="print the findings as JSON")
     _add_cost(kinds.add_parser)
+    _add_budget(kinds.add_parser)
 
 
 def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -55,6 +57,31 @@ def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
     kind.add_argument(
         "--metric", default="energy_norm", choices=("displacement_l2", "energy_norm", "jump_l2"),
         help="the error that is held equal (default: energy_norm)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--repetitions", metavar="N", type=count, default=5,
+        help="timed repetitions of each solve (default: 5)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
+    )
+    kind.add_argument("--json", action="store_true", help="print the findings as JSON")
+
+
+def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
+    text = "where the error of the XFEM answer comes from, and the cheapest adequate model"
+    kind = add("budget", help=text, description=f"{text[0].upper()}{text[1:]}.")
+    kind.add_argument("case", metavar="CASE", help="name of a case, or a case file; plane, static")
+    kind.add_argument(
+        "--level", metavar="K", type=int, help="mesh level that is taken apart (default: finest)"
+    )
+    kind.add_argument(
+        "--tolerance", metavar="T", type=positive, default=0.05,
+        help="relative error that is good enough (default: 0.05)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--metric", default="displacement_l2",
+        help="displacement_l2, energy_norm or a quantity of the case (default: displacement_l2)",
     )  # fmt: skip
     kind.add_argument(
         "--repetitions", metavar="N", type=count, default=5,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.report.budget_figures import budget_section
 from verify.report.cost_study_figures import cost_section
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import number
@@ -25,6 +26,7 @@ _TITLES = {
     "slivers": "What slivers do",
     "energy": "Whether energy and momenta are kept",
     "cost": "What accuracy costs while a cut grows",
+    "budget": "Where the error comes from, and the cheapest adequate model",
 }
 
 
@@ -64,7 +66,13 @@ def _page(record: Mapping[str, Any], kind: str) -> Markup:
         tag("title", _TITLES[kind]),
         tag("style", Markup(style + MAP_STYLE)),
     )
-    body = {"slivers": _slivers, "energy": _energy, "cost": cost_section}[kind](record)
+    sections = {
+        "slivers": _slivers,
+        "energy": _energy,
+        "cost": cost_section,
+        "budget": budget_section,
+    }
+    body = sections[kind](record)
     shortened = tag(
         "p", "Note: quick: fewer sizes and shorter runs than the whole study.", class_="warning"
     )

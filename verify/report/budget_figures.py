@@ -1,0 +1,104 @@
+"""Figures of an error budget: a bar per source, and what each model costs."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from verify.report.axes import WIDTH, text
+from verify.report.markup import Markup, joined, tag
+from verify.report.notation import metric_title, number
+
+__all__ = ["budget_section"]
+
+_ROW, _LEFT, _RIGHT, _TOP = 30, 178, 60, 30
+_COLOUR, _TOTAL = "#0067a5", "#4d4d4d"
+
+
+def budget_section(record: Mapping[str, Any]) -> Markup:
+    """Return the figures and tables of the record of a budget study."""
+    figures = [tag("figure", _bars(budget)) for budget in record["budgets"]]
+    links = tag("ol", [tag("li", name) for name in record["chain"]])
+    notes = tag("ul", [tag("li", note) for note in record["notes"]]) if record["notes"] else None
+    return joined(
+        tag(
+            "section",
+            tag("h2", f"Where the error of level {record['level']} comes from"),
+            tag(
+                "p",
+                "One thing is changed at a time. Parts of a quantity are signed and add up to its "
+                "total; those of a norm are lengths, and the total is at most their sum. Lines are "
+                "the uncertainty of the references on both sides and of the integration.",
+                class_="quiet",
+            ),
+            links,
+            notes,
+            tag("div", figures, class_="panels"),
+        ),
+        tag(
+            "section",
+            tag("h2", "What each model costs"),
+            tag(
+                "p",
+                "Against the problem with finite rotations and the cut as asked; one thread, "
+                "without the background mesh. In bold: certain to be within "
+                f"{100 * record['tolerance']:.3g} % of {metric_title(record['metric'])}.",
+                class_="quiet",
+            ),
+            tag("div", _candidates(record), class_="scroll"),
+        ),
+    )
+
+
+def _bars(budget: Mapping[str, Any]) -> Markup:
+    parts = [*budget["parts"], budget["total"]]
+    ends = [p["value"] + s * p["uncertainty"] for p in parts for s in (-1, 1)]
+    low, high = min(0.0, *ends), max(0.0, *ends)
+    length = (high - low) or 1.0
+    x0, x1 = _LEFT, WIDTH - _RIGHT
+    height = _TOP + _ROW * len(parts) + 8
+
+    def x(value: float) -> float:
+        return x0 + (value - low) / length * (x1 - x0)
+
+    content = [text(2, 12, metric_title(budget["metric"]) + ", relative", class_="axis")]
+    for row, part in enumerate(parts):
+        y = _TOP + _ROW * row
+        colour = _TOTAL if row == len(parts) - 1 else _COLOUR
+        left, right = sorted((x(0.0), x(part["value"])))
+        size = {"x": f"{left:.1f}", "y": f"{y:.1f}", "height": f"{_ROW - 12}"}
+        content.append(tag("rect", width=f"{max(right - left, 0.5):.1f}", fill=colour, **size))
+        middle = y + (_ROW - 12) / 2
+        first, last = (x(part["value"] + s * part["uncertainty"]) for s in (-1, 1))
+        whisker = f"M{first:.1f} {middle - 4:.1f}v8m0 -4H{last:.1f}m0 -4v8"
+        content.append(tag("path", d=whisker, class_="bar", stroke="#1b1b1b"))
+        content.append(text(x0 - 8, middle + 4, part["source"], text_anchor="end", class_="note"))
+        beyond = max(right, first, last) + 5
+        said = f"{100 * part['value']:.3g} %".replace("-", "−")
+        content.append(text(beyond, middle + 4, said, class_="note"))
+    content.append(tag("path", d=f"M{x(0.0):.1f} {_TOP - 6}V{height - 8}", class_="frame"))
+    label = f"{budget['metric']}: " + "; ".join(f"{p['source']} {p['value']:.3g}" for p in parts)
+    return tag("svg", tag("title", label), *content, viewBox=f"0 0 {WIDTH} {height}",
+               class_="panel", role="img", aria_label=label)  # fmt: skip
+
+
+def _candidates(record: Mapping[str, Any]) -> Markup:
+    titles = ("kinematics", "level", "h, m", "unknowns", "error", "between", "time, ms")
+    head = tag("tr", [tag("th", title, scope="col") for title in titles])
+    rows = []
+    for one in record["candidates"]:
+        if one["reason"]:
+            cells = [str(one["level"]), one["reason"], "", "", "", ""]
+            rows.append(tag("tr", tag("th", one["kinematics"], scope="row"),
+                            [tag("td", c) for c in cells]))  # fmt: skip
+            continue
+        enough = one["high"] is not None and one["high"] <= record["tolerance"]
+        times = f"{1e3 * one['seconds']:.3g} ({1e3 * one['fastest']:.3g} to "
+        cells = [
+            tag("td", str(one["level"])),
+            tag("td", f"{one['size']:.3g}"),
+            tag("td", str(one["unknowns"])),
+            tag("td", tag("b", number(one["error"])) if enough else number(one["error"])),
+            tag("td", f"{one['low']:.3g} to {one['high']:.3g}"),
+            tag("td", f"{times}{1e3 * one['slowest']:.3g})"),
+        ]
+        rows.append(tag("tr", tag("th", one["kinematics"], scope="row"), cells))
+    return tag("table", tag("thead", head), tag("tbody", rows), class_="map")

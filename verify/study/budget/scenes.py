@@ -1,0 +1,126 @@
+"""Scenes that differ from a given one in one thing: its kinematics, or its cut."""
+
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.errors import UnsupportedSceneError
+from verify.scene import Scene
+
+__all__ = ["on_realised_cut", "polylines_of", "with_kinematics"]
+
+Array = NDArray[np.float64]
+
+_SAME = 1e-10  # of the body's size: two corners this close are one
+_STRAIGHT = 1e-9
+
+
+def with_kinematics(scene: Scene, kinematics: str) -> Scene:
+    """Return `scene` in ``"linear"`` or ``"corotational"`` kinematics, without acceptance."""
+    return _changed(scene, kinematics, {"analysis": {"kinematics": kinematics}})
+
+
+def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) -> Scene:
+    """Return `scene` with the cuts that a solver realised on mesh `level`, and that level only.
+
+    Parameters
+    ----------
+    scene : Scene
+        Plane.
+    facets : (f, 2, 2) array
+        ``Solution.cut_facets``, m.
+    level : int
+        The mesh level that becomes the only one.
+    kinematics : str
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If the scene is not plane.
+    """
+    if scene.dimension != 2:
+        raise UnsupportedSceneError("the realised cut is taken as geometry in the plane only")
+    size = float(np.ptp(facets.reshape(-1, 2), axis=0).max()) if len(facets) else 0.0
+    cuts = [
+        {"kind": "polyline", "name": f"realised{i}", "points": line.tolist()}
+        for i, line in enumerate(polylines_of(facets, _SAME * size))
+    ]
+    energy = [{"kind": "strain_energy"}]  # the others may speak of a cut by its old name
+    mesh: dict[str, Any] = {}
+    if scene.mesh.cells is not None:
+        mesh["cells"] = [list(scene.mesh.cells[level])]
+    if scene.mesh.sizes is not None:
+        mesh["sizes"] = [scene.mesh.sizes[level]]
+    changes = {"cuts": cuts, "quantities": energy, "mesh": mesh}
+    changes["analysis"] = {"kinematics": kinematics}
+    return _changed(scene, f"realised-{kinematics}", changes)
+
+
+def _changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
+    content = scene.model_dump(mode="json", by_alias=True)
+    content |= {"acceptance": [], "tags": []}
+    for key, value in update.items():
+        content[key] = {**content[key], **value} if isinstance(value, dict) else value
+    changed = Scene.model_validate(content)
+    changed._file = scene.file or Path(f"{scene.name}.toml")
+    changed._name = f"{scene.name}@{name}"
+    return changed
+
+
+def polylines_of(facets: Array, tolerance: float) -> list[Array]:
+    """Join segments (f, 2, 2) to polylines, split where more than two of them meet.
+
+    Corners within `tolerance` are one; those on a straight line are left out. A closed line
+    begins and ends in the same corner.
+    """
+    corners, ends = _numbered(facets, tolerance)
+    beside: dict[int, set[int]] = defaultdict(set)
+    for a, b in ends:
+        if a != b:
+            beside[a].add(b)
+            beside[b].add(a)
+    unused = {frozenset((a, b)) for a, b in ends if a != b}
+    starts = [node for node in beside if len(beside[node]) != 2] + list(beside)
+    lines = []
+    for start in starts:
+        for step in sorted(beside[start]):
+            if frozenset((start, step)) not in unused:
+                continue
+            line = [start, step]
+            unused.discard(frozenset(line))
+            while len(beside[line[-1]]) == 2 and line[-1] != start:
+                onwards = next(iter(beside[line[-1]] - {line[-2]}))
+                edge = frozenset((line[-1], onwards))
+                if edge not in unused:
+                    break
+                unused.discard(edge)
+                line.append(onwards)
+            lines.append(_without_straight(corners[line]))
+    return lines
+
+
+def _numbered(facets: Array, tolerance: float) -> tuple[Array, list[tuple[int, int]]]:
+    points = facets.reshape(-1, 2)
+    number = np.full(len(points), -1)
+    kept: list[Array] = []
+    for i, point in enumerate(points):
+        for j, other in enumerate(kept):
+            if np.abs(point - other).max() <= tolerance:
+                number[i] = j
+                break
+        else:
+            number[i] = len(kept)
+            kept.append(point)
+    pairs = [(int(a), int(b)) for a, b in number.reshape(-1, 2)]
+    return np.array(kept).reshape(-1, 2), pairs
+
+
+def _without_straight(line: Array) -> Array:
+    step = np.diff(line, axis=0)
+    step /= np.linalg.norm(step, axis=1)[:, None]
+    turn = np.abs(step[:-1, 0] * step[1:, 1] - step[:-1, 1] * step[1:, 0])
+    keep = np.concatenate([[True], turn > _STRAIGHT, [True]])
+    return np.asarray(line[keep])
