@@ -32,7 +32,7 @@ class Quality:
         Of the volume that the surface encloses, likewise; NaN for a membrane.
     loose_edges : int
         Edges (2D: vertices) of the surface of the material that are not used as often in one
-        direction as in the other: 0 is closed.
+        direction as in the other: 0 is closed. Not counted for a membrane, which encloses nothing.
     inverted_elements : int
         Pieces whose virtual element is inside out; 0 for a membrane, where that means nothing.
     largest_stretch : float
@@ -64,13 +64,13 @@ def quality_of(session: Session) -> Quality:
     solid = virtual.mesh.dim == virtual.mesh.space
     inverted = int((np.linalg.det(gradients) < 0.0).sum()) if solid else 0
     enclosed, loose = float("nan"), 0
-    if session.surfaces.material is not None:
+    if solid:
         surface = session.surfaces.material.surface
         enclosed = abs(_enclosed(surface) / whole - 1.0)
         loose = _loose_edges(surface.facets.rows[surface.used])
     shown = session.surfaces.visual or session.surfaces.material
     turned, astray = 0, 0
-    if shown is not None and virtual.mesh.dim == 3:
+    if virtual.mesh.space == 3:
         turned, astray = _bad_facets(shown.surface, displacement, gradients, stretch)
     return Quality(
         abs(float(virtual.volumes.sum()) / whole - 1.0),

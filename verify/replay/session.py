@@ -16,7 +16,6 @@ from verify.xfem.corotational import InternalForce
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
-from verify.xfem.dynamics.taut_euler import TautEuler
 from verify.xfem.energy_ledger import EnergyLedger
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.tool_path import ToolPath
@@ -59,8 +58,7 @@ class Session:
         for path in stage.strokes:
             self.cutter.begin(path)
         self.surfaces = Surfaces(stage, self.cutter)
-        touchable = self.surfaces.touchable
-        self.collider = None if touchable is None else SurfaceCollider(touchable)
+        self.collider = SurfaceCollider(self.surfaces.touchable)
         self.records: list[StepRecord] = []
         self._start: dict[int, _Floats] = {}
         self._tool_load: _Floats | None = None
@@ -162,8 +160,7 @@ class Session:
             supports=self._grips.supports,
             damping=stage.damping,
         )
-        scheme = TautEuler if stage.is_membrane else RealTimeEuler
-        self.integrator = scheme(self.body, stage.time_step)
+        self.integrator = RealTimeEuler(self.body, stage.time_step)
 
     def _load(self, time: float) -> _Floats:
         force = self._grips.force(time)
@@ -171,8 +168,6 @@ class Session:
 
     def _collide(self) -> int:
         """Let the collision surface follow, and ask where the tools touch it."""
-        if self.collider is None:
-            return 0
         self.collider.refit(self.state.displacement)
         if self.collider.positions.shape[1] == 2:
             return 0  # a blade in the plane is a point
@@ -192,7 +187,7 @@ class Session:
         """Let the blade drag what it touches along, from the next step on."""
         self._tool_load = None
         surface = self.surfaces.touchable
-        if self.stage.tool_force == 0.0 or surface is None:
+        if self.stage.tool_force == 0.0:
             return
         load, h = np.zeros(self.body.shape), self.stage.time_step
         for contacts, path in touched:

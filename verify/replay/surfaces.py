@@ -1,7 +1,6 @@
 """Surfaces of a played body: that of the material itself, one to see, one to touch.
 
-Those of a solid are separate. A plane body and a membrane are their own surface: the triangles of
-their pieces.
+Those of a solid can be separate meshes. A plane body and a membrane are their own surface.
 """
 
 import numpy as np
@@ -51,15 +50,15 @@ class Surfaces:
 
     Attributes
     ----------
-    material : BodySurface or None
-        Closed around the material; None for a membrane, which encloses nothing.
+    material : BodySurface
+        Closed around the material; of a membrane, its triangles.
     visual, collision : EmbeddedSurface or None
         Where the stage has separate ones.
     """
 
     def __init__(self, stage: Stage, cutter: SemiProgressiveCutter) -> None:
         self._cutter = cutter
-        self.material = None if stage.is_membrane else BodySurface(cutter.body)
+        self.material = BodySurface(cutter.body)
         self.visual = None if stage.visual is None else EmbeddedSurface(cutter, *stage.visual)
         self.collision = (
             None if stage.collision is None else EmbeddedSurface(cutter, *stage.collision)
@@ -87,16 +86,14 @@ class Surfaces:
         return {name: surface.surface for name, surface in found.items() if surface is not None}
 
     @property
-    def touchable(self) -> MovingSurface | None:
-        """The surface that tools collide with; None for a membrane."""
-        chosen = self.collision or self.material
-        return None if chosen is None else chosen.surface
+    def touchable(self) -> MovingSurface:
+        """The surface that tools collide with."""
+        return (self.collision or self.material).surface
 
     def picture(self, virtual: VirtualMesh, displacement: _Floats) -> Picture:
         """Draw the body as it is now: the visual surface with the faces of the cuts."""
-        if virtual.mesh.dim == 2:
+        if virtual.mesh.space == 2:
             return _pieces(virtual, displacement)
-        assert self.material is not None
         inside = self.material.surface
         parts = [(inside, inside.used)]
         if self.visual is not None:
@@ -113,7 +110,7 @@ class Surfaces:
 
 
 def _pieces(virtual: VirtualMesh, displacement: _Floats) -> Picture:
-    """Draw a plane body or a membrane: its whole triangles and the parts of the split ones."""
+    """Draw a plane body: its whole triangles and the parts of the split ones."""
     piece, at, _ = virtual.solid_simplices
     corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
     turned = np.linalg.det(at) < 0.0  # sub-simplices come in the order of their numbers

@@ -1,0 +1,39 @@
+"""Stages that the tests share."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from verify.anatomy.procedural import procedural_face
+from verify.replay import Stage, stage_of
+from verify.scene import load_scene
+
+CASES = Path(__file__).resolve().parents[2] / "cases" / "thesis"
+
+
+def stage(name: str, **changes) -> Stage:
+    return replace(stage_of(load_scene(CASES / f"{name}.toml")), **changes)
+
+
+@pytest.fixture(scope="session")
+def hand() -> Stage:
+    return stage("hand_straight")
+
+
+@pytest.fixture(scope="session")
+def block() -> Stage:
+    return stage("block_cut_once")
+
+
+@pytest.fixture(scope="session")
+def coarse_face() -> Stage:
+    """The face with 1200 triangles in place of 7500: what costs time here is the solve."""
+    from verify.replay import Hold
+    from verify.xfem.mesh import SimplexMesh
+
+    points, triangles, rim = procedural_face().triangulate(1200)
+    whole = stage("face_incision", hooks=[], strokes=[])
+    held = Hold(np.arange(len(points)) < rim, (0, 1, 2), np.zeros(3))
+    return replace(whole, mesh=SimplexMesh(points, triangles), holds=[held])

@@ -1,0 +1,133 @@
+"""The hand scene of the thesis, 1000 tetrahedra: a sound body at every step, delays, cost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from verify.calibration import kernel_seconds
+from verify.replay import PHASES, Session, quality_of
+from verify.replay.timings import timings_of
+from verify.xfem.tool_path import ToolPath
+
+ROUND_OFF = 1e-12
+
+
+@pytest.fixture(scope="module")
+def opened(hand):
+    """The scene played to its end, with what was measured after every third step."""
+    session = Session(hand)
+    found = []
+    while not session.finished:
+        session.step()
+        if session.records[-1].newly_split or session.records[-1].step % 5 == 0:
+            found.append(quality_of(session))
+    return session, found
+
+
+def test_the_hand_is_that_of_the_thesis(hand) -> None:
+    assert 0.97 * 1000 <= len(hand.mesh.cells) <= 1.03 * 1000
+    # "in all the analyzed meshes the number of cut elements does not exceed 50" for 6 cm
+    length = np.linalg.norm(np.diff(hand.strokes[0].blades[:, 0], axis=0), axis=1).sum()
+    assert 0.058 < length <= 0.06
+
+
+def test_every_step_says_what_each_of_its_phases_took(opened) -> None:
+    session, _ = opened
+    assert len(session.records) == session.stage.steps
+    for record in session.records:
+        assert tuple(record.seconds) == PHASES
+        assert record.seconds["motion"] > 0.0
+        assert (record.seconds["assembly"] > 0.0) or record.newly_split == 0
+
+
+def test_volume_and_surfaces_are_sound_at_every_step(opened) -> None:
+    _, found = opened
+    assert len(found) > 40
+    for quality in found:
+        assert quality.volume_error < ROUND_OFF
+        assert quality.enclosed_error < ROUND_OFF
+        assert quality.loose_edges == 0
+        assert quality.inverted_elements == 0
+        assert quality.inverted_facets == 0
+        assert quality.stray_facets == 0
+
+
+def test_the_incision_opens_by_as_much_as_it_is_pulled(opened) -> None:
+    session, _ = opened
+    across = np.zeros(2)
+    for k, (hook, side) in enumerate(zip(session.stage.hooks, (-1.0, 1.0), strict=True)):
+        node = np.flatnonzero(session.virtual.node_side[:, 0] == hook.side)
+        away = np.linalg.norm(session.virtual.node_points[node] - hook.at, axis=1)
+        across[k] = side * session.state.displacement[node[np.argmin(away)], 0]
+    np.testing.assert_allclose(across, 0.011, rtol=1e-9)  # 22 mm between the hooks
+
+
+def test_the_account_of_energies_closes_and_nothing_is_gained(opened) -> None:
+    session, _ = opened
+    largest = max(record.work for record in session.records)
+    assert largest > 1e-4
+    for record in session.records:
+        balance = record.mechanical - record.work + record.dissipated
+        assert abs(balance) < 1e-9 * largest
+        assert record.mechanical <= record.work + 1e-9 * largest
+
+
+def straight(hand, speed: float) -> Session:
+    begin, end = hand.strokes[0].blades[[0, -1]]
+    duration = float(np.linalg.norm(end[0] - begin[0])) / speed
+    path = ToolPath(np.stack([begin, end]), [0.0, duration])
+    stage = replace(
+        hand, strokes=[path], hooks=[], duration=1.01 * duration, time_step=duration / 30,
+        visual=None, collision=None,
+    )  # fmt: skip
+    session = Session(stage, account=False)
+    session.run()
+    return session
+
+
+def test_the_delay_of_an_element_is_its_length_along_the_path_over_the_speed(hand) -> None:
+    """Table 4.6 without the machine in it: twice the speed is half the delay, to round-off."""
+    slow, fast = straight(hand, 0.02), straight(hand, 0.08)
+    crossed = [session.cutter.crossings for session in (slow, fast)]
+    np.testing.assert_array_equal(np.sort(crossed[0].cell), np.sort(crossed[1].cell))
+    order = [np.argsort(c.cell) for c in crossed]
+    delays = [c.delay[o] for c, o in zip(crossed, order, strict=True)]
+    np.testing.assert_allclose(delays[0], 4.0 * delays[1], rtol=1e-9, atol=1e-12)
+    # an element is no longer along the path than its longest edge
+    edges = np.linalg.norm(slow.stage.mesh.edge_vectors, axis=2).max()
+    assert 0.0 < delays[0].max() * 0.02 <= 1.5 * edges
+    recorded = np.concatenate([record.delay for record in slow.records])
+    assert len(recorded) == len(crossed[0].cell)
+
+
+def slashed(hand):
+    """Three parallel strokes through about 200 of the 1000 elements, one after the other."""
+    strokes = []
+    for k, x in enumerate((-0.025, -0.003, 0.02)):
+        tips = np.array([[x, -0.042, 0.04], [x + 0.006, 0.042, 0.04]])
+        strokes.append(ToolPath.of_tip(tips, [0.4 * k, 0.4 * k + 0.4], [0.0, 0.0, -0.07]))
+    return replace(hand, strokes=strokes, hooks=[], duration=2.0)
+
+
+@pytest.mark.timing
+def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
+    """For the reader: absolute times. Asserted: ratios to a kernel of the same machine.
+
+    A step (the kernel takes about 10 ms) is a factorisation of 1400 unknowns and two small
+    sweeps; a step that cuts also makes mass, sparsity and solver anew.
+    """
+    Session(slashed(hand), account=False).run()  # compiles
+    session = Session(slashed(hand), account=False)
+    records = session.run()
+    kernel = float(np.median(kernel_seconds()))
+    assert 170 <= records[-1].split <= 260
+    timings = timings_of(records)
+    with capsys.disabled():
+        phases = ", ".join(f"{k} {1e3 * v:.2f}" for k, v in timings.median.items())
+        print(f"\nhand, {len(session.stage.mesh.cells)} tetrahedra, {records[-1].split} cut: "
+              f"median ms {phases}; a cutting step {1e3 * timings.cutting_median:.2f}; "
+              f"within {timings.within}; kernel {1e3 * kernel:.2f}")  # fmt: skip
+    rest = [record.total_seconds for record in records if record.newly_split == 0]
+    assert np.median(rest) < 1.0 * kernel
+    assert timings.cutting_median < 3.0 * kernel
