@@ -115,17 +115,18 @@ class Mover:
         """Run all stages and carry the fields of each to the finally cut mesh."""
         initial = self.scene.initial
         open_before = isinstance(initial, Equilibrium) and initial.cuts == "open"
-        virtual = self._cut(self.opens.count(0.0) if open_before else 0)
+        opened = self.opens.count(0.0) if open_before else 0
+        virtual = self._cut(opened)
         body = self._body(virtual)
         state = self._initial(body)
         starts = sorted({0.0, *self.opens})
         fields: list[tuple[VirtualMesh, MotionState]] = []
         for k, start in enumerate(starts):
             count = sum(opens <= start for opens in self.opens)
-            if count:
+            if count > opened:
                 further = self._cut(count)
                 state = self._inherited(virtual, further, state)
-                virtual, body = further, self._body(further)
+                virtual, body, opened = further, self._body(further), count
             last = k == len(starts) - 1
             end = float(self.times[-1]) if last else starts[k + 1]
             wanted = self.times[(self.times >= start) & ((self.times < end) | last)]
