@@ -17,12 +17,13 @@ _HELD = 1e-9  # lever of the supports over the size of the piece, below which it
 
 
 def constrained_values(
-    scene: Scene, space: ConformingSpace, exact: Any
+    scene: Scene, space: ConformingSpace, exact: Any, share: float = 1.0
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Unknowns that the supports hold, and their values.
 
     A discontinuous prescribed field is taken on the side of the cell that owns the node. A later
-    support wins where two hold the same node.
+    support wins where two hold the same node. A `share` below 1 is a point on the way there: of
+    displacements, and of the angle by which a support turns.
 
     Returns
     -------
@@ -45,9 +46,10 @@ def constrained_values(
         held = list(support.held(d))
         if support.displacement == "exact":
             near = space.centroids[owner[chosen]]
-            value[np.ix_(nodes[chosen], held)] = exact.displacement(points[chosen], near)[:, held]
+            found = share * exact.displacement(points[chosen], near)[:, held]
         else:
-            value[np.ix_(nodes[chosen], held)] = support.values(points[chosen])
+            found = support.values(points[chosen], share)
+        value[np.ix_(nodes[chosen], held)] = found
     _check_every_piece_is_held(scene, space, value)
     flat = value.ravel()
     unknowns = np.flatnonzero(~np.isnan(flat)).astype(np.int32)

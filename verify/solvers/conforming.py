@@ -170,12 +170,12 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Equilibri
                 "residual": f"{linear.answer.residual:.1e}",
             },
         )
-    unknowns, values = constrained_values(scene, space, exact)
+    unknowns, _ = constrained_values(scene, space, exact)
     finite = solve_large_strain(
         scene.material,
         space,
         unknowns,
-        lambda factor: factor * values,
+        lambda factor: constrained_values(scene, space, exact, factor)[1],
         lambda v: load_form(scene, space, v, exact),
     )
     return _Equilibrium(
