@@ -29,8 +29,13 @@ _CHILDREN = {
 }
 
 
-def refine_uniformly(points: Array, cells: Cells, facets: Cells) -> tuple[Array, Cells, Cells]:
-    """Halve all edges.
+def refine_uniformly(
+    points: Array, cells: Cells, facets: Cells, times: int = 1
+) -> tuple[Array, Cells, Cells]:
+    """Halve all edges, once or several times.
+
+    All times in one call: the descendants of a tetrahedron have three shapes only if its corners
+    keep their order from level to level.
 
     Parameters
     ----------
@@ -39,20 +44,26 @@ def refine_uniformly(points: Array, cells: Cells, facets: Cells) -> tuple[Array,
         Positively oriented.
     facets : (f, d) array
         Marked facets, refined with the cells.
+    times : int
 
     Returns
     -------
-    points : (n + e, d) array
-    cells : (2^d m, d + 1) array
+    points : (…, d) array
+    cells : (2^(d·times) m, d + 1) array
         Positively oriented.
-    facets : (2^(d−1) f, d) array
+    facets : (2^((d−1)·times) f, d) array
     """
+    for _ in range(times):
+        points, cells, facets = _refine(points, cells, facets)
+    return points, oriented(points, cells), facets
+
+
+def _refine(points: Array, cells: Cells, facets: Cells) -> tuple[Array, Cells, Cells]:
     edges = mesh_edges(cells)
     count = len(points)
     keys = edges[:, 0] * count + edges[:, 1]
     points = np.vstack([points, points[edges].mean(axis=1)])
-    cells = _children(cells, keys, count)
-    return points, oriented(points, cells), _children(facets, keys, count)
+    return points, _children(cells, keys, count), _children(facets, keys, count)
 
 
 def _children(simplices: Cells, keys: Cells, count: int) -> Cells:

@@ -102,9 +102,7 @@ def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
     """
     if isinstance(scene.geometry, MeshFile):
         size = structure(scene, 0)
-        mesh = _imprinted(scene, size)
-        for _ in range(level):
-            mesh = refine_uniformly(*mesh)
+        mesh = refine_uniformly(*_imprinted(scene, size), times=level)
         return open_cut(*mesh), size.size / 2**level
     grading = _plane_grading(scene) if scene.dimension == 2 else _solid_grading(scene)
     grading = grading.halved(level)

@@ -1,0 +1,238 @@
+"""Linear elasticity in space against closed forms; directly, by multigrid, on several ranks."""
+
+import subprocess
+import sys
+from pathlib import Path
+from shutil import which
+
+import numpy as np
+import pytest
+from reference_scenes import energy_of, needs_fenicsx
+from solid_scenes import EXACT, SHAPES, cube, disc
+
+from reference.exact import exact_solution
+from verify.errors import InputError
+
+pytestmark = needs_fenicsx
+
+THROUGH = SHAPES["through"][0]
+NORMAL = [0.0, -0.2 / 3, 1.0]
+PATCH = {
+    "point": [0.5, 0.0, 0.4 + 0.2 / 3],
+    "normal": NORMAL,
+    "axis": [1.0, 0.0, 0.0],
+    "strain": [[0.1, -0.03], [-0.05, 0.02]],
+    "shift": [[0, 0, 0.1], [0, 0, -0.02]],
+}
+WAVES = {
+    "point": PATCH["point"],
+    "normal": NORMAL,
+    "above": [[0.1, 2.0, 1.0, 20.0], [0.05, -1.0, 3.0, 0.0], [0.04, 3.0, 1.5, 90.0]],
+    "below": [[-0.1, 1.0, 2.5, 0.0], [0.08, 2.0, 0.5, 40.0], [0.05, 1.0, -2.0, 10.0]],
+}
+
+
+def with_exact(name, parameters, cuts=THROUGH, **changes):
+    return cube(
+        cuts,
+        exact={"solution": name, "parameters": parameters},
+        **({"supports": EXACT, "loads": []} | changes),
+    )
+
+
+def energy_error(scene, **choices):
+    known = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    return energy_of(scene, **choices) / known.strain_energy(scene) - 1
+
+
+@pytest.mark.parametrize("mesh", ["imprinted", "remeshed"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_uniform_strain_on_each_side_of_a_cut_is_reproduced(mesh, degree):
+    scene = with_exact("solid_patch", PATCH)
+    # the imprinted cut is off by up to 3e-5 of an edge, and the energy by that times the jump
+    tolerance = 1e-5 if mesh == "imprinted" else 1e-11
+    assert abs(energy_error(scene, solver="conforming", mesh=mesh, degree=degree)) < tolerance
+
+
+def test_the_reference_reproduces_a_uniform_strain_on_each_side_of_a_cut():
+    assert abs(energy_error(with_exact("solid_patch", PATCH))) < 1e-11
+
+
+@pytest.mark.parametrize("degree, order", [(1, 2.0), (2, 4.0)])
+def test_smooth_fields_with_a_body_force_converge_with_twice_the_degree(degree, order):
+    force = [{"kind": "body_force", "force": "exact"}]
+    scene = with_exact(
+        "solid_smooth",
+        WAVES,
+        loads=force,
+        mesh={"cells": [[3] * 3, [6] * 3, [12] * 3][: 4 - degree]},
+    )
+    levels = range(len(scene.mesh.cells))
+    errors = [abs(energy_error(scene, solver="conforming", level=k, degree=degree)) for k in levels]
+    assert np.log2(errors[-2] / errors[-1]) == pytest.approx(order, abs=0.4)
+
+
+def test_an_exact_traction_does_the_work_of_an_exact_support():
+    # stress and strain are uniform on each side: the tractions are too
+    supports = [{"where": w, "displacement": "exact"} for w in ("top", "bottom")]
+    loads = [
+        {"kind": "traction", "where": w, "traction": "exact"}
+        for w in ("left", "right", "front", "back")
+    ]
+    scene = with_exact("solid_patch", PATCH, supports=supports, loads=loads)
+    assert abs(energy_error(scene, solver="conforming", mesh="remeshed", degree=2)) < 1e-9
+
+
+def test_a_bar_under_tension_is_in_uniaxial_stress():
+    scene = cube(
+        supports=[
+            {"where": "bottom", "displacement": [0], "components": ["z"]},
+            {"where": "left", "displacement": [0], "components": ["x"]},
+            {"where": "front", "displacement": [0], "components": ["y"]},
+        ],
+        loads=[{"kind": "traction", "where": "top", "traction": [0, 0, 3.0]}],
+    )
+    for solver in ("conforming", "reference"):
+        assert energy_of(scene, solver) == pytest.approx(4.5, rel=1e-10)  # ½ σ²/E
+
+
+def test_a_bar_that_hangs_under_its_weight_stretches_like_a_parabola():
+    from verify.solvers import find_solver
+
+    scene = cube(
+        geometry={"kind": "box", "lower": [0, 0, 0], "upper": [0.4, 0.3, 2.0]},
+        mesh={"cells": [[1, 1, 5]]},
+        material={"young": 1e4, "poisson": 0.0, "density": 1000.0},
+        supports=[{"where": "top", "displacement": [0, 0, 0]}],
+        loads=[{"kind": "gravity", "acceleration": [0, 0, -9.8]}],
+    )
+    solution = find_solver("reference").solve(scene, 0, repetitions=0)
+    below = 2.0 - solution.points[:, 2]
+    expected = -9800.0 * (2.0 * below - below**2 / 2) / 1e4
+    assert solution.displacement[0, :, 2] == pytest.approx(expected, abs=1e-9)
+
+
+class TestHowItIsSolved:
+    def solve(self, scene, method, size=0.22, degree=2):
+        from reference.elasticity import solve_linear
+        from reference.meshing import Grading, conforming_mesh
+        from reference.space import conforming_space
+
+        grading = Grading(size, np.zeros((0, 3)), 0.5, 2 / 3, curves=True)
+        space = conforming_space(conforming_mesh(scene, grading), degree)
+        return solve_linear(scene, space, None, method)
+
+    def test_multigrid_and_mumps_agree(self):
+        direct, iterative = (self.solve(cube([disc()]), m) for m in ("direct", "multigrid"))
+        assert iterative.strain_energy == pytest.approx(direct.strain_energy, rel=1e-10)
+        scale = np.abs(direct.displacement).max()
+        assert np.abs(iterative.displacement - direct.displacement).max() < 1e-8 * scale
+        assert iterative.answer.residual <= 1e-10
+
+    def test_iterations_do_not_grow_with_the_mesh(self):
+        found = [self.solve(cube([disc()]), "multigrid", h, 1) for h in (0.24, 0.12)]
+        few, many = (one.answer.iterations for one in found)
+        assert found[1].displacement.size > 6 * found[0].displacement.size
+        assert many <= 1.5 * few
+
+    def test_a_residual_that_cannot_be_reached_is_said(self):
+        from reference.elasticity import solve_linear
+        from reference.meshing import Grading, conforming_mesh
+        from reference.space import conforming_space
+
+        scene = cube()
+        space = conforming_space(conforming_mesh(scene, Grading(0.4, np.zeros((0, 3)))), 1)
+        with pytest.raises(RuntimeError, match="left a residual of"):
+            solve_linear(scene, space, None, "multigrid", tolerance=1e-40)
+
+
+@pytest.mark.parametrize(
+    "supports, words",
+    [
+        ([{"where": "top", "displacement": [0, 0, 0]}], "is held by no support"),
+        (
+            [
+                {"where": "bottom", "displacement": [0, 0, 0]},
+                {"where": "top", "displacement": [0, 0], "components": ["y", "z"]},
+            ],
+            "can still move in x",
+        ),
+        (
+            [
+                {"where": "bottom", "displacement": [0, 0, 0]},
+                {"where": "x < 1e-12 and z > 0.999999", "displacement": [0, 0, 0]},
+            ],
+            "can still turn",
+        ),
+    ],
+    ids=["nothing", "rollers", "an edge"],
+)
+def test_a_piece_left_a_rigid_motion_is_named_with_the_motion(supports, words):
+    with pytest.raises(InputError, match=words):
+        energy_of(cube(THROUGH, supports=supports), "conforming")
+
+
+_PARALLEL = """
+import sys
+sys.path.insert(0, {tests!r})
+from mpi4py import MPI
+from reference.dolfinx_versions import import_dolfinx
+import_dolfinx()
+import numpy as np
+from solid_scenes import cube, disc
+from reference.elasticity import solve_linear
+from reference.meshing import Grading, conforming_mesh
+from reference.space import conforming_space
+
+world = MPI.COMM_WORLD
+loads = [dict(kind="gravity", acceleration=[0, 0, -1]),
+         dict(kind="traction", where="top", traction=[0.1, 0, 1.0])]
+scene = cube([disc()], loads=loads)
+mesh = None
+if world.rank == 0:
+    mesh = conforming_mesh(scene, Grading({size}, np.zeros((0, 3)), 0.5, 2 / 3, curves=True))
+mesh = world.bcast(mesh)
+space = conforming_space(mesh, {degree}, world)
+found = solve_linear(scene, space, None, {method!r})
+import resource
+memory = world.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+if world.rank == 0:
+    print(world.size, found.displacement.size, repr(found.strain_energy),
+          repr(float(np.linalg.norm(found.displacement))), memory / 1e6,
+          sum(found.timings.values()))
+"""
+
+
+def on_ranks(count, size, degree, method):
+    """Size, energy, norm of the displacement, GB and seconds of a solve on some ranks."""
+    beside = Path(sys.executable).with_name("mpiexec")
+    mpiexec = str(beside) if beside.exists() else which("mpiexec")
+    if mpiexec is None:
+        pytest.skip("needs mpiexec")
+    script = _PARALLEL.format(
+        tests=str(Path(__file__).parent), size=size, degree=degree, method=method
+    )
+    done = subprocess.run(
+        [mpiexec, "-n", str(count), sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        cwd=Path(__file__).parents[2],
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    ranks, *values = done.stdout.split()
+    assert int(ranks) == count
+    return [float(value) for value in values]
+
+
+@pytest.mark.parametrize("degree, method", [(1, "direct"), (2, "multigrid")])
+def test_two_ranks_give_the_answer_of_one(degree, method):
+    one, two = (on_ranks(count, 0.3, degree, method)[:3] for count in (1, 2))
+    assert two == pytest.approx(one, rel=1e-10)
+
+
+@pytest.mark.heavy
+def test_a_million_unknowns_are_solved_on_two_ranks_within_five_gigabytes():
+    size, _, _, memory, _ = on_ranks(2, 0.0725, 2, "multigrid")
+    assert size > 0.85e6
+    assert memory < 5.0
