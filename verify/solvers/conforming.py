@@ -37,13 +37,6 @@ def _refusal(scene: Scene) -> str | None:
         return "dynamics is not offered by the reference yet"
     if scene.dimension == 3 and scene.analysis.kinematics != "linear":
         return "finite rotations in space are not offered by the reference yet"
-    if scene.analysis.kinematics == "corotational" and any(
-        quantity.kind == "strain_energy" for quantity in scene.quantities
-    ):
-        return (
-            "strain energies at finite rotation are not compared yet; ask for displacements and "
-            "openings in [[quantities]]"
-        )
     return None
 
 
