@@ -86,6 +86,7 @@ def front_intensity(
     at = front.coordinates(solution.points[corners])
     away = np.hypot(at.ahead, at.across)
     centres, width = _stations(front, stations)
+    on = away <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
     values = []
     for radius in np.atleast_1d(np.asarray(radii, dtype=float)):
         fall = np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0)
@@ -99,7 +100,7 @@ def front_intensity(
             for start in range(0, len(cells), _CHUNK):
                 part = cells[start : start + _CHUNK]
                 total += _interaction(solution, material, front, part, q, place, body_force)
-            extent = front.length if width is None else width
+            extent = _mean_length(front, at.along[on], weight[on])
             modulus = 0.5 * material.young / (1 - material.poisson**2)
             row.append(total * [modulus, modulus, hooke(material).shear] / extent)
         values.append(row)
@@ -120,13 +121,22 @@ def _stations(front: Front, count: int) -> tuple[Array, float | None]:
 
 
 def _hat(front: Front, along: Array, centre: float, width: float | None) -> Array:
-    """Weights of a station; the integral of the hat is its half width."""
+    """Weights of a station at places along the front."""
     if width is None:
         return np.ones(len(along))
     apart = along - centre
     if front.closed:
         apart = np.mod(apart + 0.5 * front.length, front.length) - 0.5 * front.length
     return np.clip(1.0 - np.abs(apart) / width, 0.0, 1.0)
+
+
+def _mean_length(front: Front, along: Array, weight: Array) -> float:
+    """Integrate the weight, linear between the nodes on the front, along the front."""
+    order = np.argsort(along, kind="stable")
+    s, w = along[order], weight[order]
+    if front.closed:
+        s, w = np.append(s, s[0] + front.length), np.append(w, w[0])
+    return float(np.sum(0.5 * (w[1:] + w[:-1]) * np.diff(s)))
 
 
 def _check_fit(solution: Solution, place: NDArray[np.int64], away: Array, radius: float) -> None:

@@ -1,0 +1,204 @@
+"""K_I, K_II, K_III and openings along fronts in space, against closed forms."""
+
+import numpy as np
+import pytest
+from reference_scenes import needs_fenicsx
+from solid_scenes import EXACT, cube
+
+from reference.exact import exact_solution
+from reference.fracture import CircularFront, StraightFront, face_opening, front_intensity
+from reference.fracture.front_modes import mode_field
+from reference.meshing import imprint_polygons, open_cut, structured_tetrahedra
+from verify.errors import InputError
+from verify.scene import Material
+from verify.solution import Solution
+
+SOLID = Material(young=1.0, poisson=0.3)
+FRONT = StraightFront([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
+
+
+def prism_field(intensity, points, middles):
+    """Displacement of the plane tip fields and of mode III in a prism cut on x < 0, y = 0."""
+    k_1, k_2, k_3 = intensity
+    plane = Material(young=1.0, poisson=0.3, plane="strain")
+    tip = exact_solution("tip", {"tip": [0.0, 0.0], "intensity": [k_1, k_2]}, plane)
+    field = np.zeros((len(points), 3))
+    field[:, :2] = tip.displacement(points[:, :2], middles[:, :2])
+    y = np.where(np.abs(points[:, 1]) < 1e-12, np.sign(middles[:, 1]) * 1e-300, points[:, 1])
+    r, angle = np.hypot(points[:, 0], y), np.arctan2(y, points[:, 0])
+    field[:, 2] = k_3 * 2 / tip.law.shear * np.sqrt(r / (2 * np.pi)) * np.sin(angle / 2)
+    return field
+
+
+def prism(intensity, n=16):
+    """Give the exact field at the nodes of P2 elements on a box cut along x < 0, y = 0."""
+    grid = structured_tetrahedra((-1, -1, 0), (1, 1, 1), (n, n, n // 4))
+    plane = np.array([[-2, 0, -1], [0, 0, -1], [0, 0, 2], [-2, 0, 2.0]])
+    mesh = open_cut(*imprint_polygons(*grid, [plane]))
+    corner = mesh.points[mesh.cells]
+    middles = corner.mean(axis=1)
+    ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
+    # each cell has nodes of its own: the field is the same where the material holds together
+    nodes = np.concatenate([corner, *[0.5 * (corner[:, [i]] + corner[:, [j]]) for i, j in ends]], 1)
+    points = nodes.reshape(-1, 3)
+    near = np.repeat(middles, 10, axis=0)
+    field = prism_field(intensity, points, near)
+    return Solution(
+        points, np.arange(len(points)).reshape(-1, 10), field[None], order=2,
+        cut_facets=mesh.realised_cut,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("intensity", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.7, -0.4, 0.5)])
+def test_the_three_modes_are_told_apart_in_the_exact_fields_of_a_prism(intensity):
+    field = prism(intensity)
+    found = front_intensity(field, SOLID, FRONT, [0.4, 0.6, 0.8], stations=2)
+    # the interpolant's gradient is off by (h/r)² √r of K/E' at h = 1/8: percents next to the front
+    # only, where the fields change sign
+    assert found.modes == pytest.approx(np.tile(intensity, (2, 1)), abs=6e-3)
+    assert found.spread.max() < 6e-3
+
+
+def test_the_intensity_does_not_depend_on_the_axes():
+    field = prism((0.7, -0.4, 0.5), 8)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    turned = Solution(field.points @ turn.T, field.cells, field.displacement @ turn.T, order=2)
+    front = StraightFront(turn @ [0, 0, 0], turn @ [0, 0, 1], turn @ [1, 0, 0])
+    one = front_intensity(field, SOLID, FRONT, [0.7])
+    two = front_intensity(turned, SOLID, front, [0.7])
+    assert two.modes == pytest.approx(one.modes, abs=1e-10)
+
+
+@pytest.mark.parametrize("mode", [1, 2, 3])
+def test_the_curved_fields_are_what_differences_in_space_say(mode):
+    # around a circle: gradient of the displacement, divergence of the stress, and the misfit of
+    # the strains, by central differences of fields given in fixed axes
+    radius = 1.3
+    front = CircularFront([0, 0, 0], [0, 0, 1], radius)
+    rng = np.random.default_rng(2)
+    turn = rng.uniform(0, 2 * np.pi, 5)
+    ahead, across = rng.uniform(-0.3, 0.3, 5), rng.uniform(0.05, 0.3, 5)
+    points = np.column_stack(
+        [(radius + ahead) * np.cos(turn), (radius + ahead) * np.sin(turn), across]
+    )
+    law = exact_solution("linear", {"matrix": np.zeros((3, 3)).tolist()}, SOLID).law
+
+    def displacement(x):
+        at = front.coordinates(x)
+        r, angle = np.hypot(at.ahead, at.across), np.arctan2(at.across, at.ahead)
+        local = np.zeros((len(x), 3))
+        if mode == 3:
+            local[:, 2] = 2 / law.shear * np.sqrt(r / (2 * np.pi)) * np.sin(angle / 2)
+        else:
+            plane = Material(young=1.0, poisson=0.3, plane="strain")
+            k = [1.0, 0.0] if mode == 1 else [0.0, 1.0]
+            tip = exact_solution("tip", {"tip": [0.0, 0.0], "intensity": k}, plane)
+            local[:, :2] = tip.displacement(np.column_stack([at.ahead, at.across]))
+        return np.einsum("nij,ni->nj", at.axes, local)
+
+    def in_space(name, x):
+        at = front.coordinates(x)
+        tensor = getattr(mode_field(mode, SOLID, at.ahead, at.across, front.curvature), name)
+        return at.axes.swapaxes(1, 2) @ tensor @ at.axes
+
+    def difference(field, x):
+        h = 1e-4
+        steps = h * np.eye(3)
+        return np.stack([(field(x + s) - field(x - s)) / (2 * h) for s in steps], axis=-1)
+
+    at = front.coordinates(points)
+    field = mode_field(mode, SOLID, at.ahead, at.across, front.curvature)
+    assert difference(displacement, points) == pytest.approx(in_space("gradient", points), abs=1e-6)
+    divergence = np.einsum("nijj->ni", difference(lambda x: in_space("stress", x), points))
+    local = np.einsum("nij,nj->ni", at.axes, divergence)
+    assert local == pytest.approx(field.divergence, abs=1e-5)
+
+    def misfit(x):
+        gradient, stress = in_space("gradient", x), in_space("stress", x)
+        trace = np.trace(stress, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+        return 0.5 * (gradient + gradient.swapaxes(1, 2)) - (1.3 * stress - 0.3 * trace)
+
+    slope = np.einsum("nijk,nk->nij", difference(misfit, points), at.axes[:, 0])
+    assert at.axes @ slope @ at.axes.swapaxes(1, 2) == pytest.approx(field.misfit, abs=1e-5)
+
+
+def test_openings_behind_a_straight_front_are_those_of_the_exact_field():
+    found = face_opening(prism((1.0, 0.5, 0.3), 8), FRONT, 0.9)
+    size = np.sqrt(found.behind / (2 * np.pi))
+    # 8 K √(r/2π) / E' across and along, and 4 K_III √(r/2π) / μ
+    expected = np.outer(size, [8 * 0.91 * 0.5, 8 * 0.91 * 1.0, 4 * 2.6 * 0.3])
+    assert found.jump == pytest.approx(expected, abs=1e-12)
+    assert len(found.points) > 20
+
+
+@pytest.mark.parametrize("radius, words", [(0.05, "too small"), (-1.0, "too small")])
+def test_a_tube_that_does_not_fit_is_refused(radius, words):
+    with pytest.raises(InputError, match=words):
+        front_intensity(prism((1, 0, 0), 8), SOLID, FRONT, [radius])
+
+
+def test_a_front_where_no_cell_is_or_of_a_plane_field_is_refused():
+    away = StraightFront([0.03, 0.03, 0], [0.03, 0.03, 1], [1, 0, 0])
+    with pytest.raises(InputError, match="no cell of the mesh touches"):
+        front_intensity(prism((1, 0, 0), 8), SOLID, away, [0.5])
+    with pytest.raises(InputError, match="not across"):
+        StraightFront([0, 0, 0], [0, 0, 1], [0, 0, 1])
+
+
+class TestThePenny:
+    """A penny of radius 1 in a cube of side 4 with the exact field on its surface."""
+
+    pytestmark = needs_fenicsx
+    INTENSITY = 2 / np.sqrt(np.pi)
+    FRONT = CircularFront([0, 0, 0], [0, 0, 1], 1.0)
+
+    def solve(self, level, size=1.0):
+        from verify.solvers import find_solver
+
+        crack = {
+            "kind": "disc", "name": "crack", "centre": [0.0, 0, 0], "normal": [0.0, 0, 1],
+            "radius": 1.0,
+        }  # fmt: skip
+        scene = cube(
+            [crack],
+            geometry={"kind": "box", "lower": [-2, -2, -2], "upper": [2, 2, 2]},
+            exact={"solution": "penny", "parameters": {"a": 1.0, "tension": 1.0}},
+            supports=EXACT,
+            loads=[],
+            reference={"size": size},
+        )
+        return find_solver("reference").solve(scene, level, repetitions=0)
+
+    @pytest.fixture(scope="class")
+    def fields(self):
+        return [self.solve(level) for level in range(2)]
+
+    def test_the_energy_converges_with_order_three_at_the_front(self, fields):
+        errors = [field.ledger["strain"][0] / 32.244473884 - 1 for field in fields]
+        assert 0 < errors[1] < 4e-3
+        assert np.log2(errors[0] / errors[1]) > 2.6
+
+    def test_the_intensity_along_the_front_is_sneddons_to_three_thousandths(self, fields):
+        mean = front_intensity(fields[1], SOLID, self.FRONT, [0.4, 0.5])
+        assert mean.modes / self.INTENSITY == pytest.approx(np.array([[1.0, 0, 0]]), abs=1e-3)
+        assert mean.spread.max() < 1e-3
+        local = front_intensity(fields[1], SOLID, self.FRONT, [0.5], stations=4)
+        assert local.modes[:, 0] / self.INTENSITY == pytest.approx(np.ones(4), abs=3e-3)
+        assert np.abs(local.modes[:, 1:]).max() < 3e-3
+
+    def test_it_opens_by_its_ellipsoid(self, fields):
+        found = face_opening(fields[1], self.FRONT, 0.95)
+        exact = 8 * 0.91 / np.pi * np.sqrt(1 - (1 - found.behind) ** 2)
+        # cells at the front are 0.03 large and opened by too little; farther behind it heals
+        far = found.behind > 0.25
+        assert np.count_nonzero(far) > 50
+        assert found.jump[far, 1] == pytest.approx(exact[far], rel=0.03)
+        assert np.abs(found.jump[far][:, [0, 2]]).max() < 0.01
+
+    @pytest.mark.heavy
+    def test_its_energy_is_known_to_a_thousandth(self):
+        field = self.solve(0, 0.34)
+        assert field.ledger["strain"][0] == pytest.approx(32.244473884, rel=1e-3)
+        found = front_intensity(field, SOLID, self.FRONT, [0.3, 0.4, 0.5], stations=8)
+        assert found.modes[:, 0] / self.INTENSITY == pytest.approx(np.ones(8), abs=3e-3)
