@@ -1,20 +1,13 @@
 """Stages that the tests share."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from thesis_stages import stage
 
 from verify.anatomy.procedural import procedural_face
-from verify.replay import Stage, stage_of
-from verify.scene import load_scene
-
-CASES = Path(__file__).resolve().parents[2] / "cases" / "thesis"
-
-
-def stage(name: str, **changes) -> Stage:
-    return replace(stage_of(load_scene(CASES / f"{name}.toml")), **changes)
+from verify.replay import Stage
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import CASES, stage
+from thesis_stages import CASES, stage
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.replay import Session, quality_of, stage_of

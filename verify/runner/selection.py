@@ -45,6 +45,8 @@ def select_cases(
         heavy_enough = is_named or _of_weight(scene, weight)
         if not heavy_enough or (wanted is not None and not wanted(scene)):
             continue
+        if scene.played_only and not is_named:
+            continue  # for `verify play`; every solver would refuse it
         twin = chosen.setdefault(scene.name, scene)
         if twin.file != scene.file:
             raise InputError(

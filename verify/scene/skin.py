@@ -42,7 +42,7 @@ class Skin(Strict):
             raise ValueError("elements belong to a shape, and a shape needs them")
         if self.file is not None and self.source == "anatomy":
             raise ValueError("source: 'anatomy' belongs to a shape, not to a file")
-        if self.thickness is None and "layers" in self.model_fields_set:
+        if self.thickness is None and self.layers > 1:
             raise ValueError("layers belong to a skin with a thickness")
         return self
 

@@ -66,7 +66,7 @@ class ToolPathCut(Strict):
             raise ValueError(f"{len(self.times)} times for {len(self.points)} points")
         if any(b < a for a, b in pairwise(self.times)):
             raise ValueError("times: time runs backwards")
-        if "starts_at" in self.model_fields_set:
+        if self.starts_at > 0.0:
             raise ValueError("starts_at belongs to a speed; times say when it starts")
 
     def _check_blade(self) -> None:
