@@ -36,6 +36,10 @@ def test_the_exact_energy_integrated_over_the_body_is_the_work_on_its_boundary(n
 def test_the_tips_of_the_cut_are_the_singular_points_of_the_exact_field(name):
     case = load_scene(name)
     exact = exact_solution(case.exact.solution, case.exact.parameters, case.material)
+    if case.dimension == 3:
+        assert not len(body_of(case).front)
+        assert not len(exact.singular_points)
+        return
     tips, points = body_of(case).tips, np.asarray(exact.singular_points).reshape(-1, 2)
     assert len(tips) == len(points)
     for tip in tips:
