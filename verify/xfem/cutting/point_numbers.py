@@ -10,10 +10,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from verify.xfem.growing_array import GrowingArray
-from verify.xfem.row_numbers import RowNumbers, number_of_row
+from verify.xfem.row_numbers import RowNumbers, find_row, number_of_row
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["PointNumbers"]
+__all__ = ["PointNumbers", "runs_through"]
 
 _Ints = NDArray[np.int64]
 
@@ -42,12 +42,19 @@ class PointNumbers:
         self.ends = GrowingArray(np.empty((0, 2), dtype=np.int64))
         self.cut = GrowingArray(np.empty(0, dtype=np.int64))
         self._table = RowNumbers(_WIDTH)
+        self._nodes_met = RowNumbers(2)
+        self._still_met = GrowingArray(np.empty(0, dtype=np.bool_))
         self._supports = GrowingArray(np.empty((0, _WIDTH), dtype=np.int64))
 
     @property
     def supports(self) -> _Ints:
         """(k, 7) mesh nodes (4) and cuts (3) of each zero point, ascending, padded at the end."""
         return self._supports.rows
+
+    @property
+    def nodes_on_cuts(self) -> tuple[_Ints, _Ints, NDArray[np.bool_]]:
+        """Table of rows (mesh node, cut), the rows, and whether the cut runs through the node."""
+        return self._nodes_met.table, self._nodes_met.rows, self._still_met.rows
 
     def number(self, points: ZeroPoints, whole_nodes: _Ints, cuts: _Ints) -> _Ints:
         """Numbers of all points of a patch: its nodes, then its zero points.
@@ -66,6 +73,7 @@ class PointNumbers:
         numbers[:local] = whole_nodes
         if more == 0:
             return numbers
+        self._meet_nodes(points.values[:local], whole_nodes, cuts)
         table, known, count = self._table.open_for(more)
         self._supports.extend(more)
         after = _number_points(
@@ -75,6 +83,7 @@ class PointNumbers:
             self.nodes,
             numbers,
             self._supports.rows,
+            self.nodes_on_cuts,
             table,
             known,
             count,
@@ -91,6 +100,50 @@ class PointNumbers:
         self.cut.append(cuts[points.cut[new]])
         return numbers
 
+    def supported(self, points: _Ints, nodes: _Ints) -> NDArray[np.bool_]:
+        """Whether mesh nodes (q, c) are among those that span the simplex of each point (q,).
+
+        The weights of all others are zero at the point; its own may round to zero.
+        """
+        found = np.empty(nodes.shape, dtype=np.bool_)
+        _supported(points, nodes, self.nodes, self._supports.rows, found)
+        return found
+
+    def _meet_nodes(self, values: NDArray[np.float64], nodes: _Ints, cuts: _Ints) -> None:
+        """Note which cuts run exactly through mesh nodes; of a growing one that may change."""
+        zero = values == 0.0
+        table, known, count = self._nodes_met.open_for(int(zero.sum()))
+        self._still_met.extend(len(known) - count)
+        count = _meet_nodes(zero, nodes, cuts, table, known, count, self._still_met.rows)
+        self._nodes_met.close(count)
+        self._still_met.rows = self._still_met.rows[:count]
+
+
+@njit(cache=True)
+def _supported(points, nodes, count, supports, found):
+    for q in range(len(points)):
+        for a in range(nodes.shape[1]):
+            found[q, a] = points[q] == nodes[q, a]
+            if points[q] >= count:
+                for k in range(_NODES):
+                    found[q, a] = found[q, a] or supports[points[q] - count, k] == nodes[q, a]
+
+
+@njit(cache=True)
+def _meet_nodes(zero, nodes, cuts, table, known, count, met):
+    row = np.empty(2, dtype=np.int64)
+    for n in range(len(nodes)):
+        for c in range(len(cuts)):
+            row[0], row[1] = nodes[n], cuts[c]
+            if zero[n, c]:
+                number, count = number_of_row(row, table, known, count)
+                met[number] = True
+            else:
+                number = find_row(row, table, known)
+                if number >= 0:
+                    met[number] = False
+    return count
+
 
 @njit(cache=True)
 def _merge(row, begin, end, value):
@@ -103,9 +156,19 @@ def _merge(row, begin, end, value):
 
 
 @njit(cache=True)
-def _number_points(ends, cut, local, nodes, numbers, supports, table, known, count):
+def runs_through(cut, node, met, pair):
+    """Whether a cut runs exactly through a mesh node; `pair` (2,) is overwritten."""
+    table, known, still = met
+    pair[0], pair[1] = node, cut
+    at = find_row(pair, table, known)
+    return at >= 0 and still[at]
+
+
+@njit(cache=True)
+def _number_points(ends, cut, local, nodes, numbers, supports, met, table, known, count):
     none, start, middle = np.iinfo(np.int64).max, np.int64(0), np.int64(_NODES)
     row = np.empty(_WIDTH, dtype=np.int64)
+    pair = np.empty(2, dtype=np.int64)
     edge = -np.ones(_WIDTH, dtype=np.int64)
     for z in range(len(ends)):
         for k in range(_WIDTH):
@@ -138,6 +201,13 @@ def _number_points(ends, cut, local, nodes, numbers, supports, table, known, cou
             edge[0], edge[1], edge[2] = cut[z], first + nodes, second + nodes
             number, count = number_of_row(edge, table, known, count)
         if count > before:
+            # a cut on which one end lies, and that runs exactly through the other
+            for node, other in ((first, second), (second, first)):
+                for k in range(_NODES, _WIDTH):
+                    if not node < 0 <= other or supports[other, k] == none:
+                        continue
+                    if runs_through(supports[other, k], node + nodes, met, pair):
+                        _merge(row, middle, _WIDTH, supports[other, k])
             for k in range(_WIDTH):
                 supports[number, k] = row[k]
         numbers[local + z] = nodes + number

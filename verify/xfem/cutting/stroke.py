@@ -136,6 +136,7 @@ class Stroke:
             self._turn,
             self._turns,
             self._settled,
+            self.recorded,
             self.near,
             self._strokes_near,
             self.entry,

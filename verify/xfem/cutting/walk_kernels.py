@@ -98,6 +98,7 @@ def walk(
     turn,
     turns,
     settled,
+    recorded,
     near_cell,
     strokes_near,
     entry,
@@ -106,7 +107,8 @@ def walk(
     """Walk from the seeds to all cells near what has been swept.
 
     Returns the cells that may have to be split, and those from which to go on next time.
-    `settled` marks cells that the blade has left behind, `near_cell` all that were ever near it.
+    `settled` marks cells that the blade has left behind, `recorded` those that it is known to have
+    split, `near_cell` all that were ever near it.
     """
     queue, candidates = [np.int64(0) for _ in range(0)], [np.int64(0) for _ in range(0)]
     frontier, room = [np.int64(0) for _ in range(0)], np.empty((5, 3))
@@ -128,10 +130,12 @@ def walk(
         if not near_cell[cell]:
             near_cell[cell] = True
             strokes_near[cell] += 1
-        if through or strokes_near[cell] > 1:
+        alone = strokes_near[cell] == 1
+        if (through and not recorded[cell]) or not alone:
             candidates.append(cell)
-        # what other strokes have left of a cell may be crossed through later than its edges
-        if strokes_near[cell] == 1 and (through or latest < front - size[cell]):
+        # what other strokes have left of a cell may be crossed through later than its edges; and
+        # what is crossed through only just may be split only when the blade is farther on
+        if alone and (recorded[cell] or latest < front - size[cell]):
             settled[cell] = True
         else:
             frontier.append(cell)

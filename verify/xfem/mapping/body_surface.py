@@ -75,10 +75,15 @@ class BodySurface:
         piece, cell = piece[source], cell[source]
         corners = ids.shape[1]
         row = np.repeat(np.arange(len(ids)), corners)
-        weights = at.reshape(len(row), -1)
+        weights = at.reshape(len(row), at.shape[2])
         material = np.einsum("qc,qcs->qs", weights, mesh.points[mesh.cells[cell[row]]])
+        point = ids.ravel()
         vertex = self.surface.weld(
-            ids.ravel(), material, body.piece_cells.rows[piece[row]], weights
+            point,
+            material,
+            body.piece_cells.rows[piece[row]],
+            weights,
+            body.points.supported(point, mesh.cells[cell[row]]),
         )
         numbers = self.surface.add(vertex.reshape(ids.shape), piece, inner[source])
         # facets come cell by cell

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.xfem.cutting.point_numbers import runs_through
 from verify.xfem.row_numbers import find_row, number_of_row
 
 __all__ = ["CUTS", "LINE", "EdgeRecord", "bisect_facets", "record_points"]
@@ -18,7 +19,6 @@ _NODES = 4
 _FACE = 3  # corners of a face
 LINE = _FACE + 1  # a line: the nodes of an edge or a face, and the cut that crosses it
 _NONE = np.iinfo(np.int64).max
-_ALIGNED = 1.0 - 1e-15  # squared cosine between an edge and the line on which it lies
 
 
 class EdgeRecord(NamedTuple):
@@ -40,6 +40,8 @@ class EdgeRecord(NamedTuple):
         Zero point, and the next entry of the same line or -1.
     directions : (l, s) float array
         Along which the points of a line are ordered; zero until it is first asked for.
+    met : tuple of arrays
+        Mesh nodes through which cuts run, see `PointNumbers.nodes_on_cuts`.
     """
 
     nodes: _Floats
@@ -50,6 +52,7 @@ class EdgeRecord(NamedTuple):
     first: _Ints
     entries: _Ints
     directions: _Floats
+    met: tuple[_Ints, _Ints, NDArray[np.bool_]]
 
 
 @njit(cache=True)
@@ -104,7 +107,7 @@ def _after(at, number, than, other):
 
 
 @njit(cache=True)
-def _between(x, y, line, straight, record):
+def _between(x, y, line, record):
     """Give (a point of the line's list strictly between x and y or -1, its share from x to y).
 
     The order on a line is that of projections on one direction, taken when the line is first
@@ -113,20 +116,14 @@ def _between(x, y, line, straight, record):
     direction, unset, space = record.directions[line], True, record.nodes.shape[1]
     for i in range(space):
         unset = unset and direction[i] == 0.0
-    if unset and not straight:
-        return -1, 0.0
-    total, length, aligned, start, end = 0.0, 0.0, 0.0, 0.0, 0.0
+    total, start, end = 0.0, 0.0, 0.0
     for i in range(space):
         a, b = _place(x, i, record), _place(y, i, record)
         if unset:
             direction[i] = b - a
         total += (b - a) ** 2
-        length += direction[i] ** 2
-        aligned += (b - a) * direction[i]
         start += a * direction[i]
         end += b * direction[i]
-    if not straight and aligned**2 < _ALIGNED * length * total:
-        return -1, 0.0
     forward = _after(end, y, start, x)
     entry = record.first[line]
     while entry >= 0:
@@ -145,6 +142,18 @@ def _between(x, y, line, straight, record):
 
 
 @njit(cache=True)
+def _on_cut(number, cut, record, row):
+    """Whether a cut runs exactly through a point."""
+    nodes = len(record.nodes)
+    if number < nodes:
+        return runs_through(cut, number, record.met, row)
+    found = False
+    for j in range(_NODES, _NODES + CUTS):
+        found = found or record.supports[number - nodes, j] == cut
+    return found
+
+
+@njit(cache=True)
 def _inner_point(x, y, record, row):
     """Give (a recorded point strictly between x and y or -1, its share from x to y)."""
     nodes = len(record.nodes)
@@ -154,7 +163,6 @@ def _inner_point(x, y, record, row):
         return -1, 0.0
     on_edge = row[_FACE - 1] == _NONE
     for k in range(1 if on_edge else 2 * CUTS):
-        straight = on_edge
         if not on_edge:
             # a line in a face of the mesh: of each cut on which x or y lies
             number, other = (x, y) if k < CUTS else (y, x)
@@ -163,16 +171,12 @@ def _inner_point(x, y, record, row):
             row[_FACE] = record.supports[number - nodes, _NODES + k % CUTS]
             if row[_FACE] == _NONE:
                 continue
-            if other >= nodes:
-                for j in range(_NODES, _NODES + CUTS):
-                    straight = straight or record.supports[other - nodes, j] == row[_FACE]
-                if not straight:
-                    continue
-            # a mesh node may lie on the line of a cut without being told so
-        line = find_row(row, record.table, record.known)
+            if not _on_cut(other, row[_FACE], record, row[LINE:]):
+                continue
+        line = find_row(row[:LINE], record.table, record.known)
         if line < 0:
             continue
-        z, share = _between(x, y, line, straight, record)
+        z, share = _between(x, y, line, record)
         if z >= 0:
             return z, share
     return -1, 0.0
@@ -210,7 +214,7 @@ def bisect_facets(facets, at, record, room):
     width = at.shape[2]
     ids, places = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, width))
     open_ids, open_places = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, width))
-    source, row = np.empty(room, dtype=np.int64), np.empty(LINE, dtype=np.int64)
+    source, row = np.empty(room, dtype=np.int64), np.empty(LINE + 2, dtype=np.int64)
     count, top = 0, 1
     for t in range(len(facets)):
         _copy(facets, at, t, open_ids, open_places, 0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.cutting.distinct import distinct
 from verify.xfem.cutting.point_numbers import PointNumbers
+from verify.xfem.errors import XfemError
 from verify.xfem.growing_array import GrowingArray
 from verify.xfem.mapping.edge_kernels import (
     CUTS,
@@ -95,10 +96,13 @@ class EdgePoints:
             self._first.rows,
             self._entries.rows,
             self._directions.rows,
+            self._points.nodes_on_cuts,
         )
         room = 2 * len(facets) + 64
-        while True:
+        # each point bisects a few facets, those around its edge
+        while room < 64 * (len(facets) + len(self._entries) + 64):
             *parts, enough = bisect_facets(facets, at, record, room)
             if enough:
                 return tuple(parts)
             room *= 2
+        raise XfemError(f"points on the edges of {len(facets)} facets are in no order")

@@ -154,11 +154,13 @@ class EmbeddedSurface:
             cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,
             body.first_piece, body.next_piece.rows,
         )  # fmt: skip
+        weights = weights.reshape(ids.size, weights.shape[2])
         vertex = self.surface.weld(
             ids.ravel(),
             material.reshape(-1, material.shape[2]),
             body.piece_cells.rows[piece.ravel()],
-            weights.reshape(ids.size, -1),
+            weights,
+            weights != 0.0,
         )
         numbers = self.surface.add(
             vertex.reshape(ids.shape), piece[:, 0], np.zeros(len(ids), dtype=bool)

@@ -56,7 +56,14 @@ class MovingSurface:
         self.retired: int = 0
         self._keys = RowNumbers(corners + 1)
 
-    def weld(self, point: _Ints, material: _Floats, nodes: _Ints, weights: _Floats) -> _Ints:
+    def weld(
+        self,
+        point: _Ints,
+        material: _Floats,
+        nodes: _Ints,
+        weights: _Floats,
+        counts: NDArray[np.bool_],
+    ) -> _Ints:
         """Vertices (q,) of corners: one for each point and set of unknowns from which it moves.
 
         Parameters
@@ -65,11 +72,14 @@ class MovingSurface:
             Number of the material point.
         material : (q, s) float array
         nodes, weights : (q, corners) arrays
-            Unknown nodes and weights; weights of exactly zero do not count.
+            Unknown nodes and weights.
+        counts : (q, corners) bool array
+            Whether a corner moves with a node: where it is not, the weight is zero; where it is,
+            the weight may still round to zero.
         """
         vertex, first = np.empty_like(point), np.empty_like(point)
         table, known, before = self._keys.open_for(len(point))
-        count = _weld(point, nodes, weights, table, known, before, vertex, first)
+        count = _weld(point, nodes, counts, table, known, before, vertex, first)
         self._keys.close(count)
         first = first[: count - before]
         self.material.append(material[first])
@@ -160,14 +170,14 @@ class MovingSurface:
 
 
 @njit(cache=True)
-def _weld(point, nodes, weights, table, known, count, vertex, first):
+def _weld(point, nodes, counts, table, known, count, vertex, first):
     """Write the vertex of each corner, and the corner that is the first of each new vertex."""
     before, size = count, nodes.shape[1]
     key = np.empty(size + 1, dtype=np.int64)
     for q in range(len(point)):
         key[0] = point[q]
         for a in range(size):
-            node, k = nodes[q, a] if weights[q, a] != 0.0 else -1, a
+            node, k = nodes[q, a] if counts[q, a] else -1, a
             while k > 0 and key[k] > node:
                 key[k + 1] = key[k]
                 k -= 1
