@@ -42,6 +42,21 @@ def test_a_singular_sequence_brackets_its_limit_although_order_two_was_expected(
     assert abs(found.value - 3) <= found.half_width
 
 
+def test_levels_whose_differences_grow_are_not_given_the_benefit_of_their_element():
+    sizes = [0.4, 0.2, 0.1]
+    growing = extrapolate([3.00, 3.01, 3.03], sizes, theoretical=3)
+    assert growing.half_width >= 3 * 0.02 * (1 - 1e-12)
+    assert "grow" in growing.reason
+    assert field_uncertainty([0.01, 0.02], sizes, 3).half_width >= 3 * 0.02 * (1 - 1e-12)
+
+
+def test_a_functional_may_converge_with_twice_the_order_of_its_element():
+    sizes = [0.4, 0.2, 0.1]
+    found = extrapolate([1 + h**3.9 for h in sizes], sizes, 2, best=4)
+    assert "observed order 3.90, safety factor 1.25" in found.reason
+    assert abs(found.value - 1) <= found.half_width <= 1.5 * abs(found.value - 1)
+
+
 def test_levels_at_round_off_are_not_extrapolated():
     found = extrapolate([1.0, 1.0 + 2e-16, 1.0 - 2e-16], [0.4, 0.2, 0.1], theoretical=2)
     assert found.order is None

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.compare.locate import Field, SolutionField
+from verify.compare.motion import ExactMotion
 from verify.errors import InputError
 from verify.result import CaseResult, SolveRecord, Status, Verdict, write_result
 from verify.runner.childhood import die_with_parent
@@ -103,7 +104,7 @@ def _error_picture(
     references = solutions.get(REFERENCE, {})
     truth: Field | None = None
     if scene.judged_by_exact:
-        truth = exact
+        truth = ExactMotion(exact).at(scene.analysis.duration)
     elif references:
         truth = SolutionField(references[max(references)])
     if not own or truth is None:

@@ -144,11 +144,14 @@ def _careful(
     """Half-width with safety factor 3, and its reason.
 
     An observed order below the theoretical one is believed as far as it makes things worse;
+    where differences grow, no more than order 1 is counted on;
     the coarser difference counts, scaled down, in case the finer one is small by accident.
     """
     used = min(theoretical, max(order, 0.25)) if order is not None else theoretical
-    largest = max(last, first * ratio**-used)
     why = "no order" if order is None else f"observed order {order:.2f} is not sane"
+    if order is None and last > first:  # not even the sign of convergence
+        used, why = min(theoretical, 1.0), "differences grow"
+    largest = max(last, first * ratio**-used)
     return 3 * largest / (ratio**used - 1), f"{why}: order {used:.2g}, safety factor 3"
 
 
