@@ -79,8 +79,10 @@ def test_a_phase_of_the_step(benchmark, phase):
     benchmark.pedantic(work, setup=before, rounds=STEPS)
 
 
-def test_the_step_costs_less_than_twice_the_solution_of_its_matrix():
-    scheme, state = _slab(1e-2)
+@pytest.mark.parametrize("step", [1e-3, 1e-2, 0.5])
+def test_the_step_costs_at_most_half_more_than_the_solution_of_its_matrix(step):
+    """Factorisation and solution by the fastest direct solver there is at this size, our own."""
+    scheme, state = _slab(step)
     for _ in range(20):
         scheme.advance(state)
     whole, bare = [], []
@@ -90,7 +92,28 @@ def test_the_step_costs_less_than_twice_the_solution_of_its_matrix():
         middle = perf_counter()
         scheme.solver.factorize(scheme.blocks)
         scheme.solver.solve(scheme.load)
-        whole.append(middle - start)
         bare.append(perf_counter() - middle)
-    # measured: 1.6; the rest is a margin for a noisy machine
-    assert np.median(whole) <= 1.9 * np.median(bare)
+        whole.append(middle - start)
+    # measured: 1.3 to 1.4; the two halves of each pair see the same disturbances
+    assert np.median(np.array(whole) / np.array(bare)) <= 1.5
+
+
+def test_the_sweep_costs_less_than_three_quarters_of_evaluation_and_assembly():
+    scheme, state = _slab(1e-2)
+    for _ in range(20):
+        scheme.advance(state)
+    force, pattern = scheme.body.force, scheme.body.pattern
+    u, v, out = state.displacement, state.velocity, np.empty_like(state.displacement)
+    blocks = np.empty_like(scheme.blocks)
+    one, two = [], []
+    for _ in range(STEPS):
+        start = perf_counter()
+        force.linearise(pattern, u, v, 1e-2, 1e-4, out, blocks)
+        middle = perf_counter()
+        blocks[:] = 0.0
+        force.evaluate(u, out)
+        force.add_stiffness(pattern, blocks, 1e-4)
+        two.append(perf_counter() - middle)
+        one.append(middle - start)
+    # measured: 0.55 to 0.65
+    assert np.median(np.array(one) / np.array(two)) < 0.75

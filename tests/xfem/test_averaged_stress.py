@@ -68,11 +68,10 @@ def test_the_derivative_of_the_averaged_stress_equals_central_differences(kind, 
         taken_somewhere |= taken
         # the substitute is kept once taken, as it is in a step
         space = len(F0)
-        slope = np.empty((space,) * 4)
-        stress_slope(
-            F0, F1, _rotation(F0), _rotation(F1), LAM, MU, dim, normal, taken,
-            np.empty((10, 3, 3)), slope,
-        )  # fmt: skip
+        slope = stress_slope(
+            *(X[None] for X in (F0, F1, _rotation(F0), _rotation(F1))),
+            np.array([LAM]), np.array([MU]), dim, normal[None], np.array([taken]),
+        )[0]  # fmt: skip
         # differences see curvature and round-off, both 1/gap³ times what they are at gap 1
         gap = min(np.linalg.svd(F)[1][:dim].min() for F in (F0 + F1, F1))
         if gap < 0.1:

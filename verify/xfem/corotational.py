@@ -137,11 +137,13 @@ class InternalForce:
                 self._quaternions, self._rotations,
             )  # fmt: skip
             self._swept = False
-        moving = displacement if velocity is None else velocity
         energy = self._kernels.internal_force(
-            v.cells, *self.geometry, self.rotations, displacement,
-            moving, 0.0 if velocity is None else scale, force,
-        )  # fmt: skip
+            v.cells, *self.geometry, self._rotations, displacement, force
+        )
+        if velocity is not None and scale != 0.0:
+            self._kernels.frozen_product(
+                v.cells, *self.geometry, self._rotations, velocity, scale, force
+            )
         return force, float(energy)
 
     def linearise(

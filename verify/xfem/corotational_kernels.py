@@ -153,10 +153,9 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
 
     @njit(cache=True)
     def internal_force(
-        cells, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
-        velocity, scale, force,
-    ):  # fmt: skip
-        """Add f_int(u) + `scale` K v, K with frozen rotations, to `force`; return the energy.
+        cells, gradients, parent, volumes, normals, lam, mu, rotations, displacement, force
+    ):
+        """Add f_int(u) to `force`; return the energy.
 
         Parameters
         ----------
@@ -167,11 +166,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
             Unit normals of membranes; not read otherwise.
         lam, mu : (m,) float array
         rotations : (p, d, d) float array
-        displacement, velocity : (N, d) float array
-            The velocity is not read if the scale is zero.
-        scale : float
-            In seconds.
-        force : (N, d) float array
+        displacement, force : (N, d) float array
         """
         F = np.empty((space, space))
         E = np.empty((space, space))
@@ -204,26 +199,6 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                     square += E[k, l] * E[k, l]
             w, la, m2 = volumes[piece], lam[cell], 2.0 * mu[cell]
             energy += 0.5 * w * (m2 * square + la * trace * trace)
-            if scale != 0.0:
-                for k in range(space):
-                    for l in range(space):
-                        F[k, l] = 0.0
-                for i in range(corners):
-                    node = cells[piece, i]
-                    for k in range(space):
-                        for l in range(space):
-                            F[k, l] += velocity[node, k] * gradients[cell, i, l]
-                if membrane:
-                    _project(F, R, normals, cell)
-                for k in range(space):
-                    for l in range(space):
-                        for m in range(space):
-                            E[k, l] += scale * R[m, k] * F[m, l]
-                trace = 0.0
-                for k in range(space):
-                    trace += E[k, k]
-                    for l in range(k + 1, space):
-                        E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])
             # stress w R (2μE + λ tr E I), over F
             for k in range(space):
                 for l in range(space):

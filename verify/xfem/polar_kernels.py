@@ -194,7 +194,9 @@ def _largest_eigenvector(F, q):
     form[1, 2] = form[2, 1] = F[0, 1] + F[1, 0]
     form[1, 3] = form[3, 1] = F[0, 2] + F[2, 0]
     form[2, 3] = form[3, 2] = F[1, 2] + F[2, 1]
-    vectors = np.eye(4)
+    vectors = np.zeros((4, 4))
+    for k in range(4):
+        vectors[k, k] = 1.0
     for _ in range(_JACOBI_SWEEPS):
         for i in range(3):
             for j in range(i + 1, 4):
@@ -216,6 +218,9 @@ def _largest_eigenvector(F, q):
     for i in range(1, 4):
         if form[i, i] > form[best, best]:
             best = i
-    norm = np.sqrt((vectors[:, best] ** 2).sum())
+    norm = 0.0
+    for k in range(4):
+        norm += vectors[k, best] ** 2
+    norm = np.sqrt(norm)
     for k in range(4):
         q[k] = vectors[k, best] / norm

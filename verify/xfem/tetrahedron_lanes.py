@@ -210,7 +210,9 @@ def linearise(
         Blocks above the diagonal, in the order in which they are met.
     """
     v = np.zeros(_ENTRIES * LANES)
-    v[: 15 * LANES] = new_lanes()
+    rest = new_lanes()
+    for entry in range(len(rest)):
+        v[entry] = rest[entry]
     for batch in range(len(gradients)):
         start = batch * LANES
         count = min(LANES, len(cells) - start)

@@ -18,22 +18,14 @@ from numba import njit
 
 from verify.xfem.polar_kernels import nearest_rotation
 
-__all__ = [
-    "averaged_force",
-    "deformation",
-    "inner",
-    "invert",
-    "is_moving",
-    "product",
-    "stress",
-]
+__all__ = ["averaged_force", "is_moving", "stress"]
 
 _REGULAR = 1e-6  # smallest pivot of U₀ + U₁ over its trace
 _STILL = 1e-26  # square of a relative change of C that is round-off
 
 
-@njit(cache=True)
-def product(A, B, transposed, out):
+@njit(cache=True, error_model="numpy")
+def _product(A, B, transposed, out):
     """Write A B, or Aᵀ B, to `out`."""
     size = len(out)
     for k in range(size):
@@ -44,8 +36,8 @@ def product(A, B, transposed, out):
             out[k, l] = total
 
 
-@njit(cache=True)
-def inner(A, B):
+@njit(cache=True, error_model="numpy")
+def _inner(A, B):
     """Sum of the products of entries."""
     total = 0.0
     for k in range(len(A)):
@@ -54,8 +46,8 @@ def inner(A, B):
     return total
 
 
-@njit(cache=True)
-def invert(A, out):
+@njit(cache=True, error_model="numpy")
+def _invert(A, out):
     """Write the inverse of the symmetric part of A (3, 3); False if not positive definite."""
     a, b, c = A[0, 0], A[1, 1], A[2, 2]
     d, e, f = 0.5 * (A[0, 1] + A[1, 0]), 0.5 * (A[0, 2] + A[2, 0]), 0.5 * (A[1, 2] + A[2, 1])
@@ -75,13 +67,13 @@ def invert(A, out):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def is_moving(square, size):
     """Whether a change of C, squared, is more than round-off of C, squared."""
     return square > _STILL * size
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _secant_in_plane(R0, R1, t0, t1, T):
     """Write T; whether it is undefined, both traces being zero."""
     total = t0 + t1
@@ -93,7 +85,7 @@ def _secant_in_plane(R0, R1, t0, t1, T):
     return total <= 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _secant(F0, F1, R0, R1, t0, t1, normal, substituted, work, T):
     """Write T (3, 3); whether it is the substitute. A normal that is not zero: a membrane's."""
     middle, A, B = work[0], work[1], work[2]
@@ -101,38 +93,38 @@ def _secant(F0, F1, R0, R1, t0, t1, normal, substituted, work, T):
         for l in range(3):
             middle[k, l] = F0[k, l] + F1[k, l]
     if not substituted:
-        product(R0, F0, True, A)
-        product(R1, F1, True, B)
+        _product(R0, F0, True, A)
+        _product(R1, F1, True, B)
         for k in range(3):
             for l in range(3):
                 A[k, l] += B[k, l] + 2.0 * normal[k] * normal[l]
-        if invert(A, B):
-            product(middle, B, False, T)
+        if _invert(A, B):
+            _product(middle, B, False, T)
             return False
     q = np.zeros(4)
     q[0] = 1.0
     nearest_rotation(middle, q, T)
-    product(F0, F0, True, A)
-    product(F1, F1, True, B)
-    size = inner(B, B)
+    _product(F0, F0, True, A)
+    _product(F1, F1, True, B)
+    size = _inner(B, B)
     excess = t1 - t0
     for k in range(3):
         for l in range(3):
             B[k, l] -= A[k, l]
             excess -= T[k, l] * (F1[k, l] - F0[k, l])
-    square = inner(B, B)
+    square = _inner(B, B)
     if is_moving(square, size):
-        product(middle, B, False, A)
+        _product(middle, B, False, A)
         for k in range(3):
             for l in range(3):
                 T[k, l] += excess / square * A[k, l]
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def stress(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, P):
     """Write P; whether the substitute was taken."""
-    t0, t1 = inner(R0, F0), inner(R1, F1)
+    t0, t1 = _inner(R0, F0), _inner(R1, F1)
     if len(F0) == 2:
         taken = _secant_in_plane(R0, R1, t0, t1, P)
     else:
@@ -144,8 +136,8 @@ def stress(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, P):
     return taken
 
 
-@njit(cache=True)
-def deformation(nodes, b, displacement, normal, F):
+@njit(cache=True, error_model="numpy")
+def _deformation(nodes, b, displacement, normal, F):
     """Write the deformation gradient; that of a membrane without its normal."""
     for k in range(len(F)):
         for l in range(len(F)):
@@ -156,7 +148,7 @@ def deformation(nodes, b, displacement, normal, F):
                 F[k, l] += displacement[nodes[i], k] * b[i, l]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def averaged_force(
     cells, gradients, parent, volumes, normals, lam, mu, first, second, start, end,
     substituted, force,
@@ -183,8 +175,8 @@ def averaged_force(
         if membrane:
             normal = normals[cell]
         b = gradients[cell]
-        deformation(cells[piece], b, start, normal, F0)
-        deformation(cells[piece], b, end, normal, F1)
+        _deformation(cells[piece], b, start, normal, F0)
+        _deformation(cells[piece], b, end, normal, F1)
         substituted[piece] = stress(
             F0, F1, first[piece], second[piece], lam[cell], mu[cell], corners - 1, normal,
             substituted[piece], work, P,

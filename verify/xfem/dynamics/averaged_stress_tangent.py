@@ -7,215 +7,184 @@ With G = F₀ + F₁, A = U₀ + U₁ and c = λ(½(t₀ + t₁) − d) − 2μ,
 The derivative of a polar decomposition F = R U: dR = R Ω with the axis ω of Ω from
 (tr(U) I − U) ω = axis of RᵀdF − dFᵀR, and dU = RᵀdF − Ω U. In the plane
 dT = (d(t₁R₁) − T dt₁)/(t₀ + t₁), t₁R₁ being linear in F₁. The substitute that inverted pieces take
-is differentiated likewise. Names are those of `averaged_stress_kernels`.
+is differentiated likewise. All pieces at once, in numpy: this is not the cost of a step, and as
+loops it would be half of the time that all of the solver takes to compile.
 """
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from verify.xfem.dynamics.averaged_stress_kernels import (
-    deformation,
-    inner,
-    invert,
-    is_moving,
-    product,
-    stress,
-)
+from verify.xfem.dynamics.averaged_stress_kernels import is_moving
 from verify.xfem.polar_kernels import nearest_rotation
 
-__all__ = ["add_averaged_stiffness"]
+__all__ = ["add_averaged_stiffness", "stress_slope"]
+
+_Floats = NDArray[np.float64]
+
+_EPSILON = np.zeros((3, 3, 3))
+_EPSILON[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
+_EPSILON[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = -1.0
+_SINGULAR = 1e-18  # determinant over the cube of the trace: a rotation without a slope
+# d(t R)/dF in the plane: t R = [[a, −b], [b, a]], a = F₀₀ + F₁₁, b = F₁₀ − F₀₁
+_TURN_IN_PLANE = np.einsum("kn,lm->knlm", np.eye(2), np.eye(2)) + np.einsum(
+    "kn,lm->knlm", [[0.0, -1.0], [1.0, 0.0]], [[0.0, -1.0], [1.0, 0.0]]
+)
 
 
-@njit(cache=True)
-def _spin(R, Z, dF, out):
-    """Write dR = R Ω and Ω to out[0], out[1]; Z is the inverse of tr(U) I − U."""
-    A = out[1]
-    product(R, dF, True, A)
-    a, b, c = A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]
-    x = Z[0, 0] * a + Z[0, 1] * b + Z[0, 2] * c
-    y = Z[1, 0] * a + Z[1, 1] * b + Z[1, 2] * c
-    z = Z[2, 0] * a + Z[2, 1] * b + Z[2, 2] * c
-    A[:] = 0.0
-    A[0, 1], A[0, 2], A[1, 2] = -z, y, -x
-    A[1, 0], A[2, 0], A[2, 1] = z, -y, x
-    product(R, A, False, out[0])
+def _inner(A: _Floats, B: _Floats) -> _Floats:
+    return np.einsum("pkl,pkl->p", A, B)
 
 
-@njit(cache=True)
-def _spin_compliance(R, F, U, Z):
-    """Write U = RᵀF and the inverse of tr(U) I − U, or zeros where the rotation has no slope."""
-    product(R, F, True, U)
-    trace = U[0, 0] + U[1, 1] + U[2, 2]
-    H = -U
-    for k in range(3):
-        H[k, k] += trace
-    if not invert(H, Z):
-        Z[:] = 0.0
+def _identity(size: int) -> _Floats:
+    return np.einsum("kl,nm->knlm", np.eye(size), np.eye(size))
 
 
-@njit(cache=True)
-def _slope_in_plane(t0, t1, R1, T, dF, dT):
+def _polar_slope(R: _Floats, F: _Floats) -> tuple[_Floats, _Floats]:
+    """Return dR and dU (p, 3, 3, 3, 3) of F = R U; zero dR where the rotation has no slope."""
+    U = R.transpose(0, 2, 1) @ F
+    trace = np.einsum("pkk->p", U)
+    H = trace[:, None, None] * np.eye(3) - 0.5 * (U + U.transpose(0, 2, 1))
+    singular = ~(np.abs(np.linalg.det(H)) > _SINGULAR * np.abs(trace) ** 3)
+    H[singular] = np.eye(3)
+    Z = np.linalg.inv(H)
+    Z[singular] = 0.0
+    axis = np.einsum("pij,jmk,plk->pilm", Z, _EPSILON, R, optimize=True)
+    spin = -np.einsum("ijk,pklm->pijlm", _EPSILON, axis)
+    dU = np.einsum("plk,nm->pknlm", R, np.eye(3)) - np.einsum("pijlm,pjn->pinlm", spin, U)
+    return np.einsum("pai,pijlm->pajlm", R, spin), dU
+
+
+def _in_plane(R0: _Floats, R1: _Floats, t0: _Floats, t1: _Floats) -> tuple[_Floats, _Floats]:
     total = t0 + t1
-    if total <= 0.0:
-        dT[:] = 0.0
-        return
-    change = inner(R1, dF)
-    along, across = dF[0, 0] + dF[1, 1], dF[1, 0] - dF[0, 1]
-    dT[0, 0] = (along - T[0, 0] * change) / total
-    dT[1, 1] = (along - T[1, 1] * change) / total
-    dT[0, 1] = (-across - T[0, 1] * change) / total
-    dT[1, 0] = (across - T[1, 0] * change) / total
+    defined = total > 0.0
+    safe = np.where(defined, total, 1.0)[:, None, None]
+    T = np.where(
+        defined[:, None, None], (t0[:, None, None] * R0 + t1[:, None, None] * R1) / safe, R1
+    )
+    dT = (_TURN_IN_PLANE - np.einsum("pkn,plm->pknlm", T, R1)) / safe[..., None, None]
+    return T, np.where(defined[:, None, None, None, None], dT, 0.0)
 
 
-@njit(cache=True)
-def _slope(R1, U1, Z, inverse, T, dF, work, dT):
-    """Write dT of the plain form; `inverse` is that of U₀ + U₁."""
-    _spin(R1, Z, dF, work)
-    product(work[1], U1, False, work[0])  # Ω U
-    product(R1, dF, True, work[2])
-    for k in range(3):
-        for l in range(3):
-            work[2, k, l] -= work[0, k, l]
-    product(T, work[2], False, work[0])
-    for k in range(3):
-        for l in range(3):
-            work[0, k, l] = dF[k, l] - work[0, k, l]
-    product(work[0], inverse, False, dT)
+def _plain(
+    F0: _Floats, F1: _Floats, R0: _Floats, R1: _Floats, normals: _Floats
+) -> tuple[_Floats, _Floats]:
+    A = R0.transpose(0, 2, 1) @ F0 + R1.transpose(0, 2, 1) @ F1
+    A = 0.5 * (A + A.transpose(0, 2, 1)) + 2.0 * np.einsum("pk,pl->pkl", normals, normals)
+    inverse = np.linalg.inv(A)
+    T = (F0 + F1) @ inverse
+    _, dU = _polar_slope(R1, F1)
+    change = _identity(3) - np.einsum("pka,pablm->pkblm", T, dU)
+    return T, np.einsum("pkblm,pbn->pknlm", change, inverse)
 
 
-@njit(cache=True)
-def _slope_of_substitute(F0, F1, R1, Rm, Z, excess, dF, work, dT):
-    """Write dT of the substitute; Rm and Z are those of F₀ + F₁, `excess` as in `_secant`."""
-    _spin(Rm, Z, dF, work)
-    dT[:] = work[0]
-    G, change, dC, D = work[2], work[3], work[4], work[5]
-    product(F0, F0, True, D)
-    product(F1, F1, True, change)
-    size = inner(change, change)
-    product(dF, F1, True, dC)
-    more = inner(R1, dF) - inner(Rm, dF)
-    for k in range(3):
-        for l in range(3):
-            change[k, l] -= D[k, l]
-            G[k, l] = F0[k, l] + F1[k, l]
-            more -= dT[k, l] * (F1[k, l] - F0[k, l])
-    for k in range(3):
-        for l in range(k, 3):
-            dC[k, l] = dC[l, k] = dC[k, l] + dC[l, k]
-    square = inner(change, change)
-    if not is_moving(square, size):
-        return
-    factor = excess / square
-    slope = (more - 2.0 * factor * inner(change, dC)) / square
-    product(G, change, False, D)
-    for k in range(3):
-        for l in range(3):
-            dT[k, l] += slope * D[k, l]
-    product(dF, change, False, D)
-    product(G, dC, False, work[1])
-    for k in range(3):
-        for l in range(3):
-            dT[k, l] += factor * (D[k, l] + work[1, k, l])
+def _substitute(
+    F0: _Floats, F1: _Floats, R0: _Floats, R1: _Floats, rise: _Floats
+) -> tuple[_Floats, _Floats]:
+    """T and dT of the substitute; `rise` is t₁ − t₀."""
+    G = F0 + F1
+    Rm = np.empty_like(G)
+    for piece in range(len(G)):
+        nearest_rotation(G[piece], np.array([1.0, 0.0, 0.0, 0.0]), Rm[piece])
+    dT, _ = _polar_slope(Rm, G)
+    C1 = F1.transpose(0, 2, 1) @ F1
+    change = C1 - F0.transpose(0, 2, 1) @ F0
+    half = np.einsum("ma,plb->pablm", np.eye(3), F1)
+    dC = half + half.transpose(0, 2, 1, 3, 4)
+    square = _inner(change, change)
+    moving = is_moving(square, _inner(C1, C1))
+    square = np.where(moving, square, 1.0)[:, None, None]
+    factor = np.where(moving, rise - _inner(Rm, F1 - F0), 0.0)[:, None, None] / square
+    slope = R1 - Rm - np.einsum("pknlm,pkn->plm", dT, F1 - F0)
+    slope = (slope - 2.0 * factor * np.einsum("pab,pablm->plm", change, dC)) / square
+    slope[~moving] = 0.0
+    D = G @ change
+    dT += np.einsum("plm,pkn->pknlm", slope, D)
+    moved = np.einsum("kl,pmn->pknlm", np.eye(3), change) + np.einsum("pka,panlm->pknlm", G, dC)
+    dT += factor[..., None, None] * moved
+    return Rm + factor * D, dT
 
 
-@njit(cache=True)
-def _prepare(F0, F1, R0, R1, normal, substituted, T, work):
-    """Write to work[6:] what all directions share; whether T is the substitute, and its excess."""
-    U, Z, inverse, Rm = work[6], work[7], work[8], work[9]
-    A = work[0]
-    if not substituted:
-        product(R0, F0, True, A)
-        product(R1, F1, True, work[1])
-        for k in range(3):
-            for l in range(3):
-                A[k, l] += work[1, k, l] + 2.0 * normal[k] * normal[l]
-        if invert(A, inverse):
-            _spin_compliance(R1, F1, U, Z)
-            return False, 0.0
-    q = np.zeros(4)
-    q[0] = 1.0
-    A[:] = F0 + F1
-    nearest_rotation(A, q, Rm)
-    _spin_compliance(Rm, A, U, Z)
-    excess = inner(R1, F1) - inner(R0, F0)
-    for k in range(3):
-        for l in range(3):
-            excess -= Rm[k, l] * (F1[k, l] - F0[k, l])
-    return True, excess
-
-
-@njit(cache=True)
-def stress_slope(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, slope):
-    """Write dP/dF₁ (d, d, d, d), the last two indices those of F₁.
+def stress_slope(
+    F0: _Floats,
+    F1: _Floats,
+    R0: _Floats,
+    R1: _Floats,
+    lam: _Floats,
+    mu: _Floats,
+    dim: int,
+    normals: _Floats,
+    substituted: NDArray[np.bool_],
+) -> _Floats:
+    """Return dP/dF₁ (p, d, d, d, d), the last two indices those of F₁.
 
     Parameters
     ----------
-    F0, F1, R0, R1 : (d, d) float array
-    work : (10, 3, 3) float array
+    F0, F1, R0, R1 : (p, d, d) float array
+    lam, mu : (p,) float array
+    dim : int
+        Of the pieces.
+    normals : (p, 3) float array
+        Unit normals of membranes, else zero.
+    substituted : (p,) bool array
+        Pieces that have taken the substitute.
     """
-    size = len(F0)
-    t0, t1 = inner(R0, F0), inner(R1, F1)
+    t0, t1 = _inner(R0, F0), _inner(R1, F1)
+    if F0.shape[1] == 2:
+        T, dT = _in_plane(R0, R1, t0, t1)
+    else:
+        T, dT = np.empty_like(F0), np.empty((len(F0), 3, 3, 3, 3))
+        some = ~substituted
+        T[some], dT[some] = _plain(F0[some], F1[some], R0[some], R1[some], normals[some])
+        if substituted.any():
+            of = substituted
+            T[of], dT[of] = _substitute(F0[of], F1[of], R0[of], R1[of], (t1 - t0)[of])
     factor = lam * (0.5 * (t0 + t1) - dim) - 2.0 * mu
-    T, dF, dT = np.empty((size, size)), np.zeros((size, size)), np.empty((size, size))
-    # with λ = 0 and μ = ½ the stress is ½ (F₀ + F₁) − T
-    stress(F0, F1, R0, R1, 0.0, 0.5, dim, normal, substituted, work, T)
-    for k in range(size):
-        for l in range(size):
-            T[k, l] = 0.5 * (F0[k, l] + F1[k, l]) - T[k, l]
-    taken, excess = False, 0.0
-    if size == 3:
-        taken, excess = _prepare(F0, F1, R0, R1, normal, substituted, T, work)
-    for l in range(size):
-        for m in range(size):
-            dF[l, m] = 1.0
-            if size == 2:
-                _slope_in_plane(t0, t1, R1, T, dF, dT)
-            elif taken:
-                _slope_of_substitute(F0, F1, R1, work[9], work[7], excess, dF, work, dT)
-            else:
-                _slope(R1, work[6], work[7], work[8], T, dF, work, dT)
-            dF[l, m] = 0.0
-            for k in range(size):
-                for n in range(size):
-                    slope[k, n, l, m] = 0.5 * lam * R1[l, m] * T[k, n] + factor * dT[k, n]
-            slope[l, m, l, m] += mu
+    slope = factor[:, None, None, None, None] * dT
+    slope += np.einsum("p,pkn,plm->pknlm", 0.5 * lam, T, R1)
+    slope += mu[:, None, None, None, None] * _identity(F0.shape[1])
+    return slope
+
+
+def add_averaged_stiffness(
+    cells: NDArray[np.int64],
+    targets: NDArray[np.int32],
+    gradients: _Floats,
+    parent: NDArray[np.int64],
+    volumes: _Floats,
+    normals: _Floats,
+    lam: _Floats,
+    mu: _Floats,
+    first: _Floats,
+    second: _Floats,
+    start: _Floats,
+    end: _Floats,
+    substituted: NDArray[np.bool_],
+    blocks: _Floats,
+) -> None:
+    """Add the derivative of `averaged_force` by the end of the step to the nodal blocks.
+
+    The derivative is not symmetric; arguments as there, and as the last call of it left them.
+    """
+    corners, space = cells.shape[1], gradients.shape[2]
+    b = gradients[parent]
+    normal = normals[parent] if corners == space else np.zeros((len(cells), 3))
+    rest = np.broadcast_to(np.eye(space), (len(cells), space, space))
+    if corners == space:
+        rest = rest - np.einsum("pk,pl->pkl", normal, normal)
+    F0, F1 = (rest + np.einsum("pik,pil->pkl", u[cells], b) for u in (start, end))
+    slope = stress_slope(
+        F0, F1, first, second, lam[parent], mu[parent], corners - 1, normal, substituted
+    )
+    half = np.einsum("p,pin,pknlm->piklm", volumes, b, slope, optimize=True)
+    _add(targets, np.einsum("piklm,pjm->pijkl", half, b, optimize=True), blocks)
 
 
 @njit(cache=True)
-def add_averaged_stiffness(
-    cells, targets, gradients, parent, volumes, normals, lam, mu, first, second, start, end,
-    substituted, blocks,
-):  # fmt: skip
-    """Add the derivative of `averaged_force` by the end of the step to the nodal blocks.
-
-    The derivative is not symmetric; arguments as there.
-    """
-    count, corners = cells.shape
-    space = gradients.shape[2]
-    F0, F1 = np.empty((space, space)), np.empty((space, space))
-    work, normal = np.empty((10, 3, 3)), np.zeros(3)
-    slope, half = np.empty((space, space, space, space)), np.empty((space, space, space))
-    for piece in range(count):
-        cell = parent[piece]
-        if corners == space:
-            normal = normals[cell]
-        b, w = gradients[cell], volumes[piece]
-        deformation(cells[piece], b, start, normal, F0)
-        deformation(cells[piece], b, end, normal, F1)
-        stress_slope(
-            F0, F1, first[piece], second[piece], lam[cell], mu[cell], corners - 1, normal,
-            substituted[piece], work, slope,
-        )  # fmt: skip
-        for i in range(corners):
-            for k in range(space):
-                for l in range(space):
-                    for m in range(space):
-                        half[k, l, m] = 0.0
-                        for n in range(space):
-                            half[k, l, m] += w * slope[k, n, l, m] * b[i, n]
-            for j in range(corners):
-                at = targets[piece, i, j]
-                for k in range(space):
-                    for l in range(space):
-                        for m in range(space):
-                            blocks[at, k, l] += half[k, l, m] * b[j, m]
+def _add(targets, element, blocks):
+    for piece in range(element.shape[0]):
+        for i in range(element.shape[1]):
+            for j in range(element.shape[1]):
+                for k in range(blocks.shape[1]):
+                    for l in range(blocks.shape[1]):
+                        blocks[targets[piece, i, j], k, l] += element[piece, i, j, k, l]
