@@ -16,6 +16,7 @@ __all__ = ["Frame", "View", "view_of", "write_animation", "write_picture"]
 _Floats = NDArray[np.float64]
 
 _SKIN, _FLESH, _BLADE = "#e8b79b", "#a8322a", "#5a6570"
+_SHEET = 0.6  # height over width below which a body is one
 _SHARP = 40.0  # degrees: edges beyond that are drawn as edges
 
 
@@ -55,12 +56,14 @@ class View:
 def view_of(frames: Sequence[Frame], towards: Sequence[float] | None = None) -> View:
     """Choose a view that holds the first and the last frame.
 
-    A plane body is looked at from above its plane, one in space a little from the side.
+    A plane body is looked at from above its plane, a sheet almost so, a block from a corner.
     """
     points = np.concatenate([frames[k].picture.points for k in (0, -1)])
     low, high = points.min(axis=0), points.max(axis=0)
     flat = high[2] == low[2]
-    eye = np.array(towards if towards is not None else (0, 0, 1) if flat else (-0.2, -0.75, 1.0))
+    sheet = high[2] - low[2] < _SHEET * (high[:2] - low[:2]).min()
+    usual = (0.0, 0.0, 1.0) if flat else (0.2, -0.2, 1.0) if sheet else (0.6, -0.9, 0.7)
+    eye = np.array(towards if towards is not None else usual)
     up = np.array([0.0, 1.0, 0.0]) if abs(eye[2]) >= 0.5 * np.linalg.norm(eye) else np.eye(3)[2]
     return View(
         0.5 * (low + high), eye / np.linalg.norm(eye), up, float(np.linalg.norm(high - low))
