@@ -13,6 +13,7 @@ from reference.meshing.outline import divided_outline
 from reference.meshing.separation import APART, check_separation, check_strips
 from reference.meshing.session import gmsh_session, simplices
 from reference.meshing.solid import solid_mesh
+from reference.meshing.tip_rings import shrink_to_points
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene
 
@@ -74,7 +75,12 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         raise InputError(f"gmsh could not mesh the body with its cuts ({error})", where) from None
     if scene.cuts and not len(facets):
         raise InputError("cuts: none of them lies inside the body", where)
-    return open_cut(points * scale + origin, cells, facets)
+    points = points * scale + origin
+    if grading.smallest < grading.meshed:
+        points, cells, facets = shrink_to_points(
+            points, cells, facets, grading.points, grading.smallest
+        )
+    return open_cut(points, cells, facets)
 
 
 def _add_outline(gmsh: ModuleType, outline: Array) -> int:
@@ -138,7 +144,7 @@ def _set_sizes(
     gmsh: ModuleType, grading: Grading, features: list[Feature], origin: Array, scale: float
 ) -> None:
     size, radius, smallest = (
-        value / scale for value in (grading.size, grading.radius, grading.smallest)
+        value / scale for value in (grading.size, grading.radius, grading.meshed)
     )
     field = gmsh.model.mesh.field
     terms = []

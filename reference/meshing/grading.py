@@ -15,7 +15,8 @@ from verify.scene.planar import distance_to_outline, inside_polygon
 __all__ = ["Grading", "singular_points"]
 
 Array = NDArray[np.float64]
-_SMALLEST = 3e-9  # of the grading radius: nearer to a point, gmsh runs out of digits
+_MESHED = 3e-9  # of the grading radius: nearer to a point, gmsh runs out of digits
+_SMALLEST = 1e-12  # of the grading radius: nearer, coordinates do
 _KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matter
 
 
@@ -57,6 +58,11 @@ class Grading:
         """Element size at a singular point, m."""
         ratio = min(self.size / self.radius, 1.0)
         return float(self.radius * max(ratio ** (1 / (1 - self.exponent)), _SMALLEST))
+
+    @property
+    def meshed(self) -> float:
+        """Element size that gmsh is asked for at a singular point, m; rings do the rest."""
+        return max(self.smallest, self.radius * _MESHED)
 
     def halved(self, level: int) -> "Grading":
         """Divide all sizes by 2^level."""

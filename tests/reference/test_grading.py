@@ -15,9 +15,9 @@ def test_halving_keeps_the_law_of_the_grading_down_to_the_tip_on_every_default_l
     # h(r) = size (r/R)^0.8 meets h = r at R (size/R)^5: halving the size divides it by 32
     outline = load_scene(case).geometry.outline()
     extent = float(np.sqrt(np.prod(np.ptp(outline, axis=0))))
-    levels = [Grading(extent / 12, np.zeros((1, 2)), extent / 2).halved(k) for k in range(4)]
+    levels = [Grading(extent / 12, np.zeros((1, 2)), extent / 2).halved(k) for k in range(6)]
     smallest = [level.smallest for level in levels]
-    assert np.divide(smallest[:-1], smallest[1:]) == pytest.approx([32.0] * 3, rel=1e-12)
+    assert np.divide(smallest[:-1], smallest[1:]) == pytest.approx([32.0] * 5, rel=1e-12)
 
 
 def rounded(points):
@@ -70,6 +70,28 @@ def test_a_traction_is_singular_where_no_bounded_stress_fits_it():
     assert with_load("top", [0, 1]) == set()
     assert with_load("top", [1, 0]) == {(0, 1), (1, 1)}  # shear against a free side
     assert with_load("y > 0.9999999 and x > 0.5", [0, 1]) == {(0.5, 1)}
+
+
+class TestNearerThanTheMeshGeneratorCanGo:
+    pytestmark = needs_fenicsx
+
+    def test_rings_carry_the_grading_on_to_both_tips(self):
+        from reference.meshing import conforming_mesh
+
+        scene = square([polyline("a", (0.3, 0.43), (0.7, 0.61))])
+        # few cells, but as small at the tips as those of level 5
+        grading = Grading(0.1, singular_points(scene), 4.0, 0.86)
+        assert 5e-12 < grading.smallest < 0.1 * grading.meshed
+        mesh = conforming_mesh(scene, grading)
+        for tip in ([0.3, 0.43], [0.7, 0.61]):
+            away = np.sort(np.linalg.norm(mesh.points - tip, axis=1))
+            assert away[0] < 1e-15
+            assert away[1] < 4 * grading.smallest
+        a, b, c = (mesh.points[mesh.cells[:, k]] for k in range(3))
+        area = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+        assert area.sum() == pytest.approx(1.0, rel=1e-12)
+        # and the tips stay closed: a cut of F facets between two tips doubles F − 1 nodes
+        assert len(mesh.parent) - len(np.unique(mesh.parent)) == len(mesh.cut_facets) - 1
 
 
 class TestTheMeshEndsWhereAPartEnds:
