@@ -19,6 +19,7 @@ from verify.xfem.cuts import Cut
 from verify.xfem.joining import PatchSlots, join_slots
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import Partition, split_cells
+from verify.xfem.unknown_nodes import node_sides, number_groups
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["SubCells", "VirtualMesh", "cut_mesh"]
@@ -227,43 +228,8 @@ def cut_mesh(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside") ->
     slots = join_slots(mesh, partition)
     fraction = partition.fraction
     solid = fraction > 0.0
-    group_node, numbering = _number_groups(mesh, partition, slots, solid)
+    group_node, numbering = number_groups(mesh, partition, slots, solid)
     return _virtual_mesh(mesh, partition, slots, solid, fraction, group_node, numbering)
-
-
-def _number_groups(
-    mesh: SimplexMesh, partition: Partition, slots: PatchSlots, solid: NDArray[np.bool_]
-) -> tuple[_Ints, _Ints]:
-    """Mesh node of each unknown node, and the unknown node of each group of slots (-1: none)."""
-    nodes = mesh.cells[slots.cells[slots.piece_cell]]
-    pieces = len(partition.parent)
-    alive = np.ones(len(nodes), dtype=bool)
-    alive[:pieces] = solid
-    groups = slots.group.max(initial=-1) + 1
-    node_of = np.full(groups, -1)
-    node_of[slots.group[alive]] = nodes[alive]
-
-    # the material in which a node lies keeps the node's number
-    home = np.ones(nodes.shape, dtype=bool)
-    sign = np.where(partition.points.values[nodes[:pieces]] >= 0.0, 1, -1)
-    label = partition.label[:, None, :]
-    home[:pieces] = ((label == 0) | (label == sign)).all(axis=2)
-    is_home = np.zeros(groups, dtype=bool)
-    is_home[slots.group[home & alive[:, None]]] = True
-
-    inner = np.zeros(len(mesh.points), dtype=bool)
-    inner[mesh.cells[np.unique(partition.parent)]] = True
-    used = np.flatnonzero(node_of >= 0)
-    used = used[inner[node_of[used]]]
-    used = used[np.lexsort([used, ~is_home[used], node_of[used]])]
-    first = np.diff(node_of[used], prepend=-1) != 0
-    number = np.full(groups, -1)
-    number[used[first]] = node_of[used[first]]
-    number[used[~first]] = len(mesh.points) + np.arange(int((~first).sum()))
-    # around nodes that touch no split cell the patch is not complete, but nothing is cut either
-    outer = np.flatnonzero((node_of >= 0) & ~inner[node_of])
-    number[outer] = node_of[outer]
-    return np.concatenate([np.arange(len(mesh.points)), node_of[used[~first]]]), number
 
 
 def _virtual_mesh(
@@ -301,7 +267,8 @@ def _virtual_mesh(
         fraction=partition.sub_fraction[thick],
         zero_points=partition.points,
     )
-    node_side = _node_sides(partition, cells[order], label[order], node_parent)
+    values = partition.points.values[node_parent]
+    node_side = node_sides(values, cells[order], label[order])
     return VirtualMesh(
         mesh=mesh,
         cells=cells[order],
@@ -315,18 +282,3 @@ def _virtual_mesh(
         snapped=partition.snapped,
         dropped=int((~solid).sum()),
     )
-
-
-def _node_sides(
-    partition: Partition, cells: _Ints, label: NDArray[np.int8], node_parent: _Ints
-) -> NDArray[np.int8]:
-    """Side of each unknown: of its labelled pieces if they agree, else of its node."""
-    values = partition.points.values[node_parent]
-    side = np.where(values >= 0.0, 1, -1).astype(np.int8)
-    for cut in range(label.shape[1]):
-        seen = np.zeros((2, len(node_parent)), dtype=bool)
-        for k, sign in enumerate((1, -1)):
-            seen[k, cells[label[:, cut] == sign]] = True
-        side[seen[0] & ~seen[1], cut] = 1
-        side[seen[1] & ~seen[0], cut] = -1
-    return side

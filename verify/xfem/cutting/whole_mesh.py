@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.cutting.growing_body import GrowingBody
+from verify.xfem.unknown_nodes import node_sides
 from verify.xfem.virtual import SubCells, VirtualMesh
 from verify.xfem.zero_points import ZeroPoints
 
@@ -39,7 +40,7 @@ def whole_mesh(body: GrowingBody, level_sets: _Floats) -> VirtualMesh:
         label=label,
         node_parent=node_parent,
         level_sets=level_sets,
-        node_side=_node_sides(level_sets[node_parent], cells, label),
+        node_side=node_sides(level_sets[node_parent], cells, label),
         sub_cells=SubCells(
             piece=number[body.sub_piece.rows[used]],
             points=body.sub_points.rows[used],
@@ -72,15 +73,3 @@ def _zero_points(body: GrowingBody, level_sets: _Floats) -> ZeroPoints:
     points.positions = np.concatenate([body.mesh.points, body.points.positions.rows])
     points.values, points.ends, points.cut = values, ends, cut
     return points
-
-
-def _node_sides(values: _Floats, cells: _Ints, label: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Side of each unknown: of its labelled pieces if they agree, else of its node."""
-    side = np.where(values >= 0.0, 1, -1).astype(np.int8)
-    for cut in range(label.shape[1]):
-        seen = np.zeros((2, len(values)), dtype=bool)
-        for k, sign in enumerate((1, -1)):
-            seen[k, cells[label[:, cut] == sign]] = True
-        side[seen[0] & ~seen[1], cut] = 1
-        side[seen[1] & ~seen[0], cut] = -1
-    return side
