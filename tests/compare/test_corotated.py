@@ -5,8 +5,11 @@ import pytest
 from cut_meshes import grid, quadratic, solution
 from solid_meshes import cube_grid
 
+from verify.compare.energy_error import energy_error
 from verify.compare.hooke import corotated, hooke, law_of
+from verify.compare.locate import SolutionField
 from verify.compare.simplex_rule import points_in
+from verify.compare.slabs import Rule
 from verify.compare.strain_energy import strain_energy
 from verify.scene import Material
 
@@ -114,6 +117,17 @@ def test_a_rigidly_turned_solution_in_space_has_no_energy():
     # round-off of unit displacements: (1e-16)² of the modulus
     assert strain_energy(one, corotated(SPACE)) < 1e-27 * 1e4
     assert strain_energy(one, hooke(SPACE)) > 1e3
+
+
+def test_a_reference_that_only_turns_has_no_energy_norm_to_be_relative_to():
+    points, cells = cube_grid(2, 2, 2)
+    turned = points @ turn(3).T - points
+    noise = 1e-14 * np.random.default_rng(0).normal(size=points.shape)
+    field, reference = (SolutionField(solution(points, cells, u)) for u in (turned + noise, turned))
+    rule = Rule(*points_in(points[cells], 2))
+    assert energy_error(field, reference, rule, corotated(SPACE)).scale == 0.0
+    # linear kinematics see strains of order one there
+    assert energy_error(field, reference, rule, hooke(SPACE)).scale > 1.0
 
 
 def test_the_scene_says_which_energy_is_meant():

@@ -28,6 +28,7 @@ from verify.scene.acceptance import (
 from verify.solution import Solution
 from verify.study.error_history import ERROR_NAMES, base_of, compared_times, error_history
 from verify.study.quantities import Measured, field_quantity
+from verify.study.rates import ROUND_OFF
 from verify.study.richardson import Extrapolation, extrapolate, field_uncertainty
 from verify.study.stress_intensity import exact_intensity
 
@@ -231,7 +232,7 @@ def _field_norms(
                 "value": absolute[-1] / scale,
                 "uncertainty": said / scale,
             },
-            "disagreement": absolute[-1] / said if said > 0.0 else None,
+            "disagreement": absolute[-1] / said if said > ROUND_OFF * scale else None,
         }
     return norms, entries
 
