@@ -1,6 +1,6 @@
 """A scene on its way: one step cuts, moves, maps and collides, and says what that has cost."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
 
@@ -35,6 +35,9 @@ class Session:
     account : bool
         Whether to keep the account of the energies. Without it the hot path is that of a
         simulator: that is what is timed.
+    clock : callable
+        What phases are timed by: wall time in s, or `time.thread_time` where other work on the
+        machine shall not be counted.
 
     Attributes
     ----------
@@ -52,8 +55,10 @@ class Session:
         If a stroke is not in the space of the mesh, or supports do not fit.
     """
 
-    def __init__(self, stage: Stage, account: bool = True) -> None:
-        self.stage, self._account = stage, account
+    def __init__(
+        self, stage: Stage, account: bool = True, clock: Callable[[], float] = perf_counter
+    ) -> None:
+        self.stage, self._account, self._clock = stage, account, clock
         self.cutter = SemiProgressiveCutter(stage.mesh)
         for path in stage.strokes:
             self.cutter.begin(path)
@@ -232,9 +237,9 @@ class Session:
 
     @contextmanager
     def _timed(self, phase: str) -> Iterator[None]:
-        start = perf_counter()
+        start = self._clock()
         yield
-        self._seconds[phase] = perf_counter() - start
+        self._seconds[phase] = self._clock() - start
 
 
 def _blade_at(path: ToolPath, time: float) -> tuple[_Floats, _Floats]:
