@@ -45,7 +45,9 @@ def execute(arguments: argparse.Namespace) -> int:
             print(f"verify: {stop}; the same command resumes it", file=sys.stderr)
             return 128 + stop.signum
     from verify.report import render
+    from verify.runner.ranking import rank_run
 
+    rank_run(arguments.out, [result], {}, False, arguments.timeout, print)
     report, code = render(arguments.out), exit_code([result], arguments.strict)
     if arguments.json:
         verdicts = [asdict(record) for record in result.verdicts]

@@ -195,6 +195,11 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "--no-cache", action="store_true", help="solve references again, and keep none"
     )
     command.add_argument(
+        "--conform", action=argparse.BooleanOptionalAction,
+        help="check every solver with the suite of `verify conform` before ranking "
+        "(default: if more than two are ranked)",
+    )  # fmt: skip
+    command.add_argument(
         "--no-report", action="store_true", help="leave the report to `verify report DIR`"
     )
     command.add_argument("--json", action="store_true", help="print the verdicts as JSON")

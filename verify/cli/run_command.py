@@ -13,6 +13,7 @@ from verify.cli.verdict_text import verdict_lines
 from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
 from verify.runner.checking import check_solver_name
 from verify.runner.ending import NOTHING_RAN
+from verify.runner.ranking import rank_run
 from verify.runner.reference_cache import cache_folder
 
 __all__ = ["execute"]
@@ -55,6 +56,9 @@ def execute(arguments: argparse.Namespace) -> int:
                 file=sys.stderr,
             )
             return 128 + stop.signum
+    rank_run(
+        arguments.out, summary.results, parameters, arguments.conform, arguments.timeout, _announce
+    )
     report = None if arguments.no_report else _rendered(arguments.out)
     code = exit_code(summary.results, arguments.strict)
     if arguments.json:
@@ -79,6 +83,10 @@ def execute(arguments: argparse.Namespace) -> int:
     if report:
         print(f"report: {report}")
     return code
+
+
+def _announce(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _rendered(directory: Path) -> str:

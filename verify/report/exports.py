@@ -62,6 +62,7 @@ def json_document(run: Run) -> str:
         "kind": "verification results",
         "run": run.record,
         "defects": run.defects,
+        "ranking": run.ranking,
         "cases": cases,
     }
     return json.dumps(_finite(document), indent=1, allow_nan=False) + "\n"

@@ -6,6 +6,7 @@ from verify.report.case_section import case_section
 from verify.report.markup import Markup, joined, tag
 from verify.report.origin import origin_section, reading_guide
 from verify.report.pictures import CasePictures
+from verify.report.ranking_section import ranking_section
 from verify.report.run_directory import Run
 from verify.report.summary import summary, verdict_table
 
@@ -54,6 +55,7 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
         summary(run),
         [tag("p", "Note: " + note, class_="warning") for note in notes],
         verdict_table(run),
+        ranking_section(run.ranking),
         sections,
         reading_guide(),
         origin_section(run),

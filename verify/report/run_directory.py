@@ -11,12 +11,14 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from verify.errors import InputError
+from verify.report.ranking_record import RankingRecord
 from verify.result import CaseResult, SolveRecord, read_result
 
 __all__ = ["CaseEntry", "Run", "load_run"]
 
 _RESULT = TypeAdapter(CaseResult)
 _SOLVE = TypeAdapter(SolveRecord)
+_RANKING = TypeAdapter(RankingRecord)
 
 
 @dataclass(frozen=True)
@@ -44,12 +46,16 @@ class CaseEntry:
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory in memory: ``run.json``, the cases, and what is wrong with them."""
+    """A run directory in memory: ``run.json``, the cases, and what is wrong with them.
+
+    `ranking` is what ``ranking.json`` holds, None if there is none.
+    """
 
     root: Path
     record: dict[str, Any]
     entries: list[CaseEntry]
     defects: list[str]
+    ranking: dict[str, Any] | None = None
 
     @property
     def results(self) -> list[CaseResult]:
@@ -84,7 +90,21 @@ def load_run(directory: Path) -> Run:
     entries += found.values()
     if record and not record.get("finished"):
         defects.append("the run has not finished: it was stopped, or is still going on")
-    return Run(directory, record, entries, defects)
+    ranking, trouble = _ranking(directory / "ranking.json", [e.name for e in entries])
+    return Run(directory, record, entries, defects + trouble, ranking)
+
+
+def _ranking(path: Path, cases: list[str]) -> tuple[dict[str, Any] | None, list[str]]:
+    """Read the ranking of the run; one of other cases is that of an earlier run."""
+    if not path.is_file():
+        return None, []
+    try:
+        found = _RANKING.validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        return None, [f"ranking.json cannot be read ({str(error).splitlines()[0]})"]
+    if set(found["cases"]) != set(cases):
+        return None, ["ranking.json is of other cases: no ranking is shown"]
+    return dict(found), []
 
 
 def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:

@@ -1,0 +1,185 @@
+"""Claims about rankings: ranks from intervals, nothing averaged away, nothing ranked alone."""
+
+import math
+
+import pytest
+
+from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
+from verify.study.ranking import rank_solvers
+
+
+def solve(case, solver, level, error=None, width=0.0, seconds=None, status=Status.SOLVED, **more):
+    metrics = [] if error is None else [Metric("energy_norm", error, "1", None, width, "exact")]
+    return SolveRecord(
+        case,
+        solver,
+        level,
+        status,
+        metrics=[*metrics, *more.pop("metrics", [])],
+        size=0.1 * 0.5**level,
+        timings={} if seconds is None else {"solve": [seconds * r for r in (0.9, 1.0, 1.1)]},
+        **more,
+    )
+
+
+def case_of(name, solves, verdicts=()):
+    return CaseResult(name, name, "", "", {}, {}, solves, [], list(verdicts))
+
+
+def compared(ranking, question="accuracy", metric="energy_norm", view="finest level"):
+    (found,) = [c for c in ranking[question] if (c["metric"], c["view"]) == (metric, view)]
+    return found, {s["solver"]: s for s in found["standings"]}
+
+
+def test_cases_are_joined_by_the_geometric_mean_of_ratios_to_the_best():
+    results = [
+        case_of("a", [solve("a", "x", 0, 0.01), solve("a", "y", 0, 0.02)]),
+        case_of("b", [solve("b", "x", 0, 0.3), solve("b", "y", 0, 2.4)]),
+    ]
+    _, by = compared(rank_solvers(results))
+    assert by["x"]["value"] == pytest.approx(1.0)
+    assert by["y"]["value"] == pytest.approx(4.0)  # √(2·8)
+    assert (by["x"]["rank"], by["y"]["rank"]) == (1, 2)
+
+
+@pytest.mark.parametrize(("width", "ranks"), [(0.0004, (1, 2)), (0.0006, (1, 1))])
+def test_overlapping_intervals_are_a_tie(width, ranks):
+    solves = [solve("a", "x", 0, 0.010, width), solve("a", "y", 0, 0.011, width)]
+    _, by = compared(rank_solvers([case_of("a", solves)]))
+    assert (by["x"]["rank"], by["y"]["rank"]) == ranks
+    assert by["x"]["tied"] == (ranks == (1, 1))
+
+
+def test_a_solver_that_fails_somewhere_is_listed_and_not_ranked_on_the_rest():
+    failed = solve("b", "y", 0, status=Status.FAILED, reason="singular")
+    results = [
+        case_of("a", [solve("a", "x", 0, 0.2), solve("a", "y", 0, 0.001)]),
+        case_of("b", [solve("b", "x", 0, 0.2), failed, solve("b", "z", 0, 0.3)]),
+        case_of("c", [solve("c", n, 0, 0.2) for n in ("x", "y", "z")]),
+    ]
+    ranking = rank_solvers(results)
+    found, by = compared(ranking)
+    assert (by["x"]["rank"], by["y"]["rank"], by["z"]["rank"]) == (1, None, None)
+    assert (by["y"]["count"], by["z"]["count"], found["items"]) == (2, 2, 3)
+    # x alone is everywhere: it is the measure, not the solver that did one case well
+    assert by["x"]["value"] == pytest.approx(1.0)
+    reasons = {(e["case"], e["solver"]): e["reason"] for e in found["left_out"]}
+    assert "singular" in reasons["b", "y"]
+    assert "not run" in reasons["a", "z"]
+    assert ("b", "y") in {(e["case"], e["solver"]) for e in ranking["left_out"]}
+
+
+def test_a_case_that_is_exact_to_round_off_does_not_enter_the_mean():
+    results = [
+        case_of("patch", [solve("patch", "x", 0, 1e-15), solve("patch", "y", 0, 0.1)]),
+        case_of("b", [solve("b", "x", 0, 0.2), solve("b", "y", 0, 0.1)]),
+    ]
+    found, by = compared(rank_solvers(results))
+    assert by["x"]["value"] == pytest.approx(2.0)
+    (entry,) = [e for e in found["left_out"] if e["case"] == "patch"]
+    assert "round-off: x" in entry["reason"]
+    assert "y 1.00e-01" in entry["reason"]
+
+
+def test_an_error_below_the_reference_s_uncertainty_cannot_be_beaten():
+    solves = [solve("a", "x", 0, 0.010, 0.020), solve("a", "y", 0, 0.012, 0.001)]
+    found, by = compared(rank_solvers([case_of("a", solves)]))
+    assert by["x"]["rank"] == by["y"]["rank"] == 1
+    assert by["x"]["low"] == 0.0
+    (entry,) = found["left_out"]
+    assert entry["solver"] == "x"
+    assert entry["reason"].startswith("undecided")
+
+
+def test_equal_size_takes_the_finest_common_level_and_refuses_unequal_meshes():
+    solves = [solve("a", "x", level, 0.1 * 0.5**level) for level in range(3)]
+    solves += [solve("a", "y", level, 0.3 * 0.5**level) for level in range(2)]
+    _, by = compared(rank_solvers([case_of("a", solves)]), view="equal size")
+    assert by["y"]["value"] == pytest.approx(3.0)
+    _, by = compared(rank_solvers([case_of("a", solves)]))
+    assert by["y"]["value"] == pytest.approx(0.15 / 0.025)
+    other = [SolveRecord(**{**vars(s), "size": 0.7 * s.size}) if s.solver == "y" else s
+             for s in solves]  # fmt: skip
+    found, by = compared(rank_solvers([case_of("a", other)]), view="equal size")
+    assert not by
+    assert "10 %" in found["left_out"][0]["reason"]
+
+
+def test_time_at_equal_error_is_that_of_the_power_laws():
+    # x: e = h, t = h⁻²; y: e = 3h, t = ½h⁻²: at e = 3h_min, y takes ½h_min⁻², x (3h_min)⁻²
+    solves = []
+    for level in range(4):
+        h = 0.1 * 0.5**level
+        solves += [solve("a", "x", level, h, 0.0, h**-2),
+                   solve("a", "y", level, 3 * h, 0.0, 0.5 * h**-2)]  # fmt: skip
+    found, by = compared(rank_solvers([case_of("a", solves)]), "cost", view="time at equal error")
+    assert by["x"]["value"] == pytest.approx(1.0)
+    assert by["y"]["value"] == pytest.approx(4.5, rel=1e-9)
+    assert (by["x"]["rank"], by["y"]["rank"]) == (1, 2)
+    assert not found["left_out"]
+
+
+def test_a_solver_without_an_error_in_common_is_not_timed_against_the_others():
+    solves = [solve("a", n, level, 0.1 * 0.5**level, 0.0, 4.0**level)
+              for n in ("x", "y") for level in range(3)]  # fmt: skip
+    solves += [solve("a", "bad", level, 0.9, 0.0, 0.001) for level in range(3)]
+    solves += [solve("a", "good", level, 1e-4 * 0.5**level, 0.0, 9.0) for level in range(3)]
+    found, by = compared(rank_solvers([case_of("a", solves)]), "cost", view="time at equal error")
+    assert by["x"]["rank"] == by["y"]["rank"] == 1
+    assert by["bad"]["rank"] is by["good"]["rank"] is None
+    reasons = {e["solver"]: e["reason"] for e in found["left_out"]}
+    assert "does not reach" in reasons["bad"]
+    assert "already on level 0" in reasons["good"]
+
+
+def test_stability_counts_what_was_lost_and_forgives_refusals():
+    worst = Metric("displacement_l2", 7.0, "1", None, 0.1, "exact")
+    solves = [
+        solve("a", "x", 0, 0.1),
+        solve("a", "x", 1, status=Status.REFUSED, reason="not in space"),
+        solve("a", "y", 0, 0.1, metrics=[worst]),
+        solve("a", "y", 1, 0.1, regularisations=[{"kind": "node moved", "count": 3}]),
+        solve("a", "z", 0, status=Status.TIMEOUT, reason="60 s"),
+        solve("a", "z", 1, 0.1, notes={"pieces inside out": "2"}),
+    ]
+    by = {s["solver"]: s for s in rank_solvers([case_of("a", solves)])["stability"]}
+    assert (by["x"]["rank"], by["x"]["tied"], by["x"]["lost"]) == (1, False, 0.0)
+    assert by["y"]["rank"] == by["z"]["rank"] == 2
+    assert by["y"]["blown_up"] == 1
+    assert by["y"]["regularisations"] == {"node moved": 3}
+    assert (by["z"]["timeout"], by["z"]["inside_out"]) == (1, 1)
+    assert by["x"]["refused"] == 1
+
+
+def test_of_energy_the_worst_case_counts_and_round_off_is_as_good_as_zero():
+    def moved(case, solver, drift):
+        return solve(case, solver, 0, metrics=[Metric("energy_drift", drift, "1", source="own")])
+
+    results = [
+        case_of("a", [moved("a", "x", 1e-15), moved("a", "y", 3e-13), moved("a", "z", 1e-3)]),
+        case_of("b", [moved("b", "x", 2e-15), moved("b", "y", 1e-14), moved("b", "z", 1e-9)]),
+    ]
+    _, by = compared(rank_solvers(results), "energy", "energy_drift")
+    assert by["x"]["rank"] == by["y"]["rank"] == 1
+    assert (by["z"]["rank"], by["z"]["value"], by["z"]["where"]) == (3, 1e-3, "a")
+
+
+def test_order_of_cases_and_solvers_does_not_matter():
+    names, cases = ("x", "y", "z"), ("a", "b", "c")
+    number = {(c, n): 0.01 * (1 + i) * (2 + j) for i, c in enumerate(cases)
+              for j, n in enumerate(names)}  # fmt: skip
+
+    def ranks(cases, names):
+        results = [case_of(c, [solve(c, n, 0, number[c, n], 0.001) for n in names]) for c in cases]
+        _, by = compared(rank_solvers(results))
+        return {n: (s["rank"], round(math.log(s["value"]), 12)) for n, s in by.items()}
+
+    assert ranks(cases, names) == ranks(cases[::-1], names[::-1])
+
+
+def test_undecided_checks_and_the_reference_are_never_ranked():
+    open_ = VerdictRecord("error", "x", "jump_l2", Verdict.UNDECIDED, 1, 0, 2, "at most 1", "why")
+    solves = [solve("a", n, 0, 0.1) for n in ("x", "y", "reference")]
+    ranking = rank_solvers([case_of("a", solves, [open_])])
+    assert ranking["solvers"] == ["x", "y"]
+    assert [e["reason"] for e in ranking["left_out"]] == ["error jump_l2 UNDECIDED: why"]

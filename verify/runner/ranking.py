@@ -1,0 +1,99 @@
+"""The ranking of a finished run, ``ranking.json``; before it, the conformance of the ranked.
+
+Conformance is a matter of a solver and its parameters, not of the cases: what was found stays in
+the run directory and is taken over as long as the code of the solver is the same.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from verify.conformance import conform, exit_code_of
+from verify.errors import InputError
+from verify.result import CaseResult
+from verify.runner.fingerprint import code_of_solver, digest_of
+from verify.runner.storage import read_json, write_json
+from verify.solvers import solver_names
+from verify.study.ranking import rank_solvers, ranked_solvers
+
+__all__ = ["RANKING_FILE", "rank_run"]
+
+RANKING_FILE = "ranking.json"
+_UNASKED = 2  # so many solvers are ranked without being checked unasked
+
+
+def rank_run(
+    directory: Path,
+    results: Sequence[CaseResult],
+    parameters: Mapping[str, Mapping[str, Any]],
+    conformance: bool | None,
+    timeout: float,
+    announce: Callable[[str], None],
+) -> Path | None:
+    """Rank the solvers of a run, if there are at least two.
+
+    Parameters
+    ----------
+    directory : Path
+        The run directory.
+    results : sequence of CaseResult
+    parameters : mapping
+        Parameters by solver, as the run had them.
+    conformance : bool or None
+        Whether the suite runs before; None: if more than two solvers are ranked.
+    timeout : float
+        Wall seconds for each small solve of the suite.
+    announce : callable
+        Is told what is being done.
+
+    Returns
+    -------
+    Path or None
+        Of ``ranking.json``; None if there is nothing to rank.
+    """
+    target, solvers = directory / RANKING_FILE, ranked_solvers(results)
+    if len(solvers) < 2:
+        target.unlink(missing_ok=True)
+        return None
+    wanted = len(solvers) > _UNASKED if conformance is None else conformance
+    before = _stored(target)
+    found = {}
+    for solver in solvers:
+        own = dict(parameters.get(solver, {}))
+        if solver not in solver_names() and ":" not in solver:
+            found[solver] = {"unchecked": "imported answers: there is no solver to be asked"}
+            continue
+        key = digest_of([solver, own, code_of_solver(solver), code_of_suite()])
+        known = before.get(solver, {})
+        if known.get("key") == key:
+            found[solver] = known
+        elif wanted:
+            announce(f"conformance of {solver}")
+            found[solver] = {"key": key, **_checked(solver, own, timeout)}
+        else:
+            found[solver] = {"unchecked": "not asked for: --conform"}
+    write_json(rank_solvers(results, found), target)
+    return target
+
+
+def code_of_suite() -> str:
+    """Return the fingerprint of the suite's own code."""
+    folder = Path(__file__).resolve().parent.parent / "conformance"
+    return digest_of([[p.name, p.read_text("utf-8")] for p in sorted(folder.glob("*.py"))])
+
+
+def _stored(target: Path) -> dict[str, Any]:
+    try:
+        known = read_json(target).get("conformance", {})
+    except InputError:
+        return {}
+    return {name: one for name, one in known.items() if isinstance(one, dict)}
+
+
+def _checked(solver: str, parameters: dict[str, Any], timeout: float) -> dict[str, Any]:
+    try:
+        results = conform(solver, parameters, timeout)
+    except InputError as problem:
+        return {"unchecked": str(problem)}
+    return {"exit": exit_code_of(results), "checks": [asdict(result) for result in results]}

@@ -1,0 +1,5 @@
+"""Which solver: rankings of the solvers of a run by accuracy, stability, energy and cost."""
+
+from verify.study.ranking.ranking import rank_solvers, ranked_solvers
+
+__all__ = ["rank_solvers", "ranked_solvers"]

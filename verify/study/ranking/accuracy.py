@@ -1,0 +1,124 @@
+"""Who is nearest to the truth, at equal element size and on each one's finest level."""
+
+from collections.abc import Iterable, Sequence
+from math import isfinite
+
+from verify.result import CaseResult, SolveRecord, Status
+from verify.study.energy_account import ACCOUNT
+from verify.study.ranking.standing import Comparison, Item, LeftOut, compared_by_mean
+from verify.verdict import ERROR_METRICS, Interval, NotMeasuredError, error_interval
+
+__all__ = ["EQUAL_SIZE", "FINEST", "QUANTITIES", "accuracy_comparisons"]
+
+EQUAL_SIZE, FINEST = "equal size", "finest level"
+QUANTITIES = "quantities"  # all quantities of interest of all cases together
+_MAIN = ("displacement_l2", "energy_norm", "jump_l2")
+_SAME_SIZE = 0.1  # as for checks of ratios: unstructured meshes do not meet a size exactly
+
+
+def accuracy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
+    """Compare errors: the main norms, those that a case judges, and the quantities of interest.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+    solvers : sequence of str
+        Those that are ranked.
+
+    Returns
+    -------
+    list of Comparison
+        For each metric one at equal size and one on the finest level.
+    """
+    judged = {v.metric for r in results for v in r.verdicts if v.metric in ERROR_METRICS}
+    metrics = [*_MAIN, *sorted(judged - {*_MAIN, *ACCOUNT}), QUANTITIES]
+    comparisons = []
+    for metric in metrics:
+        for view, item_of in ((EQUAL_SIZE, _at_equal_size), (FINEST, _on_finest)):
+            items, left_out = [], []
+            for result in results:
+                for name in _names(result, metric, solvers):
+                    item = item_of(result, name, solvers)
+                    if isinstance(item, LeftOut):
+                        left_out.append(item)
+                    else:
+                        items.append(item)
+            found = compared_by_mean(metric, view, solvers, items, left_out)
+            if found is not None:
+                comparisons.append(found)
+    return comparisons
+
+
+def _names(result: CaseResult, metric: str, solvers: Sequence[str]) -> list[str]:
+    """Return what a metric stands for in a case: itself, or the names of the quantities."""
+    own = [m for s in result.solves if s.solver in solvers for m in s.metrics]
+    if metric == QUANTITIES:
+        named = {m.name for m in own if m.name not in ERROR_METRICS and m.reference}
+        return sorted(named)
+    return [metric] if any(m.name == metric for m in own) else []
+
+
+def _label(result: CaseResult, name: str) -> str:
+    return result.case if name in ERROR_METRICS else f"{result.case}, {name}"
+
+
+def _on_finest(result: CaseResult, name: str, solvers: Sequence[str]) -> Item:
+    """Take every solver on the finest level that it was asked for."""
+    found, missing = {}, {}
+    for solver in solvers:
+        own = [s for s in result.solves if s.solver == solver]
+        if not own:
+            missing[solver] = "was not run on this case"
+            continue
+        last = max(own, key=lambda s: s.level)
+        error = _error(last, name)
+        if error is None:
+            missing[solver] = _why(last, name)
+        else:
+            found[solver] = error
+    return Item(_label(result, name), found, missing)
+
+
+def _at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Item | LeftOut:
+    """Take the finest level that all have who have any, if their sizes agree there."""
+    finest = _on_finest(result, name, solvers)
+    errors = {
+        solver: {
+            s.level: (s, error)
+            for s in result.solves
+            if s.solver == solver and (error := _error(s, name)) is not None
+        }
+        for solver in solvers
+    }
+    present = {solver: levels for solver, levels in errors.items() if levels}
+    common = set.intersection(*(set(levels) for levels in present.values())) if present else set()
+    for level in sorted(common, reverse=True):
+        if _same([levels[level][0].size for levels in present.values()]):
+            missing = {s: why for s, why in finest.missing.items() if s not in present}
+            found = {solver: levels[level][1] for solver, levels in present.items()}
+            return Item(f"{_label(result, name)}, level {level}", found, missing)
+    why = "no level on which all have it, with element sizes that agree within 10 %"
+    return LeftOut(_label(result, name), "", why)
+
+
+def _same(sizes: Iterable[float | None]) -> bool:
+    known = [size or 0.0 for size in sizes]
+    return min(known) > 0.0 and max(known) / min(known) - 1 <= _SAME_SIZE
+
+
+def _error(solve: SolveRecord, name: str) -> Interval | None:
+    measured = solve.metric(name)
+    if solve.status is not Status.SOLVED or measured is None:
+        return None
+    try:
+        found = error_interval(measured)
+    except NotMeasuredError:
+        return None
+    return found if isfinite(found.value) and isfinite(found.high) else None
+
+
+def _why(solve: SolveRecord, name: str) -> str:
+    if solve.status is not Status.SOLVED:
+        return f"level {solve.level} {solve.status}: {solve.reason or 'no reason given'}"
+    said = solve.notes.get(name) or solve.notes.get("comparison") or "not measured"
+    return f"level {solve.level}: {said}"

@@ -1,0 +1,93 @@
+"""Who is cheapest at equal error."""
+
+from collections.abc import Mapping, Sequence
+
+from verify.result import CaseResult
+from verify.study.cost.work import WorkPoint, time_at, work_points
+from verify.study.ranking.standing import Comparison, Item, LeftOut, compared_by_mean
+from verify.study.rates import ROUND_OFF
+from verify.verdict import Interval
+
+__all__ = ["common_error", "cost_comparisons"]
+
+_METRICS = ("displacement_l2", "energy_norm")
+
+
+def cost_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
+    """Compare the time that each new cut costs, at the error that `common_error` finds."""
+    comparisons = []
+    for metric in _METRICS:
+        items, left_out = [], []
+        for result in results:
+            if not any(s.metric(metric) for s in result.solves if s.solver in solvers):
+                continue
+            item = _item(result, metric, solvers)
+            if isinstance(item, LeftOut):
+                left_out.append(item)
+            else:
+                items.append(item)
+        found = compared_by_mean(metric, "time at equal error", solvers, items, left_out)
+        if found is not None:
+            comparisons.append(found)
+    return comparisons
+
+
+def common_error(points: Mapping[str, Sequence[WorkPoint]]) -> tuple[float, list[str]] | None:
+    """Find the error at which most solvers can be compared; of several the smallest.
+
+    A solver can be compared at an error that lies between those of its coarsest and of its best
+    level: below it has no answer, above its time would be that of a mesh nobody would choose.
+
+    Returns
+    -------
+    error : float
+    solvers : list of str
+        Those that are compared; None for fewer than two.
+    """
+    spans = {
+        name: (min(p.error for p in own), max(p.error for p in own))
+        for name, own in points.items()
+        if own
+    }
+    room = 1 + 1e-9
+    found: tuple[float, list[str]] | None = None
+    for error in sorted(best for best, _ in spans.values()):
+        able = [
+            name for name, (best, worst) in spans.items() if best <= error * room <= worst * room**2
+        ]
+        if len(able) > (len(found[1]) if found else 1):
+            found = error, able
+    return found
+
+
+def _item(result: CaseResult, metric: str, solvers: Sequence[str]) -> Item | LeftOut:
+    known = work_points([s for s in result.solves if s.solver in solvers], metric)
+    # an error that cannot be told from none, by the reference or by round-off, buys nothing
+    sure = [p for p in known if p.low > 0.0 and p.error > ROUND_OFF and p.seconds > 0.0]
+    points = {name: [p for p in sure if p.solver == name] for name in solvers}
+    common = common_error(points)
+    if common is None:
+        return LeftOut(result.case, "", "no error that two solvers reach and the reference tells")
+    error, compared = common
+    found, missing = {}, {}
+    for name in solvers:
+        times = time_at(points[name], error) if name in compared else None
+        if times is None:
+            missing[name] = _why_not(points[name], error)
+        else:
+            # time_at interpolates each of the three by itself: they may cross by round-off
+            found[name] = Interval(times[0], min(times), max(times))
+    return Item(f"{result.case}, error {error:.2e}", found, missing)
+
+
+def _why_not(points: Sequence[WorkPoint], error: float) -> str:
+    if not points:
+        return "no level that is timed and whose error is known"
+    best = min(point.error for point in points)
+    if best > error:
+        return f"does not reach this error: {best:.2e} at best"
+    coarsest = max(points, key=lambda point: point.error)
+    return (
+        f"below this error on every level: {coarsest.error:.2e} already on level "
+        f"{coarsest.level}, in {coarsest.seconds:.2e} s"
+    )

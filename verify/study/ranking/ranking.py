@@ -1,0 +1,74 @@
+"""The ranking of the solvers of a run: one table per question, and what was left out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from verify.result import CaseResult, Status, Verdict
+from verify.study.ranking.accuracy import accuracy_comparisons
+from verify.study.ranking.cost import cost_comparisons
+from verify.study.ranking.energy import energy_comparisons
+from verify.study.ranking.stability import stability_standings
+from verify.study.ranking.standing import LeftOut
+
+__all__ = ["SCHEMA", "rank_solvers", "ranked_solvers"]
+
+SCHEMA = 1
+_REFERENCE = "reference"
+
+
+def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:
+    """Return the solvers of a run that can be ranked: all but the reference."""
+    names = dict.fromkeys(solve.solver for result in results for solve in result.solves)
+    return [name for name in names if name != _REFERENCE]
+
+
+def rank_solvers(
+    results: Sequence[CaseResult], conformance: Mapping[str, Mapping[str, Any]] | None = None
+) -> dict[str, Any]:
+    """Rank the solvers of a run.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+    conformance : mapping of str to mapping, optional
+        What ``verify conform`` found, by solver; kept beside the ranks, which it does not move.
+
+    Returns
+    -------
+    dict
+        Plain data of schema `SCHEMA`: ``solvers``, ``conformance``, the comparisons
+        ``accuracy``, ``energy`` and ``cost``, the standings ``stability``, ``left_out`` and
+        ``contended`` (why times may be off, if they may).
+    """
+    solvers = ranked_solvers(results)
+    return {
+        "schema": SCHEMA,
+        "kind": "ranking",
+        "cases": [result.case for result in results],
+        "solvers": solvers,
+        "conformance": {name: dict(found) for name, found in (conformance or {}).items()},
+        "accuracy": [asdict(one) for one in accuracy_comparisons(results, solvers)],
+        "stability": [asdict(one) for one in stability_standings(results, solvers)],
+        "energy": [asdict(one) for one in energy_comparisons(results, solvers)],
+        "cost": [asdict(one) for one in cost_comparisons(results, solvers)],
+        "left_out": [asdict(one) for one in _left_out(results)],
+        "contended": sorted(
+            {s.notes["timing"] for r in results for s in r.solves if "timing" in s.notes}
+        ),
+    }
+
+
+def _left_out(results: Sequence[CaseResult]) -> list[LeftOut]:
+    """List what no ranking counts: solves without an answer, and checks nobody could decide."""
+    listed = []
+    for result in results:
+        for solve in result.solves:
+            if solve.status is not Status.SOLVED:
+                why = f"level {solve.level} {solve.status}: {solve.reason or 'no reason given'}"
+                listed.append(LeftOut(result.case, solve.solver, why))
+        for verdict in result.verdicts:
+            if verdict.verdict in (Verdict.UNDECIDED, Verdict.ERROR):
+                why = f"{verdict.check} {verdict.metric} {verdict.verdict}: {verdict.reason}"
+                listed.append(LeftOut(result.case, verdict.solver, why))
+    return listed

@@ -1,0 +1,110 @@
+"""Who gets there at all: solves that failed or blew up, refusals, regularisations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from verify.result import CaseResult, SolveRecord, Status
+
+__all__ = ["StabilityStanding", "stability_standings"]
+
+_ANSWER = ("displacement_l2", "displacement_l2_max")
+_BLOWN_UP = 1.0  # relative error: as far off as a body that does not move
+
+
+@dataclass(frozen=True)
+class StabilityStanding:
+    """How the solves of one solver ended.
+
+    Parameters
+    ----------
+    solver : str
+    rank : int
+        One more than the number of solvers with a smaller share of solves lost.
+    tied : bool
+    asked, solved, refused : int
+        Refusals are not held against a solver: it says what it cannot do.
+    failed, timeout, memory : int
+    blown_up : int
+        Solved, but as far off as a body that does not move, or not finite.
+    inside_out : int
+        Solves whose notes tell of elements turned inside out.
+    lost : float
+        Share of the solves not refused that failed, ran out of time or memory, or blew up.
+    regularisations : dict of str to int
+        What was dropped, snapped, clamped, scaled or floored, and how often.
+    """
+
+    solver: str
+    rank: int | None
+    tied: bool
+    asked: int
+    solved: int
+    refused: int
+    failed: int
+    timeout: int
+    memory: int
+    blown_up: int
+    inside_out: int
+    lost: float | None
+    regularisations: dict[str, int]
+
+
+def stability_standings(
+    results: Sequence[CaseResult], solvers: Sequence[str]
+) -> list[StabilityStanding]:
+    """Count how the solves of every solver ended; the least lost first."""
+    own = {name: [s for r in results for s in r.solves if s.solver == name] for name in solvers}
+    lost = {name: _lost(solves) for name, solves in own.items()}
+    known = [share for share in lost.values() if share is not None]
+    standings = []
+    for name, solves in own.items():
+        ended = [solve.status for solve in solves]
+        counts: dict[str, int] = {}
+        for entry in (e for solve in solves for e in solve.regularisations):
+            kind, count = str(entry.get("kind", "unnamed")), entry.get("count", 1)
+            counts[kind] = counts.get(kind, 0) + (count if isinstance(count, int) else 1)
+        share = lost[name]
+        standings.append(
+            StabilityStanding(
+                solver=name,
+                rank=None if share is None else 1 + sum(other < share for other in known),
+                tied=share is not None and known.count(share) > 1,
+                asked=len(solves),
+                solved=ended.count(Status.SOLVED),
+                refused=ended.count(Status.REFUSED),
+                failed=ended.count(Status.FAILED),
+                timeout=ended.count(Status.TIMEOUT),
+                memory=ended.count(Status.MEMORY),
+                blown_up=sum(map(_blown_up, solves)),
+                inside_out=sum(map(_inside_out, solves)),
+                lost=share,
+                regularisations=counts,
+            )
+        )
+    return sorted(standings, key=lambda s: (s.lost is None, s.lost or 0.0))
+
+
+def _lost(solves: Sequence[SolveRecord]) -> float | None:
+    tried = [solve for solve in solves if solve.status is not Status.REFUSED]
+    bad = [s for s in tried if s.status is not Status.SOLVED or _blown_up(s)]
+    return len(bad) / len(tried) if tried else None
+
+
+def _blown_up(solve: SolveRecord) -> bool:
+    found = [m for name in _ANSWER if (m := solve.metric(name)) is not None]
+    return solve.status is Status.SOLVED and any(
+        not isfinite(m.value) or m.value - m.uncertainty > _BLOWN_UP for m in found
+    )
+
+
+def _inside_out(solve: SolveRecord) -> bool:
+    """Whether a note such as ``pieces inside out`` holds anything but zero."""
+    for name, said in solve.notes.items():
+        if name.endswith("inside out"):
+            try:
+                if float(said) != 0.0:
+                    return True
+            except ValueError:
+                return True
+    return False

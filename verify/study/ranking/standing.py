@@ -1,0 +1,227 @@
+"""Where solvers stand in one comparison: ranks from intervals, ties where they overlap."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from verify.study.rates import ROUND_OFF
+from verify.verdict import Interval
+
+__all__ = ["Comparison", "Item", "LeftOut", "Standing", "compared_by_mean", "compared_by_worst"]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """What does not count in a comparison, and why; an empty solver means all of them."""
+
+    case: str
+    solver: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Item:
+    """One thing in which solvers are compared: a number per solver, smaller is better.
+
+    Parameters
+    ----------
+    case : str
+    found : dict of str to Interval
+    missing : dict of str to str
+        Solvers that have no number, and why.
+    """
+
+    case: str
+    found: dict[str, Interval]
+    missing: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A solver in a comparison.
+
+    Parameters
+    ----------
+    solver : str
+    rank : int or None
+        One more than the number of solvers that are certainly better (their intervals lie
+        wholly below). None for a solver without a number in some item: its `value` is over fewer
+        items than that of the others.
+    tied : bool
+        Whether another has the same rank.
+    value, low, high : float or None
+        The number and the interval in which it lies.
+    count : int
+        Items that it rests on.
+    where : str
+        Case that decided, where the worst counts.
+    """
+
+    solver: str
+    rank: int | None
+    tied: bool
+    value: float | None
+    low: float | None
+    high: float | None
+    count: int
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All solvers in one respect.
+
+    Parameters
+    ----------
+    metric : str
+        What was compared.
+    view : str
+        Under which condition.
+    how : str
+        How cases are joined: ``"mean"``, geometric mean of the ratios to the best of each case,
+        or ``"worst"``.
+    items : int
+    standings : list of Standing
+        Best first, those without rank last.
+    left_out : list of LeftOut
+    """
+
+    metric: str
+    view: str
+    how: str
+    items: int
+    standings: list[Standing]
+    left_out: list[LeftOut]
+
+
+def compared_by_mean(
+    metric: str,
+    view: str,
+    solvers: Sequence[str],
+    items: Sequence[Item],
+    before: Sequence[LeftOut] = (),
+) -> Comparison | None:
+    """Join items by the geometric mean of ratios to the least number of each.
+
+    The least counts among the solvers that have a number in every item: one that does a single
+    case well must not be the measure of all others there. The interval of a ratio is that of the
+    solver's own number, since the least one only sets the scale, which is the same for all. An
+    item whose least number is round-off has no ratios and is left out, with the numbers; what was
+    left out `before` is listed with it.
+    """
+    counted, left_out = [], list(before)
+    for item in items:
+        left_out += [LeftOut(item.case, solver, why) for solver, why in item.missing.items()]
+        if len(item.found) < 2:
+            alone = f"{', '.join(item.found)} alone" if item.found else "no solver"
+            left_out.append(LeftOut(item.case, "", f"nothing to compare: {alone}"))
+        elif min(found.value for found in item.found.values()) <= ROUND_OFF:
+            left_out.append(LeftOut(item.case, "", _exact_text(item.found)))
+        else:
+            counted.append(item)
+            left_out += _undecided(item)
+    if not counted:
+        return Comparison(metric, view, "mean", 0, [], left_out) if left_out else None
+    everywhere = [name for name in solvers if all(name in item.found for item in counted)]
+    joined = {}
+    for solver in solvers:
+        ratios = [
+            Interval(own.value / least, own.low / least, own.high / least)
+            for item in counted
+            if (own := item.found.get(solver)) is not None
+            and (least := min(item.found[name].value for name in everywhere or item.found))
+        ]
+        if ratios:
+            joined[solver] = (_mean(ratios), len(ratios), "")
+    return Comparison(
+        metric, view, "mean", len(counted), _standings(solvers, joined, len(counted)), left_out
+    )
+
+
+def compared_by_worst(
+    metric: str, view: str, solvers: Sequence[str], items: Sequence[Item]
+) -> Comparison | None:
+    """Join items by their largest number; numbers at round-off are as good as zero."""
+    left_out = [LeftOut(i.case, solver, why) for i in items for solver, why in i.missing.items()]
+    counted = [item for item in items if item.found]
+    if not counted:
+        return None
+    joined = {}
+    for solver in solvers:
+        own = [(item.found[solver], item.case) for item in counted if solver in item.found]
+        if own:
+            worst, case = max(own, key=lambda pair: pair[0].value)
+            joined[solver] = (_above_round_off(worst), len(own), case)
+    standings = _standings(solvers, joined, len(counted))
+    return Comparison(metric, view, "worst", len(counted), standings, left_out)
+
+
+def _standings(
+    solvers: Sequence[str], joined: Mapping[str, tuple[Interval, int, str]], items: int
+) -> list[Standing]:
+    whole = {name: found for name, (found, count, _) in joined.items() if count == items}
+    ranks = {
+        name: 1 + sum(other.high < own.low for other in whole.values())
+        for name, own in whole.items()
+    }
+    standings = []
+    for solver in solvers:
+        found, count, where = joined.get(solver, (None, 0, ""))
+        rank = ranks.get(solver)
+        tied = rank is not None and list(ranks.values()).count(rank) > 1
+        standings.append(
+            Standing(
+                solver,
+                rank,
+                tied,
+                value=found.value if found else None,
+                low=found.low if found else None,
+                high=found.high if found else None,
+                count=count,
+                where=where,
+            )
+        )
+    last = math.inf
+    return sorted(
+        standings,
+        key=lambda s: (s.rank or last, last if s.value is None else s.value),
+    )
+
+
+def _mean(ratios: Sequence[Interval]) -> Interval:
+    def mean(numbers: Sequence[float]) -> float:
+        if min(numbers) <= 0.0:
+            return 0.0
+        return math.exp(sum(map(math.log, numbers)) / len(numbers))
+
+    return Interval(
+        mean([r.value for r in ratios]),
+        mean([r.low for r in ratios]),
+        mean([r.high for r in ratios]),
+    )
+
+
+def _above_round_off(found: Interval) -> Interval:
+    low = found.low if found.value > ROUND_OFF else 0.0
+    return Interval(found.value, low, max(found.high, ROUND_OFF))
+
+
+def _exact_text(found: Mapping[str, Interval]) -> str:
+    exact = [name for name, own in found.items() if own.value <= ROUND_OFF]
+    rest = [f"{name} {own.value:.2e}" for name, own in found.items() if own.value > ROUND_OFF]
+    text = f"exact to round-off: {', '.join(exact)}"
+    return f"{text}; not: {', '.join(rest)}" if rest else text
+
+
+def _undecided(item: Item) -> list[LeftOut]:
+    """Say of which solvers the reference cannot tell the error from none; they stay in."""
+    return [
+        LeftOut(
+            item.case,
+            name,
+            f"undecided: the uncertainty {own.half_width:.1e} is not below the value "
+            f"{own.value:.1e}; it counts with a lower bound of 0",
+        )
+        for name, own in item.found.items()
+        if own.low <= 0.0
+    ]
