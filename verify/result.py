@@ -105,6 +105,8 @@ class SolveRecord:
     solution: str | None = None  # path of the stored solution, relative to the run directory
     # relative errors over time, by metric, with "time" in s; empty for a static scene
     series: dict[str, list[float]] = field(default_factory=dict)
+    # energies and momenta over time, by name, with "time" in s; empty for a static scene
+    account: dict[str, list[float]] = field(default_factory=dict)
 
     def metric(self, name: str) -> Metric | None:
         """Return the metric called `name`, if it was measured."""

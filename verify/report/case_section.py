@@ -5,6 +5,7 @@ from verify.report.curves import Curve, error_curves, limits, metric_names
 from verify.report.figures_convergence import convergence_figure, error_range, required_slope
 from verify.report.figures_cost import time_figure, unknowns_figure
 from verify.report.markup import Markup, joined, tag
+from verify.report.motion_section import motion_section
 from verify.report.notation import error_title, number, number_text
 from verify.report.pictures import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
@@ -52,6 +53,7 @@ def _body(result: CaseResult, pictures: CasePictures) -> Markup:
         curves = [curve for name in names for curve in error_curves(result, name)]
         said = tag("p", " ".join(_reservations(curves, result)), class_="quiet")
         parts += [tag("h3", "Convergence and cost"), said, *diagrams]
+    parts.append(motion_section(result))
     parts += [orders_table(result), numbers_table(result), times_table(result)]
     reference = reference_record(result.reference)
     parts.append(tag("h3", "Reference"))

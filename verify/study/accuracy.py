@@ -18,6 +18,7 @@ from verify.scene import Scene, scene_hash
 from verify.solution import Solution
 from verify.study.energy_account import ACCOUNT, account_metrics
 from verify.study.error_history import ERROR_NAMES, History, compared_times, error_history
+from verify.study.motion_history import motion_history
 from verify.study.quantities import Measured, unit_of
 from verify.study.rates import observed_rate
 from verify.study.reference import (
@@ -163,6 +164,7 @@ def _measure(
     if scene.analysis.kind == "dynamic":
         kept, why = account_metrics(scene, one.solution, one.law)
         metrics, notes = metrics + kept, notes | why
+        record = replace(record, account=motion_history(scene, one.solution))
     if reference is None:
         without = _named(scene, missing)
         notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes
