@@ -2,6 +2,8 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from verify.scene.strict import Finite, Point3, Strict, Vector
@@ -45,6 +47,17 @@ class Moving(Strict):
         if self.centre is not None and self.spin is None:
             raise ValueError("centre belongs to a spin")
         return self
+
+    def velocities(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Velocity (n, d) of points (n, d), m/s."""
+        n, d = points.shape
+        velocity = np.tile(np.asarray(self.velocity or (0.0,) * d, dtype=float), (n, 1))
+        if self.spin is None:
+            return velocity
+        arm = points - np.asarray(self.centre or (0.0,) * d)
+        if d == 2:
+            return velocity + self.spin * np.column_stack([-arm[:, 1], arm[:, 0]])
+        return velocity + np.cross(np.asarray(self.spin, dtype=float), arm)
 
 
 Initial = Annotated[AtRest | Equilibrium | Moving, Field(discriminator="kind")]

@@ -15,9 +15,10 @@ from reference.large_strain import solve_large_strain
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene
+from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
+from verify.solvers.conforming_motion import SCHEMES, move, natural_step
 
 __all__ = ["ConformingSolver", "ReferenceSolver"]
 
@@ -33,21 +34,31 @@ def _refusal(scene: Scene) -> str | None:
             return reason
     elif not isinstance(geometry, Rectangle | Polygon | Box):
         return f"conforming meshes of a '{geometry.kind}' geometry are not offered yet"
-    if scene.analysis.kind == "dynamic":
-        return "dynamics is not offered by the reference yet"
+    if any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
+        return "a cut that grows while the body moves is played (verify play), not solved"
     if scene.dimension == 3 and scene.analysis.kinematics != "linear":
         return "finite rotations in space are not offered by the reference yet"
     return None
 
 
-class _Equilibrium(NamedTuple):
-    """What every way to solve gives: displacement (n, 2), energy, seconds, iterations, notes."""
+class _Answer(NamedTuple):
+    """What every way to solve gives; displacement and velocity are (t, n, d)."""
 
+    space: ConformingSpace
+    times: NDArray[np.float64]
     displacement: NDArray[np.float64]
-    strain_energy: float
+    velocity: NDArray[np.float64] | None
+    ledger: dict[str, NDArray[np.float64]]
     timings: dict[str, float]
     iterations: dict[str, int]
     notes: dict[str, str]
+
+
+class _Motion(NamedTuple):
+    """Scheme of a dynamic scene, and its largest step (s) on a level of an element size (m)."""
+
+    scheme: str
+    largest: Callable[[int, float], float]
 
 
 class ConformingSolver:
@@ -62,6 +73,9 @@ class ConformingSolver:
         touches are split; it differs from what an unfitted method works on by the cut cells
         alone. Remeshed: gmsh meshes the cut body anew, with the same mean cell area. Neither is
         graded.
+    scheme : {"newmark", "energy_momentum", "implicit_euler", "generalised_alpha"}
+        Dynamics: time integration; the last with a spectral radius of 0.8. The step is the
+        scene's, or else the time in which a pressure wave crosses an element.
     """
 
     name = "conforming"
@@ -81,21 +95,36 @@ class ConformingSolver:
         repetitions: int = 1,
         degree: int = 1,
         mesh: str = "imprinted",
+        scheme: str = "newmark",
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
         if mesh not in ("imprinted", "remeshed") or degree not in (1, 2):
             raise InputError(
                 f"mesh '{mesh}', degree {degree}; expected imprinted or remeshed, 1 or 2"
             )
+        if scheme not in SCHEMES:
+            raise InputError(f"scheme '{scheme}'; expected one of {', '.join(SCHEMES)}")
+
+        def largest(_level: int, size: float) -> float:
+            return scene.analysis.time_step or natural_step(scene, size)
 
         size = structure(scene, level).size
         return _solve(
-            scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree, repetitions
+            scene,
+            lambda level: (peer_mesh(scene, level, mesh), size),
+            level,
+            degree,
+            repetitions,
+            _Motion(scheme, largest),
         )
 
 
 class ReferenceSolver:
     """Elements of the degree that the scene asks for, graded to every singular point.
+
+    A motion is integrated by the trapezoidal rule, at finite rotation by the energy–momentum
+    scheme, with the scene's time step on level 0; every level halves it with the elements, so
+    that what the levels say of their error is said of both.
 
     A reference is timed once, whatever `repetitions` says: it judges and does not compete.
     """
@@ -112,12 +141,19 @@ class ReferenceSolver:
 
     def solve(self, scene: Scene, level: int, repetitions: int = 1) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
+
+        def largest(level: int, size: float) -> float:
+            step = scene.analysis.time_step or natural_step(scene, size * 2**level)
+            return step / 2**level
+
+        linear = scene.analysis.kinematics == "linear"
         return _solve(
             scene,
             lambda level: reference_mesh(scene, level),
             level,
             scene.reference.degree,
             min(repetitions, 1),
+            _Motion("newmark" if linear else "energy_momentum", largest),
         )
 
 
@@ -127,34 +163,67 @@ def _solve(
     level: int,
     degree: int,
     repetitions: int,
+    motion: _Motion,
 ) -> Solution:
     if reason := _refusal(scene):
         raise UnsupportedSceneError(reason)
     exact = None
     if scene.exact is not None:
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+
+    def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
+        if scene.analysis.kind == "static":
+            return _equilibrium(scene, conforming_space(mesh, degree), exact)
+        largest = motion.largest(level, size)
+        return _moved(scene, mesh, degree, exact, motion.scheme, largest, trial)
+
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
-        _equilibrium(scene, conforming_space(make_mesh(0)[0], degree), exact)
+        answer(0, *make_mesh(0), trial=True)
     for _ in range(max(repetitions, 1)):
         start = perf_counter()
         mesh, size = make_mesh(level)
-        space = conforming_space(mesh, degree)
         meshed = perf_counter() - start
-        result = _equilibrium(scene, space, exact)
+        result = answer(level, mesh, size)
         if repetitions:
             for phase, seconds in {"meshing": meshed, **result.timings}.items():
                 timings.setdefault(phase, []).append(seconds)
-    return _solution(mesh, space, result, size, timings)
+    return _solution(mesh, result, size, timings)
 
 
-def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Equilibrium:
+def _moved(
+    scene: Scene,
+    mesh: ConformingMesh,
+    degree: int,
+    exact: Any,
+    scheme: str,
+    largest: float,
+    trial: bool,
+) -> _Answer:
+    """Solve a dynamic scene."""
+    found = move(scene, mesh, degree, exact, scheme, largest, trial)
+    return _Answer(
+        found.space,
+        found.times,
+        found.displacement,
+        found.velocity,
+        found.ledger,
+        found.timings,
+        found.iterations,
+        found.notes,
+    )
+
+
+def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Answer:
     """Solve a scene by its kinematics."""
     if scene.analysis.kinematics == "linear":
         linear = solve_linear(scene, space, exact)
-        return _Equilibrium(
-            linear.displacement,
-            linear.strain_energy,
+        return _Answer(
+            space,
+            np.zeros(1),
+            linear.displacement[None],
+            None,
+            {"strain": np.array([linear.strain_energy])},
             linear.timings,
             {"cg": linear.answer.iterations} if linear.answer.iterations else {},
             {
@@ -171,9 +240,12 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Equilibri
         lambda factor: constrained_values(scene, space, exact, factor)[1],
         lambda v: load_form(scene, space, v, exact),
     )
-    return _Equilibrium(
-        finite.displacement,
-        finite.strain_energy,
+    return _Answer(
+        space,
+        np.zeros(1),
+        finite.displacement[None],
+        None,
+        {"strain": np.array([finite.strain_energy])},
         finite.timings,
         {"newton": finite.iterations, "load steps": finite.steps},
         {
@@ -186,21 +258,20 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Equilibri
 
 
 def _solution(
-    mesh: ConformingMesh,
-    space: ConformingSpace,
-    result: _Equilibrium,
-    size: float,
-    timings: dict[str, list[float]],
+    mesh: ConformingMesh, result: _Answer, size: float, timings: dict[str, list[float]]
 ) -> Solution:
+    space = result.space
     return Solution(
         points=space.node_points,
         cells=space.cell_nodes,
-        displacement=result.displacement[None],
+        displacement=result.displacement,
+        times=result.times,
+        velocity=result.velocity,
         order=space.degree,
         cut_facets=mesh.realised_cut,
         cell_sides=mesh.pieces,
-        ledger={"strain": np.array([result.strain_energy])},
-        unknowns=result.displacement.size,
+        ledger=result.ledger,
+        unknowns=result.displacement[0].size,
         size=size,
         timings=timings,
         iterations=result.iterations,

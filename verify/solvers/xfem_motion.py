@@ -207,7 +207,7 @@ class Mover:
         state, initial = body.rest(), self.scene.initial
         if isinstance(initial, Moving):
             free = ~body.fixed
-            state.velocity[free] = _rigid_velocity(initial, body.force.virtual.node_points)[free]
+            state.velocity[free] = initial.velocities(body.force.virtual.node_points)[free]
         elif isinstance(initial, Equilibrium):
             state.displacement[:] = self._equilibrium(body)
         self.timings["initial state"] += perf_counter() - clock
@@ -336,15 +336,3 @@ class Mover:
             self.slivers,
             penalised(self.penalty),
         )
-
-
-def _rigid_velocity(initial: Moving, points: _Floats) -> _Floats:
-    """Velocity (n, d) of points (n, d) of a rigid body, m/s."""
-    d = points.shape[1]
-    velocity = np.tile(np.asarray(initial.velocity or (0.0,) * d, dtype=float), (len(points), 1))
-    if initial.spin is None:
-        return velocity
-    arm = points - np.asarray(initial.centre or (0.0,) * d)
-    if d == 2:
-        return velocity + initial.spin * np.column_stack([-arm[:, 1], arm[:, 0]])
-    return velocity + np.cross(np.asarray(initial.spin, dtype=float), arm)

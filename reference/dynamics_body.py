@@ -1,0 +1,208 @@
+"""What moves, as a scene states it: mass, elasticity, damping, loads and supports over time."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.boundary_values import constrained_values
+from reference.dynamics_law import Matrix, law_of
+from reference.elasticity import load_form
+from reference.large_strain import solve_large_strain
+from reference.linear_solvers import direct_solver
+from reference.space import ConformingSpace
+from verify.errors import InputError
+from verify.scene import Gravity, Scene, Support
+from verify.scene.history import factor_at, first_factor, slope_at
+from verify.scene.parts import on_part
+
+__all__ = ["MovingBody"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Held:
+    """Nodes and components that a support holds, and their values where they are exact."""
+
+    support: Support
+    place: tuple[NDArray[np.int64], NDArray[np.int64]]
+    points: Array
+    exact: Array | None
+
+    def values(self, factor: float) -> Array:
+        if self.exact is not None:
+            return factor * self.exact
+        return self.support.values(self.points, factor)
+
+    def rates(self, factor: float) -> Array:
+        return self.exact if self.exact is not None else self.support.rates(self.points, factor)
+
+
+class MovingBody:
+    """A body of a dynamic scene on one mesh. Arrays (k,) hold nodes × components.
+
+    Parameters
+    ----------
+    scene : Scene
+    space : ConformingSpace
+        Serial.
+    exact : ExactSolution or None
+        For supports and loads that are said to be exact.
+
+    Attributes
+    ----------
+    law : Law
+    mass : Matrix
+        Consistent.
+    weight : (k,) array
+        Dead load of gravity, N.
+    held : (h,) int array
+        Unknowns with a prescribed motion, ascending.
+
+    Raises
+    ------
+    InputError
+        If there is no density, or a support or load acts nowhere.
+    """
+
+    def __init__(self, scene: Scene, space: ConformingSpace, exact: Any) -> None:
+        import ufl
+        from dolfinx import fem
+        from dolfinx.fem import petsc
+
+        density = scene.material.density
+        if density is None:
+            raise InputError("material.density is missing: motion needs it", str(scene.file or ""))
+        self.scene, self.space, self.exact = scene, space, exact
+        V = space.function_space
+        inertia = fem.Constant(V.mesh, np.asarray(density))
+        inertia = inertia * ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V)) * ufl.dx
+        mass = petsc.assemble_matrix(fem.form(inertia))
+        mass.assemble()
+        self.mass = Matrix(mass)
+        self.law = law_of(scene.material, space, scene.analysis.kinematics)
+        self.weight = np.zeros(space.node_points.size)
+        self._driven: list[tuple[Array, Any]] = []
+        for load in scene.loads:
+            form = self._load_form(load, ufl.TestFunction(V))
+            forces = np.array(fem.assemble_vector(fem.form(form)).array, dtype=float)
+            if isinstance(load, Gravity):
+                self.weight += forces
+            else:
+                self._driven.append((forces, load.history))
+        self._supports = self._found()
+        mark = np.zeros(space.node_points.shape, dtype=bool)
+        for one in self._supports:
+            mark[one.place] = True
+        self.held = np.flatnonzero(mark.ravel()).astype(np.int32)
+
+    def external(self, time: float) -> Array:
+        """Return the forces of all loads at a time, N; after a jump there."""
+        total = self.weight.copy()
+        for forces, history in self._driven:
+            total += factor_at(history, time) * forces
+        return total
+
+    def prescribed(self, time: float) -> tuple[Array, Array]:
+        """Displacements and velocities (h,) of what is held, m and m/s."""
+        values, rates = [], []
+        for one in self._supports:
+            factor = factor_at(one.support.history, time)
+            values.append(one.values(factor))
+            rates.append(slope_at(one.support.history, time) * one.rates(factor))
+        return self._filled(values), self._filled(rates)
+
+    def equilibrium(self) -> Array:
+        """Find the static equilibrium (k,) under the first factors of all histories, m.
+
+        Raises
+        ------
+        InputError
+            If a piece is not held.
+        RuntimeError
+            If it is not found.
+        """
+        constrained_values(self.scene, self.space, self.exact)  # says which piece is not held
+        factors = [first_factor(one.support.history) for one in self._supports]
+        if self.scene.analysis.kinematics == "linear":
+            return self._linear_equilibrium(factors)
+
+        def prescribed(share: float) -> Array:
+            pairs = zip(self._supports, factors, strict=True)
+            return self._filled([one.values(share * factor) for one, factor in pairs])
+
+        found = solve_large_strain(
+            self.scene.material, self.space, self.held, prescribed, self._first_loads
+        )
+        return found.displacement.ravel()
+
+    def accelerations(self, forces: Array) -> Array:
+        """Solve M a = forces, with a = 0 where held."""
+        matrix = self.mass.petsc.copy()
+        matrix.zeroRowsColumns(self.held, 1.0)
+        right = forces.copy()
+        right[self.held] = 0.0
+        return _solved(matrix, right)
+
+    def _linear_equilibrium(self, factors: list[float]) -> Array:
+        load = self.weight.copy()
+        for forces, history in self._driven:
+            load += first_factor(history) * forces
+        u = np.zeros_like(load)
+        pairs = zip(self._supports, factors, strict=True)
+        u[self.held] = self._filled([one.values(factor) for one, factor in pairs])
+        free_load = load - self.law.force(u)
+        free_load[self.held] = 0.0
+        matrix = self.law.tangent(u)
+        matrix.zeroRowsColumns(self.held, float(matrix.getDiagonal().sum()) / len(u))
+        return u + _solved(matrix, free_load)
+
+    def _first_loads(self, v: Any) -> Any:
+        """Linear form of all loads with their first factors."""
+        form = self._load_form(None, v)
+        for load in self.scene.loads:
+            form += first_factor(getattr(load, "history", None)) * self._load_form(load, v)
+        return form
+
+    def _load_form(self, load: Any, v: Any) -> Any:
+        alone = self.scene.model_copy(update={"loads": [load] if load is not None else []})
+        alone._file, alone._name = self.scene.file, self.scene.name
+        return load_form(alone, self.space, v, self.exact)
+
+    def _found(self) -> list[_Held]:
+        """Find what each support holds."""
+        space = self.space
+        nodes, owner = space.boundary_nodes()
+        points = space.node_points[nodes]
+        found = []
+        for i, support in enumerate(self.scene.supports):
+            chosen = on_part(self.scene, support.where, points, f"supports[{i}].where")
+            held = list(support.held(space.dimension))
+            exact = None
+            if support.displacement == "exact":
+                near = space.centroids[owner[chosen]]
+                exact = self.exact.displacement(points[chosen], near)[:, held]
+            place: Any = np.ix_(nodes[chosen], held)
+            found.append(_Held(support, place, points[chosen], exact))
+        return found
+
+    def _filled(self, values: list[Array]) -> Array:
+        """Values (h,) of what is held; a later support wins."""
+        filled = np.zeros(self.space.node_points.shape)
+        for one, value in zip(self._supports, values, strict=True):
+            filled[one.place] = value
+        return filled.ravel()[self.held]
+
+
+def _solved(matrix: Any, right: Array) -> Array:
+    """Solve a symmetric positive definite system and free it."""
+    x, b = matrix.createVecs()
+    b.array[:] = right
+    solver = direct_solver(matrix)
+    solver.solve(b, x)
+    found = np.array(x.array, dtype=float)
+    for entry in (solver, matrix, x, b):
+        entry.destroy()
+    return found

@@ -1,0 +1,226 @@
+"""One implicit step of a body in motion, solved to the end, for every scheme of the family."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.dynamics import Scheme
+from reference.dynamics_body import MovingBody
+
+__all__ = ["State", "StepForces", "Stepper"]
+
+Array = NDArray[np.float64]
+
+_TOLERANCE = 1e-11  # of the largest force that the residual balances
+_GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall further
+_MOST_ITERATIONS = 40
+_SHORTEST = 1e-2  # share of a correction
+_MOST_LEAPS = 3
+_SLOW = 0.1  # a factorisation that contracts the residual by less is made anew
+_JUST = 1e-12  # of the step: loads are taken that much inside of it, on their side of a jump
+
+
+@dataclass
+class State:
+    """Displacement, velocity, acceleration (k,) at a time."""
+
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    time: float
+
+    def copy(self) -> "State":
+        """Return an independent copy."""
+        u, v, a = self.displacement, self.velocity, self.acceleration
+        return State(u.copy(), v.copy(), a.copy(), self.time)
+
+
+@dataclass(frozen=True)
+class StepForces:
+    """Forces (k,) that a step balances, N; at free unknowns the sum of all is the residual."""
+
+    external: Array
+    internal: Array
+    viscous: Array
+    inertia: Array
+
+    @property
+    def residual(self) -> Array:
+        """External less all others: at held unknowns, minus the reactions."""
+        return self.external - self.internal - self.viscous - self.inertia
+
+
+class Stepper:
+    """Steps of one size of M a + f_visc + f_int = f_ext; a at α_m, forces at α_f of `Scheme`.
+
+    Parameters
+    ----------
+    body : MovingBody
+    scheme : Scheme
+    averaged : bool
+        Whether the internal force is the mean over the step (energy–momentum) and other forces
+        are those in its middle; else all are weighted means of those at its ends. The scheme
+        must then be that of spectral radius 1.
+    size : float
+        Δt, s.
+
+    Attributes
+    ----------
+    solves : int
+        Linear solves so far.
+    """
+
+    def __init__(self, body: MovingBody, scheme: Scheme, averaged: bool, size: float) -> None:
+        self.body, self.scheme, self.averaged, self.size = body, scheme, averaged, size
+        self.solves = 0
+        self._solver: Any = None
+        self._before = np.zeros(0)  # internal and viscous force at the start of the step
+        self._load = np.zeros(0)
+
+    def step(self, state: State) -> StepForces:
+        """Advance a state in place; give the forces of the step.
+
+        Raises
+        ------
+        RuntimeError
+            If Newton's iteration does not converge.
+        """
+        body, scheme, h = self.body, self.scheme, self.size
+        start = state.copy()
+        if not self.averaged:
+            self._before = self._resisting(start.displacement, start.velocity)
+        self._load = self._external(start.time)
+        a = start.acceleration.copy()
+        still = self._end(start, 0.0 * a)[0]
+        values, _ = body.prescribed(start.time + h)
+        a[body.held] = (values - still[body.held]) / (h**2 * scheme.beta)
+        a, forces = self._solved(start, a)
+        state.displacement, state.velocity = self._end(start, a)
+        state.acceleration, state.time = a, start.time + h
+        return forces
+
+    def _end(self, start: State, a: Array) -> tuple[Array, Array]:
+        """Displacement and velocity at the end of a step that ends with an acceleration."""
+        scheme, h = self.scheme, self.size
+        reach = scheme.beta_old * start.acceleration + scheme.beta * a
+        u = start.displacement + h * start.velocity + h**2 * reach
+        return u, start.velocity + h * (scheme.gamma_old * start.acceleration + scheme.gamma * a)
+
+    def _solved(self, start: State, a: Array) -> tuple[Array, StepForces]:
+        """Newton's method for the acceleration at the end, with factorisations kept while good."""
+        forces, residual, norm = self._residual(start, a)
+        last, leaps = np.inf, 0
+        for _ in range(_MOST_ITERATIONS):
+            scale = _scale(forces)
+            stuck = norm > 0.1 * last
+            if norm <= _TOLERANCE * scale or (stuck and norm <= _GOOD_ENOUGH * scale):
+                return a, forces
+            fresh = self._solver is None or (norm > _SLOW * last and not self.body.law.linear)
+            if fresh:
+                self._factorise(start.displacement, self._end(start, a)[0])
+            correction, last = self._correction(residual), norm
+            best = self._residual(start, a + correction)
+            share = 1.0
+            while fresh and not best[2] < last and share > _SHORTEST:
+                share *= 0.5
+                best = self._residual(start, a + share * correction)
+            if fresh and not best[2] < last:  # a dead end, and not a root: leap over it
+                share, leaps = 1.0, leaps + 1
+                best = self._residual(start, a + correction)
+            if not np.isfinite(best[2]) or leaps > _MOST_LEAPS:
+                break
+            a = a + share * correction
+            forces, residual, norm = best
+        raise RuntimeError(
+            f"the step from {start.time:.6g} s by {self.size:.6g} s is not solved: residual "
+            f"{norm:.3g} N against forces of {_scale(forces):.3g} N; a smaller "
+            "analysis.time_step may help"
+        )
+
+    def _residual(self, start: State, a: Array) -> tuple[StepForces, Array, float]:
+        """Give the forces of a step that ends like this, what they leave, and its norm."""
+        forces = self._forces(start, *self._end(start, a), a)
+        residual = forces.residual
+        residual[self.body.held] = 0.0
+        return forces, residual, float(np.linalg.norm(residual))
+
+    def close(self) -> None:
+        """Free what PETSc holds."""
+        if self._solver is not None:
+            matrix = self._solver.getOperators()[0]
+            for entry in (self._solver, matrix, self._right, self._answer):
+                entry.destroy()
+            self._solver = None
+
+    def _external(self, time: float) -> Array:
+        body, h = self.body, self.size
+        if self.averaged:
+            return body.external(time + 0.5 * h)
+        old = self.scheme.alpha_f
+        later = (1 - old) * body.external(time + h * (1 - _JUST))
+        return later + old * body.external(time + h * _JUST) if old else later
+
+    def _forces(self, start: State, u: Array, v: Array, a: Array) -> StepForces:
+        body, scheme, external = self.body, self.scheme, self._load
+        mean = (1 - scheme.alpha_m) * a + scheme.alpha_m * start.acceleration
+        inertia = body.mass @ mean
+        if self.averaged:
+            internal = body.law.averaged(start.displacement, u)
+            middle = 0.5 * (start.displacement + u), 0.5 * (start.velocity + v)
+            return StepForces(external, internal, self._viscous(*middle), inertia)
+        keep = 1 - scheme.alpha_f
+        internal, viscous = keep * self._resisting(u, v) + scheme.alpha_f * self._before
+        return StepForces(external, internal, viscous, inertia)
+
+    def _resisting(self, u: Array, v: Array) -> Array:
+        """Return internal and viscous force (2, k)."""
+        return np.array([self.body.law.force(u), self._viscous(u, v)])
+
+    def _viscous(self, u: Array, v: Array) -> Array:
+        mass, stiffness = self.body.scene.analysis.damping
+        force = mass * (self.body.mass @ v) if mass else np.zeros_like(v)
+        return force + stiffness * self.body.law.viscous(u, v) if stiffness else force
+
+    def _factorise(self, before: Array, u: Array) -> None:
+        """Factorise the derivative of minus the residual by the new acceleration."""
+        from petsc4py import PETSc
+
+        self.close()
+        body, scheme, h = self.body, self.scheme, self.size
+        mass, stiffness = body.scene.analysis.damping
+        keep = 0.5 if self.averaged else 1 - scheme.alpha_f
+        if self.averaged:
+            matrix = body.law.averaged_tangent(before, u)
+            matrix.scale(h**2 * scheme.beta)
+        else:
+            matrix = body.law.tangent(u)
+            matrix.scale(keep * h**2 * scheme.beta)
+        if stiffness:
+            damping = body.law.viscous_tangent(0.5 * (before + u) if self.averaged else u)
+            matrix.axpy(keep * h * scheme.gamma * stiffness, damping)
+            damping.destroy()
+        matrix.axpy(1 - scheme.alpha_m + keep * h * scheme.gamma * mass, body.mass.petsc)
+        matrix.zeroRowsColumns(body.held, float(matrix.getDiagonal().sum()) / len(u))
+        symmetric = body.law.linear or not self.averaged
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
+        solver = PETSc.KSP().create(matrix.comm)
+        solver.setOperators(matrix)
+        solver.setType("preonly")
+        solver.getPC().setType("cholesky" if symmetric else "lu")
+        solver.getPC().setFactorSolverType("mumps")
+        solver.setUp()
+        self._solver = solver
+        self._answer, self._right = matrix.createVecs()
+
+    def _correction(self, residual: Array) -> Array:
+        self._right.array[:] = residual
+        self._solver.solve(self._right, self._answer)
+        self.solves += 1
+        return np.array(self._answer.array, dtype=float)
+
+
+def _scale(forces: StepForces) -> float:
+    parts = (forces.external, forces.internal, forces.viscous, forces.inertia)
+    return max(float(np.linalg.norm(part)) for part in parts) or 1.0
