@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.cell_tree import morton_order
 from verify.compare.cut_line import AWAY, CutRule
 from verify.compare.patches import Patch
 from verify.compare.simplex_rule import points_in
@@ -51,6 +52,8 @@ def surface_rule(body: SolidBody, spacing: float, order: int = 2, depth: float =
     if not rows:
         return CutRule(*(np.zeros(shape) for shape in ((0, 3), (0,), (0, 3), (0, 3), (0, 3))))
     points, weights, normals, away = (np.concatenate(column) for column in zip(*rows, strict=True))
+    near = morton_order(points) if len(points) else np.zeros(0, dtype=np.int64)
+    points, weights, normals, away = points[near], weights[near], normals[near], away[near]
     shift = away[:, None] * normals
     return CutRule(points, weights, normals, points + shift, points - shift)
 

@@ -10,6 +10,7 @@ point is then a matter of the field that is asked; the rest is in the integratio
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.cell_tree import morton_order
 from verify.compare.patches import Patch
 from verify.compare.simplex_rule import points_in
 from verify.compare.slabs import Rule
@@ -51,8 +52,9 @@ def volume_rule(
         Exact volumes of the body and, for plane cuts, of each of its parts.
     """
     points, weights = points_in(volume_cells(body, spacing, seed, depth, grading), order)
-    kept = weights > 0.0
-    return Rule(np.ascontiguousarray(points[kept]), weights[kept])
+    kept = np.flatnonzero(weights > 0.0)
+    near = kept[morton_order(points[kept])]
+    return Rule(np.ascontiguousarray(points[near]), weights[near])
 
 
 def volume_cells(
