@@ -41,14 +41,12 @@ class BlockPattern:
     @cached_property
     def diagonal(self) -> _Ints:
         """(N,) the block on the diagonal of each row."""
-        rows = np.repeat(np.arange(self.node_count), np.diff(self.starts))
-        return np.flatnonzero(rows == self.columns).astype(np.int32)
+        return _diagonal(self.starts, self.columns)
 
     @cached_property
     def mirror(self) -> _Ints:
         """(B,) of each block (i, j), the place of (j, i)."""
-        rows = np.repeat(np.arange(self.node_count), np.diff(self.starts))
-        return np.lexsort((rows, self.columns)).astype(np.int32)
+        return _mirror(self.starts, self.columns)
 
     def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
         """Return the matrix of the given blocks (B, d, d), without a copy."""
@@ -111,3 +109,23 @@ def _pattern(cells, node_count):
                     for b in range(corners):
                         targets[cell, a, b] = place[cells[cell, b]]
     return starts, columns[:used].copy(), targets
+
+
+@njit(cache=True)
+def _diagonal(starts, columns):
+    place = np.empty(len(starts) - 1, dtype=np.int32)
+    for node in range(len(place)):
+        for k in range(starts[node], starts[node + 1]):
+            if columns[k] == node:
+                place[node] = k
+    return place
+
+
+@njit(cache=True)
+def _mirror(starts, columns):
+    # rows are met in ascending order, so each block is the next one in the row of its column
+    following, place = starts[:-1].copy(), np.empty(len(columns), dtype=np.int32)
+    for k in range(len(columns)):
+        place[k] = following[columns[k]]
+        following[columns[k]] += 1
+    return place

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.polar_kernels import LANES
+from verify.xfem.sweep_order_kernels import fill_lanes, number_upper_blocks, order_pieces
 from verify.xfem.tetrahedron_lanes import complete, linearise, unpack_rotations
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Linearisation"]
 
 _Floats = NDArray[np.float64]
-
-_FIRST, _SECOND = (0, 0, 0, 1, 1, 2), (1, 2, 3, 2, 3, 3)  # pairs of corners above the diagonal
 
 
 class Linearisation:
@@ -43,25 +42,21 @@ class Linearisation:
         pattern: BlockPattern,
         turning: bool = True,
     ) -> None:
-        corner = np.argsort(virtual.cells, axis=1)
-        nodes = np.take_along_axis(virtual.cells, corner, axis=1)
-        self._pieces = np.lexsort(nodes.T[::-1])
-        corner, parent = corner[self._pieces], virtual.parent[self._pieces]
-        self._cells = nodes[self._pieces].astype(np.int32)
-        gradients = np.take_along_axis(virtual.mesh.gradients[parent], corner[:, :, None], axis=1)
-        self._gradients = _in_lanes(gradients[:, 1:].reshape(-1, 9))
-        volumes = virtual.volumes[self._pieces]
-        self._moduli = _in_lanes(np.stack([volumes * lam[parent], volumes * mu[parent]], axis=1))
-        self._quaternions = _in_lanes(np.tile([1.0, 0.0, 0.0, 0.0], (len(corner), 1)))
-        of_piece = pattern.targets[self._pieces]
-        targets = of_piece[np.arange(len(corner))[:, None], corner[:, _FIRST], corner[:, _SECOND]]
-        met, first, index = np.unique(targets, return_index=True, return_inverse=True)
-        rank = np.empty(len(met), dtype=np.int32)
-        rank[np.argsort(first)] = np.arange(len(met))
-        self._targets = np.ascontiguousarray(rank[index].reshape(targets.shape))
-        self._source = np.full(len(pattern.columns), len(met), dtype=np.int32)
-        self._source[met] = self._source[pattern.mirror[met]] = rank
-        self._half = np.zeros((len(met) + 1, 3, 3))
+        pieces, corner, self._cells = order_pieces(virtual.cells, virtual.node_count)
+        batches = -(-len(pieces) // LANES)
+        self._pieces = pieces
+        self._gradients = np.zeros((batches, 9 * LANES))
+        self._moduli = np.zeros((batches, 2 * LANES))
+        fill_lanes(
+            pieces, corner, virtual.parent, virtual.mesh.gradients, virtual.volumes, lam, mu,
+            LANES, self._gradients, self._moduli,
+        )  # fmt: skip
+        self._quaternions = np.zeros((batches, 4 * LANES))
+        self._quaternions.reshape(-1, LANES)[::4] = 1.0
+        self._targets, self._source, met = number_upper_blocks(
+            pieces, corner, pattern.targets, pattern.mirror
+        )
+        self._half = np.zeros((met + 1, 3, 3))
         self.pattern, self.turning = pattern, turning
 
     def __call__(
@@ -103,12 +98,3 @@ class Linearisation:
         read = sum(array.nbytes for array in kept) + self._quaternions.nbytes
         vectors = 3 * self.pattern.node_count * 3 * 8
         return read + self._quaternions.nbytes + vectors + len(self.pattern.columns) * 9 * 8
-
-
-def _in_lanes(values: _Floats) -> _Floats:
-    """(p, k) values as (batches, k · LANES), lane by lane; the last with zeros."""
-    batches = -(-len(values) // LANES)
-    filled = np.zeros((batches * LANES, values.shape[1]))
-    filled[: len(values)] = values
-    lanes = filled.reshape(batches, LANES, -1).transpose(0, 2, 1)
-    return np.ascontiguousarray(lanes).reshape(batches, -1)

@@ -10,7 +10,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.cholesky import Cholesky
 from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.dynamics.body import DynamicBody, MotionState
@@ -54,7 +53,9 @@ class RealTimeEuler:
         self._internal = np.empty(body.shape)
         self._last: _Floats | None = None
         self._any_fixed = bool(body.fixed.any())
-        self._held = _held_entries(body.pattern, body.fixed)
+        self._held = _held_entries(
+            body.pattern.starts, body.pattern.columns, body.pattern.diagonal, body.fixed
+        )
         self._change = np.empty(body.shape)
 
     def step(self, state: MotionState) -> StepForces:
@@ -142,13 +143,20 @@ class RealTimeEuler:
         _hold(body.pattern.diagonal, body.fixed, self._held, self._change, self.blocks, self.load)
 
 
-def _held_entries(pattern: BlockPattern, fixed: NDArray[np.bool_]) -> NDArray[np.int64]:
+@njit(cache=True)
+def _held_entries(starts, columns, diagonal, fixed):
     """Entries of the blocks, flat, in a row or column of a fixed component, but the diagonal's."""
-    rows = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
-    held = fixed[rows][:, :, None] | fixed[pattern.columns][:, None, :]
-    axes = np.arange(fixed.shape[1])
-    held[pattern.diagonal[:, None], axes, axes] = False
-    return np.flatnonzero(held)
+    space = fixed.shape[1]
+    found, count = np.empty(len(columns) * space * space, dtype=np.int64), 0
+    for i in range(len(starts) - 1):
+        for k in range(starts[i], starts[i + 1]):
+            for a in range(space):
+                for b in range(space):
+                    held = fixed[i, a] or fixed[columns[k], b]
+                    if held and not (k == diagonal[i] and a == b):
+                        found[count] = (k * space + a) * space + b
+                        count += 1
+    return found[:count].copy()
 
 
 @njit(cache=True)
