@@ -29,6 +29,8 @@ class Body:
         What is coloured, per node or per triangle.
     element_edges : (k, 2) int array
         Edges of the elements, empty where they would be too dense to be seen.
+    material : (n, 3) float array
+        Where the nodes are in the undeformed body, m.
     """
 
     points: NDArray[np.float64]
@@ -36,6 +38,7 @@ class Body:
     edges: NDArray[np.int64]
     values: NDArray[np.float64]
     element_edges: NDArray[np.int64]
+    material: NDArray[np.float64]
 
 
 def read_stored(root: Path, path: str) -> Solution:
@@ -64,7 +67,8 @@ def deformed_body(solution: Solution, scale: float) -> Body:
     displacement = solution.displacement[-1]
     points = solution.points + scale * displacement
     cells = _straight(solution.cells, solution.cell_type)
-    return _body(points, cells, np.linalg.norm(displacement, axis=1), solution.cells)
+    values = np.linalg.norm(displacement, axis=1)
+    return _body(points, cells, values, solution.cells, solution.points)
 
 
 def error_body(path: Path) -> Body:
@@ -117,9 +121,13 @@ def _body(
     cells: NDArray[np.int64],
     values: NDArray[np.float64],
     elements: NDArray[np.int64],
+    material: NDArray[np.float64] | None = None,
 ) -> Body:
     flat = points.shape[1] == 2
-    drawn = np.column_stack([points, np.zeros(len(points))]) if flat else points
+    drawn, still = (
+        np.column_stack([places, np.zeros(len(places))]) if flat else places
+        for places in (points, points if material is None else material)
+    )
     if flat:
         triangles = cells
         edges = _single(cells, ((0, 1), (1, 2), (2, 0)))
@@ -128,7 +136,7 @@ def _body(
         triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))
         edges = _creases(drawn, triangles)
         inner = _all_edges(triangles, ((0, 1), (1, 2), (2, 0)))
-    return Body(drawn, triangles, edges, values, inner if len(inner) <= 4000 else inner[:0])
+    return Body(drawn, triangles, edges, values, inner if len(inner) <= 4000 else inner[:0], still)
 
 
 def _single(cells: NDArray[np.int64], faces: tuple[tuple[int, ...], ...]) -> NDArray[np.int64]:

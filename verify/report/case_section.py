@@ -22,6 +22,11 @@ from verify.result import CaseResult
 
 __all__ = ["case_section"]
 
+_TURN = (
+    "Drag to turn; click first, then the wheel or two fingers zoom, arrow keys turn, 0 goes back. "
+    "All bodies of a figure turn together. Colours are shaded a little by the light."
+)
+
 
 def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup:
     """Return the section of a case, number `index` of the run."""
@@ -94,13 +99,22 @@ def _figure(group: list[Picture], bar: str, caption: Markup) -> Markup:
         tag(
             "div",
             tag("div", picture.title, class_="label"),
-            tag("img", src=picture.address, alt=picture.description, width=width, height=height),
+            _image(picture, width, height),
         )
         for picture in group
     ]
     shape = "tall" if height > 1.6 * width else "wide"
     row = tag("div", images, class_=f"row {shape}")
+    if any(picture.turned for picture in group):
+        caption = joined(caption, tag("p", _TURN, class_="quiet turn-hint"))
     return tag("figure", row, colour_bar(group[0].view, bar), caption, class_=f"n{len(group)}")
+
+
+def _image(picture: Picture, width: int, height: int) -> Markup:
+    image = tag("img", src=picture.address, alt=picture.description, width=width, height=height)
+    if not (data := picture.turned):
+        return image
+    return tag("div", image, class_="turn", **{k.replace("-", "_"): v for k, v in data.items()})
 
 
 def _diagrams(result: CaseResult, metric: str) -> Markup | None:

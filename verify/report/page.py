@@ -1,4 +1,4 @@
-"""The page as a whole: one file, nothing fetched, no script."""
+"""The page as a whole: one file, nothing fetched; a script only where bodies can be turned."""
 
 from importlib.resources import files
 
@@ -9,6 +9,7 @@ from verify.report.pictures import CasePictures
 from verify.report.ranking_section import ranking_section
 from verify.report.run_directory import Run
 from verify.report.summary import summary, verdict_table
+from verify.report.turntable import turntable_script
 
 __all__ = ["page"]
 
@@ -60,4 +61,7 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
         reading_guide(),
         origin_section(run),
     )
-    return joined(Markup("<!DOCTYPE html>\n"), tag("html", head, tag("body", top, body), lang="en"))
+    turned = any(picture.turned for shown in pictures for picture in shown.all)
+    script = turntable_script() if turned else None
+    whole = tag("html", head, tag("body", top, body, script), lang="en")
+    return joined(Markup("<!DOCTYPE html>\n"), whole)

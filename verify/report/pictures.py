@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from verify.report import draw_with_matplotlib
 from verify.report.bodies import Body, deformed_body, error_body, read_stored
 from verify.report.notation import number_text, solver_title
 from verify.report.run_directory import CaseEntry
+from verify.report.turntable import packed
 from verify.report.view import View, common_view
 from verify.result import CaseResult, SolveRecord, Status
 from verify.solution import Solution
@@ -42,6 +44,17 @@ class Picture:
     view: View
     image: bytes = b""  # WebP
     by_vtk: bool = True
+    turnable: bool = True  # whether a body in space may be turned in the page
+
+    @cached_property
+    def solid(self) -> dict[str, str]:
+        """What a view that can be turned needs; empty for plane bodies."""
+        return packed(self.body, self.view)
+
+    @property
+    def turned(self) -> dict[str, str]:
+        """The same if the page has room for it."""
+        return self.solid if self.turnable else {}
 
     @property
     def address(self) -> str:

@@ -49,8 +49,12 @@ def render(directory: Path) -> Path:
 
 
 def _left_out(pictures: list[CasePictures], excess: int) -> str:
-    """Leave out the pictures of the last cases until the page is `excess` bytes smaller."""
-    dropped, total = 0, sum(len(shown.all) for shown in pictures)
+    """Leave out what can be turned, then pictures, of the last cases, by `excess` bytes."""
+    stills = dropped = 0
+    total = sum(len(shown.all) for shown in pictures)
+    for picture in [picture for shown in reversed(pictures) for picture in shown.all]:
+        if excess > 0 and (size := sum(map(len, picture.turned.values()))):
+            excess, stills, picture.turnable = excess - size, stills + 1, False
     for shown in reversed(pictures):
         if excess <= 0:
             break
@@ -58,8 +62,9 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
         dropped += len(shown.all)
         shown.deformed, shown.error = [], []
         shown.notes.append("Its pictures are left out to keep the page small.")
-    size = f"{_PAGE_BYTES / 1e6:.3g} MB"
-    return f"{dropped} of {total} pictures are left out to keep the page below {size}."
+    said = [f"{stills} bodies are shown as stills"] if stills else []
+    said += [f"{dropped} of {total} pictures are left out"] if dropped else []
+    return f"{', '.join(said)} to keep the page below {_PAGE_BYTES / 1e6:.3g} MB."
 
 
 def _write(path: Path, content: str) -> None:
