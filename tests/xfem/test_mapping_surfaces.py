@@ -279,3 +279,36 @@ def test_bad_input_is_refused_with_its_reason() -> None:
     surface.retire(np.array([3]))
     with pytest.raises(XfemError, match="facet 3 is no longer in use"):
         surface.facet_force(3, np.ones(3) / 3, np.ones(3), np.zeros((8, 3)))
+
+
+def _facets_in_any_order(surface, displacement):
+    """Corners of the facets in the material frame and moved, each from its first corner on."""
+    used = surface.facets.rows[surface.used]
+    corners = [x[used] for x in (surface.material.rows, surface.positions(displacement))]
+    places = np.concatenate(corners, axis=2).round(9) + 0.0
+    first = [min(range(3), key=lambda k, c=c: tuple(c[k])) for c in places]
+    rows = [np.roll(c, -k, axis=0).ravel() for c, k in zip(places, first, strict=True)]
+    return np.array(sorted(rows, key=tuple))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_facets_divided_by_one_cut_are_those_that_the_general_division_gives(
+    seed, monkeypatch
+) -> None:
+    """The kernel for a single cut against the way that takes any number of them."""
+    mesh, rng = box_mesh((4, 4, 4)), np.random.default_rng(seed)
+    points, facets = _sphere(3, np.full(3, 0.5), 0.47)
+    tips, blade = np.array([[-0.1, 0.3, 1.2], [0.8, 0.5, 1.2]]), np.array([0.1, 0.0, -0.8])
+    if seed == 2:  # some vertices exactly on the cut
+        points, facets = mesh.points, _own_boundary(mesh)
+        tips, blade = np.array([[-0.2, 0.15, 1.3], [0.8, 0.65, 1.3]]), np.array([0.0, 0.0, -1.6])
+    else:
+        tips, blade = tips + 0.1 * rng.random(3), blade + 0.2 * rng.random(3)
+    path = ToolPath.of_tip(tips, [0.0, 1.0], blade)
+    cutter, _, quick = _cut(mesh, [path], points, facets)
+    monkeypatch.setattr(EmbeddedSurface, "_divided_by_one", EmbeddedSurface._divided_by_several)
+    _, _, general = _cut(mesh, [path], points, facets)
+    displacement = rng.normal(size=(cutter.body.node_count, 3))
+    found, expected = (_facets_in_any_order(s.surface, displacement) for s in (quick, general))
+    assert len(found) > len(facets)
+    np.testing.assert_allclose(found, expected, atol=1e-8)

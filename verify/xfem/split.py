@@ -23,14 +23,14 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split_kernels import crossed_edges, divide_simplices
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["Held", "Partition", "split_cells"]
+__all__ = ["ROUND_OFF", "Held", "Partition", "split_cells"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 Held = Callable[[_Ints, NDArray[np.int8], int], NDArray[np.bool_]]
 
-_ROUND_OFF = 8.0 * np.finfo(float).eps
+ROUND_OFF = 8.0 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def split_cells(
     if tip not in get_args(TipRule):
         raise XfemError(f"tip rule '{tip}'; expected inside, through or nearest")
     values, snapped = _nodal_values(mesh, cuts)
-    snap = _ROUND_OFF * mesh.extent
+    snap = ROUND_OFF * mesh.extent
     plus = values[mesh.cells] >= 0.0
     candidates = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
     corners = mesh.dim + 1
@@ -165,7 +165,7 @@ def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]
         if column.shape != (len(mesh.points),) or not np.isfinite(column).all():
             raise XfemError(f"cut {index}: level set of shape {column.shape} or not finite")
         values[:, index] = column
-    tiny = (np.abs(values) <= _ROUND_OFF * mesh.extent) & (values != 0.0)
+    tiny = (np.abs(values) <= ROUND_OFF * mesh.extent) & (values != 0.0)
     values[tiny] = 0.0
     return values, int(tiny.sum())
 
@@ -196,7 +196,9 @@ def _split_by(
         active[doubtful] = held(partition.parent[doubtful], partition.label[doubtful], index)
     if not active.any():
         return partition
-    return _bisect_beside(_divide(partition, index, active), index)
+    divided = _divide(partition, index, active)
+    # of a single cut, what it leaves whole is left out in the end
+    return divided if divided.label.shape[1] == 1 else _bisect_beside(divided, index)
 
 
 def _divide(partition: Partition, index: int, active: NDArray[np.bool_]) -> Partition:

@@ -5,6 +5,8 @@ of some cuts. If the support has one node more than there are cuts, these sets s
 is; otherwise the edge on which it was found does.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -13,12 +15,21 @@ from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import RowNumbers, find_row, number_of_row
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["PointNumbers", "runs_through"]
+__all__ = ["FoundPoints", "PointNumbers", "runs_through"]
 
 _Ints = NDArray[np.int64]
 
 _NODES, _CUTS = 4, 3  # a point of a tetrahedron has at most that many
 _WIDTH = _NODES + _CUTS
+
+
+class FoundPoints(NamedTuple):
+    """What is asked of the points of a patch, as in `ZeroPoints`."""
+
+    positions: NDArray[np.float64]
+    values: NDArray[np.float64]
+    ends: _Ints
+    cut: _Ints
 
 
 class PointNumbers:
@@ -56,12 +67,12 @@ class PointNumbers:
         """Table of rows (mesh node, cut), the rows, and whether the cut runs through the node."""
         return self._nodes_met.table, self._nodes_met.rows, self._still_met.rows
 
-    def number(self, points: ZeroPoints, whole_nodes: _Ints, cuts: _Ints) -> _Ints:
+    def number(self, points: ZeroPoints | FoundPoints, whole_nodes: _Ints, cuts: _Ints) -> _Ints:
         """Numbers of all points of a patch: its nodes, then its zero points.
 
         Parameters
         ----------
-        points : ZeroPoints
+        points : ZeroPoints or FoundPoints
             Of the patch.
         whole_nodes : int array
             Number in the whole mesh of each node of the patch.

@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.cutting.distinct import distinct, ranges
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.patch import MeshPatch
-from verify.xfem.cutting.point_numbers import PointNumbers
+from verify.xfem.cutting.point_numbers import FoundPoints, PointNumbers
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
+from verify.xfem.mapping.cut_facet_kernels import divide_facets
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.locate_kernels import (
     corner_cells,
@@ -25,7 +26,7 @@ from verify.xfem.mapping.locate_kernels import (
     locate_many,
 )
 from verify.xfem.mapping.moving_surface import MovingSurface
-from verify.xfem.split import split_cells
+from verify.xfem.split import ROUND_OFF, split_cells
 
 __all__ = ["EmbeddedSurface"]
 
@@ -90,7 +91,7 @@ class EmbeddedSurface:
         self.facets = np.ascontiguousarray(facets, dtype=np.int64)
         _check(self.points, self.facets, mesh.space)
         self.surface = MovingSurface(mesh.dim + 1, mesh.space, self.facets.shape[1])
-        self._cutter = cutter
+        self._cutter, self._snap = cutter, ROUND_OFF * mesh.extent
         tree = cutter.interior
         self._elements = _Elements(
             1e-9 * mesh.extent, tree.low, tree.high, tree.order, mesh.cells, mesh.points,
@@ -174,8 +175,43 @@ class EmbeddedSurface:
         self, facets: _Ints
     ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8], NDArray[np.bool_]]:
         """Parts of facets: points (q, k), facet, barycentric corners in it, sides, if whole."""
-        patch = self._patch(facets)
-        numbers, values = self._values(patch.whole_nodes)
+        nodes = distinct(self.facets[facets])
+        numbers, values = self._values(nodes)
+        several = len(numbers) > 1 or self.facets.shape[1] == 2
+        divide = self._divided_by_several if several else self._divided_by_one
+        ids, source, at, side = divide(facets, nodes, numbers, values)
+        self._edges.add(ids.ravel())
+        ids, at, origin = self._edges.bisect(ids, at)
+        source, side = source[origin], side[origin]
+        label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
+        label[:, numbers] = side
+        alone = np.bincount(source, minlength=len(facets)) == 1
+        is_whole = alone[source] & ~side.any(axis=1)
+        return ids, facets[source], at, label, is_whole
+
+    def _divided_by_one(
+        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
+    ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8]]:
+        """Divide facets by the only cut there is: points, which facet, corners in it, side."""
+        if len(numbers) == 0:
+            at = np.tile(np.eye(3), (len(facets), 1, 1))
+            return self.facets[facets], np.arange(len(facets)), at, np.zeros((len(facets), 0), "i1")
+        body = self._cutter.body
+        corners = self.points[nodes]
+        ends, positions, ids, at, source, side = divide_facets(
+            np.searchsorted(nodes, self.facets[facets]), values[:, 0], corners,
+            numbers[0], *self._elements, body.piece_label.rows, body.first_piece,
+            body.next_piece.rows,
+        )  # fmt: skip
+        positions = np.concatenate([corners, positions])
+        found = FoundPoints(positions, values, ends, np.zeros(len(ends), dtype=np.int64))
+        return self._numbers.number(found, nodes, numbers)[ids], source, at, side[:, None]
+
+    def _divided_by_several(
+        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
+    ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8]]:
+        """Divide facets by any number of cuts, as elements are."""
+        patch = self._patch(facets, nodes)
         cuts = [
             _SurfaceCut(patch.points, values[:, k], int(cut), self) for k, cut in enumerate(numbers)
         ]
@@ -185,44 +221,42 @@ class EmbeddedSurface:
         unsplit[parts.parent] = False
         whole = np.flatnonzero(unsplit)
         size = self.facets.shape[1]
-        point = self._numbers.number(parts.points, patch.whole_nodes, numbers)
-        split_ids = point[parts.sub_points[solid]]
-        self._edges.add(split_ids.ravel())
-        ids = np.concatenate([self.facets[facets[whole]], split_ids])
+        point = self._numbers.number(parts.points, nodes, numbers)
+        ids = np.concatenate([self.facets[facets[whole]], point[parts.sub_points[solid]]])
         eye = np.broadcast_to(np.eye(size), (len(whole), size, size))
         at = np.concatenate([eye, parts.sub_barycentric[solid]])
         source = np.concatenate([whole, parts.parent[parts.sub_piece[solid]]])
-        label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
-        label[len(whole) :, numbers] = parts.label[parts.sub_piece[solid]]
+        side = np.zeros((len(ids), len(numbers)), dtype=np.int8)
+        side[len(whole) :] = parts.label[parts.sub_piece[solid]]
         # sub-simplices come in the order of their numbers; facets keep their direction
         wrong = np.linalg.det(at) < 0.0
         ids[wrong, 0], ids[wrong, 1] = ids[wrong, 1], ids[wrong, 0].copy()
         at[wrong, 0], at[wrong, 1] = at[wrong, 1], at[wrong, 0].copy()
-        ids, at, origin = self._edges.bisect(ids, at)
-        order = np.argsort(source[origin], kind="stable")
-        origin = origin[order]
-        alone = np.bincount(origin, minlength=len(source)) == 1
-        is_whole = (origin < len(whole)) & alone[origin]
-        return ids[order], facets[source[origin]], at[order], label[origin], is_whole
+        order = np.argsort(source, kind="stable")
+        return ids[order], source[order], at[order], side[order]
 
-    def _patch(self, facets: _Ints) -> MeshPatch:
-        nodes = distinct(self.facets[facets])
+    def _patch(self, facets: _Ints, nodes: _Ints) -> MeshPatch:
         local = np.searchsorted(nodes, self.facets[facets])
         extent = self._cutter.mesh.extent
         across = np.full((len(facets), self.facets.shape[1]), -1)
         return MeshPatch(self.points, extent, facets, nodes, local, across)
 
     def _values(self, vertices: _Ints) -> tuple[_Ints, _Floats]:
-        """Cuts under way, and their realised level sets (q, cuts) at vertices."""
-        mesh = self._cutter.mesh
-        near = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
-        nodes = distinct(mesh.cells[self._vertex_cell[vertices]])
-        values = np.empty((len(vertices), len(near)))
-        for k, stroke in enumerate(near):
-            level = stroke.level_sets(nodes)
-            place = np.searchsorted(nodes, mesh.cells[self._vertex_cell[vertices]])
-            values[:, k] = (self._vertex_at[vertices] * level[place]).sum(axis=1)
-        return np.array([stroke.number for stroke in near], dtype=np.int64), values
+        """Cuts between vertices, or through one, and their realised level sets (q, cuts) there."""
+        cells = self._cutter.mesh.cells[self._vertex_cell[vertices]]
+        strokes = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
+        nodes = distinct(cells)
+        place, at = np.searchsorted(nodes, cells), self._vertex_at[vertices]
+        numbers, columns = [], []
+        for stroke in strokes:
+            values = (at * stroke.level_sets(nodes)[place]).sum(axis=1)
+            values[np.abs(values) <= self._snap] = 0.0
+            # the last stroke may still be led elsewhere: what it met before is asked again
+            if values.min() <= 0.0 <= values.max() or stroke is strokes[-1]:
+                numbers.append(stroke.number)
+                columns.append(values)
+        found = np.stack(columns, axis=1) if columns else np.empty((len(vertices), 0))
+        return np.array(numbers, dtype=np.int64), found
 
 
 def _check(points: _Floats, facets: _Ints, space: int) -> None:

@@ -1,0 +1,144 @@
+"""Triangles of a surface divided by one cut, wherever the body beneath is split.
+
+What `verify.xfem.split` does for any number of cuts, for the one that is under way: at a step a
+blade meets a hundred facets, and with so few only the number of calls costs.
+"""
+
+import numpy as np
+from numba import njit
+
+from verify.xfem.mapping.locate_kernels import cut_at
+from verify.xfem.row_numbers import number_of_row
+
+__all__ = ["divide_facets"]
+
+
+@njit(cache=True)
+def _crossed_edges(facets, values):
+    """Give ends (z, 2), plus first, of edges that the cut crosses, and those (f, 3) of each facet.
+
+    Edge k of a facet is that opposite to its corner k; -1 where the cut does not cross it.
+    """
+    count = len(facets)
+    size = 64
+    while size < 8 * count:
+        size *= 2
+    table, known = np.full(size, -1, dtype=np.int64), np.empty((2 * count, 2), dtype=np.int64)
+    of_facet, row, found = np.full((count, 3), -1), np.empty(2, dtype=np.int64), 0
+    for f in range(count):
+        for k in range(3):
+            a, b = facets[f, (k + 1) % 3], facets[f, (k + 2) % 3]
+            if (values[a] >= 0.0) == (values[b] >= 0.0):
+                continue
+            row[0], row[1] = (a, b) if values[a] >= 0.0 else (b, a)
+            of_facet[f, k], found = number_of_row(row, table, known, found)
+    return known[:found].copy(), of_facet
+
+
+@njit(cache=True)
+def _points_on_edges(ends, values, points):
+    """Positions (z, 3) where the level set is zero, and shares (z, 2) of both ends."""
+    share, at = np.empty((len(ends), 2)), np.empty((len(ends), points.shape[1]))
+    for z in range(len(ends)):
+        plus, minus = ends[z, 0], ends[z, 1]
+        above, below = values[plus], values[minus]
+        r, s = above / (above - below), -below / (above - below)
+        share[z, 0], share[z, 1] = s, r
+        for i in range(points.shape[1]):
+            at[z, i] = s * points[plus, i] + r * points[minus, i]
+    return at, share
+
+
+@njit(cache=True)
+def _write(end, out, f, corners, at, side):
+    """Write a part of facet f unless it has a corner twice; give the end."""
+    ids, where, source, sides = out
+    if corners[0] == corners[1] or corners[1] == corners[2] or corners[2] == corners[0]:
+        return end
+    for k in range(3):
+        ids[end, k] = corners[k]
+        for j in range(3):
+            where[end, k, j] = at[k][j]
+    source[end], sides[end] = f, side
+    return end + 1
+
+
+@njit(cache=True)
+def divide_facets(
+    facets, values, points, cut, reach, low, high, order, cells, nodes, gradients,
+    piece_label, first_piece, next_piece,
+):  # fmt: skip
+    """Divide triangles by a cut where both places in which it crosses their edges are split.
+
+    Parameters
+    ----------
+    facets : (f, 3) int array
+        Places of their corners in `points`.
+    values : (n,) float array
+        Level set at the points, exactly zero within round-off.
+    points : (n, 3) float array
+    cut : int
+    reach, low, high, order, cells, nodes, gradients
+        Elements of the body, as `cut_at` takes them.
+    piece_label, first_piece, next_piece
+        Pieces of the body, likewise.
+
+    Returns
+    -------
+    ends : (z, 2) int array
+        Ends of the edges with a new point, that above the cut first.
+    positions : (z, 3) float array
+    ids : (q, 3) int array
+        Corners of the parts, in the direction of their facet: new points count from n on.
+    at : (q, 3, 3) float array
+        Barycentric coordinates of these corners in the facet.
+    source : (q,) int array
+        Facet of each part, ascending.
+    side : (q,) int8 array
+        Side of the cut; 0 of a facet that is not divided.
+    """
+    edges, of_facet = _crossed_edges(facets, values)
+    place, share = _points_on_edges(edges, values, points)
+    inside = cut_at(
+        place, cut, reach, low, high, order, cells, nodes, gradients,
+        piece_label, first_piece, next_piece,
+    )  # fmt: skip
+    # where the level set is zero at an end, the point is that end
+    number, count = np.empty(len(edges), dtype=np.int64), 0
+    for z in range(len(edges)):
+        number[z] = edges[z, 0]
+        if share[z, 1] > 0.0:
+            number[z] = len(points) + count
+            edges[count], place[count] = edges[z], place[z]
+            count += 1
+    room = 3 * len(facets)
+    ids, at = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, 3))
+    source, side = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int8)
+    out, eye, end = (ids, at, source, side), np.eye(3), 0
+    for f in range(len(facets)):
+        alone, through = -1, True
+        for k in range(3):
+            if of_facet[f, k] < 0:
+                alone = k
+            else:
+                through = through and inside[of_facet[f, k]]
+        if of_facet[f].max() < 0 or not through:
+            end = _write(end, out, f, facets[f], (eye[0], eye[1], eye[2]), 0)
+            continue
+        # the corner alone on its side is opposite to the edge that is not crossed
+        a, b, c = alone, (alone + 1) % 3, (alone + 2) % 3
+        first, second = of_facet[f, c], of_facet[f, b]  # edges a-b and a-c
+        p, q, u, v = facets[f, b], facets[f, c], number[first], number[second]
+        mine, other = (1, -1) if values[facets[f, a]] >= 0.0 else (-1, 1)
+        near, far = (0, 1) if mine > 0 else (1, 0)
+        x = share[first, near] * eye[a] + share[first, far] * eye[b]
+        y = share[second, near] * eye[a] + share[second, far] * eye[c]
+        end = _write(end, out, f, (facets[f, a], u, v), (eye[a], x, y), mine)
+        # as in `verify.xfem.clipping`: the diagonal begins at the corner with the lower number
+        if p < q:
+            end = _write(end, out, f, (u, p, v), (x, eye[b], y), other)
+            end = _write(end, out, f, (p, q, v), (eye[b], eye[c], y), other)
+        else:
+            end = _write(end, out, f, (u, p, q), (x, eye[b], eye[c]), other)
+            end = _write(end, out, f, (u, q, v), (x, eye[c], y), other)
+    return edges[:count], place[:count], ids[:end], at[:end], source[:end], side[:end]
