@@ -264,8 +264,7 @@ def _newton(equations: _Equations) -> Any:
     from petsc4py import PETSc
 
     solver = PETSc.SNES().create(equations.matrix.comm)
-    solver.setType("newtonls")
-    solver.getLineSearch().setType("bt")
+    solver.setType("newtonls")  # with backtracking, unless told otherwise
     solver.setFunction(equations.residual, equations.vector.duplicate())
     solver.setJacobian(equations.tangent, equations.matrix)
     linear = solver.getKSP()
