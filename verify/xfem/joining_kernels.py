@@ -72,9 +72,8 @@ def _next_region(top, stack, level, sides, relevant, values, stairs, edges, aske
                 minus = stack[top, stairs.minus[entry, k]]
                 point = plus
                 if plus != minus:
-                    point = point_on_edge(cut, plus, minus, edges)
+                    point = point_on_edge(cut, plus, minus, edges, asked)
                 if point < 0:
-                    asked[0], asked[1], asked[2] = cut, plus, minus
                     return -1
                 stack[above, k] = point
             for j in range(cuts):

@@ -94,9 +94,8 @@ def find_row(row, table, known):
 
 
 @njit(cache=True)
-def point_on_edge(cut, plus, minus, edges):
-    """Give the zero point of a cut on an edge, -1 if nobody has asked for it yet."""
-    row = np.empty(3, dtype=np.int64)
+def point_on_edge(cut, plus, minus, edges, row):
+    """Give the zero point of a cut on an edge, -1 if nobody has asked for it; writes row (3,)."""
     row[0], row[1], row[2] = cut, plus, minus
     number = find_row(row, edges.table, edges.known)
     return edges.point[number] if number >= 0 else -1

@@ -96,7 +96,10 @@ def divide_simplices(simplices, values, cut, active, below, stairs, edges):
     new_barycentric = np.empty((total, corners, corners))
     new_fraction, new_sign = np.empty(total), np.empty(total, dtype=np.int8)
     new = (new_piece, new_points, new_barycentric, new_fraction, new_sign)
-    order = np.empty(corners, dtype=np.int64)
+    order, row = np.empty(corners, dtype=np.int64), np.empty(3, dtype=np.int64)
+    # of the points on the edges: number, and the shares (r, s) of their ends
+    number = np.empty((corners, corners), dtype=np.int64)
+    share = np.empty((2, corners, corners))
     at, end = np.int64(0), kept
     for s in range(count):
         pattern = _pattern(points[s], values, cut) if active[piece[s]] else whole
@@ -109,41 +112,35 @@ def divide_simplices(simplices, values, cut, active, below, stairs, edges):
             new_fraction[at], new_sign[at] = fraction[s], sign[s]
             at += 1
             continue
-        turned = _in_order(points[s], order)
-        end = _clip(simplices, s, order, turned, values, cut, below, stairs, edges, new, end)
-    return new, kept
-
-
-@njit(cache=True)
-def _clip(simplices, s, order, turned, values, cut, below, stairs, edges, new, end):
-    """Write the parts of a simplex whose corners ascend in that order; give their end."""
-    piece, points, barycentric, fraction, sign = simplices
-    new_piece, new_points, new_barycentric, new_fraction, new_sign = new
-    corners, pattern = len(order), 0
-    for k in range(corners):
-        if values[points[s, order[k]], cut] >= 0.0:
-            pattern |= 1 << k
-    for entry in range(stairs.start[pattern], stairs.start[pattern + 1]):
-        new_piece[end] = piece[s] if stairs.side[entry] > 0 else below[piece[s]]
-        new_sign[end] = turned * sign[s] * stairs.sign[entry]
-        share = 1.0
+        turned, pattern = _in_order(points[s], order), 0
         for k in range(corners):
-            a, b = order[stairs.factors[entry, k, 1]], order[stairs.factors[entry, k, 2]]
-            if a != b:
-                above, beneath = values[points[s, a], cut], values[points[s, b], cut]
-                part = above if stairs.factors[entry, k, 0] == 0 else -beneath
-                share *= part / (above - beneath)
-            a, b = order[stairs.plus[entry, k]], order[stairs.minus[entry, k]]
-            if a == b:
-                new_points[end, k] = points[s, a]
-                for j in range(corners):
-                    new_barycentric[end, k, j] = barycentric[s, a, j]
+            plus = points[s, order[k]]
+            number[k, k], share[0, k, k], share[1, k, k] = plus, 0.0, 1.0
+            above = values[plus, cut]
+            if above < 0.0:
                 continue
-            above, beneath = values[points[s, a], cut], values[points[s, b], cut]
-            r, rest = above / (above - beneath), -beneath / (above - beneath)
-            new_points[end, k] = point_on_edge(cut, points[s, a], points[s, b], edges)
+            pattern |= 1 << k
             for j in range(corners):
-                new_barycentric[end, k, j] = rest * barycentric[s, a, j] + r * barycentric[s, b, j]
-        new_fraction[end] = fraction[s] * share
-        end += 1
-    return end
+                minus = points[s, order[j]]
+                beneath = values[minus, cut]
+                if beneath < 0.0:
+                    number[k, j] = point_on_edge(cut, plus, minus, edges, row)
+                    share[0, k, j] = above / (above - beneath)
+                    share[1, k, j] = -beneath / (above - beneath)
+        for entry in range(stairs.start[pattern], stairs.start[pattern + 1]):
+            new_piece[end] = piece[s] if stairs.side[entry] > 0 else below[piece[s]]
+            new_sign[end] = turned * sign[s] * stairs.sign[entry]
+            volume = 1.0
+            for k in range(corners):
+                a, b = stairs.factors[entry, k, 1], stairs.factors[entry, k, 2]
+                volume *= share[stairs.factors[entry, k, 0], a, b]
+                a, b = stairs.plus[entry, k], stairs.minus[entry, k]
+                new_points[end, k] = number[a, b]
+                for j in range(corners):
+                    new_barycentric[end, k, j] = (
+                        share[1, a, b] * barycentric[s, order[a], j]
+                        + share[0, a, b] * barycentric[s, order[b], j]
+                    )
+            new_fraction[end] = fraction[s] * volume
+            end += 1
+    return new, kept

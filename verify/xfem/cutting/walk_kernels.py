@@ -40,14 +40,6 @@ def cells_hit(sweep, after, front, margin, low, high, order):
 
 
 @njit(cache=True)
-def _level(node, points, snap, sweep, phi, room):
-    if np.isnan(phi[node]):
-        value = probe(points[node], sweep, room)[0]
-        phi[node] = 0.0 if abs(value) <= snap else value
-    return phi[node]
-
-
-@njit(cache=True)
 def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, room):
     """(near the sweep, crossed through, latest travel) of a cell.
 
@@ -57,12 +49,14 @@ def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, roo
     place = room[4, :space]
     near, through, any_zero, latest = False, True, False, 0.0
     for a in range(corners):
+        node = cells[cell, a]
+        if np.isnan(phi[node]):
+            value = probe(points[node], sweep, room)[0]
+            phi[node] = 0.0 if abs(value) <= snap else value
+    for a in range(corners):
         for b in range(a + 1, corners):
             p, m = cells[cell, a], cells[cell, b]
-            above, below = (
-                _level(p, points, snap, sweep, phi, room),
-                _level(m, points, snap, sweep, phi, room),
-            )
+            above, below = phi[p], phi[m]
             if (above >= 0.0) == (below >= 0.0):
                 continue
             if above < 0.0:

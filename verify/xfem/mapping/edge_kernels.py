@@ -28,14 +28,16 @@ class EdgeRecord(NamedTuple):
     ----------
     nodes : (n, s) float array
         Mesh nodes, in metres.
+    crossed : (n,) bool array
+        Whether an edge at the node has a point.
     positions : (z, s) float array
         Zero points, numbered after these.
     supports : (z, 7) int array
         See `PointNumbers`.
     table, known : int arrays
         Lines by their nodes and cut (`verify.xfem.row_numbers`).
-    first : (l,) int array
-        First entry of each line.
+    first, tally : (l,) int array
+        First entry of each line, and how many it has.
     entries : (e, 2) int array
         Zero point, and the next entry of the same line or -1.
     directions : (l, s) float array
@@ -45,18 +47,20 @@ class EdgeRecord(NamedTuple):
     """
 
     nodes: _Floats
+    crossed: NDArray[np.bool_]
     positions: _Floats
     supports: _Ints
     table: _Ints
     known: _Ints
     first: _Ints
+    tally: _Ints
     entries: _Ints
     directions: _Floats
     met: tuple[_Ints, _Ints, NDArray[np.bool_]]
 
 
 @njit(cache=True)
-def record_points(zero, supports, table, known, lines, first, entries, used):
+def record_points(zero, supports, crossed, table, known, lines, first, tally, entries, used):
     """Enter points into the lists of their lines; the counts of lines and entries."""
     row = np.empty(LINE, dtype=np.int64)
     for z in zero:
@@ -72,18 +76,19 @@ def record_points(zero, supports, table, known, lines, first, entries, used):
             line, lines = number_of_row(row, table, known, lines)
             entries[used, 0], entries[used, 1] = z, first[line]
             first[line] = used
+            tally[line] += 1
             used += 1
             if row[_FACE] == _NONE:
+                crossed[row[0]] = crossed[row[1]] = True
                 break
     return lines, used
 
 
 @njit(cache=True)
-def _join(number, record, row):
+def _join(number, nodes, supports, row):
     """Insert the mesh nodes of a point into the ascending row[:3]; False if there is no room."""
-    nodes = len(record.nodes)
     for k in range(1 if number < nodes else _NODES):
-        value = number if number < nodes else record.supports[number - nodes, k]
+        value = number if number < nodes else supports[number - nodes, k]
         for j in range(_FACE):
             if row[j] == value:
                 value = _NONE
@@ -142,11 +147,13 @@ def _between(x, y, line, record):
 
 
 @njit(cache=True)
-def _on_cut(number, cut, record, row):
-    """Whether a cut runs exactly through a point."""
-    nodes = len(record.nodes)
+def _on_cut(number, line, record, row):
+    """Whether a point lies on the cut of a line, if that is a line in a face."""
+    nodes, cut = len(record.nodes), record.known[line, _FACE]
+    if cut == _NONE:
+        return True
     if number < nodes:
-        return runs_through(cut, number, record.met, row)
+        return runs_through(cut, number, record.met, row[LINE:])
     found = False
     for j in range(_NODES, _NODES + CUTS):
         found = found or record.supports[number - nodes, j] == cut
@@ -154,32 +161,33 @@ def _on_cut(number, cut, record, row):
 
 
 @njit(cache=True)
-def _inner_point(x, y, record, row):
-    """Give (a recorded point strictly between x and y or -1, its share from x to y)."""
-    nodes = len(record.nodes)
-    for k in range(LINE):
-        row[k] = _NONE
-    if not (_join(x, record, row) and _join(y, record, row)):
-        return -1, 0.0
-    on_edge = row[_FACE - 1] == _NONE
-    for k in range(1 if on_edge else 2 * CUTS):
-        if not on_edge:
-            # a line in a face of the mesh: of each cut on which x or y lies
-            number, other = (x, y) if k < CUTS else (y, x)
-            if number < nodes:
-                continue
-            row[_FACE] = record.supports[number - nodes, _NODES + k % CUTS]
-            if row[_FACE] == _NONE:
-                continue
-            if not _on_cut(other, row[_FACE], record, row[LINE:]):
-                continue
-        line = find_row(row[:LINE], record.table, record.known)
-        if line < 0:
-            continue
-        z, share = _between(x, y, line, record)
-        if z >= 0:
-            return z, share
-    return -1, 0.0
+def _lines(x, y, nodes, supports, table, known, tally, row, found):
+    """Write the lines on which an edge may lie that have other points than its ends; their count.
+
+    A line in a face holds no points on edges of the mesh, which are on the lines of these.
+    """
+    own = 0
+    row[_FACE - 1] = row[_FACE] = _NONE
+    if x < nodes and y < nodes:  # nearly always: an edge of the mesh
+        row[0], row[1] = min(x, y), max(x, y)
+    else:
+        row[0] = row[1] = _NONE
+        if not (_join(x, nodes, supports, row) and _join(y, nodes, supports, row)):
+            return 0
+    if row[_FACE - 1] == _NONE:
+        found[0] = find_row(row[:LINE], table, known)
+        own = (x >= nodes) + (y >= nodes)
+        return 1 if found[0] >= 0 and tally[found[0]] > own else 0
+    # in a face of the mesh: of each cut on which x lies, or y if x is a mesh node
+    number, count = (x if x >= nodes else y) - nodes, 0
+    for end in (x, y):
+        own += end >= nodes and supports[end - nodes, _FACE - 1] != _NONE
+    for k in range(_NODES, _NODES + CUTS):
+        row[_FACE] = supports[number, k]
+        if row[_FACE] != _NONE:
+            found[count] = find_row(row[:LINE], table, known)
+            count += found[count] >= 0 and tally[found[count]] > own
+    return count
 
 
 @njit(cache=True)
@@ -188,6 +196,16 @@ def _copy(ids, places, k, into_ids, into_places, at):
         into_ids[at, a] = ids[k, a]
         for i in range(places.shape[2]):
             into_places[at, a, i] = places[k, a, i]
+
+
+@njit(cache=True)
+def _replace(ids, places, k, begin, end, replaced, z, share):
+    """Move a corner of a triangle to a point of its edge; whether it is still a triangle."""
+    for i in range(places.shape[2]):
+        places[k, replaced, i] = (1.0 - share) * places[k, begin, i] + share * places[k, end, i]
+    ids[k, replaced] = z
+    # else all three are on one line: nothing is left of it
+    return ids[k, 0] != ids[k, 1] and ids[k, 1] != ids[k, 2] and ids[k, 2] != ids[k, 0]
 
 
 @njit(cache=True)
@@ -201,7 +219,7 @@ def bisect_facets(facets, at, record, room):
         Coordinates of their corners, of any kind.
     record : EdgeRecord
     room : int
-        Most triangles to make.
+        Most triangles to make, more than are given.
 
     Returns
     -------
@@ -211,38 +229,46 @@ def bisect_facets(facets, at, record, room):
     enough : bool
         Whether there was room for all.
     """
-    width = at.shape[2]
+    width, nodes, more = at.shape[2], len(record.nodes), room - len(facets)
     ids, places = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, width))
-    open_ids, open_places = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, width))
+    later_ids, later_places = np.empty((more, 3), dtype=np.int64), np.empty((more, 3, width))
     source, row = np.empty(room, dtype=np.int64), np.empty(LINE + 2, dtype=np.int64)
-    count, top = 0, 1
+    lines = np.empty(CUTS, dtype=np.int64)
+    # arrays taken out once: taking them out for every edge costs more than most edges do
+    crossed, supports, tally = record.crossed, record.supports, record.tally
+    table, known = record.table, record.known
+    zero = np.int64(0)  # a literal 0 would be a type of its own to compile for
+    count = zero
     for t in range(len(facets)):
-        _copy(facets, at, t, open_ids, open_places, 0)
-        top = 1
-        while top > 0:
-            top -= 1
-            if count == room or top + 2 > room:
-                return ids, places, source, False
-            # either it stays, or its two halves are looked at
-            _copy(open_ids, open_places, top, ids, places, count)
-            z, share, begin, end = np.int64(-1), 0.0, np.int64(0), np.int64(0)
-            while z < 0 and end < 3:
-                begin, end = end, end + 1
-                z, share = _inner_point(ids[count, begin], ids[count, end % 3], record, row)
+        if count == room:
+            return ids, places, source, False
+        _copy(facets, at, t, ids, places, count)
+        top, k, whole = zero, zero, True
+        while whole or top > 0:
+            if not whole:
+                top -= 1
+                _copy(later_ids, later_places, top, ids, places, count)
+                k, whole = zero, True
+            z, share, begin = np.int64(-1), 0.0, zero
+            while z < 0 and k < 3:
+                begin, x, y = k, ids[count, k], ids[count, (k + 1) % 3]
+                k += 1
+                if x < nodes and y < nodes and not (crossed[x] and crossed[y]):
+                    continue
+                for line in lines[: _lines(x, y, nodes, supports, table, known, tally, row, lines)]:
+                    if z < 0 and _on_cut(x, line, record, row) and _on_cut(y, line, record, row):
+                        z, share = _between(x, y, line, record)
             if z < 0:
                 source[count] = t
                 count += 1
+                whole = False
+                if top > 0 and count == room:
+                    return ids, places, source, False
                 continue
-            end %= 3
-            for replaced in (begin, end):
-                _copy(ids, places, count, open_ids, open_places, top)
-                open_ids[top, replaced] = z
-                for i in range(width):
-                    open_places[top, replaced, i] = (1.0 - share) * places[
-                        count, begin, i
-                    ] + share * places[count, end, i]
-                a, b, c = open_ids[top, 0], open_ids[top, 1], open_ids[top, 2]
-                # all three on one line: nothing is left of that half
-                if a != b and b != c and c != a:
-                    top += 1
+            if top == more:
+                return ids, places, source, False
+            end, k = (begin + 1) % 3, zero
+            _copy(ids, places, count, later_ids, later_places, top)
+            top += _replace(later_ids, later_places, top, begin, end, begin, z, share)
+            whole = _replace(ids, places, count, begin, end, end, z, share)
     return ids[:count], places[:count], source[:count], True

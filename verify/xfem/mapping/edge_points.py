@@ -41,7 +41,9 @@ class EdgePoints:
 
     def __init__(self, nodes: _Floats, points: PointNumbers) -> None:
         self._nodes, self._points = nodes, points
+        self._crossed = np.zeros(len(nodes), dtype=bool)
         self._lines = RowNumbers(LINE)
+        self._tally = GrowingArray(np.empty(0, dtype=np.int64))
         self._first = GrowingArray(np.empty(0, dtype=np.int64))
         self._directions = GrowingArray(np.empty((0, nodes.shape[1])))
         self._entries = GrowingArray(np.empty((0, 2), dtype=np.int64))
@@ -57,14 +59,17 @@ class EdgePoints:
         table, known, lines = self._lines.open_for(CUTS * len(zero))
         begin = self._first.extend(CUTS * len(zero))
         self._first.rows[begin:] = -1
+        self._tally.extend(CUTS * len(zero))
+        self._tally.rows[begin:] = 0
         used = len(self._entries)
         self._entries.extend(CUTS * len(zero))
         lines, used = record_points(
-            zero, self._points.supports, table, known, lines, self._first.rows,
-            self._entries.rows, used,
+            zero, self._points.supports, self._crossed, table, known, lines, self._first.rows,
+            self._tally.rows, self._entries.rows, used,
         )  # fmt: skip
         self._lines.close(lines)
         self._first.rows = self._first.rows[:lines]
+        self._tally.rows = self._tally.rows[:lines]
         known_lines = self._directions.extend(lines - len(self._directions))
         self._directions.rows[known_lines:] = 0.0
         self._entries.rows = self._entries.rows[:used]
@@ -89,16 +94,18 @@ class EdgePoints:
             return facets, at, np.arange(len(facets))
         record = EdgeRecord(
             self._nodes,
+            self._crossed,
             self._points.positions.rows,
             self._points.supports,
             self._lines.table,
             self._lines.rows,
             self._first.rows,
+            self._tally.rows,
             self._entries.rows,
             self._directions.rows,
             self._points.nodes_on_cuts,
         )
-        room = 2 * len(facets) + 64
+        room = len(facets) + len(facets) // 4 + 64
         # each point bisects a few facets, those around its edge
         while room < 64 * (len(facets) + len(self._entries) + 64):
             *parts, enough = bisect_facets(facets, at, record, room)

@@ -36,26 +36,24 @@ def barycentric(x, cell, cells, points, gradients, out):
 
 
 @njit(cache=True)
-def _cells_about(x, reach, low, high, order):
-    """Cells whose boxes come within reach of x; the reach grows until there are some."""
-    found, stack = [np.int64(0) for _ in range(0)], np.empty(_DEEP, dtype=np.int64)
-    while len(found) == 0:
-        stack[0], top = 1, 1
-        while top > 0:
-            top -= 1
-            node, apart = stack[top], False
-            for i in range(len(x)):
-                if x[i] < low[node, i] - reach or x[i] > high[node, i] + reach:
-                    apart = True
-            if apart:
-                continue
-            if node >= len(order):
-                found.append(order[node - len(order)])
-            else:
-                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
-                top += 2
-        reach *= 2.0
-    return found
+def _cells_about(x, reach, low, high, order, stack, found):
+    """Write the cells whose boxes come within reach of x; give their count."""
+    count, top = 0, 1
+    stack[0] = 1
+    while top > 0:
+        top -= 1
+        node, apart = stack[top], False
+        for i in range(len(x)):
+            apart = apart or x[i] < low[node, i] - reach or x[i] > high[node, i] + reach
+        if apart:
+            continue
+        if node < len(order):
+            stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+            top += 2
+        else:
+            found[count] = order[node - len(order)]
+            count += 1
+    return count
 
 
 @njit(cache=True)
@@ -103,17 +101,20 @@ def cut_at(
 ):  # fmt: skip
     """Whether a cell that holds each place (q, s) is split by a cut."""
     found = np.zeros(len(places), dtype=np.bool_)
-    trial = np.empty(cells.shape[1])
+    trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
+    about, least = np.empty(len(order), dtype=np.int64), np.empty(len(order))
     for q in range(len(places)):
-        about = _cells_about(places[q], reach, low, high, order)
-        best = -np.inf
-        for cell in about:
-            best = max(best, barycentric(places[q], cell, cells, points, gradients, trial))
-        for cell in about:
-            smallest = barycentric(places[q], cell, cells, points, gradients, trial)
-            if smallest < min(best, 0.0) - _TIE:
+        count, wider, best = 0, reach, -np.inf
+        while count == 0:
+            count = _cells_about(places[q], wider, low, high, order, stack, about)
+            wider *= 2.0
+        for k in range(count):
+            least[k] = barycentric(places[q], about[k], cells, points, gradients, trial)
+            best = max(best, least[k])
+        for k in range(count):
+            if least[k] < min(best, 0.0) - _TIE:
                 continue
-            piece = first_piece[cell]
+            piece = first_piece[about[k]]
             while piece >= 0:
                 found[q] = found[q] or piece_label[piece, cut] != 0
                 piece = next_piece[piece]
