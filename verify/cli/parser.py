@@ -134,9 +134,14 @@ def _add_reading_commands(add: Callable[[str, str, str], argparse.ArgumentParser
     command = add(
         "report",
         "render the report of a run again, without computing anything",
-        "examples:\n  verify report out",
+        "examples:\n  verify report out\n  verify report out --format markdown",
     )
     command.add_argument("directory", metavar="DIR", type=Path, help="directory of a run")
+    command.add_argument(
+        "--format", choices=("html", "markdown", "pdf"), default="html",
+        help="report.html (default); report.md with pictures beside it; report.pdf, which "
+        "needs Chromium",
+    )  # fmt: skip
 
 
 def _add_run(command: argparse.ArgumentParser) -> None:

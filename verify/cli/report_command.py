@@ -11,7 +11,8 @@ def execute(arguments: argparse.Namespace) -> int:
     """Render the report of a run directory."""
     if not (arguments.directory / "run.json").is_file():
         raise InputError("not a run (it has no run.json)", str(arguments.directory))
-    from verify.report import render
+    from verify.report import render, render_markdown, render_pdf
 
-    print(f"report: {render(arguments.directory)}")
+    made = {"html": render, "markdown": render_markdown, "pdf": render_pdf}[arguments.format]
+    print(f"report: {made(arguments.directory)}")
     return 0

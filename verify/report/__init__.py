@@ -4,7 +4,7 @@ Reads results only (``run.json``, ``result.json``, stored solutions for the pict
 computes no error of its own. Needs neither FEniCSx nor gmsh.
 """
 
-from verify.report.rendering import render
+from verify.report.rendering import render, render_markdown, render_pdf
 from verify.report.run_directory import CaseEntry, Run, load_run
 
-__all__ = ["CaseEntry", "Run", "load_run", "render"]
+__all__ = ["CaseEntry", "Run", "load_run", "render", "render_markdown", "render_pdf"]

@@ -47,6 +47,9 @@ def ranking_section(ranking: Mapping[str, Any] | None) -> Markup | None:
 
 def _conformance(ranking: Mapping[str, Any]) -> Markup | None:
     found = ranking["conformance"]
+    if not any(own.get("checks") for own in found.values()):
+        said = "No conformance suite was run before this ranking (verify run --conform)."
+        return tag("p", said, class_="warning")
     rows = []
     for solver in ranking["solvers"]:
         own = found.get(solver, {})

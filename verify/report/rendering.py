@@ -4,11 +4,13 @@ import os
 from pathlib import Path
 
 from verify.report.exports import csv_rows, json_document, junit_document
+from verify.report.markdown import markdown
 from verify.report.page import page
 from verify.report.pictures import CasePictures, case_pictures, drawn
+from verify.report.printing import print_page
 from verify.report.run_directory import load_run
 
-__all__ = ["render"]
+__all__ = ["render", "render_markdown", "render_pdf"]
 
 _PAGE_BYTES = 14_500_000  # what a mail system or a code host still takes
 
@@ -45,6 +47,33 @@ def render(directory: Path) -> Path:
     _write(directory / "junit.xml", junit_document(run))
     target = directory / "report.html"
     _write(target, text)
+    return target
+
+
+def render_markdown(directory: Path) -> Path:
+    """Write ``report.md`` with its pictures beside it, and all that `render` writes.
+
+    Raises
+    ------
+    InputError, OSError
+        As `render`.
+    """
+    text = render(directory).read_text(encoding="utf-8")
+    target = directory / "report.md"
+    _write(target, markdown(text, directory))
+    return target
+
+
+def render_pdf(directory: Path) -> Path:
+    """Write ``report.pdf``, and all that `render` writes.
+
+    Raises
+    ------
+    InputError, OSError
+        As `render`; also if there is no browser that prints.
+    """
+    target = directory / "report.pdf"
+    print_page(render(directory), target)
     return target
 
 

@@ -99,12 +99,13 @@ def _ranking(path: Path, cases: list[str]) -> tuple[dict[str, Any] | None, list[
     if not path.is_file():
         return None, []
     try:
-        found = _RANKING.validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
+        found = json.loads(path.read_bytes())
+        _RANKING.validate_python(found)
+    except (OSError, ValueError) as error:  # ValidationError is one
         return None, [f"ranking.json cannot be read ({str(error).splitlines()[0]})"]
     if set(found["cases"]) != set(cases):
         return None, ["ranking.json is of other cases: no ranking is shown"]
-    return dict(found), []
+    return found, []
 
 
 def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:

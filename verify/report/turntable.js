@@ -11,10 +11,10 @@
     }`;
   const FRAGMENT = `#version 300 es
     precision highp float;
-    uniform sampler2D colours; uniform bool line; uniform bool sieve;
+    uniform sampler2D colours; uniform int line; uniform bool sieve;
     in float v; in vec3 seen; out vec4 colour;
     void main() {
-      if (line) { colour = vec4(0.1, 0.1, 0.1, 1.0); return; }
+      if (line > 0) { colour = vec4(vec3(line == 1 ? 0.1 : 0.42), 1.0); return; }
       ivec2 p = ivec2(gl_FragCoord.xy);
       if (sieve && (p.x % 3 != 0 || p.y % 3 != 0)) discard;
       vec3 n = normalize(cross(dFdx(seen), dFdy(seen)));
@@ -105,10 +105,14 @@
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, surface);
       part(0, head.outer, state.sieve);
       part(head.outer, head.triangles - head.outer, false);
-      gl.uniform1i(at('line'), 1);
-      gl.uniform1f(at('lift'), 0.0015);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, lines);
-      gl.drawElements(gl.LINES, 2 * head.edges, gl.UNSIGNED_INT, 0);
+      const strokes = (kind, from, count, lift) => {
+        gl.uniform1i(at('line'), kind);
+        gl.uniform1f(at('lift'), lift);
+        if (count) gl.drawElements(gl.LINES, 2 * count, gl.UNSIGNED_INT, 8 * from);
+      };
+      strokes(2, head.outline, head.edges - head.outline, 0.001);
+      strokes(1, 0, head.outline, 0.002);
       canvas.getContext('2d').drawImage(shared, 0, 0);
     };
     const redraw = () => state.views.forEach(one => requestAnimationFrame(one));

@@ -64,6 +64,7 @@ def packed(body: Body, view: View) -> dict[str, str]:
         "outer": int((~inside).sum()),
         "triangles": len(triangles),
         "edges": len(edges),
+        "outline": len(body.edges),
     }
     colours = colormaps[view.colours](np.linspace(0, 1, 64))[:, :3]
     cut = 3 * len(triangles)

@@ -96,7 +96,7 @@ def _at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Ite
         if _same([levels[level][0].size for levels in present.values()]):
             missing = {s: why for s, why in finest.missing.items() if s not in present}
             found = {solver: levels[level][1] for solver, levels in present.items()}
-            return Item(f"{_label(result, name)}, level {level}", found, missing)
+            return Item(_label(result, name), found, missing)
     why = "no level on which all have it, with element sizes that agree within 10 %"
     return LeftOut(_label(result, name), "", why)
 

@@ -1,0 +1,130 @@
+"""Claims about the section that ranks solvers, and about the conformance asked before it."""
+
+import json
+import re
+
+import pytest
+from page_parser import parsed
+from synthetic_run import HOSTILE, make_run
+
+from verify.conformance import CheckResult, State
+from verify.report import load_run, render
+from verify.runner import ranking as runner_ranking
+from verify.runner.ranking import rank_run
+
+
+def ranked(root, conformance=False):
+    return rank_run(root, load_run(root).results, {}, conformance, 10.0, lambda text: None)
+
+
+def text_of(root):
+    return parsed(render(root).read_text(encoding="utf-8")).text
+
+
+@pytest.fixture
+def suite(monkeypatch):
+    """Replace the suite by one that says that XFEM breaks something; count how often it runs."""
+    asked = []
+
+    def conform(solver, parameters, timeout):
+        asked.append((solver, dict(parameters)))
+        state = State.BROKEN if solver == "xfem" else State.KEPT
+        return [
+            CheckResult("traction", "two halves contract each for itself", state, 1.0, 0.1, "off"),
+            CheckResult("refusals", "it does not crash", State.KEPT),
+        ]
+
+    monkeypatch.setattr(runner_ranking, "conform", conform)
+    return asked
+
+
+def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    assert "Which solver" not in text_of(root)
+    ranked(root)
+    said = text_of(root)
+    assert "Which solver" in said
+    assert "No conformance suite was run" in said
+    stored = json.loads((root / "results.json").read_text())["ranking"]
+    assert stored == json.loads((root / "ranking.json").read_text())
+
+
+def test_failed_and_refused_solves_and_undecided_checks_stand_in_the_section(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    ranked(root)
+    said = text_of(root).partition("Which solver")[2].partition("Soft-tissue strip cut")[0]
+    for words in ("killed after 60 s", "cannot do a tip inside an element", "level 3 timeout",
+                  "not clearly below the error 0.12"):  # fmt: skip
+        assert words in said
+
+
+def test_a_solver_that_does_not_conform_carries_a_mark_wherever_it_is_ranked(tmp_path, suite):
+    root = make_run(tmp_path / "run", pictures=False)
+    ranked(root, conformance=True)
+    page = parsed(render(root).read_text(encoding="utf-8"))
+    assert "two halves contract each for itself" in page.text
+    marks = page.all("abbr")
+    assert len(marks) >= 2
+    assert re.search(r"XFEM\s*†", page.text)
+    assert not re.search(r"conforming P1\s*†", page.text)
+
+
+def test_conformance_is_taken_over_until_the_solver_changes(tmp_path, suite, monkeypatch):
+    root = make_run(tmp_path / "run", pictures=False)
+    ranked(root, conformance=True)
+    first = list(suite)
+    # 'other' is no solver that could be asked
+    assert [name for name, _ in first] == ["xfem", "conforming"]
+    ranked(root, conformance=False)
+    assert suite == first
+    assert "checks" in json.loads((root / "ranking.json").read_text())["conformance"]["xfem"]
+    monkeypatch.setattr(runner_ranking, "code_of_solver", lambda name: "changed")
+    ranked(root, conformance=True)
+    assert len(suite) == 2 * len(first)
+
+
+def test_the_suite_runs_unasked_only_for_more_than_two_solvers(tmp_path, suite):
+    root = make_run(tmp_path / "run", pictures=False)
+    results = load_run(root).results
+    two = [r for r in results if not any(s.solver == "other" for s in r.solves)]
+    rank_run(root, two, {}, None, 10.0, lambda text: None)
+    assert suite == []
+    rank_run(root, results, {}, None, 10.0, lambda text: None)
+    assert len(suite) == 2
+
+
+def test_a_single_solver_is_not_ranked(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    ranked(root)
+    (strip,) = [r for r in load_run(root).results if "strip" in r.case]
+    alone = [s for s in strip.solves if s.solver in ("xfem", "reference")]
+    strip.solves[:] = alone
+    assert rank_run(root, [strip], {}, True, 10.0, lambda text: None) is None
+    assert not (root / "ranking.json").exists()
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"schema": 2}', '{"schema": 1, "cases": [1]}'])
+def test_a_damaged_ranking_is_a_note_and_no_crash(tmp_path, content):
+    root = make_run(tmp_path / "run", pictures=False)
+    (root / "ranking.json").write_text(content)
+    said = text_of(root)
+    assert "ranking.json cannot be read" in said
+    assert "Which solver" not in said
+
+
+def test_a_ranking_of_other_cases_is_not_shown(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    rank_run(root, load_run(root).results[:2], {}, False, 10.0, lambda text: None)
+    assert "of other cases" in text_of(root)
+
+
+def test_hostile_words_of_a_ranking_stay_text(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    file = ranked(root)
+    record = json.loads(file.read_text())
+    for entry in record["left_out"]:
+        entry["reason"] = HOSTILE
+    file.write_text(json.dumps(record))
+    page = parsed(render(root).read_text(encoding="utf-8"))
+    assert not page.all("script")
+    assert "<script>alert('x')</script>" in page.text
