@@ -32,6 +32,13 @@ def execute(arguments: argparse.Namespace) -> int:
         slivers = sliver_study(dimensions, arguments.quick, announce)
         findings, record = slivers.findings, slivers.as_record()
         rows = [asdict(m) for m in slivers.measurements]
+    elif arguments.study == "calibration":
+        from verify.study.calibration import calibration_study
+
+        calibration = calibration_study(arguments.quick, announce)
+        findings, record, rows = (
+            calibration.findings, calibration.as_record(), calibration.rows()
+        )  # fmt: skip
     else:
         from verify.study.energy import energy_study
 

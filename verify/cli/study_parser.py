@@ -17,6 +17,7 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
         "examples:\n  verify study slivers --quick --out studies\n"
         "  verify study slivers --dimension 2 --out studies\n"
         "  verify study energy --out studies\n"
+        "  verify study calibration --quick --out studies\n"
         "  verify study cost statics/tissue_strip --steps 4 --solver xfem --solver conforming "
         "--out studies\n"
         "  verify study budget statics/tissue_strip --tolerance 0.05 --out studies\n\n"
@@ -27,6 +28,7 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
     for name, text in {
         "slivers": "conditioning, explicit steps, errors and compliance against sliver size",
         "energy": "falls and spins of cut bodies, by lumping and scheme",
+        "calibration": "stated uncertainty of the reference against its true error",
     }.items():
         kind = kinds.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
         if name == "slivers":

@@ -9,6 +9,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.report.budget_figures import budget_section
+from verify.report.calibration_figures import calibration_section
 from verify.report.cost_study_figures import cost_section
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import number
@@ -27,6 +28,7 @@ _TITLES = {
     "energy": "Whether energy and momenta are kept",
     "cost": "What accuracy costs while a cut grows",
     "budget": "Where the error comes from, and the cheapest adequate model",
+    "calibration": "Whether the reference's error bars can be trusted",
 }
 
 
@@ -71,6 +73,7 @@ def _page(record: Mapping[str, Any], kind: str) -> Markup:
         "energy": _energy,
         "cost": cost_section,
         "budget": budget_section,
+        "calibration": calibration_section,
     }
     body = sections[kind](record)
     shortened = tag(

@@ -1,0 +1,101 @@
+"""The page of the calibration study: stated against true, with the lines of 1 and of 10."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from verify.report.axes import Panel, log_range, text
+from verify.report.markup import Markup, joined, tag
+from verify.report.notation import metric_title, number
+from verify.report.tables import table
+
+__all__ = ["calibration_section"]
+
+_COLOURS = ("#0067a5", "#c04a00", "#00785a", "#a3487b", "#8a6a00", "#5b4db5")
+_WASTED = 10.0
+
+
+def calibration_section(record: Mapping[str, Any]) -> Markup:
+    """Return the plots, one per degree, and the tables of all trials."""
+    trials = record["trials"]
+    counted = [t for t in trials if not t["left_out"]]
+    degrees = sorted({t["degree"] for t in counted})
+    figures = [
+        tag("figure", _scatter([t for t in counted if t["degree"] == degree], degree))
+        for degree in degrees
+    ]
+    said = (
+        "Every mark is a number that a reference of three levels states its uncertainty of; above "
+        "the line 1 the uncertainty covers the true error, above the line 10 it is wider than it "
+        "need be. Open marks are quantities of interest, whose error can vanish by chance: they "
+        "lie far above without harm."
+    )
+    return tag(
+        "section",
+        tag("h2", "Stated uncertainty against true error"),
+        tag("div", figures, class_="panels"),
+        tag("p", said, class_="quiet"),
+        _trials_table(trials),
+    )
+
+
+def _scatter(trials: Sequence[Mapping[str, Any]], degree: int) -> Markup:
+    shown = [t for t in trials if t["stated"] > 0.0 and t["true"] > 0.0]
+    if not shown:
+        return tag("p", f"P{degree}: no mark can be drawn.")
+    panel = Panel(
+        log_range([t["true"] for t in shown]),
+        log_range([t["stated"] for t in shown]),
+        "true error, relative",
+        f"P{degree}: stated uncertainty, relative",
+    )
+    families = list(dict.fromkeys(t["family"] for t in shown))
+    colours = dict(zip(families, _COLOURS, strict=False))
+    parts = [_line(panel, 1.0), _line(panel, _WASTED)]
+    parts += [_mark(panel, t, colours.get(t["family"], "#333")) for t in shown]
+    parts += [
+        text(panel.gutter, 46 + 18 * row, name, class_="note", fill=colours.get(name, "#333"))
+        for row, name in enumerate(families)
+    ]
+    below = sum(not t["covered"] for t in shown)
+    label = (
+        f"Stated uncertainty over true error, P{degree}: {len(shown)} marks, {below} not covered."
+    )
+    return panel.drawn(label, joined(*parts))
+
+
+def _line(panel: Panel, factor: float) -> Markup:
+    """Draw stated = factor · true, clipped to the panel."""
+    low = max(panel.x.low, panel.y.low / factor)
+    high = min(panel.x.high, panel.y.high / factor)
+    if high <= low:
+        return joined()
+    x0, x1 = panel.x.at(low), panel.x.at(high)
+    y0, y1 = panel.y.at(low * factor), panel.y.at(high * factor)
+    end = text(x1 + 3, y1 + 4, f"{factor:g}", class_="note")
+    return joined(tag("path", d=f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}", class_="slope"), end)
+
+
+def _mark(panel: Panel, trial: Mapping[str, Any], colour: str) -> Markup:
+    norm = trial["quantity"] in ("displacement_l2", "energy_norm", "jump_l2")
+    tip = (
+        f"{trial['family']}, {metric_title(trial['quantity'])}, level {trial['level']}: "
+        f"stated {trial['stated']:.3g}, true {trial['true']:.3g}"
+    )
+    return tag(
+        "circle", tag("title", tip), cx=f"{panel.x.at(trial['true']):.1f}",
+        cy=f"{panel.y.at(trial['stated']):.1f}", r="3.4", stroke=colour,
+        fill=colour if norm else "#fff", class_="marker",
+    )  # fmt: skip
+
+
+def _trials_table(trials: Sequence[Mapping[str, Any]]) -> Markup:
+    rows = [
+        [
+            t["family"], f"P{t['degree']}", t["level"], metric_title(t["quantity"]),
+            number(t["stated"], 3), number(t["true"], 3),
+            t["left_out"] or joined(number(t["ratio"], 3), "" if t["covered"] else " not covered"),
+        ]
+        for t in trials
+    ]  # fmt: skip
+    head = ["case", "degree", "finest level", "number", "stated", "true", "stated over true"]
+    return table(head, rows, "All trials, relative; with those that do not count, and why")
