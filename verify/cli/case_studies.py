@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from verify.solution import Solution
     from verify.study.budget import BudgetStudy, Solved
     from verify.study.cost import CostStudy
+    from verify.study.thesis import ThesisStudy
 
-__all__ = ["budget", "cost"]
+__all__ = ["budget", "cost", "thesis"]
 
 Announce = Callable[[str], None]
 
@@ -81,6 +82,27 @@ def budget(arguments: argparse.Namespace, announce: Announce) -> "BudgetStudy":
         scene, level, arguments.tolerance, arguments.metric, asked, realised, exact,
         perf_counter() - start,
     )  # fmt: skip
+
+
+def thesis(arguments: argparse.Namespace, announce: Announce) -> "ThesisStudy":
+    """Measure the tables of the thesis again, and judge its claims."""
+    from verify.scene import load_scene
+    from verify.study.thesis import CASES, SOLVERS, thesis_study
+
+    quick = arguments.quick
+    folder = arguments.out / "thesis-cases"
+    names, solvers = (CASES[:2], SOLVERS[:4]) if quick else (CASES, SOLVERS)
+    scenes = [_coarsest(load_scene(name), 2 if quick else 3) for name in names]
+    announce(f"{len(solvers)} solvers on {', '.join(names)}, into {folder}")
+    start = perf_counter()
+    results = _run(scenes, folder, solvers, 1 if quick else 3)
+    return thesis_study(scenes, results, quick, announce, perf_counter() - start)
+
+
+def _coarsest(scene: "Scene", levels: int) -> "Scene":
+    assert scene.mesh.cells is not None
+    mesh = scene.mesh.model_copy(update={"cells": scene.mesh.cells[:levels]})
+    return scene.model_copy(update={"mesh": mesh})
 
 
 def _exact(scene: "Scene") -> Any:

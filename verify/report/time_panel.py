@@ -9,8 +9,8 @@ from verify.report.markup import Markup, tag
 __all__ = ["time_panel"]
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52, 96, 34, 40
-_COLOURS = ("#c04a00", "#0067a5", "#00785a", "#4d4d4d")
-_DASHES = (None, "6 3", "2 2", "8 2 2 2")
+_COLOURS = ("#c04a00", "#0067a5", "#00785a", "#4d4d4d", "#7a3e9d")
+_DASHES = (None, "6 3", "2 2", "8 2 2 2", "1 4")
 
 
 def time_panel(
@@ -29,7 +29,7 @@ def time_panel(
     time : sequence of float
         In s, ascending.
     curves : sequence of (name, values)
-        At most four; they differ in dashes as well as in colour.
+        At most five; they differ in dashes as well as in colour.
     marks : sequence of float
         Instants to be marked by a vertical line.
     x_title : str

@@ -1,0 +1,125 @@
+"""All methods against one conforming reference or exact answer: error, energy, step, time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from verify.methods.catalogue import METHODS
+from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.scene import Scene
+from verify.solvers.xfem_cuts import cuts_of
+from verify.solvers.xfem_scene import background_mesh, material_of
+from verify.study.cost.work import work_points
+from verify.study.thesis.sliver_steps import explicit_step
+from verify.xfem.errors import XfemError
+
+__all__ = ["MethodOnCase", "compare_methods"]
+
+
+@dataclass(frozen=True)
+class MethodOnCase:
+    """One method on one mesh of one case.
+
+    Attributes
+    ----------
+    case, solver : str
+    level : int
+    size : float or None
+        Of the elements, m.
+    unknowns : int or None
+    displacement, energy_norm, jump : (value, low, high) or None
+        Relative errors with the intervals in which they lie.
+    energy : float or None
+        Relative error of the strain energy.
+    critical_step : float or None
+        Over that of the uncut mesh; None where the method has none or its mesh is not the
+        background mesh.
+    seconds : float or None
+        Wall time of what each cut costs anew, median.
+    reason : str
+        Why there is no answer or no comparison.
+    changed : str
+        What the method moved, removed or left out: the largest of each kind.
+    """
+
+    case: str
+    solver: str
+    level: int
+    size: float | None
+    unknowns: int | None
+    displacement: tuple[float, float, float] | None
+    energy_norm: tuple[float, float, float] | None
+    jump: tuple[float, float, float] | None
+    energy: float | None
+    critical_step: float | None
+    seconds: float | None
+    reason: str
+    changed: str
+
+
+def compare_methods(scenes: Sequence[Scene], results: Sequence[CaseResult]) -> list[MethodOnCase]:
+    """Sum up what the runner has solved and measured, and add critical steps."""
+    found = []
+    for scene, result in zip(scenes, results, strict=True):
+        steps = _critical_steps(scene)
+        times = {
+            (point.solver, point.level): point.seconds
+            for metric in ("displacement_l2", "energy_norm")
+            for point in work_points(result.solves, metric)
+        }
+        for record in result.solves:
+            if record.solver != "reference":
+                key = record.solver, record.level
+                found.append(_summed_up(scene.name, record, times.get(key), steps.get(key)))
+    return found
+
+
+def _summed_up(
+    case: str, record: SolveRecord, seconds: float | None, step: float | None
+) -> MethodOnCase:
+    displacement, energy_norm, jump = (
+        _interval(record.metric(name)) for name in ("displacement_l2", "energy_norm", "jump_l2")
+    )
+    reason = record.reason if record.status is not Status.SOLVED else ""
+    if not reason and displacement is None:
+        reason = "; ".join(record.notes.values()) or "not compared"
+    changed = "; ".join(
+        f"{one['kind']}: {one['count']}, {one['size']:.2g} {one['unit']}"
+        for one in record.regularisations
+    )
+    return MethodOnCase(
+        case, record.solver, record.level, record.size, record.unknowns, displacement,
+        energy_norm, jump, _relative(record.metric("strain_energy")), step, seconds, reason,
+        changed,
+    )  # fmt: skip
+
+
+def _interval(metric: Metric | None) -> tuple[float, float, float] | None:
+    if metric is None:
+        return None
+    return (
+        metric.value,
+        max(metric.value - metric.uncertainty, 0.0),
+        (metric.value + metric.uncertainty),
+    )
+
+
+def _relative(metric: Metric | None) -> float | None:
+    if metric is None or not metric.reference:
+        return None
+    return metric.value / metric.reference - 1.0
+
+
+def _critical_steps(scene: Scene) -> Mapping[tuple[str, int], float]:
+    """Over that of the uncut mesh, by method and level."""
+    material, found = material_of(scene), {}
+    for level in range(scene.mesh.count):
+        mesh, size = background_mesh(scene, level)
+        cuts = cuts_of(scene, size)
+        uncut = explicit_step(mesh, [], "xfem", material)[0]
+        for method in ("xfem", *METHODS):
+            try:
+                step, _ = explicit_step(mesh, cuts, method, material)
+            except XfemError:
+                continue  # the solver has said why
+            found[method, level] = step / uncut
+    return found

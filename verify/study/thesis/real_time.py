@@ -1,0 +1,116 @@
+"""Real time: what every step of the hand costs while it is cut and pulled open."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter, thread_time
+
+import numpy as np
+
+from verify.calibration import kernel_seconds
+from verify.replay import PHASES, Session, Stage, quality_of
+from verify.study.thesis.strokes import hand, stroke_along
+
+__all__ = ["LIMITS", "RealTime", "real_time"]
+
+LIMITS = {"1 ms": 1e-3, "2 ms": 2e-3, "1/60 s": 1.0 / 60.0}
+_TETRAHEDRA = 1000
+_STROKES = ((-0.022, 1.8), (0.024, 3.0))  # m, s: after the incision, while it is pulled open
+_STROKE, _DURATION = 1.1, 4.6  # s
+_LOOK = 10  # steps
+
+
+@dataclass(frozen=True)
+class RealTime:
+    """The hand, played.
+
+    Attributes
+    ----------
+    tetrahedra, cuts, unknowns, steps, cutting_steps : int
+        Cuts are split elements, unknowns displacement components, both at the end.
+    within : dict
+        Share of all steps within each of the `LIMITS`, in processor time of one thread.
+    within_wall : dict
+        Likewise in wall time, the other work of the machine included.
+    resting, cutting : dict
+        Median by phase, and of the whole step, of steps without and with newly split elements:
+        processor time, s.
+    slowest : float
+        Processor time, s.
+    kernel : float
+        Processor time of the calibration kernel beside it, s.
+    volume_error, loose_edges, inverted : float, int, int
+        Worst over every tenth step: see `verify.replay.quality.Quality`.
+    energy_gain : float
+        Largest excess of the mechanical energy over the work done, relative to that work.
+    """
+
+    tetrahedra: int
+    cuts: int
+    unknowns: int
+    steps: int
+    cutting_steps: int
+    within: dict[str, float]
+    within_wall: dict[str, float]
+    resting: dict[str, float]
+    cutting: dict[str, float]
+    slowest: float
+    kernel: float
+    volume_error: float
+    loose_edges: int
+    inverted: int
+    energy_gain: float
+
+
+def real_time() -> RealTime:
+    """Cut the hand as in the case, cut it twice more along its whole length, and time each step."""
+    stage = hand(_TETRAHEDRA)
+    more = [stroke_along(stage, place, begin, _STROKE) for place, begin in _STROKES]
+    stage = replace(stage, strokes=[*stage.strokes, *more], duration=_DURATION)
+    volume, loose, inverted, gain = _soundness(stage)  # compiles what is timed below
+    session = Session(stage, account=False, clock=thread_time)
+    wall = []
+    while not session.finished:
+        start = perf_counter()
+        session.step()
+        wall.append(perf_counter() - start)
+    kernel = float(np.median(kernel_seconds(clock=thread_time)))
+    total = np.array([record.total_seconds for record in session.records])
+    cutting = np.array([record.newly_split > 0 for record in session.records])
+    phases = {name: np.array([r.seconds[name] for r in session.records]) for name in PHASES}
+    phases["step"] = total
+    return RealTime(
+        tetrahedra=len(stage.mesh.cells),
+        cuts=session.records[-1].split,
+        unknowns=session.records[-1].unknowns,
+        steps=len(total),
+        cutting_steps=int(cutting.sum()),
+        within={name: float(np.mean(total <= limit)) for name, limit in LIMITS.items()},
+        within_wall={
+            name: float(np.mean(np.array(wall) <= limit)) for name, limit in LIMITS.items()
+        },
+        resting={name: float(np.median(values[~cutting])) for name, values in phases.items()},
+        cutting={name: float(np.median(values[cutting])) for name, values in phases.items()},
+        slowest=float(total.max()),
+        kernel=kernel,
+        volume_error=volume,
+        loose_edges=loose,
+        inverted=inverted,
+        energy_gain=gain,
+    )
+
+
+def _soundness(stage: Stage) -> tuple[float, int, int, float]:
+    """Play with the account kept and the body measured every few steps."""
+    session = Session(stage)
+    seen = []
+    while not session.finished:
+        session.step()
+        if len(session.records) % _LOOK == 0 or session.finished:
+            seen.append(quality_of(session))
+    largest = max(record.work for record in session.records)
+    gain = max(record.mechanical - record.work for record in session.records) / largest
+    return (
+        max(quality.volume_error for quality in seen),
+        max(quality.loose_edges for quality in seen),
+        max(quality.inverted_elements + quality.inverted_facets for quality in seen),
+        float(gain),
+    )

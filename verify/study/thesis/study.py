@@ -1,0 +1,158 @@
+"""The study of the thesis: everything measured, judged, and as plain data."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from time import perf_counter
+from typing import Any
+
+from verify.result import CaseResult
+from verify.scene import Scene
+from verify.study.finding import Finding
+from verify.study.thesis.delays import SPEEDS, delays, with_other_frames
+from verify.study.thesis.measured import Measured
+from verify.study.thesis.methods_compared import compare_methods
+from verify.study.thesis.published import published_rows, published_source
+from verify.study.thesis.real_time import real_time
+from verify.study.thesis.sliver_steps import sliver_steps
+from verify.study.thesis.small_pieces import small_pieces
+from verify.study.thesis.step_times import CUTS, TETRAHEDRA, step_times
+from verify.study.thesis.thin_skin import skin_bending
+from verify.study.thesis.unknowns import count_face, count_strips
+from verify.study.thesis.verdicts_on_cost import verdicts_on_cost
+from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
+
+__all__ = ["CASES", "SOLVERS", "ThesisStudy", "thesis_study"]
+
+# an exact answer without tips, one with tips inside elements, and a converged reference
+CASES = ("statics/f3_inclined", "statics/griffith_inside", "statics/tissue_strip")
+SOLVERS = (
+    "xfem", "conforming", "subdivision", "snapping", "snapping_subdivision", "removal",
+    "removal_refined", "virtual_node", "virtual_node_arbitrary", "mass_spring", "uncut",
+)  # fmt: skip
+_ROWS = (10, 50, 100, 500, 1000)  # of Table 4.3
+
+
+@dataclass(frozen=True)
+class ThesisStudy:
+    """What the study found.
+
+    Attributes
+    ----------
+    measured : Measured
+    findings : list of Finding
+    quick : bool
+    seconds : float
+        Wall time.
+    """
+
+    measured: Measured
+    findings: list[Finding]
+    quick: bool
+    seconds: float
+
+    def as_record(self) -> dict[str, Any]:
+        """Return all of it as plain data, the thesis' rows beside."""
+        tables = {name: published_rows(name) for name in ("4.3", "4.4", "4.5", "4.6")}
+        return {
+            "quick": self.quick,
+            "seconds": self.seconds,
+            "published": {"source": published_source(), "tables": tables},
+            "findings": [asdict(finding) for finding in self.findings],
+            **asdict(self.measured),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the entries of the tables, one a line: what it is here and in the thesis."""
+        return [
+            *(
+                _line("4.3", row.cuts, name, added, row.thesis.get(name.split()[0]), "nodes added")
+                for row in self.measured.face
+                for name, added in row.added.items()
+            ),
+            *(
+                _line("4.4", row.tetrahedra, f"{row.cuts} cuts", row.per_second,
+                      row.thesis_per_second, "s per simulated s")
+                for row in self.measured.steps
+            ),
+            *(
+                _line("4.5", row.tetrahedra, f"{row.cuts} cuts", row.nodes, row.thesis_nodes,
+                      "nodes")
+                for row in self.measured.steps
+            ),
+            *(
+                _line("4.6", row.tetrahedra, row.speed_name, row.delay, row.thesis, "s")
+                for row in self.measured.delays
+            ),
+        ]  # fmt: skip
+
+
+def _line(
+    table: str, row: int, column: str, here: float, thesis: float | None, unit: str
+) -> dict[str, Any]:
+    return {
+        "table": table, "row": row, "column": column, "here": here,
+        "thesis": "" if thesis is None else thesis, "unit": unit,
+    }  # fmt: skip
+
+
+def thesis_study(
+    scenes: Sequence[Scene],
+    results: Sequence[CaseResult],
+    quick: bool,
+    announce: Callable[[str], None],
+    seconds: float = 0.0,
+) -> ThesisStudy:
+    """Measure the tables, and judge them together with solved cases.
+
+    Parameters
+    ----------
+    scenes, results : sequences
+        Cases that the methods have solved, and what the runner found.
+    quick : bool
+        Fewer rows of each table.
+    announce : callable
+        Told what is under way.
+    seconds : float
+        That solving the cases took, for the record.
+    """
+    start = perf_counter()
+    announce("time of a step (Tables 4.4 and 4.5)")
+    steps = step_times(TETRAHEDRA[::4] if quick else TETRAHEDRA, CUTS[::2] if quick else CUTS)
+    announce("real time")
+    hand = real_time()
+    contended = _contention()
+    announce("unknowns (Table 4.3)")
+    strips = count_strips((1, 2, 7, 50) if quick else (1, 2, 3, 7, 50, 500))
+    face = count_face(_ROWS[:3] if quick else _ROWS)
+    announce("delays (Table 4.6)")
+    waited = delays(TETRAHEDRA[::4] if quick else TETRAHEDRA)
+    fast = next(row.speed for row in waited if row.speed_name == SPEEDS[-1])
+    frames = with_other_frames(TETRAHEDRA[0 if quick else -1], fast, (1 / 240, 1 / 15, 0.5))
+    announce("slivers and limits")
+    sizes = (1e-1, 1e-3, 1e-4, 1e-5)
+    measured = Measured(
+        strips=strips,
+        face=face,
+        steps=steps,
+        delays=waited,
+        frames=frames,
+        hand=hand,
+        methods=compare_methods(scenes, results),
+        slivers=sliver_steps((2, 3), sizes[:3] if quick else sizes),
+        pieces=small_pieces((1e-3, 1e-6) if quick else (1e-2, 1e-4, 1e-6)),
+        skin=skin_bending(
+            ((8e-3, 1), (4e-3, 1))
+            if quick
+            else ((8e-3, 1), (4e-3, 1), (2e-3, 1), (2e-3, 2), (1e-3, 2))
+        ),
+        contended=contended,
+    )
+    findings = [*verdicts_on_cost(measured), *verdicts_on_mechanics(measured)]
+    return ThesisStudy(measured, findings, quick, seconds + perf_counter() - start)
+
+
+def _contention() -> str:
+    """Say so if the machine has more to do than it has cores."""
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    return f"the machine was busy: load {load:.1f} on {cores} cores" if load > cores else ""

@@ -1,0 +1,150 @@
+"""Table 4.3 and Figure 4.11: nodes that each method adds while incisions grow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.methods.catalogue import cut_by
+from verify.replay import Stage, stage_of
+from verify.scene import load_scene
+from verify.study.thesis.published import published_rows
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.polyline import Polyline
+from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.tool_path import ToolPath
+from verify.xfem.virtual import cut_mesh
+
+__all__ = ["THRESHOLDS", "FaceCount", "StripCount", "count_face", "count_strips"]
+
+THRESHOLDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)  # of an edge: nodes as near as that are snapped
+_HEIGHT = 0.43  # of the strip: away from nodes and from the middles of edges
+
+
+@dataclass(frozen=True)
+class StripCount:
+    """A strip of triangles, cut along from border to border.
+
+    Attributes
+    ----------
+    pattern : str
+        Of the diagonals.
+    triangles : int
+        That are cut through.
+    enriched : int
+        Nodes that XFEM enriches.
+    """
+
+    pattern: str
+    triangles: int
+    enriched: int
+
+
+@dataclass(frozen=True)
+class FaceCount:
+    """Nodes added on the face.
+
+    Attributes
+    ----------
+    asked : int
+        Row of Table 4.3.
+    cuts : int
+        Elements that were split when at least so many were.
+    strokes : int
+        That the tool had begun.
+    added : dict of str to int
+        By method; ``xfem played`` is counted on the membrane, semi-progressively, all others on
+        its plan: the blade is parallel to the line of sight, so that the same edges are crossed
+        at the same places.
+    smallest : dict of str to float
+        Smallest volume of an element or a piece of one over that of its element.
+    thesis : dict of str to int
+        The thesis' increments.
+    """
+
+    asked: int
+    cuts: int
+    strokes: int
+    added: dict[str, int]
+    smallest: dict[str, float]
+    thesis: dict[str, int]
+
+
+def count_strips(lengths: Sequence[int]) -> list[StripCount]:
+    """Cut strips of so many squares, divided by diagonals in each of the patterns."""
+    counts = []
+    for pattern in ("right", "left", "alternating", "crossed"):
+        for length in lengths:
+            mesh = rectangle_mesh((length, 1), (0.0, 0.0), (float(length), 1.0), pattern)
+            cut = Polyline([[-1.0, _HEIGHT], [length + 1.0, _HEIGHT]])
+            virtual = cut_mesh(mesh, [cut])
+            through = int((np.bincount(virtual.parent) > 1).sum())
+            counts.append(StripCount(pattern, through, virtual.node_count - len(mesh.points)))
+    return counts
+
+
+def count_face(rows: Sequence[int]) -> list[FaceCount]:
+    """Let incisions grow over the face until so many elements are split.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Of Table 4.3, ascending, without 0.
+    """
+    stage = stage_of(load_scene("thesis/face_thousand_cuts"))
+    # the positive direction of the plan is that of the membrane: it is a graph over x and y
+    plan = SimplexMesh(stage.mesh.points[:, :2], stage.mesh.cells)
+    thesis = {int(row[0]): row for row in published_rows("4.3")}
+    counts = []
+    for asked, (cuts, played, time) in zip(rows, _growth(stage, rows), strict=True):
+        lines = [Polyline(tips) for tips in _tips_until(stage.strokes, time)]
+        bodies = {
+            "xfem": cut_by("virtual_node_arbitrary", plan, lines),
+            "subdivision": cut_by("subdivision", plan, lines),
+            "snapping": cut_by("snapping", plan, lines),
+        }
+        for threshold in THRESHOLDS:
+            name = f"snapping_subdivision {threshold:g}"
+            bodies[name] = cut_by("snapping_subdivision", plan, lines, threshold=threshold)
+        sizes = {name: body.counts for name, body in bodies.items()}
+        added = {"xfem played": played}
+        added |= {name: size.nodes - size.nodes_before for name, size in sizes.items()}
+        smallest = {name: body.smallest_fraction for name, body in bodies.items()}
+        own = thesis[asked]
+        said = {"xfem": int(own[3]), "snapping_subdivision": int(own[4])}
+        counts.append(FaceCount(asked, cuts, len(lines), added, smallest, said))
+    return counts
+
+
+def _growth(stage: Stage, rows: Sequence[int]) -> list[tuple[int, int, float]]:
+    """Elements split, nodes added and time when so many elements were split."""
+    cutter = SemiProgressiveCutter(stage.mesh)
+    for path in stage.strokes:
+        cutter.begin(path)
+    found: list[tuple[int, int, float]] = []
+    frame = 0.25 * stage.time_step
+    for k in range(1, 4 * stage.steps + 1):
+        if len(found) == len(rows):
+            break
+        cutter.advance(k * frame)
+        split = int(np.count_nonzero(cutter.body.split_cells))
+        while len(found) < len(rows) and split >= rows[len(found)]:
+            added = cutter.virtual_mesh().node_count - len(stage.mesh.points)
+            found.append((split, added, k * frame))
+    if len(found) < len(rows):
+        raise ValueError(f"the strokes split {split} elements; expected {rows[-1]}")
+    return found
+
+
+def _tips_until(strokes: Sequence[ToolPath], time: float) -> list[NDArray[np.float64]]:
+    """Plan (k, 2) of what each tip has come along, of the strokes that have begun."""
+    tips = []
+    for path in strokes:
+        if path.times[0] >= time:
+            continue
+        last = [np.interp(time, path.times, path.blades[:, 0, i]) for i in range(2)]
+        before = path.times < min(time, path.times[-1])
+        tips.append(np.concatenate([path.blades[before, 0, :2], [last]]))
+    return tips

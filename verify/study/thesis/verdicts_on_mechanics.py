@@ -1,0 +1,178 @@
+"""Verdicts on stability, accuracy, and on what goes wrong where."""
+
+from collections.abc import Iterator, Sequence
+
+from verify.result import Verdict
+from verify.study.finding import Finding
+from verify.study.thesis.measured import Measured
+from verify.study.thesis.methods_compared import MethodOnCase
+from verify.study.thesis.sliver_steps import SliverStep, exponent
+from verify.study.thesis.small_pieces import SmallPiece
+from verify.study.thesis.thin_skin import SkinBending
+from verify.study.thesis.unknowns import FaceCount
+
+__all__ = ["verdicts_on_mechanics"]
+
+_FLAT, _KEPT = 0.02, 0.9  # exponent of a step that slivers leave alone; share of the uncut one
+_BEAM = 0.1  # of the deflection: what an engineer would accept of a plate
+_AS_GOOD = 1.05
+_TIPS = 3.0
+_TIP_CASE = "griffith_inside"
+
+
+def verdicts_on_mechanics(measured: Measured) -> list[Finding]:
+    """Judge slivers, accuracy and limits."""
+    return [
+        *_slivers(measured.slivers, measured.face),
+        *_accuracy(measured.methods),
+        *_wrong(measured.methods),
+        *_thin(measured.skin),
+        *_small(measured.pieces),
+    ]
+
+
+def _slivers(steps: Sequence[SliverStep], face: Sequence[FaceCount]) -> Iterator[Finding]:
+    for method in dict.fromkeys(step.method for step in steps):
+        own = [step for step in steps if step.method == method]
+        slopes = {
+            dim: exponent([step for step in own if step.dimension == dim])
+            for dim in dict.fromkeys(step.dimension for step in own)
+        }
+        least = min(step.ratio for step in own)
+        name = next((k for k in face[-1].smallest if k in (method, f"{method} 0.2")), None)
+        slivers = (
+            f"; smallest piece among {face[-1].cuts} cuts of the face "
+            f"{face[-1].smallest[name]:.1e} of its element"
+            if name
+            else ""
+        )
+        exponents = ", ".join(f"{slope:.2f} ({dim}D)" for dim, slope in slopes.items())
+        yield Finding(
+            f"stable: explicit step with slivers, {method}",
+            f"over ε from {max(s.size for s in own):g} to {min(s.size for s in own):g} the "
+            f"critical step is at least {least:.3g} of that of the uncut body, with exponents "
+            f"{exponents}{slivers}",
+            f"at least {_KEPT} of the uncut step, exponent within {_FLAT} of 0",
+            Verdict.PASS
+            if least >= _KEPT and all(abs(slope) <= _FLAT for slope in slopes.values())
+            else Verdict.FAIL,
+        )
+
+
+def _finest(methods: Sequence[MethodOnCase], case: str) -> dict[str, MethodOnCase]:
+    """By solver, on the finest level that both XFEM and the conforming solver were compared on."""
+    own = [row for row in methods if row.case == case and row.displacement is not None]
+    levels = [{r.level for r in own if r.solver == name} for name in ("xfem", "conforming")]
+    common = levels[0] & levels[1]
+    return {row.solver: row for row in own if common and row.level == max(common)}
+
+
+def _accuracy(methods: Sequence[MethodOnCase]) -> Iterator[Finding]:
+    for case in dict.fromkeys(row.case for row in methods):
+        finest = _finest(methods, case)
+        if not finest:
+            yield Finding(
+                f"accuracy: {case}", "XFEM and the conforming solver were not both compared",
+                "a comparison", Verdict.UNDECIDED,
+            )  # fmt: skip
+            continue
+        limit = _TIPS if _TIP_CASE in case else _AS_GOOD
+        words, ratios = [], []
+        for title, quantity in (("L²", "displacement"), ("energy norm", "energy_norm")):
+            one = getattr(finest["xfem"], quantity)
+            other = getattr(finest["conforming"], quantity)
+            if one is None or other is None:
+                continue
+            # the ratio of any two values in the intervals
+            low, high = one[1] / other[2], one[2] / max(other[1], 1e-300)
+            ratios.append((low, high))
+            words.append(f"{title} {one[0]:.3g} against {other[0]:.3g}")
+        kept, broken = all(h <= limit for _, h in ratios), any(lo > limit for lo, _ in ratios)
+        verdict = Verdict.PASS if kept else Verdict.FAIL if broken else Verdict.UNDECIDED
+        steps = {r.solver: r.critical_step for r in finest.values() if r.critical_step}
+        said = ", ".join(f"{name} {step:.2g}" for name, step in steps.items())
+        yield Finding(
+            f"accuracy: {case}",
+            f"relative errors of XFEM against those of a conforming mesh of the same size, level "
+            f"{finest['xfem'].level}: {'; '.join(words)}. Critical steps over that of the uncut "
+            f"mesh: {said}",
+            f"at most {limit:g} times the conforming one, in both norms",
+            verdict,
+        )
+
+
+def _wrong(methods: Sequence[MethodOnCase]) -> Iterator[Finding]:
+    for case in dict.fromkeys(row.case for row in methods):
+        finest = _finest(methods, case)
+        if not finest or "xfem" not in finest:
+            continue
+        own = finest["xfem"].displacement
+        assert own is not None
+        others = {n: r.displacement[0] / own[0] for n, r in finest.items() if r.displacement}
+        good = [name for name, ratio in others.items() if ratio <= _TIPS]
+        bad = {name: ratio for name, ratio in others.items() if ratio > _TIPS}
+        yield Finding(
+            f"what goes wrong: methods on {case}",
+            f"within {_TIPS:g} times XFEM's error: {', '.join(good)}; worse: "
+            + (", ".join(f"{name} {ratio:.0f} times" for name, ratio in bad.items()) or "none"),
+            f"every method within {_TIPS:g} times",
+            Verdict.FAIL if bad else Verdict.PASS,
+        )
+        if _TIP_CASE in case:
+            yield from _tips(methods, case)
+
+
+def _tips(methods: Sequence[MethodOnCase], case: str) -> Iterator[Finding]:
+    rows = {
+        name: {
+            row.level: row
+            for row in methods
+            if row.case == case and row.solver == name and row.displacement is not None
+        }
+        for name in ("xfem", "conforming")
+    }
+    levels = sorted(set(rows["xfem"]) & set(rows["conforming"]))
+    ratios = [
+        rows["xfem"][k].displacement[0] / rows["conforming"][k].displacement[0]  # type: ignore[index]
+        for k in levels
+    ]
+    if not ratios:
+        return
+    yield Finding(
+        "what goes wrong: tips inside elements",
+        "without tip enrichment an incision ends on an edge of the element. Its error is "
+        + ", ".join(f"{ratio:.2f}" for ratio in ratios)
+        + " times that of a conforming mesh whose node is the tip, from coarse to fine; "
+        f"{rows['xfem'][levels[0]].changed or 'nothing else changed'}",
+        f"at most {_AS_GOOD:g} times",
+        Verdict.PASS if max(ratios) <= _AS_GOOD else Verdict.FAIL,
+    )
+
+
+def _thin(skin: Sequence[SkinBending]) -> Iterator[Finding]:
+    coarse = skin[0]
+    words = ", ".join(f"{row.deflection:.2f} ({1e3 * row.edge:g} mm, {row.layers})" for row in skin)
+    yield Finding(
+        "what goes wrong: thin skin",
+        f"a clamped strip of 2 mm skin sinks by {words} of what a beam does (element, layers): "
+        f"on the hand's elements it is {1.0 / coarse.deflection:.0f} times too stiff in bending. "
+        f"Stretched it is right to {max(abs(row.stretch - 1.0) for row in skin):.1e}. So is every "
+        "method on linear tetrahedra, cut or not: a cut flap of skin curls too little",
+        f"within {_BEAM:.0%} of the beam",
+        Verdict.PASS if all(abs(r.deflection - 1.0) <= _BEAM for r in skin) else Verdict.FAIL,
+    )
+
+
+def _small(pieces: Sequence[SmallPiece]) -> Iterator[Finding]:
+    first, last = pieces[0], pieces[-1]
+    yield Finding(
+        "what goes wrong: small pieces",
+        f"from ε = {first.size:g} to {last.size:g} the condition of XFEM's stiffness grows from "
+        f"{first.condition:.1e} to {last.condition:.1e}; scaled by its diagonal it is "
+        f"{last.scaled:.0f} and a force on a smallest piece moves it "
+        f"{last.compliance:.2f} times as far. More placements: verify study slivers",
+        "condition after scaling, and compliance, less than twice those at the first ε",
+        Verdict.PASS
+        if last.scaled <= 2.0 * first.scaled and last.compliance <= 2.0
+        else Verdict.FAIL,
+    )
