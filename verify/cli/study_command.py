@@ -20,7 +20,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
     make_directory(arguments.out)  # before minutes of work
     command = shlex.join(["verify", *sys.argv[1:]])
-    if arguments.study in ("cost", "budget"):
+    if arguments.study in ("cost", "budget", "thesis"):
         from verify.cli import case_studies
 
         study = getattr(case_studies, arguments.study)(arguments, announce)

@@ -17,6 +17,7 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
         "examples:\n  verify study slivers --quick --out studies\n"
         "  verify study slivers --dimension 2 --out studies\n"
         "  verify study energy --out studies\n"
+        "  verify study thesis --quick --out studies\n"
         "  verify study calibration --quick --out studies\n"
         "  verify study cost statics/tissue_strip --steps 4 --solver xfem --solver conforming "
         "--out studies\n"
@@ -28,6 +29,7 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
     for name, text in {
         "slivers": "conditioning, explicit steps, errors and compliance against sliver size",
         "energy": "falls and spins of cut bodies, by lumping and scheme",
+        "thesis": "the tables and figures of the thesis measured again, its claims judged",
         "calibration": "stated uncertainty of the reference against its true error",
     }.items():
         kind = kinds.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")

@@ -16,6 +16,7 @@ from verify.report.notation import number
 from verify.report.sliver_figures import sliver_curves, sliver_maps
 from verify.report.stability_map import MAP_STYLE
 from verify.report.summary import badge
+from verify.report.thesis_figures import thesis_section
 from verify.report.time_panel import time_panel
 from verify.result import Verdict
 
@@ -28,6 +29,7 @@ _TITLES = {
     "energy": "Whether energy and momenta are kept",
     "cost": "What accuracy costs while a cut grows",
     "budget": "Where the error comes from, and the cheapest adequate model",
+    "thesis": "The tables and claims of the thesis, measured again",
     "calibration": "Whether the reference's error bars can be trusted",
 }
 
@@ -73,6 +75,7 @@ def _page(record: Mapping[str, Any], kind: str) -> Markup:
         "energy": _energy,
         "cost": cost_section,
         "budget": budget_section,
+        "thesis": thesis_section,
         "calibration": calibration_section,
     }
     body = sections[kind](record)
