@@ -1,12 +1,13 @@
 """The hand scene of the thesis, 1000 tetrahedra: a sound body at every step, delays, cost."""
 
 from dataclasses import replace
+from time import perf_counter, thread_time
 
 import numpy as np
 import pytest
 
 from verify.calibration import kernel_seconds
-from verify.replay import PHASES, Session, quality_of
+from verify.replay import PHASES, Session, StepRecord, quality_of
 from verify.replay.timings import timings_of
 from verify.xfem.tool_path import ToolPath
 
@@ -110,24 +111,59 @@ def slashed(hand):
     return replace(hand, strokes=strokes, hooks=[], duration=2.0)
 
 
+def of_seconds(seconds: float, split: int) -> StepRecord:
+    phases = dict.fromkeys(PHASES, 0.0) | {"motion": seconds}
+    rest = dict.fromkeys(("time", "kinetic", "strain", "potential", "work", "dissipated"), 0.0)
+    return StepRecord(
+        step=1, seconds=phases, split=split, newly_split=split, unknowns=3, delay=np.empty(0),
+        contacts=0, **rest,
+    )  # fmt: skip
+
+
+def test_timings_are_the_quantiles_of_steps_that_cut_and_of_those_that_do_not() -> None:
+    seconds = 1e-3 * np.arange(1, 101)
+    records = [of_seconds(s, int(k >= 60)) for k, s in enumerate(seconds)]
+    timings = timings_of(records)
+    assert (timings.step.count, timings.resting.count, timings.cutting.count) == (100, 60, 40)
+    assert timings.step.median == pytest.approx(50.5e-3)
+    assert timings.step.most == pytest.approx(95.05e-3)
+    assert timings.step.largest == pytest.approx(0.1)
+    assert timings.resting.largest == pytest.approx(60e-3)
+    assert timings.step.within == {"1 ms": 0.01, "2 ms": 0.02, "1/60 s": 0.16}
+    assert timings.phases["motion"][1].median == pytest.approx(80.5e-3)
+    assert timings.phases["cutting"][0].largest == 0.0
+    assert timings_of(records[:9]).cutting.count == 0
+    assert "cutting (" not in timings_of(records[:9]).table
+
+
+THESIS_STEP = 2.78515 / 2  # s: Table 4.4, 1000 tetrahedra, 200 cuts, one second in steps of 0.5 s
+
+
 @pytest.mark.timing
 def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
     """For the reader: absolute times. Asserted: ratios to a kernel of the same machine.
 
-    A step (the kernel takes about 10 ms) is a factorisation of 1400 unknowns and two small
-    sweeps; a step that cuts also makes mass, sparsity and solver anew.
+    Processor time, so that what else the machine does counts as little as can be. The kernel takes
+    about 10 ms. A step is a sweep over 1400 pieces, a factorisation of 1500 unknowns and the
+    positions of three surfaces; one that cuts also divides elements and surfaces and makes mass,
+    sparsity and solver anew. Inner surface, mapping and collision are included, records are not.
     """
     Session(slashed(hand), account=False).run()  # compiles
-    session = Session(slashed(hand), account=False)
-    records = session.run()
-    kernel = float(np.median(kernel_seconds()))
-    assert 170 <= records[-1].split <= 260
-    timings = timings_of(records)
+    found = {}
+    for name, clock in (("processor", thread_time), ("wall", perf_counter)):
+        session = Session(slashed(hand), account=False, clock=clock)
+        found[name] = timings_of(session.run())
+    kernel = float(np.median(kernel_seconds(clock=thread_time)))
+    last = session.records[-1]
+    assert 170 <= last.split <= 260
     with capsys.disabled():
-        phases = ", ".join(f"{k} {1e3 * v:.2f}" for k, v in timings.median.items())
-        print(f"\nhand, {len(session.stage.mesh.cells)} tetrahedra, {records[-1].split} cut: "
-              f"median ms {phases}; a cutting step {1e3 * timings.cutting_median:.2f}; "
-              f"within {timings.within}; kernel {1e3 * kernel:.2f}")  # fmt: skip
-    rest = [record.total_seconds for record in records if record.newly_split == 0]
-    assert np.median(rest) < 1.0 * kernel
-    assert timings.cutting_median < 3.0 * kernel
+        print(f"\nhand, {len(session.stage.mesh.cells)} tetrahedra, {last.split} cut; kernel "
+              f"{1e3 * kernel:.2f} ms; the step of Table 4.4 takes "
+              f"{THESIS_STEP / found['processor'].resting.median:.0f} times as long")  # fmt: skip
+        for name, timings in found.items():
+            print(f"{name} time\n{timings.table}")
+    timings = found["processor"]
+    assert timings.resting.median < 0.25 * kernel
+    assert timings.resting.most < 0.5 * kernel
+    assert timings.cutting.median < 1.2 * kernel
+    assert timings.cutting.median < 12.0 * timings.resting.median

@@ -1,48 +1,94 @@
-"""What the steps of a played scene cost, phase by phase: medians, and how many meet a limit."""
+"""What the steps of a played scene cost, phase by phase: how long, and how many meet a limit.
 
-from collections.abc import Sequence
+Only the phases count: cutting, assembly, motion, mapping and collision, all that a simulator does
+in a step. What is kept beside it is not timed: the record of the step, the account of energies,
+and the measures of `verify.replay.quality`.
+"""
+
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from verify.replay.step_record import PHASES, StepRecord
 
-__all__ = ["LIMITS", "Timings", "timings_of"]
+__all__ = ["LIMITS", "Spread", "Timings", "timings_of"]
 
-LIMITS = {"2 ms": 2e-3, "1/60 s": 1.0 / 60.0}  # touch, and sight
+LIMITS = {"1 ms": 1e-3, "2 ms": 2e-3, "1/60 s": 1.0 / 60.0}  # touch, and sight
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Distribution of some seconds.
+
+    Attributes
+    ----------
+    count : int
+    median, most, largest : float
+        Half of them, 95 % of them, and all of them are at most that, s; NaN if there are none.
+    within : dict
+        Share within each of the `LIMITS`.
+    """
+
+    count: int
+    median: float
+    most: float
+    largest: float
+    within: dict[str, float]
+
+    @classmethod
+    def of(cls, seconds: Iterable[float]) -> "Spread":
+        """Sum up seconds."""
+        found = np.array(list(seconds))
+        if len(found) == 0:
+            return cls(0, float("nan"), float("nan"), float("nan"), {})
+        median, most, largest = np.quantile(found, (0.5, 0.95, 1.0))
+        within = {name: float(np.mean(found <= limit)) for name, limit in LIMITS.items()}
+        return cls(len(found), float(median), float(most), float(largest), within)
 
 
 @dataclass(frozen=True)
 class Timings:
-    """Medians over steps.
+    """Steps of a scene.
 
     Attributes
     ----------
-    steps : int
-    median : dict
-        Seconds by phase, and "step" for all together.
-    cutting_median : float
-        Seconds of a whole step in which elements were split; NaN if there is none.
-    within : dict
-        Share of the steps within each of the `LIMITS`.
+    step, cutting, resting : Spread
+        Of whole steps: all, those in which elements were split, and the others.
+    phases : dict
+        By phase, the `Spread` over all steps, those that cut, and the others.
     """
 
-    steps: int
-    median: dict[str, float]
-    cutting_median: float
-    within: dict[str, float]
+    step: Spread
+    cutting: Spread
+    resting: Spread
+    phases: dict[str, tuple[Spread, Spread, Spread]]
+
+    @property
+    def table(self) -> str:
+        """In words: a line for each kind of step, in ms."""
+        lines = []
+        kinds = (("all", self.step), ("cutting", self.cutting), ("resting", self.resting))
+        for k, (name, step) in enumerate(kinds):
+            if step.count == 0:
+                continue
+            phases = ", ".join(f"{p} {1e3 * s[k].median:.2f}" for p, s in self.phases.items())
+            within = ", ".join(f"{share:.0%} in {limit}" for limit, share in step.within.items())
+            lines.append(
+                f"{name} ({step.count} steps): median {1e3 * step.median:.2f} ms ({phases}), "
+                f"95 % {1e3 * step.most:.2f}, max {1e3 * step.largest:.2f}; {within}"
+            )
+        return "\n".join(lines)
 
 
 def timings_of(records: Sequence[StepRecord]) -> Timings:
     """Sum up the steps; the first and the first that cuts, which compile, are for the caller."""
-    total = np.array([record.total_seconds for record in records])
-    median = {
-        phase: float(np.median([record.seconds[phase] for record in records])) for phase in PHASES
+    cutting = [record for record in records if record.newly_split > 0]
+    resting = [record for record in records if record.newly_split == 0]
+    kinds = (records, cutting, resting)
+    step = [Spread.of(record.total_seconds for record in kind) for kind in kinds]
+    phases = {
+        phase: tuple(Spread.of(record.seconds[phase] for record in kind) for kind in kinds)
+        for phase in PHASES
     }
-    cutting = total[[record.newly_split > 0 for record in records]]
-    return Timings(
-        len(records),
-        {**median, "step": float(np.median(total))},
-        float(np.median(cutting)) if len(cutting) else float("nan"),
-        {name: float(np.mean(total <= limit)) for name, limit in LIMITS.items()},
-    )
+    return Timings(*step, phases)  # type: ignore[arg-type]
