@@ -23,16 +23,20 @@ def _crossed_edges(facets, values):
     size = 64
     while size < 8 * count:
         size *= 2
-    table, known = np.full(size, -1, dtype=np.int64), np.empty((2 * count, 2), dtype=np.int64)
-    of_facet, row, found = np.full((count, 3), -1), np.empty(2, dtype=np.int64), 0
+    table, known = np.empty(size, dtype=np.int64), np.empty((2 * count, 2), dtype=np.int64)
+    for place in range(size):
+        table[place] = -1
+    of_facet, row = np.empty((count, 3), dtype=np.int64), np.empty(2, dtype=np.int64)
+    found = np.int64(0)
     for f in range(count):
         for k in range(3):
+            of_facet[f, k] = -1
             a, b = facets[f, (k + 1) % 3], facets[f, (k + 2) % 3]
             if (values[a] >= 0.0) == (values[b] >= 0.0):
                 continue
             row[0], row[1] = (a, b) if values[a] >= 0.0 else (b, a)
             of_facet[f, k], found = number_of_row(row, table, known, found)
-    return known[:found].copy(), of_facet
+    return known[:found], of_facet
 
 
 @njit(cache=True)
@@ -50,15 +54,17 @@ def _points_on_edges(ends, values, points):
 
 
 @njit(cache=True)
-def _write(end, out, f, corners, at, side):
-    """Write a part of facet f unless it has a corner twice; give the end."""
+def _write(end, out, f, corners, a, b, c, at, side):
+    """Write a part of facet f unless it has a corner twice; give the end.
+
+    Its corners are three of those given, and `at` are the barycentric coordinates of all.
+    """
     ids, where, source, sides = out
-    if corners[0] == corners[1] or corners[1] == corners[2] or corners[2] == corners[0]:
+    if corners[a] == corners[b] or corners[b] == corners[c] or corners[c] == corners[a]:
         return end
-    for k in range(3):
-        ids[end, k] = corners[k]
-        for j in range(3):
-            where[end, k, j] = at[k][j]
+    ids[end, 0], ids[end, 1], ids[end, 2] = corners[a], corners[b], corners[c]
+    for j in range(3):
+        where[end, 0, j], where[end, 1, j], where[end, 2, j] = at[a, j], at[b, j], at[c, j]
     source[end], sides[end] = f, side
     return end + 1
 
@@ -109,36 +115,44 @@ def divide_facets(
         number[z] = edges[z, 0]
         if share[z, 1] > 0.0:
             number[z] = len(points) + count
-            edges[count], place[count] = edges[z], place[z]
+            for i in range(2):
+                edges[count, i] = edges[z, i]
+            for i in range(points.shape[1]):
+                place[count, i] = place[z, i]
             count += 1
     room = 3 * len(facets)
     ids, at = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, 3))
     source, side = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int8)
-    out, eye, end = (ids, at, source, side), np.eye(3), 0
+    # typed: a literal 0 would be a type of its own to compile for
+    zero, u, v = np.int64(0), np.int64(3), np.int64(4)
+    out, end = (ids, at, source, side), zero
+    # the corners of a facet and two new points on its edges
+    corners, where = np.empty(5, dtype=np.int64), np.empty((5, 3))
     for f in range(len(facets)):
-        alone, through = -1, True
+        alone, through, crossed = zero, True, False
         for k in range(3):
+            corners[k] = facets[f, k]
+            for j in range(3):
+                where[k, j] = 1.0 if j == k else 0.0
             if of_facet[f, k] < 0:
                 alone = k
             else:
-                through = through and inside[of_facet[f, k]]
-        if of_facet[f].max() < 0 or not through:
-            end = _write(end, out, f, facets[f], (eye[0], eye[1], eye[2]), 0)
+                crossed, through = True, through and inside[of_facet[f, k]]
+        if not (crossed and through):
+            end = _write(end, out, f, corners, zero, zero + 1, zero + 2, where, np.int8(0))
             continue
         # the corner alone on its side is opposite to the edge that is not crossed
         a, b, c = alone, (alone + 1) % 3, (alone + 2) % 3
         first, second = of_facet[f, c], of_facet[f, b]  # edges a-b and a-c
-        p, q, u, v = facets[f, b], facets[f, c], number[first], number[second]
-        mine, other = (1, -1) if values[facets[f, a]] >= 0.0 else (-1, 1)
+        mine = np.int8(1) if values[corners[a]] >= 0.0 else np.int8(-1)
         near, far = (0, 1) if mine > 0 else (1, 0)
-        x = share[first, near] * eye[a] + share[first, far] * eye[b]
-        y = share[second, near] * eye[a] + share[second, far] * eye[c]
-        end = _write(end, out, f, (facets[f, a], u, v), (eye[a], x, y), mine)
+        corners[u], corners[v] = number[first], number[second]
+        for j in range(3):
+            where[u, j] = share[first, near] * where[a, j] + share[first, far] * where[b, j]
+            where[v, j] = share[second, near] * where[a, j] + share[second, far] * where[c, j]
+        end = _write(end, out, f, corners, a, u, v, where, mine)
         # as in `verify.xfem.clipping`: the diagonal begins at the corner with the lower number
-        if p < q:
-            end = _write(end, out, f, (u, p, v), (x, eye[b], y), other)
-            end = _write(end, out, f, (p, q, v), (eye[b], eye[c], y), other)
-        else:
-            end = _write(end, out, f, (u, p, q), (x, eye[b], eye[c]), other)
-            end = _write(end, out, f, (u, q, v), (x, eye[c], y), other)
+        third, start = (v, b) if corners[b] < corners[c] else (c, u)
+        end = _write(end, out, f, corners, u, b, third, where, -mine)
+        end = _write(end, out, f, corners, start, c, v, where, -mine)
     return edges[:count], place[:count], ids[:end], at[:end], source[:end], side[:end]

@@ -91,13 +91,15 @@ def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, s
     for a in range(corners):
         for i in range(space):
             simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
-    whole = signed_volume(simplex)
+    whole, least = signed_volume(simplex), np.inf
     for a in range(corners):
-        kept = simplex[a].copy()
-        simplex[a] = place
+        for i in range(space):
+            simplex[a, i] = place[i]
         at[a] = signed_volume(simplex) / whole if whole != 0.0 else -1.0
-        simplex[a] = kept
-    return at.min()
+        for i in range(space):
+            simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
+        least = min(least, at[a])
+    return least
 
 
 @njit(cache=True)
@@ -107,10 +109,10 @@ def _pull_back(
 ):  # fmt: skip
     count, space = places.shape
     corners = cells.shape[1]
-    material, found = np.zeros((count, space)), np.full(count, -1)
+    material, found = np.empty((count, space)), np.empty(count, dtype=np.int64)
     simplex, at = np.empty((corners, space)), np.empty(corners)
     for q in range(count):
-        piece = pieces[q]
+        piece, found[q] = pieces[q], -1
         for _ in range(len(cells)):
             cell, place = piece_parent[piece], places[q]
             least = _coordinates(
@@ -129,9 +131,9 @@ def _pull_back(
                         found[q] = piece = other
                     other = next_piece[other]
             _coordinates(place, piece, cell, displacement, points, cells, piece_cells, simplex, at)
-            material[q] = 0.0
-            for a in range(corners):
-                for i in range(space):
+            for i in range(space):
+                material[q, i] = 0.0
+                for a in range(corners):
                     material[q, i] += at[a] * points[cells[cell, a], i]
             if found[q] >= 0:
                 break
