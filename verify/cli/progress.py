@@ -53,6 +53,7 @@ class _Lines:
 
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
         self.done += 1
+        self.total = max(self.total, self.done)  # a reference may get further levels
         self._say(f"[{self.done}/{self.total}] {_solve_text(label, record, reused)}")
 
     def judged(self, result: CaseResult) -> None:

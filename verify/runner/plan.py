@@ -30,12 +30,16 @@ Survey = dict[str, dict[str, Any]]
 
 @dataclass
 class CasePlan:
-    """The solves of one case, and the records of those that are known not to run."""
+    """The solves of one case, and the records of those that are known not to run.
+
+    `spare` are levels of the reference that are solved only if the others do not suffice.
+    """
 
     scene: Scene
     solvers: list[str]
     jobs: list[Job] = field(default_factory=list)
     refused: list[tuple[Job, SolveRecord]] = field(default_factory=list)
+    spare: list[Job] = field(default_factory=list)
 
 
 def solvers_of(scene: Scene, options: Options) -> list[str]:
@@ -121,6 +125,10 @@ def plan_case(
         parameters = options.parameters.get(name, {})
         code = [code_of_solver(name), answer.get("source", "")]
         asked = answer.get("cases", {}).get(scene.name, {})
+        planned = asked.get("levels", 0)
+        most = planned
+        if name == REFERENCE and bundle is None and not scene.judged_by_exact:
+            most = max(planned, scene.reference.max_levels or 0)
         jobs = [
             Job(
                 case=scene.name,
@@ -133,14 +141,15 @@ def plan_case(
                 folder=directory.solve_folder(scene.name, name, level),
                 parameters=parameters,
             )
-            for level in range(max(asked.get("levels", 0), 1))
+            for level in range(max(most, 1))
         ]
         if answer["error"]:
             plan.refused.append((jobs[0], jobs[0].blank(Status.FAILED, answer["error"])))
         elif asked["refusal"]:
             plan.refused.append((jobs[0], jobs[0].blank(Status.REFUSED, asked["refusal"])))
         else:
-            plan.jobs += jobs[: asked["levels"]]
+            plan.jobs += jobs[:planned]
+            plan.spare += jobs[planned:most]
     return plan
 
 

@@ -14,6 +14,7 @@ from verify.result import CaseResult, SolveRecord, Status, read_result
 from verify.runner.checking import check_scene
 from verify.runner.child import POLL_SECONDS, Child, Ending
 from verify.runner.cluster import ClusterEngine
+from verify.runner.deepening import further_level, take_up_known_levels
 from verify.runner.directory import RunDirectory, claimed, write_run
 from verify.runner.engine import Engine, LocalEngine, Running
 from verify.runner.fingerprint import code_of_comparison, digest_of
@@ -132,6 +133,8 @@ class _Work:
         self.directory, self.options, self.origin = directory, options, origin
         self.progress, self.reused = progress, 0
         self.plans = {plan.scene.name: plan for plan in plans}
+        for plan in plans:
+            take_up_known_levels(plan)
         self.waiting: list[Job] = [job for plan in plans for job in plan.jobs]
         self.open = {name: len(plan.jobs) for name, plan in self.plans.items()}
         self.to_judge = [name for name, count in self.open.items() if not count]
@@ -318,6 +321,10 @@ class _Work:
         self._case_done(result)
 
     def _case_done(self, result: CaseResult) -> None:
+        if (job := further_level(self.plans[result.case], result)) is not None:
+            self.waiting.insert(0, job)
+            self.open[result.case] += 1
+            return
         self.results[result.case] = result
         self.progress.judged(result)
 

@@ -62,7 +62,21 @@ class ReferenceLevels(Strict):
     levels: int = Field(
         strict=True, default=3, ge=3, le=8, description="number of levels, each halving h"
     )
+    max_levels: int | None = Field(
+        strict=True,
+        default=None,
+        ge=3,
+        le=8,
+        description="further levels are solved, up to that many, until the uncertainty is below "
+        "a tenth of every error that it judges (default: `levels`)",
+    )
     degree: Literal[1, 2] = Field(default=2, description="polynomial order")
+
+    @model_validator(mode="after")
+    def _levels_are_in_order(self) -> "ReferenceLevels":
+        if self.max_levels is not None and self.max_levels < self.levels:
+            raise ValueError(f"max_levels {self.max_levels} is below levels {self.levels}")
+        return self
 
 
 def _finer(one: CellCounts, other: CellCounts) -> bool:

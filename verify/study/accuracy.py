@@ -29,6 +29,7 @@ from verify.study.reference import (
     exact_reference,
     size_of,
 )
+from verify.study.sufficiency import sufficiency
 from verify.verdict import error_interval, judge
 
 __all__ = ["assess_accuracy"]
@@ -88,6 +89,9 @@ def assess_accuracy(
                 measured[i] = _measure(records[i], one, judge_of, missing, rules)
     rates = _rates(scene, measured)
     record = reference.record if reference else {"kind": "none", "reason": missing}
+    if record["kind"] == "conforming":
+        levels = len(record["levels"])
+        record = {**record, **sufficiency(scene, measured, REFERENCE, levels)}
     return CaseResult(
         case=scene.name,
         title=scene.title,

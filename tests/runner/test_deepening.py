@@ -1,0 +1,138 @@
+"""Levels that a reference gets as long as it is too coarse for what it judges."""
+
+import json
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from verify.errors import InputError
+from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.runner.deepening import further_level
+from verify.runner.job import Job
+from verify.runner.plan import CasePlan
+from verify.scene import Scene, load_scene
+from verify.study.sufficiency import sufficiency
+
+MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
+
+CASE = """
+title = "A slit under its weight"
+requirement = "It shall open."
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+[mesh]
+cells = [[48, 48]]
+[material]
+young = 1.0e4
+poisson = 0.3
+density = 1000.0
+plane = "strain"
+[[supports]]
+where = "top"
+displacement = [0.0, 0.0]
+[[loads]]
+kind = "gravity"
+acceleration = [0.0, -9.8]
+[[cuts]]
+kind = "polyline"
+points = [[0.3, 0.52], [0.7, 0.52]]
+[reference]
+size = 0.3
+degree = 1
+levels = 3
+max_levels = {most}
+[[quantities]]
+kind = "opening"
+name = "opening"
+at = 0.5
+"""
+
+
+def solve(solver, level, value=1.1, uncertainty=0.001, status=Status.SOLVED):
+    metric = Metric("opening", value, "m", 1.0, uncertainty, "conforming")
+    return SolveRecord("slit", solver, level, status, metrics=[metric])
+
+
+@pytest.fixture
+def scene(tmp_path) -> Scene:
+    file = tmp_path / "slit.toml"
+    file.write_text(CASE.format(most=5))
+    return load_scene(file)
+
+
+def judged(scene, *solves):
+    found = sufficiency(scene, solves, "reference", 3)
+    return CaseResult("slit", "", "", "", {}, found, list(solves), [], [])
+
+
+def plan(scene):
+    spare = [Job("slit", "reference", level, 1, "key", Path()) for level in (3, 4)]
+    return CasePlan(scene, ["xfem", "reference"], spare=spare)
+
+
+def test_the_finest_solution_of_every_solver_sets_the_measure(scene):
+    coarse, fine = solve("xfem", 0), solve("xfem", 1, value=1.005)
+    found = sufficiency(scene, [fine, coarse, solve("conforming", 1)], "reference", 3)
+    assert not found["suffices"]  # 0.001 of 0.005
+    assert found["suffices_reason"].startswith("not reached with 3 levels")
+    worst, other = found["judged_errors"].items()
+    assert worst[0] == "opening of xfem, level 1"
+    assert worst[1]["ratio"] == pytest.approx(0.2)
+    assert other[1]["ratio"] == pytest.approx(0.01)
+    assert sufficiency(scene, [coarse], "reference", 3)["suffices"]
+
+
+def test_a_solution_that_is_exact_needs_no_better_reference(scene):
+    found = sufficiency(scene, [solve("xfem", 0, 1.0, 1e-13)], "reference", 3)
+    assert found["suffices"]
+    by_chance = sufficiency(scene, [solve("xfem", 0, 1.0, 1e-3)], "reference", 3)
+    assert not by_chance["suffices"]
+
+
+def test_levels_are_added_one_by_one_while_they_are_needed(scene):
+    waiting = plan(scene)
+    poor = judged(scene, solve("xfem", 0, uncertainty=0.05), solve("reference", 0))
+    good = judged(scene, solve("xfem", 0), solve("reference", 0))
+    assert further_level(waiting, good) is None
+    assert further_level(waiting, poor).level == 3
+    assert further_level(waiting, poor).level == 4
+    assert further_level(waiting, poor) is None
+    assert [job.level for job in waiting.jobs] == [3, 4]
+
+
+def test_no_level_follows_one_that_was_not_solved(scene):
+    failed = solve("reference", 3, status=Status.TIMEOUT)
+    poor = solve("xfem", 0, uncertainty=1)
+    assert further_level(plan(scene), judged(scene, poor, failed)) is None
+    unjudged = replace(judged(scene), reference={"kind": "none", "reason": "too few levels"})
+    assert further_level(plan(scene), unjudged) is None
+
+
+def test_fewer_levels_at_most_than_at_least_are_refused(tmp_path):
+    file = tmp_path / "slit.toml"
+    file.write_text(CASE.format(most=3).replace("levels = 3\n", "levels = 4\n", 1))
+    with pytest.raises(InputError, match="max_levels 3 is below levels 4"):
+        load_scene(file)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.skipif(bool(MISSING), reason=f"needs {' and '.join(MISSING)}")
+def test_a_run_solves_levels_until_the_reference_suffices_and_says_so(verify):
+    case = verify.folder / "slit.toml"
+    case.write_text(CASE.format(most=6))
+    command = ("run", "slit.toml", "--out", "out", "--repetitions", "1", "--solver", "xfem")
+    assert verify(*command).returncode == 0
+    result = json.loads((verify.folder / "out/cases/slit/result.json").read_text())
+    levels = [level["level"] for level in result["reference"]["levels"]]
+    assert result["reference"]["suffices"]
+    assert 3 < len(levels) <= 6
+    assert levels == list(range(len(levels)))
+    assert f"reached with {len(levels)} levels" in result["reference"]["suffices_reason"]
+    # again: nothing is solved, nothing is judged otherwise
+    again = verify(*command)
+    assert f"{len(levels) + 1} finished solves were taken over" in again.stdout
+    assert json.loads((verify.folder / "out/cases/slit/result.json").read_text()) == result

@@ -1,0 +1,71 @@
+"""Whether the reference is good enough for the errors that it has to judge."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from verify.result import Metric, SolveRecord, Status
+from verify.scene import Scene
+
+__all__ = ["SHARE", "sufficiency"]
+
+SHARE = 0.1  # of the error that is judged, below which the reference's uncertainty shall be
+_ROUND_OFF = 1e-10  # relative: an error that small is none, and needs no reference to say so
+
+
+def sufficiency(
+    scene: Scene, solves: Sequence[SolveRecord], reference: str, levels: int
+) -> dict[str, Any]:
+    """Compare the reference's uncertainty with the error of each solver's finest solution.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its quantities of interest, and the errors that its acceptance asks for, count.
+    solves : sequence of SolveRecord
+        Measured.
+    reference : str
+        Name of the solver that is the reference.
+    levels : int
+        Levels of the reference so far.
+
+    Returns
+    -------
+    dict
+        ``suffices``, ``suffices_reason`` and, by metric and solver, ``judged_errors`` with
+        ``error``, ``uncertainty`` and their ``ratio``, worst first. Plain values, for the record.
+    """
+    names = dict.fromkeys(
+        [quantity.name for quantity in scene.quantities]
+        + [check.metric for check in scene.acceptance]
+    )
+    finest: dict[str, SolveRecord] = {}
+    for solve in sorted(solves, key=lambda solve: solve.level):
+        if solve.solver != reference and solve.status is Status.SOLVED:
+            finest[solve.solver] = solve
+    rows = {
+        f"{name} of {solve.solver}, level {solve.level}": _row(metric)
+        for solve in finest.values()
+        for name in names
+        if (metric := solve.metric(name)) is not None and metric.source
+    }
+    rows = dict(sorted(rows.items(), key=lambda item: -(item[1]["ratio"] or 0.0)))
+    if not rows:
+        return {"suffices": False, "suffices_reason": "no error was judged", "judged_errors": {}}
+    name, worst = next(iter(rows.items()))
+    ratio = worst["ratio"] or 0.0
+    reached = ratio <= SHARE
+    said = "reached" if reached else "not reached"
+    reason = (
+        f"{said} with {levels} levels: its uncertainty is at most {ratio:.2g} of an error "
+        f"({name}); {SHARE:g} is wanted"
+    )
+    return {"suffices": reached, "suffices_reason": reason, "judged_errors": rows}
+
+
+def _row(metric: Metric) -> dict[str, float | None]:
+    scale = 1.0 if metric.reference is None else abs(metric.reference)
+    error = abs(metric.value - (metric.reference or 0.0))
+    ratio: float | None = None
+    if max(error, metric.uncertainty) > _ROUND_OFF * scale:
+        ratio = metric.uncertainty / error if error > 0.0 else float("inf")
+    return {"error": error, "uncertainty": metric.uncertainty, "ratio": ratio}
