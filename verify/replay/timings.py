@@ -5,7 +5,7 @@ in a step. What is kept beside it is not timed: the record of the step, the acco
 and the measures of `verify.replay.quality`.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,10 +85,10 @@ def timings_of(records: Sequence[StepRecord]) -> Timings:
     """Sum up the steps; the first and the first that cuts, which compile, are for the caller."""
     cutting = [record for record in records if record.newly_split > 0]
     resting = [record for record in records if record.newly_split == 0]
-    kinds = (records, cutting, resting)
-    step = [Spread.of(record.total_seconds for record in kind) for kind in kinds]
-    phases = {
-        phase: tuple(Spread.of(record.seconds[phase] for record in kind) for kind in kinds)
-        for phase in PHASES
-    }
-    return Timings(*step, phases)  # type: ignore[arg-type]
+
+    def spreads(seconds: Callable[[StepRecord], float]) -> tuple[Spread, Spread, Spread]:
+        of = [Spread.of(map(seconds, kind)) for kind in (records, cutting, resting)]
+        return of[0], of[1], of[2]
+
+    phases = {name: spreads(lambda record, name=name: record.seconds[name]) for name in PHASES}  # type: ignore[misc]
+    return Timings(*spreads(lambda record: record.total_seconds), phases)
