@@ -163,7 +163,7 @@ def _real_time(hand: Mapping[str, Any], contended: str) -> Markup:
         _said(
             f"{hand['tetrahedra']} tetrahedra, {hand['cuts']} cut, {hand['unknowns']} unknowns, "
             f"{hand['steps']} steps of 1/60 s of which {hand['cutting_steps']} cut. Steps "
-            f"{shares}. {contended}"
+            f"{shares}." + (f" Note: {contended}." if contended else "")
         ),
         _table("Median processor time of a step", columns, rows),
     )
@@ -180,8 +180,9 @@ def _methods(methods: _Rows) -> Markup:
         "strain energy": lambda row: _signed(row["energy"]),
         "critical step": lambda row: _first([row["critical_step"]]),
         "time": lambda row: seconds_text(row["seconds"]),
-        "why not": lambda row: row["reason"][:120],
     }
+    if any(row["reason"] for row in methods):
+        columns["why not"] = lambda row: row["reason"][:120]
     tables = [
         _table(case, columns, [row for row in methods if row["case"] == case])
         for case in dict.fromkeys(row["case"] for row in methods)
@@ -191,7 +192,8 @@ def _methods(methods: _Rows) -> Markup:
         tag("h2", "All methods against the same answers"),
         _said(
             "Relative errors; the strain energy with its sign. Critical explicit steps over that "
-            "of the uncut mesh. Wall time of what each cut costs anew."
+            "of the uncut mesh, masses lumped; none for a mesh of its own and for springs. Wall "
+            "time of what each cut costs anew."
         ),
         *tables,
     )
@@ -211,8 +213,9 @@ def _slivers(slivers: _Rows) -> Markup:
             points = [(row["size"], row["ratio"]) for row in own if row["method"] == name]
             way = "L".join(f"{panel.x.at(x):.1f} {panel.y.at(y):.1f}" for x, y in points)
             content.append(tag("path", d=f"M{way}", class_="curve", stroke=colour))
+            radius = f"{6.5 - 0.8 * place:.1f}"  # of curves on each other all are seen
             content += [
-                tag("circle", tag("title", f"{name}, {x:g}: {y:.3g}"), r="3.5", fill=colour,
+                tag("circle", tag("title", f"{name}, {x:g}: {y:.3g}"), r=radius, fill=colour,
                     cx=f"{panel.x.at(x):.1f}", cy=f"{panel.y.at(y):.1f}")
                 for x, y in points
             ]  # fmt: skip

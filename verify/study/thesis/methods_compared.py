@@ -85,6 +85,7 @@ def _summed_up(
     changed = "; ".join(
         f"{one['kind']}: {one['count']}, {one['size']:.2g} {one['unit']}"
         for one in record.regularisations
+        if one["size"]
     )
     return MethodOnCase(
         case, record.solver, record.level, record.size, record.unknowns, displacement,
