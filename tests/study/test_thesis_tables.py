@@ -38,6 +38,7 @@ _HOLD = (
     "Table 4.6: delay and machine",
     "Table 4.6: delay is size",
     "stable: explicit step with slivers, virtual_node",
+    "stable: no slivers in the face",
     "accuracy: statics/f3",
     "what goes wrong: small pieces",
 )
@@ -107,6 +108,16 @@ def test_what_snaps_less_adds_more_and_subdivision_twice_as_much_as_xfem(face) -
     # two nodes on each crossed edge, one for each end; an end in the next cell divides that too
     edges = face[-1].cuts + face[-1].strokes
     assert 2 * edges <= last["subdivision"] <= 2 * edges + 6 * face[-1].strokes
+
+
+def test_on_the_face_only_what_divides_elements_shortens_the_explicit_step(face) -> None:
+    last = face[-1]
+    assert last.step["xfem"] == pytest.approx(1.0, abs=1e-6)
+    assert last.smallest["xfem"] == pytest.approx(last.smallest["subdivision"], rel=1e-6)
+    # the same pieces, as elements of their own
+    assert last.step["subdivision"] < 0.02
+    assert last.step["subdivision"] <= last.step["snapping_subdivision 0.01"] < 0.1
+    assert last.step["snapping"] > 0.5
 
 
 def test_a_delay_is_a_length_over_the_speed_of_the_tool(crossed) -> None:
@@ -259,6 +270,8 @@ def test_a_verdict_falls_with_its_evidence(measured) -> None:
     assert verdict(replace(measured, steps=slow), "Table 4.4, 200") is Verdict.FAIL
     late = [replace(frame, difference=1e-6) for frame in measured.frames]
     assert verdict(replace(measured, frames=late), "Table 4.6: delay and") is Verdict.FAIL
+    short = replace(measured.face[-1], step={**measured.face[-1].step, "xfem": 0.5})
+    assert verdict(replace(measured, face=[short]), "stable: no slivers") is Verdict.FAIL
     loose = replace(measured, hand=replace(measured.hand, loose_edges=1))
     assert verdict(loose, "stable: the hand") is Verdict.FAIL
     worse = [method("xfem", 0, 0.12), *measured.methods[1:]]

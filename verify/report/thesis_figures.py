@@ -47,6 +47,10 @@ def _unknowns(record: Mapping[str, Any]) -> Markup:
     }
     for name in face[0]["added"]:
         columns[_short(name)] = partial(_added, name)
+    steps: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+        "cut elements": lambda row: row["cuts"],
+        **{_short(name): partial(_step, name) for name in face[0]["step"]},
+    }
     return tag(
         "section",
         tag("h2", "Unknowns: Table 4.3 and Figure 4.11"),
@@ -58,12 +62,17 @@ def _unknowns(record: Mapping[str, Any]) -> Markup:
         tag("div", _figure(time_panel("nodes added", cuts, curves, (), "cut elements")),
             class_="panels"),
         _table("Nodes added by growing incisions", columns, face),
+        _table("Critical explicit step over that of the uncut face, as a free sheet", steps, face),
     )  # fmt: skip
 
 
 def _added(name: str, row: Mapping[str, Any]) -> int:
     added: int = row["added"][name]
     return added
+
+
+def _step(name: str, row: Mapping[str, Any]) -> Markup:
+    return number(row["step"][name], 2)
 
 
 def _short(name: str) -> str:

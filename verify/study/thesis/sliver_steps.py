@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from verify.methods.catalogue import cut_by
+from verify.methods.cut_body import CutBody
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Cut, Plane
@@ -17,7 +18,7 @@ from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
-__all__ = ["SliverStep", "explicit_step", "exponent", "sliver_steps"]
+__all__ = ["SliverStep", "explicit_step", "exponent", "sliver_steps", "step_of_body"]
 
 _DIVISIONS = {2: 6, 3: 2}
 _METHODS = (
@@ -92,6 +93,12 @@ def explicit_step(
         material = body.material(material)
     mass = (consistent_mass if "consistent" in method else side_wise_mass)(virtual, _DENSITY)
     return _critical(resisting, material, mass), smallest
+
+
+def step_of_body(body: CutBody) -> float:
+    """Critical step 2/ω_max of a free sheet of Table 4.1 that has been cut, in s."""
+    material = body.material(isotropic(_YOUNG, _POISSON, "plane stress"))
+    return _critical(body.resisting, material, side_wise_mass(body.virtual, _DENSITY))
 
 
 def exponent(steps: Sequence[SliverStep]) -> float:

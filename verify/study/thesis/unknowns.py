@@ -10,6 +10,7 @@ from verify.methods.catalogue import cut_by
 from verify.replay import Stage, stage_of
 from verify.scene import load_scene
 from verify.study.thesis.published import published_rows
+from verify.study.thesis.sliver_steps import step_of_body
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.polyline import Polyline
@@ -60,6 +61,9 @@ class FaceCount:
         at the same places.
     smallest : dict of str to float
         Smallest volume of an element or a piece of one over that of its element.
+    step : dict of str to float
+        Critical explicit step of the plan as a free sheet, masses lumped, over that of the uncut
+        one.
     thesis : dict of str to int
         The thesis' increments.
     """
@@ -69,6 +73,7 @@ class FaceCount:
     strokes: int
     added: dict[str, int]
     smallest: dict[str, float]
+    step: dict[str, float]
     thesis: dict[str, int]
 
 
@@ -96,6 +101,7 @@ def count_face(rows: Sequence[int]) -> list[FaceCount]:
     stage = stage_of(load_scene("thesis/face_thousand_cuts"))
     # the positive direction of the plan is that of the membrane: it is a graph over x and y
     plan = SimplexMesh(stage.mesh.points[:, :2], stage.mesh.cells)
+    uncut = step_of_body(cut_by("uncut", plan, []))
     thesis = {int(row[0]): row for row in published_rows("4.3")}
     counts = []
     for asked, (cuts, played, time) in zip(rows, _growth(stage, rows), strict=True):
@@ -111,10 +117,11 @@ def count_face(rows: Sequence[int]) -> list[FaceCount]:
         sizes = {name: body.counts for name, body in bodies.items()}
         added = {"xfem played": played}
         added |= {name: size.nodes - size.nodes_before for name, size in sizes.items()}
+        step = {name: step_of_body(body) / uncut for name, body in bodies.items()}
         smallest = {name: body.smallest_fraction for name, body in bodies.items()}
         own = thesis[asked]
         said = {"xfem": int(own[3]), "snapping_subdivision": int(own[4])}
-        counts.append(FaceCount(asked, cuts, len(lines), added, smallest, said))
+        counts.append(FaceCount(asked, cuts, len(lines), added, smallest, step, said))
     return counts
 
 

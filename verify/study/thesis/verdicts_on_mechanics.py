@@ -23,7 +23,8 @@ _TIP_CASE = "griffith_inside"
 def verdicts_on_mechanics(measured: Measured) -> list[Finding]:
     """Judge slivers, accuracy and limits."""
     return [
-        *_slivers(measured.slivers, measured.face),
+        *_slivers(measured.slivers),
+        _face(measured.face[-1]),
         *_accuracy(measured.methods),
         *_wrong(measured.methods),
         *_thin(measured.skin),
@@ -31,7 +32,7 @@ def verdicts_on_mechanics(measured: Measured) -> list[Finding]:
     ]
 
 
-def _slivers(steps: Sequence[SliverStep], face: Sequence[FaceCount]) -> Iterator[Finding]:
+def _slivers(steps: Sequence[SliverStep]) -> Iterator[Finding]:
     for method in dict.fromkeys(step.method for step in steps):
         own = [step for step in steps if step.method == method]
         slopes = {
@@ -39,24 +40,32 @@ def _slivers(steps: Sequence[SliverStep], face: Sequence[FaceCount]) -> Iterator
             for dim in dict.fromkeys(step.dimension for step in own)
         }
         least = min(step.ratio for step in own)
-        name = next((k for k in face[-1].smallest if k in (method, f"{method} 0.2")), None)
-        slivers = (
-            f"; smallest piece among {face[-1].cuts} cuts of the face "
-            f"{face[-1].smallest[name]:.1e} of its element"
-            if name
-            else ""
-        )
         exponents = ", ".join(f"{slope:.2f} ({dim}D)" for dim, slope in slopes.items())
         yield Finding(
             f"stable: explicit step with slivers, {method}",
             f"over ε from {max(s.size for s in own):g} to {min(s.size for s in own):g} the "
             f"critical step is at least {least:.3g} of that of the uncut body, with exponents "
-            f"{exponents}{slivers}",
+            f"{exponents}",
             f"at least {_KEPT} of the uncut step, exponent within {_FLAT} of 0",
             Verdict.PASS
             if least >= _KEPT and all(abs(slope) <= _FLAT for slope in slopes.values())
             else Verdict.FAIL,
         )
+
+
+def _face(row: FaceCount) -> Finding:
+    said = ", ".join(
+        f"{name} {step:.2g} ({row.smallest[name]:.1e})" for name, step in row.step.items()
+    )
+    divided = [step for name, step in row.step.items() if "subdivision" in name]
+    kept = row.step["xfem"] >= _KEPT and row.step["xfem"] > max(divided)
+    return Finding(
+        "stable: no slivers in the face",
+        f"{row.cuts} cut elements, critical explicit step over that of the uncut face (smallest "
+        f"element or piece over its element): {said}",
+        f"XFEM at least {_KEPT}, and more than whatever divides elements",
+        Verdict.PASS if kept else Verdict.FAIL,
+    )
 
 
 def _finest(methods: Sequence[MethodOnCase], case: str) -> dict[str, MethodOnCase]:
