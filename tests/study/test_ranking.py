@@ -183,3 +183,14 @@ def test_undecided_checks_and_the_reference_are_never_ranked():
     ranking = rank_solvers([case_of("a", solves, [open_])])
     assert ranking["solvers"] == ["x", "y"]
     assert [e["reason"] for e in ranking["left_out"]] == ["error jump_l2 UNDECIDED: why"]
+
+
+def test_a_case_without_any_error_is_named_with_its_reason():
+    notes = {"comparison": "the reference has 0 solved levels"}
+    solves = [solve("a", name, 0, notes=notes) for name in ("x", "y")]
+    (entry,) = rank_solvers([case_of("a", solves)])["left_out"]
+    assert entry == {
+        "case": "a",
+        "solver": "",
+        "reason": f"no error is measured: {notes['comparison']}",
+    }

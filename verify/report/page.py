@@ -35,7 +35,10 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
     )
     started = run.record.get("started")
     when = f"Run of {started}" if started else "Run of unknown date"
-    links = (("#reading", "how to read this"), ("#provenance", "provenance"))
+    which = ranking_section(run.ranking)
+    links = [("#reading", "how to read this"), ("#provenance", "provenance")]
+    if which is not None:
+        links.insert(0, ("#which", "which solver"))
     top = tag(
         "header",
         tag("h1", "Verification report"),
@@ -56,7 +59,7 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
         summary(run),
         [tag("p", "Note: " + note, class_="warning") for note in notes],
         verdict_table(run),
-        ranking_section(run.ranking),
+        which,
         sections,
         reading_guide(),
         origin_section(run),

@@ -191,7 +191,8 @@ _ENDS = (
 
 def _left_out(ranking: Mapping[str, Any]) -> Markup:
     rows = [
-        [e["case"], solver_title(e["solver"]), e["reason"]] for e in ranking["left_out"]
+        [e["case"], solver_title(e["solver"]) if e["solver"] else "all", e["reason"]]
+        for e in ranking["left_out"]
     ]  # fmt: skip
     if not rows:
         return tag("p", "No solve is missing, and every check of the cases was decided.")

@@ -5,11 +5,13 @@ from dataclasses import asdict
 from typing import Any
 
 from verify.result import CaseResult, Status, Verdict
+from verify.study.energy_account import ACCOUNT
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons
 from verify.study.ranking.energy import energy_comparisons
 from verify.study.ranking.stability import stability_standings
 from verify.study.ranking.standing import LeftOut
+from verify.verdict import ERROR_METRICS
 
 __all__ = ["SCHEMA", "rank_solvers", "ranked_solvers"]
 
@@ -67,8 +69,20 @@ def _left_out(results: Sequence[CaseResult]) -> list[LeftOut]:
             if solve.status is not Status.SOLVED:
                 why = f"level {solve.level} {solve.status}: {solve.reason or 'no reason given'}"
                 listed.append(LeftOut(result.case, solve.solver, why))
+        if why := _uncompared(result):
+            listed.append(LeftOut(result.case, "", why))
         for verdict in result.verdicts:
             if verdict.verdict in (Verdict.UNDECIDED, Verdict.ERROR):
                 why = f"{verdict.check} {verdict.metric} {verdict.verdict}: {verdict.reason}"
                 listed.append(LeftOut(result.case, verdict.solver, why))
     return listed
+
+
+def _uncompared(result: CaseResult) -> str:
+    """Say why no error was measured in a case, if none was."""
+    errors = set(ERROR_METRICS) - set(ACCOUNT)
+    solved = [s for s in result.solves if s.status is Status.SOLVED and s.solver != _REFERENCE]
+    if not solved or any(m.name in errors for s in solved for m in s.metrics):
+        return ""
+    said = next((s.notes["comparison"] for s in solved if "comparison" in s.notes), "")
+    return f"no error is measured: {said or 'no reason given'}"
