@@ -2,26 +2,26 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, identity
 
-from reference.meshing import imprint, open_cut
+from verify.study.slivers.conforming_peers import PEERS, conforming_peer
+from verify.study.slivers.placements import Placement, placed_cuts
+from verify.xfem.corotational import InternalForce, Kinematics
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = [
     "DENSITY",
     "TREATMENTS",
-    "Placement",
     "SweptBody",
     "background",
     "soft",
@@ -29,17 +29,8 @@ __all__ = [
     "uncut_body",
 ]
 
-Placement = Literal["along faces", "along edges", "through vertices"]
-
-TREATMENTS = ("keep", "drop", "merge", "ghost penalty", "conforming", "conforming snapped")
+TREATMENTS = ("keep", "drop", "merge", "ghost penalty", *PEERS)
 YOUNG, POISSON, DENSITY = 1e4, 0.3, 1000.0  # the thesis' soft tissue, SI units
-_SNAP = 0.25  # element sizes: nodes as near as that to the cut are moved onto it
-_ON = 1e-10  # edges: the mesh generator takes nodes as near as that to lie on the cut
-_NORMALS = {  # in the plane without the second component; what contains which nodes for ε = 0
-    "along faces": (0.0, 0.0, 1.0),
-    "along edges": (-1 / 3, 0.0, 1.0),
-    "through vertices": (-1 / 3, -1 / 5, 1.0),
-}
 _Floats = NDArray[np.float64]
 
 
@@ -60,7 +51,7 @@ def background(dimension: int, quick: bool = False) -> SimplexMesh:
 
 @dataclass(frozen=True)
 class SweptBody:
-    """A body with one cut, after the treatment of its slivers.
+    """A body with its cuts, after the treatment of its slivers.
 
     Attributes
     ----------
@@ -73,7 +64,7 @@ class SweptBody:
     extension : (N_untreated, N) csr_array
         Untreated unknowns from treated ones.
     ghost : GhostPenalty or None
-    cut : Plane
+    cuts : tuple of Plane
         As asked.
     """
 
@@ -85,7 +76,17 @@ class SweptBody:
     untreated: VirtualMesh
     extension: csr_array
     ghost: GhostPenalty | None
-    cut: Plane
+    cuts: tuple[Plane, ...]
+
+    @property
+    def cut(self) -> Plane:
+        """The first of the cuts."""
+        return self.cuts[0]
+
+    @property
+    def is_conforming(self) -> bool:
+        """Whether the mesh itself is opened: no element is cut."""
+        return self.treatment in PEERS
 
     @cached_property
     def node_above(self) -> NDArray[np.bool_]:
@@ -95,36 +96,38 @@ class SweptBody:
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
-        """(N, d) both faces across the cut clamped."""
-        last = self.virtual.node_points[:, -1]
-        ends = (last < 1e-9) | (last > 1.0 - 1e-9)
+        """(N, d) both faces across the cut clamped; a side too, if a strip lies between cuts."""
+        points = self.virtual.node_points
+        ends = (points[:, -1] < 1e-9) | (points[:, -1] > 1.0 - 1e-9)
+        if self.placement == "two cuts apart":
+            ends |= points[:, 0] < 1e-9
         return np.repeat(ends[:, None], self.dimension, axis=1)
+
+    def force(self, kinematics: Kinematics = "corotational") -> InternalForce:
+        """Return the internal force, with the ghost penalty if there is one."""
+        material = soft(self.dimension)
+        if self.ghost is not None:
+            return PenalisedForce(self.virtual, material, self.ghost, kinematics)
+        return InternalForce(self.virtual, material, kinematics)
 
 
 def swept_body(mesh: SimplexMesh, placement: Placement, size: float, treatment: str) -> SweptBody:
-    """Cut a mesh `size` element sizes away from its nodes and treat the slivers.
+    """Cut a mesh `size` elements from where the cut would be degenerate, and treat the slivers.
 
     Raises
     ------
     ValueError
-        If the treatment is unknown, or the conforming mesh does not exist (a cell without area).
+        If treatment or placement are unknown, or the conforming mesh does not exist (a cell
+        without volume).
     """
     if treatment not in TREATMENTS:
         raise ValueError(f"treatment '{treatment}'; expected one of {', '.join(TREATMENTS)}")
     dim = mesh.dim
-    up = np.eye(dim)[-1]
-    normal = np.array(_NORMALS[placement])[[0, -1] if dim == 2 else [0, 1, 2]]
-    layer = 1.0 / (8.0 if dim == 2 else 4.0)
-    corner = np.full(dim, 0.5)
-    if placement != "along faces":
-        # the node nearest to the middle, whatever the number of divisions
-        nearest = np.linalg.norm(mesh.points - corner, axis=1).argmin()
-        corner = mesh.points[nearest]
-    cut = Plane(corner + size * layer * up, normal)
-    cut_body = cut_mesh(mesh, [cut])
+    cuts = placed_cuts(mesh, placement, size)
+    cut_body = cut_mesh(mesh, cuts)
     whole = SweptBody(
         dim, placement, size, treatment, cut_body, cut_body,
-        csr_array(identity(cut_body.node_count)), None, cut,
+        csr_array(identity(cut_body.node_count)), None, cuts,
     )  # fmt: skip
     if treatment == "ghost penalty":
         return replace(whole, ghost=GhostPenalty(cut_body, soft(dim)))
@@ -133,8 +136,7 @@ def swept_body(mesh: SimplexMesh, placement: Placement, size: float, treatment: 
         return replace(whole, virtual=treated, extension=report.absorption.extension)
     if treatment == "keep":
         return whole
-    source = _snapped(mesh, cut, _SNAP * layer) if treatment == "conforming snapped" else mesh
-    opened = cut_mesh(_conforming(source, cut), [])
+    opened = conforming_peer(mesh, cuts, treatment)
     return replace(
         whole, virtual=opened, untreated=opened, extension=csr_array(identity(opened.node_count))
     )
@@ -149,31 +151,3 @@ def uncut_body(mesh: SimplexMesh) -> SweptBody:
         beside, virtual=whole, untreated=whole, extension=extension, placement="uncut",
         treatment="uncut",
     )  # fmt: skip
-
-
-def _snapped(mesh: SimplexMesh, cut: Plane, reach: float) -> SimplexMesh:
-    """Move the nodes within reach of the cut onto it, along the last axis."""
-    height = cut.level_set(mesh.points)
-    slope = cut.level_set(mesh.points + np.eye(mesh.dim)[-1]) - height
-    points = mesh.points.copy()
-    near = np.abs(height) <= reach
-    points[near, -1] -= (height / slope)[near]
-    return SimplexMesh(points, mesh.cells)
-
-
-def _conforming(mesh: SimplexMesh, cut: Plane) -> SimplexMesh:
-    """Split the cells that are cut, and open the cut."""
-    if mesh.dim == 2:  # by the reference's own code, which shares nothing with the solver's
-        height = np.abs(cut.level_set(mesh.points)) / np.linalg.norm(mesh.edge_vectors[0, 0])
-        if ((height > 1e-4 * _ON) & (height <= _ON)).any():
-            raise ValueError(
-                f"nodes lie {height[height > 1e-4 * _ON].min():.1e} edges from the cut: the mesh "
-                "generator takes them to lie on it, and makes a mesh of another cut"
-            )
-        ends = np.array([[-1.0, 0.0], [2.0, 0.0]])
-        rise = cut.level_set(ends + np.array([0.0, 1.0])) - cut.level_set(ends)
-        ends[:, 1] = -cut.level_set(ends) / rise
-        opened = open_cut(*imprint(mesh.points, mesh.cells, [ends]))
-        return SimplexMesh(opened.points, opened.cells)
-    divided = subdivide(cut_mesh(mesh, [cut]))
-    return SimplexMesh(divided.points, divided.cells)

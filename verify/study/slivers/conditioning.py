@@ -2,7 +2,8 @@
 
 Everything comes from one inverse of the stiffness in side-wise unknowns, scaled by its diagonal
 beforehand: that scaling removes the slivers, so that the smallest eigenvalues of every basis
-and scaling are exact down to ε = 1e-12, where those of the matrix itself are round-off.
+and scaling are exact down to ε = 1e-12, where those of the matrix itself are round-off. Where a
+body is so slender that the scaled matrix is singular to round-off, nothing is said.
 """
 
 from functools import cached_property
@@ -15,6 +16,7 @@ from scipy.sparse import csr_array, identity, kron
 from verify.study.slivers.bodies import SweptBody, soft
 from verify.xfem.bases import transformation
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.errors import XfemError
 from verify.xfem.loads import body_force
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.virtual import VirtualMesh
@@ -24,6 +26,7 @@ __all__ = ["BASES", "SCALINGS", "HeldStiffness", "stiffness_matrix"]
 BASES = ("side-wise", "shifted", "heaviside")
 SCALINGS = ("raw", "Jacobi", "nodal blocks")
 _ITERATIONS, _TOLERANCE = 3000, 1e-10
+_TRUSTED = 1e13  # condition number up to which the smallest eigenvalue has two digits and more
 _Floats = NDArray[np.float64]
 
 
@@ -52,7 +55,11 @@ class HeldStiffness:
         self._K = stiffness_matrix(body).toarray()[np.ix_(self._free, self._free)]
         scale = 1.0 / np.sqrt(np.diag(self._K))
         scaled = scale[:, None] * self._K * scale
-        self._inverse = scale[:, None] * np.linalg.inv(scaled) * scale
+        least, *_, largest = np.linalg.eigvalsh(scaled)
+        self._is_known = bool(least * _TRUSTED > largest)
+        self._inverse = np.full_like(scaled, np.nan)
+        if self._is_known:
+            self._inverse = scale[:, None] * np.linalg.inv(scaled) * scale
         self._cache: dict[str, tuple[_Floats, _Floats, _Floats, NDArray[np.int64]]] = {}
 
     def in_basis(self, basis: str) -> tuple[_Floats, _Floats, _Floats, NDArray[np.int64]]:
@@ -68,7 +75,15 @@ class HeldStiffness:
         return self._cache[basis]
 
     def condition_number(self, basis: str, scaling: str) -> float:
-        """λ_max/λ_min of the stiffness, both to round-off of a well-scaled matrix."""
+        """λ_max/λ_min of the stiffness, both to round-off of a well-scaled matrix.
+
+        Raises
+        ------
+        XfemError
+            If the basis does not exist on this body, or scaling leaves the matrix singular to
+            round-off.
+        """
+        self._check_known()
         K, inverse, _, node = self.in_basis(basis)
         root = _root(K, scaling, node)
         scaled = _both_sides(K, root)
@@ -88,7 +103,13 @@ class HeldStiffness:
 
         The worst among the pieces of up to twice the smallest volume: which one of several equal
         ones is smallest is up to round-off.
+
+        Raises
+        ------
+        XfemError
+            If scaling leaves the matrix singular to round-off.
         """
+        self._check_known()
         body, before = self.body, self.body.untreated
         small = np.flatnonzero(before.volumes <= 2.0 * before.volumes.min())
         shape = before.shape_integrals[small] / before.volumes[small, None]
@@ -102,6 +123,13 @@ class HeldStiffness:
         force = nodal[:, self._free[axis] // body.dimension]
         inverse = self._inverse[np.ix_(axis, axis)]
         return float(np.einsum("pi,ij,pj->p", force, inverse, force).max())
+
+    def _check_known(self) -> None:
+        if not self._is_known:
+            raise XfemError(
+                f"condition number above {_TRUSTED:.0e} after scaling by the diagonal: what "
+                "depends on the smallest eigenvalue is round-off"
+            )
 
     def _changed(self, basis: str) -> tuple[_Floats, _Floats, _Floats, NDArray[np.int64]]:
         body, dim = self.body, self.body.dimension

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.study.slivers.bodies import DENSITY, SweptBody, soft
+from verify.study.slivers.bodies import DENSITY, SweptBody
 from verify.study.slivers.conditioning import stiffness_matrix
-from verify.xfem.corotational import InternalForce
 from verify.xfem.critical_step import critical_step
 from verify.xfem.dynamics import CentralDifferences, DynamicBody, Integrator, StepFailedError
+from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.virtual import VirtualMesh
@@ -36,6 +36,7 @@ LUMPINGS: dict[str, Callable[[VirtualMesh, float], Mass]] = {
 _BLOWN_UP = 1e6  # kinetic energy over that at the start: beyond any exchange with strain energy
 _BISECTIONS = 8
 _BRACKET = (0.55, 1.9)  # times the guess, so that no middle falls on the guess itself
+_LEAST_MASS = 1e-13  # eigenvalue of the scaled mass: below, its inverse has no three digits
 _RUN = 400  # steps: 0.5 % beyond the critical step a mode grows by e^(0.2 · 400)
 
 
@@ -74,13 +75,27 @@ def mass_of(body: SweptBody, lumping: str, with_ghost: bool = True) -> Mass:
 
 
 def estimated_step(body: SweptBody, mass: Mass) -> float:
-    """2/ω_max of the free body, in s."""
+    """2/ω_max of the free body, in s.
+
+    Raises
+    ------
+    XfemError
+        If the mass is singular to round-off: that of a strip which is much thinner than its
+        elements, if it is not lumped.
+    """
+    if mass.diagonal is None and mass.root is None:
+        scale = 1.0 / np.sqrt(mass.matrix.diagonal())
+        least = np.linalg.eigvalsh(scale[:, None] * mass.matrix.toarray() * scale)[0]
+        if least < _LEAST_MASS:
+            raise XfemError(
+                "mass singular to round-off, though scaled: its least eigenvalue is below "
+                f"{_LEAST_MASS:.0e}"
+            )
     return critical_step(stiffness_matrix(body), mass)
 
 
 def _linear(body: SweptBody, mass: Mass) -> DynamicBody:
-    force = InternalForce(body.virtual, soft(body.dimension), "linear")
-    return DynamicBody(force, mass)
+    return DynamicBody(body.force("linear"), mass)
 
 
 def course(integrator: Integrator, dynamic: DynamicBody, steps: int) -> Course:

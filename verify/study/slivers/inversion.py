@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.study.slivers.bodies import POISSON, SweptBody, soft
-from verify.xfem.corotational import InternalForce
+from verify.study.slivers.bodies import POISSON, SweptBody
 from verify.xfem.dynamics import DynamicBody, Integrator, StepFailedError
 from verify.xfem.mass import Mass
 from verify.xfem.supports import Supports
@@ -55,7 +54,7 @@ def swing(
 ) -> Swing:
     """Let a stretched body swing, and look at it every few steps."""
     virtual = body.virtual
-    force = InternalForce(virtual, soft(body.dimension))
+    force = body.force()
     held = virtual.mesh.points[:, 0] < 1e-9
     dynamic = DynamicBody(force, mass, supports=Supports.none(virtual).prescribe(virtual, held))
     state = dynamic.rest()

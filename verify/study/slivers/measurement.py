@@ -12,13 +12,15 @@ class Measurement:
     Attributes
     ----------
     dimension : int
-    placement : {"along faces", "along edges", "through vertices", "uncut"}
-        Where the cut goes for size 0.
+    placement : str
+        Where the cut goes for size 0 (along faces, along edges, through vertices), what is as
+        small as the size (two cuts apart, crossing cuts, corner cut off), or "uncut".
     size : float
         Distance ε of the cut from there, in element sizes.
     treatment : str
-        Sliver policy (keep, drop, merge, ghost penalty), or a conforming mesh (conforming, or
-        conforming snapped: nodes near the cut moved onto it).
+        Sliver policy (keep, drop, merge, ghost penalty), or a conforming mesh (conforming;
+        conforming snapped: nodes near the cut moved onto it before cells are split; snapped: all
+        of them moved and no cell split).
     variant : str
         Basis, lumping or integrator, whichever the quantity depends on.
     quantity : str

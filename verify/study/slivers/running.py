@@ -12,8 +12,9 @@ from verify.study.slivers.explicit_step import (
     mass_of,
     step_by_running,
 )
-from verify.study.slivers.inversion import swing
+from verify.study.slivers.inversion import Swing, swing
 from verify.study.slivers.measurement import Measurement
+from verify.study.slivers.placements import SMALL_FEATURES
 from verify.xfem.dynamics import (
     CentralDifferences,
     EnergyMomentum,
@@ -29,9 +30,11 @@ __all__ = ["EXPLICIT_SHARE", "IMPLICIT_MULTIPLE", "run_measurements"]
 
 EXPLICIT_SHARE = 0.9  # of the uncut step
 IMPLICIT_MULTIPLE = 10.0  # of the uncut step
+_POLICIES = ("keep", "drop", "merge", "ghost penalty")
 _SHARES = (0.9, 0.7)  # of the body's own linear step, at large strain
 _SIZES = (0.5, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-12, 0.0)
 _QUICK_SIZES = (0.5, 1e-3, 1e-7, 0.0)
+_NO_THESIS = ("two cuts apart", "crossing cuts")  # its lumping needs one cut per element
 _RUN = {True: 500, False: 2000}  # steps, quick or not
 _SWING = {True: 1000, False: 4000}
 _IMPLICIT_RUN = {True: 10, False: 100}
@@ -44,19 +47,31 @@ _IMPLICIT: dict[str, Callable[..., Integrator]] = {
 
 
 def run_measurements(mesh: SimplexMesh, quick: bool) -> Iterator[Measurement]:
-    """Run bodies with the cut along faces: linear and explicit, at large strain, implicit."""
+    """Run bodies with slivers: linear and explicit, at large strain, implicit.
+
+    The whole grid of treatments and sizes with the cut along faces, and a few sizes of cuts that
+    have something small themselves.
+    """
     whole = uncut_body(mesh)
     uncut = estimated_step(whole, mass_of(whole, "side-wise"))
-    for treatment in ("keep",) if quick else ("keep", "drop", "merge"):
+    for treatment in ("keep", "ghost penalty") if quick else _POLICIES:
         for size in _QUICK_SIZES if quick else _SIZES:
             body = swept_body(mesh, "along faces", size, treatment)
             yield from _explicit(body, uncut, quick)
-    for treatment in ("keep", "drop", "merge"):
+    for treatment in _POLICIES:
         for size in (1e-1, 1e-3) if quick else (0.5, 1e-1, 1e-2, 1e-3, 1e-6, 1e-12, 0.0):
             body = swept_body(mesh, "along faces", size, treatment)
             yield from _at_large_strain(body, quick)
             if treatment != "drop":
                 yield from _implicit(body, uncut, quick)
+    for placement in SMALL_FEATURES:
+        for treatment in ("keep", "merge", "ghost penalty"):
+            for size in (1e-3,) if quick else (1e-1, 1e-3, 1e-6, 1e-12, 0.0):
+                body = swept_body(mesh, placement, size, treatment)
+                yield from _explicit(body, uncut, quick, bisected=False)
+                yield from _at_large_strain(body, quick)
+                if not quick:
+                    yield from _implicit(body, uncut, quick)
 
 
 def _base(body: SweptBody, variant: str, quantity: str, unit: str = "") -> Measurement:
@@ -65,8 +80,11 @@ def _base(body: SweptBody, variant: str, quantity: str, unit: str = "") -> Measu
     )
 
 
-def _explicit(body: SweptBody, uncut: float, quick: bool) -> Iterator[Measurement]:
-    for lumping in LUMPINGS:
+def _explicit(
+    body: SweptBody, uncut: float, quick: bool, bisected: bool = True
+) -> Iterator[Measurement]:
+    # the penalty's own mass makes any lumping of the rest pointless
+    for lumping in LUMPINGS if body.ghost is None else ("side-wise",):
         blow_up = _base(body, lumping, "steps to blow-up, explicit", "steps")
         by_running = _base(body, lumping, "stable step found by running", "s")
         try:
@@ -76,10 +94,9 @@ def _explicit(body: SweptBody, uncut: float, quick: bool) -> Iterator[Measuremen
             yield replace(blow_up, reason=str(problem))
             continue
         course = linear_course(body, mass, EXPLICIT_SHARE * uncut, _RUN[quick])
-        yield replace(
-            blow_up, value=float(course.steps) if course.blown_up else None, reason=course.reason
-        )
-        if quick and body.size not in (0.5, 1e-3):
+        text = f"{course.reason}; t = {course.time:.3g} s"
+        yield replace(blow_up, value=float(course.steps) if course.blown_up else None, reason=text)
+        if not bisected or (quick and body.size not in (0.5, 1e-3)):
             continue
         try:
             low, high = step_by_running(body, mass, estimate)
@@ -91,14 +108,15 @@ def _explicit(body: SweptBody, uncut: float, quick: bool) -> Iterator[Measuremen
 
 
 def _at_large_strain(body: SweptBody, quick: bool) -> Iterator[Measurement]:
-    for lumping in ("side-wise",) if quick else ("side-wise", "thesis"):
+    alone = quick or body.ghost is not None or body.placement in _NO_THESIS
+    for lumping in ("side-wise",) if alone else ("side-wise", "thesis"):
         mass = mass_of(body, lumping)
         step = estimated_step(body, mass)
         for share in _SHARES:
             scheme = partial(CentralDifferences, step_size=share * step)
             end = swing(body, mass, scheme, _SWING[quick])
             variant = f"{lumping}, {share:g} of its step"
-            text = f"{end.reason}; largest energy {end.energy:.4g} times that at the start"
+            text = _said(end, share * step)
             inverted = _base(body, variant, "inverted pieces", "pieces")
             yield replace(inverted, value=float(end.inverted), reason=text)
             blow_up = _base(body, variant, "steps to blow-up, large strain", "steps")
@@ -112,6 +130,13 @@ def _implicit(body: SweptBody, uncut: float, quick: bool) -> Iterator[Measuremen
     for name, scheme in _IMPLICIT.items():
         start = partial(scheme, step_size=step)
         end = swing(body, mass, start, _IMPLICIT_RUN[quick], every=1)
-        text = f"{end.reason}; largest energy {end.energy:.4g} times that at the start"
+        text = _said(end, step)
         blow_up = _base(body, name, "steps to blow-up, implicit", "steps")
         yield replace(blow_up, value=float(end.steps) if end.blown_up else None, reason=text)
+
+
+def _said(end: Swing, step: float) -> str:
+    return (
+        f"{end.reason}; t = {end.steps * step:.3g} s; "
+        f"largest energy {end.energy:.4g} times that at the start"
+    )

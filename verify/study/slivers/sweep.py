@@ -10,7 +10,6 @@ from verify.study.slivers.accuracy import displacement_error
 from verify.study.slivers.bodies import (
     DENSITY,
     TREATMENTS,
-    Placement,
     SweptBody,
     background,
     soft,
@@ -22,6 +21,7 @@ from verify.study.slivers.explicit_step import LUMPINGS, estimated_step, mass_of
 from verify.study.slivers.findings import Finding, findings
 from verify.study.slivers.growth import growth
 from verify.study.slivers.measurement import Measurement
+from verify.study.slivers.placements import PLACEMENTS, SMALL_FEATURES, Placement
 from verify.study.slivers.running import run_measurements
 from verify.xfem.critical_step import element_critical_steps
 from verify.xfem.errors import XfemError
@@ -31,11 +31,14 @@ __all__ = ["SIZES", "SliverStudy", "sliver_study"]
 
 SIZES = (0.5, 1e-1, *(10.0**-k for k in range(2, 13)), 0.0)
 _QUICK_SIZES = (0.5, 1e-1, 1e-3, 1e-4, 1e-6, 1e-12, 0.0)
-_FITTED = ("condition number", "CG iterations", "compliance", "displacement error", "critical step")
-_PLACEMENTS: dict[int, tuple[Placement, ...]] = {  # in the plane, faces are edges
-    2: ("along faces", "through vertices"),
-    3: ("along faces", "along edges", "through vertices"),
+# conforming meshes of small features in space end at 1e-4: three sizes for a fit above it
+_QUICK_SMALL = (0.5, 1e-3, 3e-4, 1e-4, 1e-6, 1e-12, 0.0)
+_SMALL = (*SIZES[:4], 3e-4, *SIZES[4:])
+_QUICK_TREATMENTS = {  # of other placements than along faces, by whether the cuts are small
+    False: ("keep", "conforming", "snapped"),
+    True: ("keep", "merge", "ghost penalty", "conforming", "snapped"),
 }
+_FITTED = ("condition number", "CG iterations", "compliance", "displacement error", "critical step")
 
 
 @dataclass(frozen=True)
@@ -93,8 +96,8 @@ def sliver_study(
     for dimension in dimensions:
         mesh = background(dimension, quick)
         found += _uncut(mesh)
-        for placement in _PLACEMENTS[dimension]:
-            announce(f"{dimension}D, cut {placement}: conditioning, steps, errors, compliance")
+        for placement in PLACEMENTS[dimension]:
+            announce(f"{dimension}D, {placement}: conditioning, steps, errors, compliance")
             found += _swept(mesh, placement, quick)
         announce(f"{dimension}D: runs at and around the critical step, motion at large strain")
         found += run_measurements(mesh, quick)
@@ -118,10 +121,12 @@ def _uncut(mesh: SimplexMesh) -> list[Measurement]:
 
 def _swept(mesh: SimplexMesh, placement: Placement, quick: bool) -> Iterator[Measurement]:
     treatments: tuple[str, ...] = TREATMENTS
+    small = placement in SMALL_FEATURES
     if quick and placement != "along faces":
-        treatments = ("keep", "conforming")
+        treatments = _QUICK_TREATMENTS[small]
+    quick_sizes, sizes = (_QUICK_SMALL, _SMALL) if small else (_QUICK_SIZES, SIZES)
     for treatment in treatments:
-        for size in _QUICK_SIZES if quick else SIZES:
+        for size in quick_sizes if quick else sizes:
             base = Measurement(mesh.dim, placement, size, treatment, "", "", None)
             try:
                 body = swept_body(mesh, placement, size, treatment)
@@ -135,7 +140,7 @@ def _swept(mesh: SimplexMesh, placement: Placement, quick: bool) -> Iterator[Mea
 
 def _static(body: SweptBody, base: Measurement) -> Iterator[Measurement]:
     stiffness = HeldStiffness(body)
-    for basis in BASES if not body.treatment.startswith("conforming") else BASES[:1]:
+    for basis in BASES if not body.is_conforming else BASES[:1]:
         for scaling in SCALINGS:
             base = replace(base, variant=f"{basis}, {scaling}")
             try:
@@ -149,16 +154,19 @@ def _static(body: SweptBody, base: Measurement) -> Iterator[Measurement]:
             yield replace(
                 base, quantity="CG iterations", value=None if text else float(count), reason=text
             )
-    base = replace(base, variant="")
-    yield replace(base, quantity="compliance", value=stiffness.compliance, unit="m/N")
+    base = replace(base, variant="", quantity="compliance", unit="m/N", value=None, reason="")
+    try:
+        yield replace(base, value=stiffness.compliance)
+    except XfemError as problem:
+        yield replace(base, reason=str(problem))
     if body.placement == "along faces":
-        yield replace(base, quantity="displacement error", value=displacement_error(body))
+        yield replace(base, quantity="displacement error", unit="", value=displacement_error(body))
 
 
 def _steps(body: SweptBody, base: Measurement) -> Iterator[Measurement]:
     base = replace(base, quantity="critical step", unit="s")
     names = list(LUMPINGS)
-    if body.treatment.startswith("conforming"):
+    if body.is_conforming:
         names = ["side-wise", "consistent"]  # without a cut, lumping is lumping
     for lumping in names:
         base = replace(base, variant=lumping, value=None, reason="")
@@ -168,7 +176,8 @@ def _steps(body: SweptBody, base: Measurement) -> Iterator[Measurement]:
             yield replace(base, reason=str(problem))
     if body.ghost is not None:
         mass = mass_of(body, "side-wise", with_ghost=False)
-        yield replace(base, variant="without the ghost mass", value=estimated_step(body, mass))
+        value = estimated_step(body, mass)
+        yield replace(base, variant="without the ghost mass", value=value, reason="")
 
 
 def _growths(found: list[Measurement]) -> list[dict[str, Any]]:

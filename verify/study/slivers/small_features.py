@@ -1,0 +1,182 @@
+"""Findings on cuts that have something small themselves: a thin strip, a wedge, a corner."""
+
+from collections.abc import Iterator
+
+from verify.result import Verdict
+from verify.study.finding import Finding
+from verify.study.slivers.placements import SMALL_FEATURES
+from verify.study.slivers.results import FLAT, Results, counts, expects, exponent_text, worst
+
+__all__ = ["small_features"]
+
+_WORDS = {
+    "two cuts apart": "The strip between two cuts ε apart",
+    "crossing cuts": "Two cuts that cross at ε from a vertex",
+    "corner cut off": "A corner of the body cut off at ε",
+}
+_TREATMENTS = ("keep", "merge", "ghost penalty")
+
+
+def small_features(r: Results) -> Iterator[Finding]:
+    """Conditioning, steps, compliance and runs of each such cut."""
+    for placement in SMALL_FEATURES:
+        yield _growth(r, placement)
+    yield _bases(r)
+    yield _bending(r)
+    yield _peers(r)
+    yield _runs(r)
+
+
+def _growth(r: Results, placement: str) -> Finding:
+    """Return the growth laws; a strip has a volume like ε, a wedge or corner like ε^d."""
+    d = r.dimension
+    power = 1 if placement == "two cuts apart" else d
+    raw = r.growth("condition number", "side-wise, raw", placement=placement)
+    scaled = r.growth("condition number", "side-wise, Jacobi", placement=placement)
+    merged = r.growth("condition number", "side-wise, raw", "merge", placement)
+    ghost, is_bounded = _penalised(r, placement)
+    step, least = r.growth("critical step", "side-wise", placement=placement), _least(r, placement)
+    return Finding(
+        f"{d}D {placement}",
+        f"{_WORDS[placement]}: in side-wise unknowns the condition number grows with exponent "
+        f"{exponent_text(raw)}, scaled by its diagonal {exponent_text(scaled)}; merged "
+        f"{exponent_text(merged)} without scaling; with the ghost penalty {ghost}. The side-wise "
+        f"step (exponent {exponent_text(step)}) is at worst {least:.3f} of the smallest element's.",
+        f"−{power} raw, 0 scaled or merged; "
+        + (
+            "a ghost penalty finds no whole element beside it to lean on"
+            if placement != "crossing cuts"
+            else "a ghost penalty bounds it as well"
+        )
+        + "; step at least the element's",
+        worst(
+            [
+                expects(raw, -power - 0.02, -power + 0.02),
+                expects(scaled, -FLAT, FLAT),
+                expects(merged, -FLAT, FLAT),
+                expects(step, -FLAT, FLAT),
+                Verdict.PASS if least >= 1.0 - 1e-9 else Verdict.FAIL,
+                Verdict.PASS if is_bounded == (placement == "crossing cuts") else Verdict.FAIL,
+            ]
+        ),
+    )
+
+
+def _penalised(r: Results, placement: str) -> tuple[str, bool]:
+    """Condition number with the ghost penalty, and whether it stays within ten times mid-cell's."""
+    fixed = {"treatment": "ghost penalty", "placement": placement, "variant": "side-wise, raw"}
+    found = [m for m in r.all_of("condition number", **fixed) if m.size > 0.0]
+    known = [(m.size, m.value) for m in found if m.value is not None]
+    (least, last), (most, first) = min(known), max(known)
+    lost = len(found) - len(known)
+    text = f"it goes from {first:.3g} at ε = {most:g} to {last:.3g} at ε = {least:g}"
+    if lost:
+        text += f", and the matrix is singular to round-off at {lost} smaller positions"
+    return text, not lost and last < 10.0 * first
+
+
+def _least(r: Results, placement: str) -> float:
+    element = r.uncut("critical step of the smallest element")
+    steps = r.values("critical step", treatment="keep", variant="side-wise", placement=placement)
+    return min((m.value or 0.0) / element for m in steps)
+
+
+def _bases(r: Results) -> Finding:
+    said, absent = [], True
+    for placement in ("two cuts apart", "crossing cuts"):
+        fixed = {"treatment": "keep", "placement": placement}
+        shifted = r.all_of("condition number", variant="shifted, Jacobi", **fixed)
+        thesis = r.all_of("critical step", variant="thesis", **fixed)
+        missing = [[m for m in found if m.value is None] for found in (shifted, thesis)]
+        # two coincident cuts are one
+        absent &= all(m in missing[0] for m in shifted if m.size > 0.0)
+        said.append(
+            f"{placement}: the shifted basis is missing for {len(missing[0])} of {len(shifted)} "
+            f"positions, the thesis' lumping for {len(missing[1])} of {len(thesis)}"
+        )
+    return Finding(
+        f"{r.dimension}D bases with several cuts in an element",
+        "; ".join(said) + "; side-wise unknowns exist for all.",
+        "enrichment of one cut per element cannot express two",
+        Verdict.PASS if absent else Verdict.FAIL,
+    )
+
+
+def _bending(r: Results) -> Finding:
+    fixed = {"placement": "two cuts apart"}
+    law = r.growth("compliance", placement="two cuts apart")
+    kept = {m.size: m.value for m in r.values("compliance", treatment="keep", **fixed)}
+    peers = [
+        (m.size, m.value / own)
+        for m in r.values("compliance", treatment="conforming", **fixed)
+        if m.value and 0.0 < m.size < 0.5 and (own := kept.get(m.size))
+    ]
+    size, ratio = min(peers, default=(0.0, 0.0))
+    return Finding(
+        f"{r.dimension}D a strip thinner than its elements is too stiff",
+        f"Held at one end, it yields to a force with exponent {exponent_text(law)} as XFEM keeps "
+        f"it; a beam would with −3. At ε = {size:g} the conforming mesh yields {ratio:.0f} times "
+        "as far, and that has but one layer of elements. The shape functions of whole elements do "
+        "not let a strip inside them bend; dropped or merged, there is no strip any more.",
+        "−1, and softer in the conforming mesh",
+        worst([expects(law, -1.02, -0.98), Verdict.PASS if ratio > 2.0 else Verdict.UNDECIDED]),
+    )
+
+
+def _peers(r: Results) -> Finding:
+    laws = {
+        p: r.growth("critical step", "side-wise", "conforming", placement=p) for p in SMALL_FEATURES
+    }
+    uncut = r.uncut("critical step")
+    snapped = [
+        (m.value or 0.0) / uncut
+        for p in SMALL_FEATURES
+        for m in r.values("critical step", treatment="snapped", variant="side-wise", placement=p)
+    ]
+    split = [m for m in r.measured if m.treatment == "conforming" and m.placement in SMALL_FEATURES]
+    refused = [m for m in split if m.quantity == "mesh"]
+    unknown = [m for m in split if m.quantity == "compliance" and m.value is None]
+    return Finding(
+        f"{r.dimension}D conforming meshes of small features",
+        "The explicit step of the split mesh vanishes with exponent "
+        + ", ".join(f"{exponent_text(g)} ({p})" for p, g in laws.items())
+        + f"; {len(refused)} meshes do not exist, and {len(unknown)} are singular to round-off "
+        "whatever the scaling. Snapped without splitting, the step is at worst "
+        f"{min(snapped):.3f} of the uncut one: features below half an element are gone.",
+        "1 when split; bounded when snapped",
+        worst(
+            [
+                *(expects(g, 0.95, 1.05) for g in laws.values()),
+                Verdict.PASS if min(snapped) > 0.1 else Verdict.FAIL,
+            ]
+        ),
+    )
+
+
+def _runs(r: Results) -> Finding:
+    said, blown_elsewhere = [], 0
+    for placement in SMALL_FEATURES:
+        for treatment in _TREATMENTS:
+            fixed = {"placement": placement, "treatment": treatment}
+            linear = r.all_of("steps to blow-up, explicit", variant="side-wise", **fixed)
+            blown = [m for m in linear if m.value is not None]
+            swings = r.all_of("inverted pieces", **fixed)
+            inverted = [m for m in swings if m.value]
+            if placement != "corner cut off" or treatment == "merge":
+                blown_elsewhere += len(blown)
+            if not blown and not inverted:
+                continue
+            after = f" after {counts(blown)} steps" if blown else ""
+            said.append(
+                f"{placement}, {treatment}: {len(blown)} of {len(linear)} linear runs blow "
+                f"up{after}, {len(inverted)} of {len(swings)} at large strain invert pieces"
+            )
+    return Finding(
+        f"{r.dimension}D runs with small features",
+        "At 0.9 of the assembled uncut step, and from 15 % strain at 0.9 and 0.7 of their own: "
+        + ("; ".join(said) or "none")
+        + ". All others go through. A free corner is an element alone: its step is the element's, "
+        "not that of the assembled body.",
+        "side-wise is stable below the smallest element's step; merged, at 0.9 of the uncut one",
+        Verdict.PASS if blown_elsewhere == 0 else Verdict.FAIL,
+    )
