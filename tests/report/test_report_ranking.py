@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from page_parser import parsed
@@ -9,6 +10,7 @@ from synthetic_run import HOSTILE, make_run
 
 from verify.conformance import CheckResult, State
 from verify.report import load_run, render
+from verify.result import Status
 from verify.runner import ranking as runner_ranking
 from verify.runner.ranking import rank_run
 
@@ -128,3 +130,14 @@ def test_hostile_words_of_a_ranking_stay_text(tmp_path):
     page = parsed(render(root).read_text(encoding="utf-8"))
     assert not page.all("script")
     assert "<script>alert('x')</script>" in page.text
+
+
+def test_a_solver_that_solved_nothing_is_not_asked_for_more(tmp_path, suite):
+    root = make_run(tmp_path / "run", pictures=False)
+    results = load_run(root).results
+    for result in results:
+        ended = [s if s.solver != "conforming" else replace(s, status=Status.FAILED)
+                 for s in result.solves]  # fmt: skip
+        result.solves[:] = ended
+    rank_run(root, results, {}, True, 10.0, lambda text: None)
+    assert [name for name, _ in suite] == ["xfem"]

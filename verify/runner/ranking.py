@@ -11,7 +11,7 @@ from typing import Any
 
 from verify.conformance import conform, exit_code_of
 from verify.errors import InputError
-from verify.result import CaseResult
+from verify.result import CaseResult, Status
 from verify.runner.fingerprint import code_of_solver, digest_of
 from verify.runner.storage import read_json, write_json
 from verify.solvers import solver_names
@@ -20,6 +20,7 @@ from verify.study.ranking import rank_solvers, ranked_solvers
 __all__ = ["RANKING_FILE", "rank_run"]
 
 RANKING_FILE = "ranking.json"
+_SECONDS = 120.0  # for each small solve of the suite
 _UNASKED = 2  # so many solvers are ranked without being checked unasked
 
 
@@ -43,7 +44,7 @@ def rank_run(
     conformance : bool or None
         Whether the suite runs before; None: if more than two solvers are ranked.
     timeout : float
-        Wall seconds for each small solve of the suite.
+        Wall seconds of a solve of the run; of the suite's small ones at most 120.
     announce : callable
         Is told what is being done.
 
@@ -58,6 +59,7 @@ def rank_run(
         return None
     wanted = len(solvers) > _UNASKED if conformance is None else conformance
     before = _stored(target)
+    answered = {s.solver for r in results for s in r.solves if s.status is Status.SOLVED}
     found = {}
     for solver in solvers:
         own = dict(parameters.get(solver, {}))
@@ -68,9 +70,11 @@ def rank_run(
         known = before.get(solver, {})
         if known.get("key") == key:
             found[solver] = known
+        elif wanted and solver not in answered:
+            found[solver] = {"unchecked": "not asked: it solved nothing in this run"}
         elif wanted:
             announce(f"conformance of {solver}")
-            found[solver] = {"key": key, **_checked(solver, own, timeout)}
+            found[solver] = {"key": key, **_checked(solver, own, min(timeout, _SECONDS))}
         else:
             found[solver] = {"unchecked": "not asked for: --conform"}
     write_json(rank_solvers(results, found), target)
