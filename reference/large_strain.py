@@ -17,6 +17,7 @@ __all__ = ["LargeStrainSolve", "solve_large_strain"]
 
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
+_GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall further
 _SMALLEST_STEP = 1e-4
 _MOST_ITERATIONS = 25
 # share of the body that may be inside out: the corotated energy has no barrier, and at a tip or a
@@ -196,11 +197,13 @@ class _Equations:
         self.factor.value = np.asarray(target)
         self._predict(solver.getKSP(), values)
         x = self.solution.x.petsc_vec
-        solver.setTolerances(atol=_TOLERANCE * self.force, rtol=0.0, max_it=_MOST_ITERATIONS)
+        # no step so small that it would count as converged: a line search that fails takes such
+        limit = _TOLERANCE * self.force
+        solver.setTolerances(atol=limit, rtol=0.0, stol=0.0, max_it=_MOST_ITERATIONS)
         solver.solve(None, x)
         self.iterations += solver.getIterationNumber()
         reason = solver.getConvergedReason()
-        if reason <= 0:
+        if reason <= 0 and not solver.getFunctionNorm() <= _GOOD_ENOUGH * self.force:
             from petsc4py import PETSc
 
             names = vars(PETSc.SNES.ConvergedReason)
