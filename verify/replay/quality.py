@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.replay.session import Session
+from verify.replay.surface_part import SurfacePart
 from verify.xfem.mapping.moving_surface import MovingSurface
 from verify.xfem.mesh import SimplexMesh
 
@@ -68,10 +69,9 @@ def quality_of(session: Session) -> Quality:
         surface = session.surfaces.material.surface
         enclosed = abs(_enclosed(surface) / whole - 1.0)
         loose = _loose_edges(surface.facets.rows[surface.used])
-    shown = session.surfaces.visual or session.surfaces.material
     turned, astray = 0, 0
     if virtual.mesh.space == 3:
-        turned, astray = _bad_facets(shown.surface, displacement, gradients, stretch)
+        turned, astray = _bad_facets(session.surfaces.shown, displacement, gradients, stretch)
     return Quality(
         abs(float(virtual.volumes.sum()) / whole - 1.0),
         enclosed, loose, inverted, stretch, turned, astray,
@@ -107,7 +107,7 @@ def _loose_edges(facets: _Ints) -> int:
 
 
 def _bad_facets(
-    surface: MovingSurface, displacement: _Floats, gradients: _Floats, stretch: float
+    surface: MovingSurface | SurfacePart, displacement: _Floats, gradients: _Floats, stretch: float
 ) -> tuple[int, int]:
     """Facets that face the wrong way, and facets that are stretched beyond the material."""
     used = surface.used

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.replay.stage import Stage
+from verify.replay.surface_part import SurfacePart, embed_together
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mapping.body_surface import BodySurface
-from verify.xfem.mapping.embedded_surface import EmbeddedSurface
 from verify.xfem.mapping.moving_surface import MovingSurface
 from verify.xfem.virtual import VirtualMesh
 
@@ -52,53 +52,52 @@ class Surfaces:
     ----------
     material : BodySurface
         Closed around the material; of a membrane, its triangles.
-    visual, collision : EmbeddedSurface or None
+    visual, collision : SurfacePart or None
         Where the stage has separate ones.
     """
 
     def __init__(self, stage: Stage, cutter: SemiProgressiveCutter) -> None:
         self._cutter = cutter
         self.material = BodySurface(cutter.body)
-        self.visual = None if stage.visual is None else EmbeddedSurface(cutter, *stage.visual)
-        self.collision = (
-            None if stage.collision is None else EmbeddedSurface(cutter, *stage.collision)
+        self._embedded, (self.visual, self.collision) = embed_together(
+            cutter, [stage.visual, stage.collision]
         )
-        self._positions: dict[str, _Floats] = {}
+        followers = (self.material, self._embedded)
+        self._followers = [surface for surface in followers if surface is not None]
+        self._positions = [np.empty((0, stage.mesh.space)) for _ in self._followers]
 
     def update(self, increment: Increment) -> None:
         """Follow a cut."""
-        for surface in (self.material, self.visual, self.collision):
-            if surface is not None:
-                surface.update(increment)
+        for surface in self._followers:
+            surface.update(increment)
 
     def move(self, displacement: _Floats) -> None:
         """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""
-        for name, surface in self.moving.items():
-            at = self._positions.get(name)
-            if at is None or len(at) != len(surface.material.rows):
-                at = self._positions[name] = np.empty_like(surface.material.rows)
-            surface.positions(displacement, at)
+        for k, follower in enumerate(self._followers):
+            surface = follower.surface
+            if len(self._positions[k]) != len(surface.material.rows):
+                self._positions[k] = np.empty_like(surface.material.rows)
+            surface.positions(displacement, self._positions[k])
 
     @property
-    def moving(self) -> dict[str, MovingSurface]:
-        """The surfaces that there are, by name."""
-        found = {"material": self.material, "visual": self.visual, "collision": self.collision}
-        return {name: surface.surface for name, surface in found.items() if surface is not None}
+    def shown(self) -> MovingSurface | SurfacePart:
+        """The surface that is seen, the faces of cuts apart."""
+        return self.visual or self.material.surface
 
     @property
-    def touchable(self) -> MovingSurface:
+    def touchable(self) -> MovingSurface | SurfacePart:
         """The surface that tools collide with."""
-        return (self.collision or self.material).surface
+        return self.collision or self.material.surface
 
     def picture(self, virtual: VirtualMesh, displacement: _Floats) -> Picture:
         """Draw the body as it is now: the visual surface with the faces of the cuts."""
         if virtual.mesh.space == 2:
             return _pieces(virtual, displacement)
         inside = self.material.surface
-        parts = [(inside, inside.used)]
+        parts: list[tuple[MovingSurface | SurfacePart, _Ints]] = [(inside, inside.used)]
         if self.visual is not None:
             shown = inside.used[inside.inner.rows[inside.used]]
-            parts = [(inside, shown), (self.visual.surface, self.visual.surface.used)]
+            parts = [(inside, shown), (self.visual, self.visual.used)]
         points, material, triangles, inner, begin = [], [], [], [], 0
         for number, (surface, used) in enumerate(parts):
             points.append(surface.positions(displacement))
