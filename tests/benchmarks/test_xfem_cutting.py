@@ -109,7 +109,7 @@ def test_the_cost_of_a_cut_is_that_of_the_elements_touched() -> None:
     seconds = [best_seconds(prepare, insert, 8) for prepare in cubes]
     sizes = [6 * 6 * 5, 13 * 13 * 12, 26 * 26 * 25]
     exponent = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
-    # 0.015 seen; proportional to the mesh it would be 1; larger meshes leave less of what is touched in cache
+    # 0.015 seen; 1 if it were proportional to the mesh; more of a small mesh stays in cache
     assert exponent < 0.12
 
 

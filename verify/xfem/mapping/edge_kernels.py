@@ -60,12 +60,26 @@ class EdgeRecord(NamedTuple):
 
 
 @njit(cache=True)
-def record_points(zero, supports, crossed, table, known, lines, first, tally, entries, used):
+def _write_ends(x, y, row):
+    """Write the row of the edge between two points, none of which is that of a line."""
+    row[0], row[1], row[2], row[_FACE] = -1, min(x, y), max(x, y), _NONE
+
+
+@njit(cache=True)
+def record_points(zero, supports, ends, crossed, table, known, lines, first, tally, entries, used):
     """Enter points into the lists of their lines; the counts of lines and entries."""
     row = np.empty(LINE, dtype=np.int64)
     for z in zero:
         if supports[z, _FACE] != _NONE:
             continue  # inside an element: nobody else meets it
+        if supports[z, _FACE - 1] != _NONE:
+            # in a face, where the edge on which it was found may be a diagonal
+            _write_ends(ends[z, 0], ends[z, 1], row)
+            line, lines = number_of_row(row, table, known, lines)
+            entries[used, 0], entries[used, 1] = z, first[line]
+            first[line] = used
+            tally[line] += 1
+            used += 1
         for k in range(_FACE):
             row[k] = supports[z, k]
         for k in range(_NODES, _NODES + CUTS):
@@ -187,6 +201,9 @@ def _lines(x, y, nodes, supports, table, known, tally, row, found):
         if row[_FACE] != _NONE:
             found[count] = find_row(row[:LINE], table, known)
             count += found[count] >= 0 and tally[found[count]] > own
+    _write_ends(x, y, row)
+    found[count] = find_row(row[:LINE], table, known)
+    count += found[count] >= 0
     return count
 
 
@@ -233,7 +250,7 @@ def bisect_facets(facets, at, record, room):
     ids, places = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, width))
     later_ids, later_places = np.empty((more, 3), dtype=np.int64), np.empty((more, 3, width))
     source, row = np.empty(room, dtype=np.int64), np.empty(LINE + 2, dtype=np.int64)
-    lines = np.empty(CUTS, dtype=np.int64)
+    lines = np.empty(CUTS + 1, dtype=np.int64)
     # arrays taken out once: taking them out for every edge costs more than most edges do
     crossed, supports, tally = record.crossed, record.supports, record.tally
     table, known = record.table, record.known

@@ -56,16 +56,16 @@ class EdgePoints:
         zero = numbers[numbers >= self._points.nodes] - self._points.nodes
         zero = distinct(zero[~self._recorded.rows[zero]])
         self._recorded.rows[zero] = True
-        table, known, lines = self._lines.open_for(CUTS * len(zero))
-        begin = self._first.extend(CUTS * len(zero))
+        table, known, lines = self._lines.open_for((CUTS + 1) * len(zero))
+        begin = self._first.extend((CUTS + 1) * len(zero))
         self._first.rows[begin:] = -1
-        self._tally.extend(CUTS * len(zero))
+        self._tally.extend((CUTS + 1) * len(zero))
         self._tally.rows[begin:] = 0
         used = len(self._entries)
-        self._entries.extend(CUTS * len(zero))
+        self._entries.extend((CUTS + 1) * len(zero))
         lines, used = record_points(
-            zero, self._points.supports, self._crossed, table, known, lines, self._first.rows,
-            self._tally.rows, self._entries.rows, used,
+            zero, self._points.supports, self._points.ends.rows, self._crossed, table, known,
+            lines, self._first.rows, self._tally.rows, self._entries.rows, used,
         )  # fmt: skip
         self._lines.close(lines)
         self._first.rows = self._first.rows[:lines]

@@ -34,6 +34,76 @@ def _face_of(barycentric, skip):
 
 
 @njit(cache=True)
+def _meets(piece, other, cell, across, opposite, cells, piece_cells):
+    """Whether pieces of two cells move together at the nodes of the face between these."""
+    same = True
+    for a in range(cells.shape[1]):
+        for b in range(cells.shape[1]):
+            if a != opposite and cells[across, b] == cells[cell, a]:
+                same = same and piece_cells[other, b] == piece_cells[piece, a]
+    return same
+
+
+@njit(cache=True)
+def _parted(s, skip, cell, across, opposite, cells, piece_cells, sub_range, sub_piece, sub_points):
+    """Whether the same facet of the cell across is that of a piece that moves otherwise."""
+    parted = False
+    for t in range(sub_range[across, 0], sub_range[across, 1]):
+        for other in range(cells.shape[1]):
+            if _same_set(sub_points[s], skip, sub_points[t], other):
+                parted = not _meets(
+                    sub_piece[s], sub_piece[t], cell, across, opposite, cells, piece_cells
+                )
+    return parted
+
+
+@njit(cache=True)
+def _is_whole(points, skip, nodes):
+    """Whether a facet is a whole face of the element: all its points are nodes."""
+    whole = True
+    for k in range(len(points)):
+        node = k == skip
+        for a in range(len(nodes)):
+            node = node or points[k] == nodes[a]
+        whole = whole and node
+    return whole
+
+
+@njit(cache=True)
+def _beyond(
+    piece, cell, opposite, neighbours, cells, piece_cells, sub_range, sub_piece,
+    sub_points, sub_barycentric, sub_sign, orientation, out, count,
+):  # fmt: skip
+    """Expose parts of a whole face beyond which there is a piece that moves otherwise.
+
+    They are the facets of the cell across, turned about. Gives the count of facets.
+    """
+    ids, at, piece_of, cell_of, inner = out
+    across, corners = neighbours[cell, opposite], cells.shape[1]
+    for s in range(sub_range[across, 0], sub_range[across, 1]):
+        if _meets(piece, sub_piece[s], cell, across, opposite, cells, piece_cells):
+            continue
+        for skip in range(corners):
+            face = _face_of(sub_barycentric[s], skip)
+            if face < 0 or neighbours[across, face] != cell:
+                continue
+            k = 0
+            for v in range(corners):
+                if v == skip:
+                    continue
+                ids[count, k] = sub_points[s, v]
+                for b in range(corners):
+                    for j in range(corners):
+                        if cells[across, j] == cells[cell, b]:
+                            at[count, k, b] = sub_barycentric[s, v, j]
+                k += 1
+            piece_of[count], cell_of[count], inner[count] = piece, cell, True
+            _turn(ids[count], at[count], -orientation[across] * sub_sign[s], skip)
+            count += 1
+    return count
+
+
+@njit(cache=True)
 def exposed_facets(
     wanted, split, cells, neighbours, piece_cells, first_piece, next_piece,
     sub_range, sub_piece, sub_points, sub_barycentric, sub_sign, orientation,
@@ -47,30 +117,39 @@ def exposed_facets(
     room = 0
     for cell in wanted:
         room += corners * max(1, sub_range[cell, 1] - sub_range[cell, 0])
+        for a in range(corners):
+            across = neighbours[cell, a]
+            if across >= 0:
+                room += corners * (sub_range[across, 1] - sub_range[across, 0])
     ids = np.empty((room, corners - 1), dtype=np.int64)
     at = np.zeros((room, corners - 1, corners))
     piece_of, cell_of = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     inner = np.empty(room, dtype=np.bool_)
-    count = 0
+    out, count = (ids, at, piece_of, cell_of, inner), np.int64(0)
     for cell in wanted:
         begin, end = sub_range[cell, 0], sub_range[cell, 1]
         if not split[cell]:
             piece = first_piece[cell]
             for a in range(corners):
+                across = neighbours[cell, a]
                 other = partner(
                     piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
                 )
-                if other >= 0:
+                if other < 0:
+                    k = 0
+                    for b in range(corners):
+                        if b != a:
+                            ids[count, k], at[count, k, b] = cells[cell, b], 1.0
+                            k += 1
+                    piece_of[count], cell_of[count] = piece, cell
+                    inner[count] = across >= 0
+                    _turn(ids[count], at[count], orientation[cell], a)
+                    count += 1
                     continue
-                k = 0
-                for b in range(corners):
-                    if b != a:
-                        ids[count, k], at[count, k, b] = cells[cell, b], 1.0
-                        k += 1
-                piece_of[count], cell_of[count] = piece, cell
-                inner[count] = neighbours[cell, a] >= 0
-                _turn(ids[count], at[count], orientation[cell], a)
-                count += 1
+                count = _beyond(
+                    piece, cell, a, neighbours, cells, piece_cells, sub_range, sub_piece,
+                    sub_points, sub_barycentric, sub_sign, orientation, out, count,
+                )  # fmt: skip
             continue
         for s in range(begin, end):
             for skip in range(corners):
@@ -84,14 +163,22 @@ def exposed_facets(
                 if not lonely:
                     continue
                 face = _face_of(sub_barycentric[s], skip)
-                other = -1
                 if face >= 0:
                     other = partner(
                         sub_piece[s], cell, face, cells, neighbours, piece_cells, first_piece,
                         next_piece,
                     )  # fmt: skip
-                if other >= 0:
-                    continue
+                    if other >= 0 and not _parted(
+                        s, skip, cell, neighbours[cell, face], face, cells, piece_cells,
+                        sub_range, sub_piece, sub_points,
+                    ):  # fmt: skip
+                        if _is_whole(sub_points[s], skip, cells[cell]):
+                            count = _beyond(
+                                sub_piece[s], cell, face, neighbours, cells, piece_cells,
+                                sub_range, sub_piece, sub_points, sub_barycentric, sub_sign,
+                                orientation, out, count,
+                            )  # fmt: skip
+                        continue
                 k = 0
                 for b in range(corners):
                     if b != skip:
