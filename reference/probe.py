@@ -8,6 +8,8 @@ import json
 import sys
 from collections.abc import Callable
 
+import numpy as np
+
 from reference.dolfinx_versions import import_dolfinx
 
 __all__ = ["PROBES", "main"]
@@ -29,7 +31,7 @@ def _petsc() -> str:
     from petsc4py import PETSc
 
     version = ".".join(map(str, PETSc.Sys.getVersion()))
-    scalar = "real" if PETSc.ScalarType().dtype.kind == "f" else "complex"
+    scalar = "real" if np.dtype(PETSc.ScalarType).kind == "f" else "complex"
     if scalar != "real":
         raise RuntimeError(f"PETSc {version} is built for complex numbers; real ones are needed")
     built = [name for name in _PACKAGES if PETSc.Sys.hasExternalPackage(name)]
