@@ -135,7 +135,7 @@ def divide_facets(
             for j in range(3):
                 where[k, j] = 1.0 if j == k else 0.0
             if of_facet[f, k] < 0:
-                alone = k
+                alone = np.int64(k)
             else:
                 crossed, through = True, through and inside[of_facet[f, k]]
         if not (crossed and through):
