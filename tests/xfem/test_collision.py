@@ -186,3 +186,20 @@ def test_bad_input_is_refused_with_its_reason() -> None:
     tree = BoundingTree(np.eye(3), np.array([[0, 1, 2]]))
     with pytest.raises(XfemError, match="2 points; expected more than 2"):
         tree.refit(np.eye(3)[:2])
+
+
+def test_following_known_positions_is_refitting_to_their_displacement() -> None:
+    mesh = box_mesh((3, 3, 3))
+    cutter = SemiProgressiveCutter(mesh)
+    surface = BodySurface(cutter.body).surface
+    displacement = 0.1 * np.random.default_rng(4).normal(size=mesh.points.shape)
+    refitted, following = SurfaceCollider(surface), SurfaceCollider(surface)
+    refitted.refit(displacement)
+    following.follow(surface.positions(displacement))
+    tool = ([0.5, 0.5, -0.5], [0.4, 0.6, 1.5], 0.1)
+    ours, theirs = (collider.touched(*tool) for collider in (following, refitted))
+    assert len(ours.facet) > 0
+    np.testing.assert_array_equal(ours.facet, theirs.facet)
+    np.testing.assert_array_equal(ours.distance, theirs.distance)
+    with pytest.raises(XfemError, match="positions of shape"):
+        following.follow(np.zeros((2, 3)))

@@ -173,7 +173,7 @@ class Session:
 
     def _collide(self) -> int:
         """Let the collision surface follow, and ask where the tools touch it."""
-        self.collider.refit(self.state.displacement)
+        self.collider.follow(self.surfaces.touchable_positions)
         if self.collider.positions.shape[1] == 2:
             return 0  # a blade in the plane is a point
         touched = [

@@ -89,6 +89,11 @@ class Surfaces:
         """The surface that tools collide with."""
         return self.collision or self.material.surface
 
+    @property
+    def touchable_positions(self) -> _Floats:
+        """(v, s) vertices of that surface after the last `move`, m."""
+        return self._positions[-1 if self.collision else 0]
+
     def picture(self, virtual: VirtualMesh, displacement: _Floats) -> Picture:
         """Draw the body as it is now: the visual surface with the faces of the cuts."""
         if virtual.mesh.space == 2:

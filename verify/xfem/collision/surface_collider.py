@@ -111,7 +111,21 @@ class SurfaceCollider:
         """
         if len(self.positions) != len(self.surface.material.rows):
             self.positions = np.empty_like(self.surface.material.rows)
-        self.surface.positions(displacement, self.positions)
+        self.follow(self.surface.positions(displacement, self.positions))
+
+    def follow(self, positions: _Floats) -> None:
+        """Move to positions (v, s) of all vertices that are known already, kept by reference, m.
+
+        Raises
+        ------
+        XfemError
+            If there are not as many as vertices.
+        """
+        if positions.shape != self.surface.material.rows.shape:
+            raise XfemError(
+                f"positions of shape {positions.shape}; expected {self.surface.material.rows.shape}"
+            )
+        self.positions = positions
         if self._state != self._now():
             self._rebuild()
         else:
