@@ -132,7 +132,8 @@ def test_a_run_solves_levels_until_the_reference_suffices_and_says_so(verify):
     assert 3 < len(levels) <= 6
     assert levels == list(range(len(levels)))
     assert f"reached with {len(levels)} levels" in result["reference"]["suffices_reason"]
-    # again: nothing is solved, nothing is judged otherwise
+    # again: nothing is solved, and the same is said
     again = verify(*command)
     assert f"{len(levels) + 1} finished solves were taken over" in again.stdout
-    assert json.loads((verify.folder / "out/cases/slit/result.json").read_text()) == result
+    said = json.loads((verify.folder / "out/cases/slit/result.json").read_text())["reference"]
+    assert said["suffices_reason"] == result["reference"]["suffices_reason"]
