@@ -22,14 +22,21 @@ _STYLES = (
     Style("#8a6a00", "disc"),
 )
 _PLACE = "along faces"
+_STEP_LEGEND = {
+    "good": "at least 0.9",
+    "fair": "at least 0.5",
+    "poor": "at least 0.1",
+    "bad": "less: it vanishes",
+}
+_CONDITION_LEGEND = {"good": "up to 10³", "fair": "up to 10⁴", "poor": "up to 10⁶", "bad": "more"}
 _FAIR = ((0.9, "good"), (0.5, "fair"), (0.1, "poor"))
 
 
 def sliver_maps(measured: Records, dimension: int) -> Markup:
     """Return the maps of one dimension, of the cut along faces."""
-    here = listed(measured, dimension=dimension)
-    uncut = _number(listed(here, placement="uncut", quantity="critical step"))
-    here = listed(here, placement=_PLACE)
+    every = listed(measured, dimension=dimension)
+    uncut = _number(listed(every, placement="uncut", quantity="critical step"))
+    here = listed(every, placement=_PLACE)
 
     def step(record: Mapping[str, Any]) -> Cell:
         value = record["value"]
@@ -48,8 +55,7 @@ def sliver_maps(measured: Records, dimension: int) -> Markup:
     return joined(
         _map(
             f"{dimension}D: explicit step over that of the uncut body", here, "critical step", step,
-            {"good": "at least 0.9", "fair": "at least 0.5", "poor": "at least 0.1",
-             "bad": "less: it vanishes"},
+            _STEP_LEGEND,
         ),
         _map(
             f"{dimension}D: linear runs at 0.9 of the uncut step", here,
@@ -59,7 +65,7 @@ def sliver_maps(measured: Records, dimension: int) -> Markup:
         _map(
             f"{dimension}D: condition number, scaled by its diagonal", scaled, "condition number",
             condition,
-            {"good": "up to 10³", "fair": "up to 10⁴", "poor": "up to 10⁶", "bad": "more"},
+            _CONDITION_LEGEND,
         ),
         _map(
             f"{dimension}D: most pieces inside out at once, explicit from 15 % strain", here,
@@ -69,6 +75,25 @@ def sliver_maps(measured: Records, dimension: int) -> Markup:
             f"{dimension}D: implicit from 15 % strain, ten times the uncut step", here,
             "steps to blow-up, implicit", _course,
             {"good": "ran through", "bad": "ended after so many steps"},
+        ),
+        _map(
+            f"{dimension}D: explicit step over that of the uncut body, wherever cut",
+            _by_placement(every, "side-wise"), "critical step", step, _STEP_LEGEND,
+        ),
+        _map(
+            f"{dimension}D: condition number, scaled by its diagonal, wherever cut",
+            _by_placement(every, "side-wise, Jacobi"), "condition number", condition,
+            _CONDITION_LEGEND,
+        ),
+        _map(
+            f"{dimension}D: linear runs at 0.9 of the uncut step, small features",
+            _by_placement(every, "side-wise"), "steps to blow-up, explicit", _course,
+            {"good": "ran through", "bad": "blew up after so many steps"},
+        ),
+        _map(
+            f"{dimension}D: most pieces inside out at once, explicit at 0.9, small features",
+            _by_placement(every, "side-wise, 0.9 of its step"), "inverted pieces", _inverted,
+            {"good": "none", "poor": "so many"},
         ),
     )  # fmt: skip
 
@@ -86,13 +111,16 @@ def sliver_curves(measured: Records, growths: Records, dimension: int) -> Markup
         ("condition number, scaled by its diagonal", "condition number", _PLACE,
          [*((b, "keep", f"{b}, Jacobi") for b in bases),
           ("conforming", "conforming", "side-wise, Jacobi"),
-          ("snapped", "conforming snapped", "side-wise, Jacobi")]),
+          ("snapped", "snapped", "side-wise, Jacobi")]),
         ("critical step in s, slivers kept", "critical step", _PLACE,
          [(name, "keep", name) for name in lumpings]),
         ("critical step in s, side-wise or lumped", "critical step", _PLACE,
-         [(t, t, "side-wise") for t in ("keep", "drop", "merge", "ghost penalty", "conforming")]),
+         [(t, t, "side-wise")
+          for t in ("keep", "drop", "merge", "ghost penalty", "conforming", "snapped")]),
         ("compliance of the smallest piece in m/N", "compliance", _PLACE,
-         [(t, t, "") for t in ("keep", "drop", "merge", "conforming", "conforming snapped")]),
+         [(t, t, "") for t in ("keep", "drop", "merge", "conforming", "snapped")]),
+        ("compliance of a strip between two cuts in m/N", "compliance", "two cuts apart",
+         [(t, t, "") for t in ("keep", "conforming", "ghost penalty")]),
         ("relative L² error of the displacement", "displacement error", _PLACE,
          [(t, t, "") for t in ("keep", "drop", "merge", "ghost penalty", "conforming")]),
         ("iterations of conjugate gradients, nodal blocks", "CG iterations", _PLACE,
@@ -114,6 +142,15 @@ def sliver_curves(measured: Records, growths: Records, dimension: int) -> Markup
 
 def _number(records: Records) -> float | None:
     return records[0]["value"] if records else None
+
+
+def _by_placement(measured: Records, variant: str) -> Records:
+    """One row per placement and treatment of a single variant; along faces has maps of its own."""
+    return [
+        {**m, "variant": m["placement"]}
+        for m in listed(measured, variant=variant)
+        if m["placement"] not in ("uncut", _PLACE)
+    ]
 
 
 def _course(record: Mapping[str, Any]) -> Cell:

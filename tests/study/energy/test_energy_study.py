@@ -40,6 +40,7 @@ def test_the_finding_names_the_defect_and_rejects_it(study):
     verdicts = {f.topic: f for f in study.findings}
     thesis = verdicts["inertia of a freed half, thesis"]
     assert "−8.757" in thesis.sentence
+    assert "dynamics/freed_half --solver xfem --set xfem.mass=thesis" in thesis.sentence
     assert thesis.verdict is Verdict.FAIL
     assert verdicts["inertia of a freed half, side-wise"].verdict is Verdict.PASS
 
