@@ -9,16 +9,33 @@ __all__ = ["exposed_facets"]
 
 
 @njit(cache=True)
-def _same_set(a, skip_a, b, skip_b):
-    for i in range(len(a)):
-        if i == skip_a:
+def _find_facet(s, skip, begin, end, piece, sub_piece, sub_points):
+    """Give another simplex from `begin` to `end` that has the facet of s opposite to a corner.
+
+    Of simplices of one piece if that is not -1; -1 if there is none.
+    """
+    corners, total = sub_points.shape[1], -sub_points[s, skip]
+    for k in range(corners):
+        total += sub_points[s, k]
+    for t in range(begin, end):
+        if t == s or (piece >= 0 and sub_piece[t] != piece):
             continue
-        found = False
-        for j in range(len(b)):
-            found = found or (j != skip_b and a[i] == b[j])
-        if not found:
-            return False
-    return True
+        rest = -total
+        for k in range(corners):
+            rest += sub_points[t, k]
+        for other in range(corners):
+            # the sums tell most facets apart
+            if sub_points[t, other] != rest:
+                continue
+            same = True
+            for i in range(corners):
+                found = i == skip
+                for j in range(corners):
+                    found = found or (j != other and sub_points[s, i] == sub_points[t, j])
+                same = same and found
+            if same:
+                return t
+    return -1
 
 
 @njit(cache=True)
@@ -42,19 +59,6 @@ def _meets(piece, other, cell, across, opposite, cells, piece_cells):
             if a != opposite and cells[across, b] == cells[cell, a]:
                 same = same and piece_cells[other, b] == piece_cells[piece, a]
     return same
-
-
-@njit(cache=True)
-def _parted(s, skip, cell, across, opposite, cells, piece_cells, sub_range, sub_piece, sub_points):
-    """Whether the same facet of the cell across is that of a piece that moves otherwise."""
-    parted = False
-    for t in range(sub_range[across, 0], sub_range[across, 1]):
-        for other in range(cells.shape[1]):
-            if _same_set(sub_points[s], skip, sub_points[t], other):
-                parted = not _meets(
-                    sub_piece[s], sub_piece[t], cell, across, opposite, cells, piece_cells
-                )
-    return parted
 
 
 @njit(cache=True)
@@ -146,6 +150,8 @@ def exposed_facets(
                     _turn(ids[count], at[count], orientation[cell], a)
                     count += 1
                     continue
+                if not split[across]:
+                    continue
                 count = _beyond(
                     piece, cell, a, neighbours, cells, piece_cells, sub_range, sub_piece,
                     sub_points, sub_barycentric, sub_sign, orientation, out, count,
@@ -153,14 +159,7 @@ def exposed_facets(
             continue
         for s in range(begin, end):
             for skip in range(corners):
-                lonely = True
-                for t in range(begin, end):
-                    if t == s or sub_piece[t] != sub_piece[s]:
-                        continue
-                    for other in range(corners):
-                        if _same_set(sub_points[s], skip, sub_points[t], other):
-                            lonely = False
-                if not lonely:
+                if _find_facet(s, skip, begin, end, sub_piece[s], sub_piece, sub_points) >= 0:
                     continue
                 face = _face_of(sub_barycentric[s], skip)
                 if face >= 0:
@@ -168,10 +167,18 @@ def exposed_facets(
                         sub_piece[s], cell, face, cells, neighbours, piece_cells, first_piece,
                         next_piece,
                     )  # fmt: skip
-                    if other >= 0 and not _parted(
-                        s, skip, cell, neighbours[cell, face], face, cells, piece_cells,
-                        sub_range, sub_piece, sub_points,
-                    ):  # fmt: skip
+                    across = neighbours[cell, face]
+                    first, last = (np.int64(0), np.int64(0))
+                    if across >= 0:
+                        first, last = sub_range[across, 0], sub_range[across, 1]
+                    # the same facet of the cell across may be that of a piece that moves otherwise
+                    same = _find_facet(s, skip, first, last, np.int64(-1), sub_piece, sub_points)
+                    if other >= 0 and (
+                        same < 0
+                        or _meets(
+                            sub_piece[s], sub_piece[same], cell, across, face, cells, piece_cells
+                        )
+                    ):
                         if _is_whole(sub_points[s], skip, cells[cell]):
                             count = _beyond(
                                 sub_piece[s], cell, face, neighbours, cells, piece_cells,
