@@ -26,8 +26,8 @@ def calibration_section(record: Mapping[str, Any]) -> Markup:
     said = (
         "Every mark is a number that a reference of three levels states its uncertainty of; above "
         "the line 1 the uncertainty covers the true error, above the line 10 it is wider than it "
-        "need be. Open marks are quantities of interest: the error of a single number can vanish by "
-        "chance, and then lies far above."
+        "need be. Open marks are quantities of interest: the error of a single number can vanish "
+        "by chance, and then lies far above."
     )
     return tag(
         "section",
