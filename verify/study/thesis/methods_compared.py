@@ -81,7 +81,7 @@ def _summed_up(
     )
     reason = record.reason if record.status is not Status.SOLVED else ""
     if not reason and displacement is None:
-        reason = "; ".join(record.notes.values()) or "not compared"
+        reason = record.notes.get("comparison", "not compared")
     changed = "; ".join(
         f"{one['kind']}: {one['count']}, {one['size']:.2g} {one['unit']}"
         for one in record.regularisations
