@@ -161,6 +161,8 @@ def _course(record: Mapping[str, Any]) -> Cell:
 
 def _inverted(record: Mapping[str, Any]) -> Cell:
     count = record["value"]
+    if count is None:
+        return ("none", "", record["reason"])
     return ("poor", f"{count:.0f}", record["reason"]) if count else ("good", "", record["reason"])
 
 

@@ -10,6 +10,7 @@ from verify.study.slivers.conditioning import HeldStiffness, stiffness_matrix
 from verify.study.slivers.explicit_step import estimated_step, linear_course, mass_of
 from verify.study.slivers.inversion import swing
 from verify.study.slivers.placements import PLACEMENTS, placed_cuts, row_height
+from verify.study.slivers.running import _at_large_strain, _explicit
 from verify.xfem.critical_step import element_critical_steps
 from verify.xfem.dynamics import CentralDifferences
 from verify.xfem.elasticity import isotropic
@@ -151,3 +152,15 @@ def test_a_placement_that_is_not_there_is_refused():
         placed_cuts(MESH[2], "along edges", 0.1)
     with pytest.raises(ValueError, match="expected one of"):
         body("askew", 0.1)
+
+
+def test_a_mass_that_is_singular_ends_the_measurement_not_the_study():
+    thin = body("corner cut off", 1e-6, "ghost penalty", dimension=3)
+    found = [*_at_large_strain(thin, quick=False), *_explicit(thin, 0.05, quick=False)]
+    assert {m.value for m in found} == {None}
+    assert all("singular to round-off" in m.reason for m in found)
+    assert {m.quantity for m in found} == {
+        "inverted pieces",
+        "steps to blow-up, large strain",
+        "steps to blow-up, explicit",
+    }

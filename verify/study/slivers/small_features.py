@@ -160,16 +160,19 @@ def _runs(r: Results) -> Finding:
             fixed = {"placement": placement, "treatment": treatment}
             linear = r.all_of("steps to blow-up, explicit", variant="side-wise", **fixed)
             blown = [m for m in linear if m.value is not None]
-            swings = r.all_of("inverted pieces", **fixed)
+            swings = r.values("inverted pieces", **fixed)
             inverted = [m for m in swings if m.value]
             if placement != "corner cut off" or treatment == "merge":
                 blown_elsewhere += len(blown)
-            if not blown and not inverted:
+            ended = r.values("steps to blow-up, implicit", **fixed)
+            if not blown and not inverted and not ended:
                 continue
+            early = f", {len(ended)} implicit ones end early" if ended else ""
             after = f" after {counts(blown)} steps" if blown else ""
             said.append(
                 f"{placement}, {treatment}: {len(blown)} of {len(linear)} linear runs blow "
-                f"up{after}, {len(inverted)} of {len(swings)} at large strain invert pieces"
+                f"up{after}, {len(inverted)} of {len(swings)} at large strain invert "
+                f"pieces{early}"
             )
     return Finding(
         f"{r.dimension}D runs with small features",
