@@ -171,7 +171,8 @@ def join_across_faces(
                     return here, asked
                 p = _fitting(starts[here], starts[here + 1], pieces, label, sides[top])
                 q = _fitting(starts[there], starts[there + 1], pieces, label, sides[top])
-                assert min(p, q) >= 0  # the pieces of a cell partition the plane of its face
+                if p < 0 or q < 0:
+                    raise RuntimeError("the pieces of a cell do not partition the plane of a face")
                 _join_face(cell, across, skip, p, q, cells, towards)
                 top -= 1
     return len(patch), asked[:0]
