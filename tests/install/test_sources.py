@@ -18,7 +18,7 @@ def compiled_functions():
 
 
 def test_no_kernel_asserts():
-    """The package has a pytest plugin: pytest rewrites its asserts, and numba knows none of that."""
+    """The package has a pytest plugin: pytest rewrites its asserts, which numba cannot compile."""
     found = [
         f"{file.name}:{node.lineno}"
         for file, function in compiled_functions()
