@@ -138,10 +138,7 @@ class ReferenceCache:
                 shutil.copyfile(folder / name, job.folder / name)
                 if file_digest(job.folder / name) != digest:
                     raise InputError("differs from what was stored", str(folder / name))
-        except FileNotFoundError:  # removed by somebody while we looked, or damaged
-            self._remove(folder)
-            return None
-        except InputError:
+        except (FileNotFoundError, InputError):  # damaged, or removed while we looked
             self._remove(folder)
             return None
         return entry.taken_by(job, "from the reference cache")

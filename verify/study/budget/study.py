@@ -139,36 +139,22 @@ def budget_study(
     InputError
         If something that the chain needs was not solved, or `metric` is unknown.
     """
-    own = scene.analysis.kinematics
-    judged = _solution(asked[own], JUDGED, level)
     body = body_of(scene, None if exact is None else np.asarray(exact.singular_points))
+    judged = _solution(asked[scene.analysis.kinematics], JUDGED, level)
     size = size_of(judged)
     links = _Links(scene, body, size)
-    notes: list[str] = []
     first = "linear" if exact is not None else "corotational"
     if exact is not None:
         known = exact_reference(scene, exact, body, hooke(scene.material))
-        chain = [links.of_reference("the problem: exact solution", "", known)]
-        notes.append("the exact solution is one of linear elasticity: nothing is said of rotations")
+        title = "the problem: exact solution"
+        notes = ["the exact solution is one of linear elasticity: nothing is said of rotations"]
     else:
         known = links.reference(asked[first], first)
-        chain = [links.of_reference("the problem: finite rotations, cut as asked", "", known)]
+        title, notes = "the problem: finite rotations, cut as asked", []
     if realised is None:
         notes.append("the cut is realised as asked, to round-off: that part is zero")
-    else:
-        moved = links.reference(realised[first], first)
-        text = "cut as asked → as realised"
-        chain.append(links.of_reference("the same with the cut as realised", text, moved))
-    if own != first:
-        place = asked if realised is None else realised
-        linear = links.reference(place[own], own)
-        text = "finite rotations → linear"
-        chain.append(links.of_reference("linear kinematics", text, linear))
-    place, k = (asked, level) if realised is None else (realised, 0)
-    conforming = _solution(place[own], CONFORMING, k)
-    text = "fine → own h, conforming P1"
-    chain.append(links.of_solution("conforming P1 at the same h", text, conforming))
-    chain.append(links.of_solution("XFEM", "conforming P1 → XFEM", judged))
+    chain = [links.of_reference(title, "", known)]
+    chain += links.from_problem_to_answer(first, level, asked, realised, judged)
     units = {q.name: unit_of(q, scene.dimension) for q in scene.quantities}
     budgets = error_budget(chain, body, size, hooke(scene.material), units)
     if metric not in {budget.metric for budget in budgets}:
@@ -199,6 +185,31 @@ class _Links:
 
     def __init__(self, scene: Scene, body: AnyBody, size: float) -> None:
         self._scene, self._body, self._size = scene, body, size
+
+    def from_problem_to_answer(
+        self,
+        first: str,
+        level: int,
+        asked: Mapping[str, Solved],
+        realised: Mapping[str, Solved] | None,
+        judged: Solution,
+    ) -> list[Answer]:
+        """Change the cut, the kinematics, the mesh and the method, in this order."""
+        own, chain = self._scene.analysis.kinematics, []
+        place, k = (asked, level) if realised is None else (realised, 0)
+        if realised is not None:
+            moved = self.reference(realised[first], first)
+            text = "cut as asked → as realised"
+            chain.append(self.of_reference("the same with the cut as realised", text, moved))
+        if own != first:
+            linear = self.reference(place[own], own)
+            text = "finite rotations → linear"
+            chain.append(self.of_reference("linear kinematics", text, linear))
+        conforming = _solution(place[own], CONFORMING, k)
+        text = "fine → own h, conforming P1"
+        chain.append(self.of_solution("conforming P1 at the same h", text, conforming))
+        chain.append(self.of_solution("XFEM", "conforming P1 → XFEM", judged))
+        return chain
 
     def reference(self, solved: Solved, kinematics: str) -> Reference:
         levels = solved.solutions.get(REFERENCE, {})
