@@ -4,89 +4,140 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.replay.animation import Frame, meshes_of, view_of
 from verify.replay.live_scalpel import LiveScalpel
 from verify.replay.session import Session
+from verify.replay.sight import place_in_sight
 from verify.replay.stage import Stage
 from verify.replay.stroke_file import write_stroke
 
-__all__ = ["play_in_window"]
+__all__ = ["PlayWindow", "play_in_window"]
 
 _DEPTH = 0.05  # of the body's size: how far the blade reaches from where it touches
 
 
 def play_in_window(stage: Stage, title: str, stroke_file: Path) -> None:
     """Play until the window is closed; strokes of the mouse are written to a file as they end."""
-    import pyvista
-
-    session = Session(stage, account=False)
-    frame = Frame(0.0, session.picture(), session.blades())
-    view = view_of([frame, frame])
-    plotter = pyvista.Plotter(title=title, window_size=list(view.size))
-    plotter.background_color = pyvista.Color("white")
-    scalpel = LiveScalpel(session, _DEPTH * view.width)
-    _Hand(plotter, session, scalpel, stroke_file)
-
-    def tick(_: int) -> None:
-        session.step()
-        plotter.clear_actors()
-        frame = Frame(session.time, session.picture(), session.blades())
-        for mesh, colour, smooth in meshes_of(frame):
-            plotter.add_mesh(mesh, color=colour, smooth_shading=smooth, reset_camera=False)
-        plotter.render()
-
-    plotter.camera.focal_point, plotter.camera.up = view.centre, view.up
-    plotter.camera.position = view.centre + 1.5 * view.width * view.towards
+    window = PlayWindow(stage, title, stroke_file)
     milliseconds = max(1, round(1e3 * stage.time_step))
-    plotter.add_timer_event(  # type: ignore[call-arg]
-        max_steps=10**9, duration=milliseconds, callback=tick
+    window.plotter.add_timer_event(
+        max_steps=10**9, duration=milliseconds, callback=lambda _: window.tick()
     )
-    plotter.show()
+    window.plotter.show()
 
 
-class _Hand:
-    """Turns the movements of the mouse into those of the scalpel."""
+class PlayWindow:
+    """The window: left button cuts, right button turns, wheel comes nearer.
+
+    Parameters
+    ----------
+    stage : Stage
+    title : str
+    stroke_file : Path
+        Where each stroke of the mouse is written as it ends.
+    off_screen : bool
+        Without a display, for tests: events are then sent to `plotter.iren.interactor`.
+
+    Attributes
+    ----------
+    plotter : pyvista.Plotter
+    session : Session
+    scalpel : LiveScalpel
+    """
 
     def __init__(
-        self, plotter: Any, session: Session, scalpel: LiveScalpel, stroke_file: Path
+        self, stage: Stage, title: str, stroke_file: Path, off_screen: bool = False
     ) -> None:
-        self._plotter, self._session, self._scalpel = plotter, session, scalpel
-        self._file, self._down = stroke_file, False
-        style = plotter.iren
-        style.add_observer("LeftButtonPressEvent", self._press)
-        style.add_observer("MouseMoveEvent", self._move)
-        style.add_observer("LeftButtonReleaseEvent", self._release)
+        import pyvista
+
+        self.session = Session(stage, account=False)
+        frame = self._frame()
+        view = view_of([frame, frame])
+        self.scalpel = LiveScalpel(self.session, _DEPTH * view.width)
+        self.plotter: Any = pyvista.Plotter(
+            title=title, window_size=list(view.size), off_screen=off_screen
+        )
+        self.plotter.background_color = pyvista.Color("white")
+        self._stroke_file, self._down = stroke_file, False
+        self._take_the_mouse()
+        camera = self.plotter.camera
+        camera.focal_point, camera.up = view.centre, view.up
+        camera.position = view.centre + 2.0 * view.width * view.towards
+        camera.parallel_projection, camera.parallel_scale = True, 0.5 * view.width
+        self._draw(frame)
+
+    def tick(self) -> None:
+        """Take one step and draw it."""
+        self.session.step()
+        self._draw(self._frame())
+        self.plotter.render()
+
+    def _frame(self) -> Frame:
+        return Frame(self.session.time, self.session.picture(), self.session.blades())
+
+    def _draw(self, frame: Frame) -> None:
+        self.plotter.clear_actors()
+        for mesh, colour, smooth in meshes_of(frame):
+            self.plotter.add_mesh(
+                mesh, color=colour, smooth_shading=smooth, reset_camera=False, render=False
+            )
+        records = self.session.records
+        cost = f", step {1e3 * sum(records[-1].seconds.values()):.1f} ms" if records else ""
+        self.plotter.add_text(
+            f"{frame.time:.2f} s{cost}\nleft: cut, right: turn, wheel: nearer",
+            font_size=9, color="black", render=False,
+        )  # fmt: skip
+        self.plotter.reset_camera_clipping_range()
+
+    def _take_the_mouse(self) -> None:
+        """Give the left button to the scalpel, and turning, which it does usually, to the right.
+
+        A style that finds an observer of an event leaves the event to it.
+        """
+        from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
+
+        style: Any = vtkInteractorStyleTrackballCamera()
+        style.AddObserver("LeftButtonPressEvent", self._press)
+        style.AddObserver("MouseMoveEvent", lambda *_: self._move(style))
+        style.AddObserver("LeftButtonReleaseEvent", self._release)
+        style.AddObserver("RightButtonPressEvent", lambda *_: self._turn(style))
+        style.AddObserver("RightButtonReleaseEvent", lambda *_: style.EndRotate())
+        self.plotter.iren.style = style
+
+    def _turn(self, style: Any) -> None:
+        style.SetCurrentRenderer(self.plotter.renderer)
+        style.StartRotate()
 
     def _press(self, *_: Any) -> None:
         self._down = True
-        self._move()
+        self._cut()
 
-    def _move(self, *_: Any) -> None:
-        if not self._down:
-            return
-        camera = self._plotter.camera
-        towards = np.array(camera.focal_point) - np.array(camera.position)
-        place = _touched(self._session, self._plotter.pick_mouse_position(), towards)
-        if place is not None:
-            self._scalpel.touch(place, towards)
+    def _move(self, style: Any) -> None:
+        if self._down:
+            self._cut()
+        else:
+            style.OnMouseMove()
 
     def _release(self, *_: Any) -> None:
         self._down = False
-        self._scalpel.lift()
-        if self._scalpel.finished:
-            write_stroke(self._scalpel.finished[-1], self._file)
+        before = len(self.scalpel.finished)
+        self.scalpel.lift()
+        if len(self.scalpel.finished) > before:
+            write_stroke(self.scalpel.finished[-1], self._stroke_file)
 
+    def _cut(self) -> None:
+        x, y = self.plotter.iren.interactor.GetEventPosition()
+        near, far = (self._seen_at(x, y, depth) for depth in (0.0, 1.0))
+        place = place_in_sight(self.session.picture(), near, far - near)
+        if place is not None:
+            self.scalpel.touch(place, far - near)
 
-def _touched(session: Session, near: Any, towards: Any) -> Any:
-    """Find the material point of the nearest vertex in sight of a place; None if it is far off."""
-    if near is None:
-        return None
-    picture = session.picture()
-    used = np.unique(picture.triangles[~picture.inner])
-    away = np.linalg.norm(
-        np.cross(picture.points[used] - np.asarray(near), towards / np.linalg.norm(towards)), axis=1
-    )
-    closest = int(np.argmin(away))
-    edge = np.linalg.norm(session.stage.mesh.edge_vectors, axis=2).mean()
-    return picture.material[used[closest]] if away[closest] < edge else None
+    def _seen_at(self, x: int, y: int, depth: float) -> NDArray[np.float64]:
+        """Find the point (3,) of space behind a pixel: 0 is the near end of what is seen."""
+        renderer = self.plotter.renderer
+        renderer.SetDisplayPoint(x, y, depth)
+        renderer.DisplayToWorld()
+        point = np.array(renderer.GetWorldPoint())
+        return np.asarray(point[:3] / point[3])
