@@ -40,6 +40,13 @@ def test_what_is_not_known_does_not_count():
     assert calibration_findings([unknown])[0].verdict is Verdict.UNDECIDED
 
 
+def test_families_that_nothing_was_tuned_on_are_told_apart():
+    held = [replace(one, held_out=True) for one in made([20.0] * 3)]
+    covered, width = calibration_findings([*made([2.0] * 17), *held])
+    assert "nothing was tuned on, 3 of 3" in covered.sentence
+    assert "nothing was tuned on, 0 of 3" in width.sentence
+
+
 def test_the_truth_s_own_uncertainty_is_granted():
     assert Trial("a", 1, 2, "u", stated=1.0, true=1.05, known=0.06).covered
     assert not Trial("a", 1, 2, "u", stated=1.0, true=1.05, known=0.04).covered

@@ -67,6 +67,10 @@ class SolutionMotion:
         close: bool = bool(np.abs(times - time).min() <= _SAME_TIME * max(np.ptp(times), 1e-300))
         return close
 
+    def cells_at(self, points: Array, near: Array) -> NDArray[np.int64]:
+        """Find the cell (n,) that holds each of `points` (n, d), on the side of `near`."""
+        return self._field.cells_at(points, near)
+
     def at(self, time: float | None = None) -> Field:
         """Field at a time in s; None is the last.
 

@@ -10,7 +10,7 @@ from verify.compare.jump_error import displacement_jump
 from verify.compare.locate import Field
 from verify.compare.surface_rule import nearest_on_cut
 
-__all__ = ["opening"]
+__all__ = ["cut_place", "opening"]
 
 
 def opening(
@@ -23,7 +23,7 @@ def opening(
     and the tangential jump is the length of what is left of the jump without its normal part.
     The normal points into the positive side.
     """
-    at = _rule(body, cut, place)
+    at = cut_place(body, cut, place)
     normal, jump = at.normals[0], displacement_jump(field, at)[0]
     if component == "normal":
         return float(jump @ normal)
@@ -32,7 +32,8 @@ def opening(
     return float(np.linalg.norm(jump - (jump @ normal) * normal))
 
 
-def _rule(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRule:
+def cut_place(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRule:
+    """Take the point of a cut where an opening is asked for, as a rule of weight 1."""
     if isinstance(body, Body):
         assert isinstance(place, float)
         return place_on_cut(body, cut, place)

@@ -21,15 +21,23 @@ from verify.compare.volume_rule import volume_rule
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.acceptance import (
+    DisplacementQuantity,
     MaximumDisplacementQuantity,
+    OpeningQuantity,
     Quantity,
     StressIntensityQuantity,
 )
 from verify.solution import Solution
 from verify.study.error_history import ERROR_NAMES, base_of, compared_times, error_history
+from verify.study.local_difference import local_difference
 from verify.study.quantities import Measured, field_quantity
 from verify.study.rates import ROUND_OFF
-from verify.study.richardson import Extrapolation, extrapolate, field_uncertainty
+from verify.study.richardson import (
+    Extrapolation,
+    extrapolate,
+    field_uncertainty,
+    place_uncertainty,
+)
 from verify.study.stress_intensity import exact_intensity
 
 __all__ = ["ExactField", "Reference", "conforming_reference", "exact_reference", "size_of"]
@@ -184,8 +192,7 @@ def conforming_reference(
         except UnsupportedSceneError as problem:
             missing[asked.name] = str(problem)
             continue
-        # functionals of a Galerkin solution converge with up to twice its order
-        known = extrapolate(values, sizes, order, 2 * order)
+        known = _known(asked, measured, values, sizes)
         quantities[asked.name] = known.value, known.half_width
         metrics[asked.name] = _entry(values, known) | _second_opinion(asked, second, known)
     norms, entries = _field_norms(scene, measured, sizes, order, size)
@@ -204,6 +211,18 @@ def conforming_reference(
     if missing:
         record["missing"] = missing
     return Reference(measured[-1].motion, source, norms, quantities, record)
+
+
+def _known(
+    asked: Quantity, measured: Sequence[Measured], values: list[float], sizes: list[float]
+) -> Extrapolation:
+    """Judge a quantity from its levels; a value at a place also from what lies around it."""
+    order = measured[-1].solution.order
+    if isinstance(asked, DisplacementQuantity | OpeningQuantity):
+        around = [local_difference(asked, *pair) for pair in pairwise(measured)]
+        return place_uncertainty(values[-1], around, sizes, order + 1)
+    # functionals of a Galerkin solution converge with up to twice its order
+    return extrapolate(values, sizes, order, 2 * order)
 
 
 def _field_norms(
@@ -249,7 +268,7 @@ def _second_opinion(
     try:
         values = [one.quantity(asked) for one in others]
         sizes, order = [size_of(one.solution) for one in others], others[-1].solution.order
-        found = extrapolate(values, sizes, order, 2 * order)
+        found = _known(asked, others, values, sizes)
     except (InputError, UnsupportedSceneError):
         return {}
     apart = abs(found.value - known.value)

@@ -12,9 +12,16 @@ from math import inf, isfinite, log
 
 from verify.errors import InputError
 
-__all__ = ["Extrapolation", "extrapolate", "field_uncertainty", "observed_order"]
+__all__ = [
+    "Extrapolation",
+    "extrapolate",
+    "field_uncertainty",
+    "observed_order",
+    "place_uncertainty",
+]
 
 _ROUND_OFF = 1e-13  # relative: below this, differences of levels say nothing
+_DEVIATIONS = 2.0  # of the error around a place: 95 % of a normal distribution
 
 
 @dataclass(frozen=True)
@@ -81,7 +88,10 @@ def extrapolate(
 
 
 def field_uncertainty(
-    differences: Sequence[float], sizes: Sequence[float], theoretical: float
+    differences: Sequence[float],
+    sizes: Sequence[float],
+    theoretical: float,
+    safety: float = 1.25,
 ) -> Extrapolation:
     """Estimate the error norm of the finest of several reference fields.
 
@@ -93,6 +103,8 @@ def field_uncertainty(
         Element sizes, coarse to fine, at least three.
     theoretical : float
         Order in this norm that can be counted on.
+    safety : float
+        Factor where the observed order is sane; 3 elsewhere.
 
     Returns
     -------
@@ -107,11 +119,37 @@ def field_uncertainty(
         return Extrapolation(0.0, 0.0, 0.0, None, "successive levels are equal")
     order = observed_order(first, last, sizes[-3:])
     if order is not None and 0.5 * theoretical <= order <= 2 * theoretical + 0.5:
-        width = 1.25 * last / (ratio ** min(order, theoretical) - 1)
-        text = f"observed order {order:.2f}, safety factor 1.25"
+        width = safety * last / (ratio ** min(order, theoretical) - 1)
+        text = f"observed order {order:.2f}, safety factor {safety:g}"
         return Extrapolation(last, 0.0, width, order, text)
     width, text = _careful(first, last, ratio, order, theoretical)
     return Extrapolation(last, 0.0, width, order, text)
+
+
+def place_uncertainty(
+    value: float, differences: Sequence[float], sizes: Sequence[float], theoretical: float
+) -> Extrapolation:
+    """Estimate the error of a value at one place, from how levels differ around it.
+
+    At one place errors change sign from level to level, so that neither an order nor a size can
+    be had from three values; from root mean squares around it both can. The error at the place
+    is one draw from those around: within two of their root mean squares in 95 of 100.
+
+    Parameters
+    ----------
+    value : float
+        On the finest level.
+    differences : sequence of float
+        Root mean squares around the place of the differences of successive levels, one fewer
+        than `sizes`.
+    sizes : sequence of float
+        Element sizes, coarse to fine, at least three.
+    theoretical : float
+        Order in L2 that can be counted on.
+    """
+    around = field_uncertainty(differences, sizes, theoretical, _DEVIATIONS)
+    width = max(around.half_width, _ROUND_OFF * abs(value))
+    return Extrapolation(value, value, width, around.order, f"around the place: {around.reason}")
 
 
 def observed_order(first: float, last: float, sizes: Sequence[float]) -> float | None:

@@ -12,13 +12,16 @@ _UNIT = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
 _INCLINED = [[-0.1, 0.3], [1.1, 0.7]]
 _FORCE = [{"kind": "body_force", "force": "exact"}]
 _LINE = {"point": [0.5, 0.5], "slope": 1 / 3}
+_FALLING = {"point": [0.5, 0.45], "slope": -0.25}
+_DOWN = [[-0.2, 0.625], [1.2, 0.275]]
 
 
 @dataclass(frozen=True)
 class Family:
     """An exact solution, the element size of the coarsest reference level (m), and how many.
 
-    Every three successive levels make a reference.
+    Every three successive levels make a reference. `held_out` are those that no estimator was
+    tuned on: other angles, stresses, places.
     """
 
     name: str
@@ -26,6 +29,7 @@ class Family:
     size: float
     levels: int
     content: dict[str, Any]
+    held_out: bool = False
 
     def scene(self) -> Scene:
         """Return the scene, judged by conforming levels as if there were no exact solution."""
@@ -60,12 +64,26 @@ def families(quick: bool) -> list[Family]:
         Family("griffith", 1, 1 / 2, 4, _griffith()),
         Family("griffith", 2, 1 / 2, 4, _griffith()),
         Family("solid_smooth", 1, 1 / 3, 3, _solid_smooth()),
+        Family("airy, falling", 1, 1 / 5, 5, _airy_falling(), held_out=True),
+        Family("airy, falling", 2, 1 / 3, 4, _airy_falling(), held_out=True),
+        Family("smooth, falling", 1, 1 / 4, 5, _smooth_falling(), held_out=True),
+        Family("smooth, falling", 2, 1 / 4, 4, _smooth_falling(), held_out=True),
+        Family("tip, both modes", 1, 1 / 4, 4, _tip(-35.0, (0.5, 1.0)), held_out=True),
+        Family("tip, both modes", 2, 1 / 3, 4, _tip(-35.0, (0.5, 1.0)), held_out=True),
+        Family("griffith, askew", 1, 1 / 2, 4, _griffith_askew(), held_out=True),
+        Family("griffith, askew", 2, 1 / 2, 4, _griffith_askew(), held_out=True),
     ]
 
 
 def _plane(
-    title: str, exact: dict[str, Any], points: list[list[float]], at: float = 0.5, **more: Any
+    title: str,
+    exact: dict[str, Any],
+    points: list[list[float]],
+    at: float = 0.5,
+    point: tuple[float, float] = (0.31, 0.83),
+    **more: Any,
 ) -> dict[str, Any]:
+    place = {"kind": "displacement", "point": list(point)}
     return {
         "title": title,
         "requirement": "The stated uncertainty of the reference shall cover its true error.",
@@ -77,8 +95,8 @@ def _plane(
         "quantities": [
             {"kind": "strain_energy"},
             {"kind": "opening", "name": "opening", "at": at},
-            {"kind": "displacement", "name": "u_x", "point": [0.31, 0.83], "component": "x"},
-            {"kind": "displacement", "name": "u_y", "point": [0.31, 0.83], "component": "y"},
+            {**place, "name": "u_x", "component": "x"},
+            {**place, "name": "u_y", "component": "y"},
         ],
         "exact": exact,
         **more,
@@ -98,6 +116,19 @@ def _smooth() -> dict[str, Any]:
     return _plane("smooth", exact, _INCLINED, loads=_FORCE)
 
 
+def _airy_falling() -> dict[str, Any]:
+    parameters = {**_FALLING, "above": [0.1, -0.2, 2.5], "below": [0.15, 0.1, 1.5]}
+    exact = {"solution": "airy", "parameters": parameters}
+    return _plane("airy, falling", exact, _DOWN, at=0.37, point=(0.72, 0.21))
+
+
+def _smooth_falling() -> dict[str, Any]:
+    above = [[0.1, 4.0, 20.0], [0.05, 2.0, -50.0]]
+    below = [[-0.05, 3.0, 10.0], [0.08, 5.0, 40.0]]
+    exact = {"solution": "smooth", "parameters": {**_FALLING, "above": above, "below": below}}
+    return _plane("smooth, falling", exact, _DOWN, at=0.64, point=(0.18, 0.27), loads=_FORCE)
+
+
 def _tip(angle: float, intensity: tuple[float, float]) -> dict[str, Any]:
     away = [-2.0 * cos(radians(angle)), -2.0 * sin(radians(angle))]
     parameters = {"tip": [0.0, 0.0], "angle": angle, "intensity": list(intensity)}
@@ -112,6 +143,17 @@ def _griffith() -> dict[str, Any]:
     box = {"kind": "rectangle", "lower": [-2.0, -2.0], "upper": [2.0, 2.0]}
     exact = {"solution": "griffith", "parameters": parameters}
     return _plane("griffith", exact, [[-1.0, 0.0], [1.0, 0.0]], geometry=box)
+
+
+def _griffith_askew() -> dict[str, Any]:
+    centre, angle = (0.1, -0.2), 35.0
+    half = (cos(radians(angle)), sin(radians(angle)))
+    ends = [[m + sign * h for m, h in zip(centre, half, strict=True)] for sign in (-1, 1)]
+    stress = [0.3, 1.0, 0.4]
+    parameters = {"centre": list(centre), "a": 1.0, "angle": angle, "stress": stress}
+    box = {"kind": "rectangle", "lower": [-2.0, -2.0], "upper": [2.0, 2.0]}
+    exact = {"solution": "griffith", "parameters": parameters}
+    return _plane("griffith, askew", exact, ends, at=0.37, point=(-0.9, 0.4), geometry=box)
 
 
 def _solid_smooth() -> dict[str, Any]:

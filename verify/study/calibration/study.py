@@ -76,6 +76,8 @@ def calibration_findings(found: Sequence[Trial]) -> list[Finding]:
         (name, [one for one in counted if (one.quantity in NORMS) == norms])
         for name, norms in (("norms of the error", True), ("quantities of interest", False))
     ]
+    if held_out := [one for one in counted if one.held_out]:
+        kinds.append(("of all, on families that nothing was tuned on,", held_out))
     return [
         Finding(
             "coverage",

@@ -45,6 +45,8 @@ class Trial:
         How well the true error is known.
     left_out : str
         Why it does not count; empty if it does.
+    held_out : bool
+        Whether no estimator was tuned on the family.
     """
 
     family: str
@@ -55,6 +57,7 @@ class Trial:
     true: float
     known: float
     left_out: str = ""
+    held_out: bool = False
 
     @property
     def covered(self) -> bool:
@@ -79,7 +82,13 @@ def trials(family: Family) -> list[Trial]:
     for last in range(_LEVELS - 1, len(solutions)):
         levels = {k: solutions[k] for k in range(last - _LEVELS + 1, last + 1)}
         found += [
-            replace(one, family=family.name, degree=family.degree, level=last)
+            replace(
+                one,
+                family=family.name,
+                degree=family.degree,
+                level=last,
+                held_out=family.held_out,
+            )
             for one in _judged(scene, levels, body, law, exact, truth.quantities)
         ]
     return [replace(one, left_out=_left_out(one)) for one in found]
