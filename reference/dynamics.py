@@ -64,7 +64,7 @@ class Moment:
     ----------
     time : float
         s.
-    displacement, velocity : (n, 2) arrays
+    displacement, velocity : (n, d) arrays
         m, m/s.
     kinetic, strain, work : float
         J/m; `work` is what loads have done since the start.
@@ -91,7 +91,7 @@ class LinearMotion:
     space : ConformingSpace
     unknowns : (k,) int array
         Scalar unknowns held at their initial displacement.
-    displacement, velocity : (n, 2) arrays
+    displacement, velocity : (n, d) arrays
         At the nodes of the space at `start`, m and m/s.
     load : callable, optional
         Gives the linear form of constant loads for a test function.
@@ -127,7 +127,8 @@ class LinearMotion:
         self._u = _vector(self._stiffness, displacement)
         self._v = _vector(self._stiffness, velocity)
         self._v.array[unknowns] = 0.0
-        zero = fem.Constant(V.mesh, np.zeros(2))
+        self._dimension = space.dimension
+        zero = fem.Constant(V.mesh, np.zeros(space.dimension))
         form = ufl.inner(zero, v) * ufl.dx if load is None else load(v)
         self._force: Any = petsc.assemble_vector(fem.form(form))
         self._a = self._initial_acceleration()
@@ -220,8 +221,8 @@ class LinearMotion:
         kinetic, strain = self._energies()
         return Moment(
             self._time,
-            np.array(self._u.array, dtype=float).reshape(-1, 2),
-            np.array(self._v.array, dtype=float).reshape(-1, 2),
+            np.array(self._u.array, dtype=float).reshape(-1, self._dimension),
+            np.array(self._v.array, dtype=float).reshape(-1, self._dimension),
             kinetic,
             strain,
             work,
@@ -230,7 +231,7 @@ class LinearMotion:
 
 
 def inherit(closed: ConformingSpace, opened: ConformingSpace, field: Array) -> Array:
-    """Carry nodal values (n, 2) over to the same mesh with more of its cuts open.
+    """Carry nodal values (n, d) over to the same mesh with more of its cuts open.
 
     Every copy of a node starts with the value that the node had: nothing jumps when a cut
     opens, so energy and momentum go on.

@@ -3,14 +3,16 @@
 Both offer a step-averaged force, a discrete gradient of the energy: its work over a step is the
 change of the stored energy, and it turns nothing, whatever the step (Simo & Tarnow, ZAMP 43,
 1992; Gonzalez, CMAME 190, 2000). The linear one is the force at the mean displacement. The
-corotated energy in the plane is a function of tr C and of
+corotated energy is μ (tr C − 2 s + d) + ½ λ (s − d)² with s = tr U, of which tr C is quadratic in
+F, so that its mean stress is that of F̄, the mean of both deformation gradients. The rest is
 
-    q = (F₁₁ + F₂₂)² + (F₁₂ − F₂₁)² = tr C + 2 det F,
+    s₁ − s₀ = D : (F₁ − F₀),   D F̄ᵀ symmetric,
 
-both quadratic in F and blind to rotations. So along the path on which they are linear the mean
-stress is known in closed form: with s = √q, of which the energy is μ (tr C − 2 s + 2) +
-½ λ (s − 2)², it is 2 μ F̄ + c ∂q/∂F(F̄), c = (½ λ (s₀ + s₁ − 4) − 2 μ) / (s₀ + s₁), where F̄ is
-the mean of both deformation gradients.
+which leaves the stress 2 μ F̄ + (½ λ (s₀ + s₁ − 2 d) − 2 μ) D. In the plane s² = q = tr C + 2 det F
+is quadratic and blind to rotations: D = ∂q/∂F(F̄) / (s₀ + s₁). In space U₁² − U₀² =
+Ū (U₁ − U₀) + (U₁ − U₀) Ū with the mean stretch Ū = ½ (U₀ + U₁), so that D = F̄ Ū⁻¹: exact, not 0/0
+at rest, and without a quadrature over the step. It asks for a regular Ū: a cell that is pressed
+through zero volume at a mean stretch of zero has no such mean force.
 """
 
 from typing import Any, Protocol
@@ -19,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.elasticity import lame, stiffness_form
+from reference.polar_stretch import PolarStretch
 from reference.space import ConformingSpace
-from reference.strain_energies import corotated
+from reference.strain_energies import corotated, corotated_value
 from verify.scene import Material
 
 __all__ = ["CorotatedLaw", "Law", "LinearLaw", "Matrix", "law_of"]
@@ -126,13 +129,12 @@ class LinearLaw:
 
 
 class CorotatedLaw:
-    """μ‖U−I‖² + ½λ tr²(U−I) in the plane, at any rotation.
+    """μ‖U−I‖² + ½λ tr²(U−I) at any rotation.
 
     Parameters
     ----------
     material : Material
     space : ConformingSpace
-        In the plane.
     """
 
     linear = False
@@ -143,61 +145,69 @@ class CorotatedLaw:
 
         V = space.function_space
         lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
-        dx = ufl.Measure("dx", domain=V.mesh, metadata={"quadrature_degree": 4 * space.degree - 2})
         self._before, self._after, self._velocity = (fem.Function(V) for _ in range(3))
         v, w = ufl.TestFunction(V), ufl.TrialFunction(V)
-        first, last = (ufl.Identity(2) + ufl.grad(u) for u in (self._before, self._after))
-        total = corotated(last, lam, mu) * dx
-        force = ufl.derivative(total, self._after, v)
-        mean = 0.5 * (first + last)
-        reach = _stretch(first) + _stretch(last)
-        share = (lam / 2 * (reach - 4) - 2 * mu) / reach
-        stress = 2 * mu * mean + share * _slope(mean)
+        degree = 4 * space.degree - 2
+        first, last = (PolarStretch(u, degree) for u in (self._before, self._after))
+        self._first, self._last, dx = first, last, last.measure
+        force = last.derivative(corotated(last, lam, mu) * dx, v)
+        d = space.dimension
+        share = lam / 2 * (first.s + last.s - 2 * d) - 2 * mu
+        stress = mu * (first.F + last.F) + share * _mean_turn(first, last)
         averaged = ufl.inner(stress, ufl.grad(v)) * dx
-        viscous = _turned_work(last, ufl.grad(self._velocity), ufl.grad(v), lam, mu) * dx
-        damping = _turned_work(last, ufl.grad(w), ufl.grad(v), lam, mu) * dx
-        self._energy, self._force = fem.form(total), fem.form(force)
+        viscous = _turned_work(last.R, ufl.grad(self._velocity), ufl.grad(v), lam, mu) * dx
+        damping = _turned_work(last.R, ufl.grad(w), ufl.grad(v), lam, mu) * dx
+        self._energy = fem.form(corotated_value(last, lam, mu) * dx)
+        self._force = fem.form(force)
         self._averaged, self._viscous = fem.form(averaged), fem.form(viscous)
-        self._tangent = fem.form(ufl.derivative(force, self._after, w))
-        self._averaged_tangent = fem.form(ufl.derivative(averaged, self._after, w))
+        self._tangent = fem.form(last.derivative(force, w))
+        self._averaged_tangent = fem.form(last.derivative(averaged, w))
         self._viscous_tangent = fem.form(damping)
 
     def energy(self, u: Array) -> float:
         """Integral of the energy density."""
         from dolfinx import fem
 
-        self._after.x.array[:] = u
+        self._put(u)
         return float(np.real(fem.assemble_scalar(self._energy)))
 
     def force(self, u: Array) -> Array:
         """Return the gradient of the energy."""
-        self._after.x.array[:] = u
+        self._put(u)
         return self._vector(self._force)
 
     def averaged(self, u: Array, later: Array) -> Array:
         """Return the mean force of a step; see the module."""
-        self._before.x.array[:], self._after.x.array[:] = u, later
+        self._put(later, u)
         return self._vector(self._averaged)
 
     def viscous(self, u: Array, v: Array) -> Array:
         """Return the force of the rate of strain, seen in the turned frame."""
-        self._after.x.array[:], self._velocity.x.array[:] = u, v
+        self._put(u)
+        self._velocity.x.array[:] = v
         return self._vector(self._viscous)
 
     def tangent(self, u: Array) -> Any:
         """Return the exact tangent."""
-        self._after.x.array[:] = u
+        self._put(u)
         return _matrix(self._tangent)
 
     def averaged_tangent(self, u: Array, later: Array) -> Any:
         """Return the exact tangent of the mean force."""
-        self._before.x.array[:], self._after.x.array[:] = u, later
+        self._put(later, u)
         return _matrix(self._averaged_tangent)
 
     def viscous_tangent(self, u: Array) -> Any:
         """Return the stiffness with the rotations of u."""
-        self._after.x.array[:] = u
+        self._put(u)
         return _matrix(self._viscous_tangent)
+
+    def _put(self, after: Array, before: Array | None = None) -> None:
+        self._after.x.array[:] = after
+        self._last.update()
+        if before is not None:
+            self._before.x.array[:] = before
+            self._first.update()
 
     @staticmethod
     def _vector(form: Any) -> Array:
@@ -211,28 +221,22 @@ def law_of(material: Material, space: ConformingSpace, kinematics: str) -> Law:
     return (LinearLaw if kinematics == "linear" else CorotatedLaw)(material, space)
 
 
-def _stretch(F: Any) -> Any:
-    """√q = tr U."""
+def _mean_turn(first: PolarStretch, last: PolarStretch) -> Any:
+    """D of the module: a discrete gradient of tr U."""
     import ufl
 
-    return ufl.sqrt((F[0, 0] + F[1, 1]) ** 2 + (F[0, 1] - F[1, 0]) ** 2)
+    mean = 0.5 * (first.F + last.F)
+    if len(mean[0, :]) == 2:
+        return 2 * (mean + ufl.cofac(mean)) / (first.s + last.s)
+    stretches = [ufl.sym(state.R.T * state.F) for state in (first, last)]
+    return mean * ufl.inv(0.5 * (stretches[0] + stretches[1]))
 
 
-def _slope(F: Any) -> Any:
-    """∂q/∂F, linear in F."""
+def _turned_work(turn: Any, rate: Any, test: Any, lam: Any, mu: Any) -> Any:
+    """Linear elastic work of two gradients turned back by a rotation."""
     import ufl
 
-    trace, skew = 2 * (F[0, 0] + F[1, 1]), 2 * (F[0, 1] - F[1, 0])
-    return ufl.as_matrix([[trace, skew], [-skew, trace]])
-
-
-def _turned_work(F: Any, rate: Any, test: Any, lam: Any, mu: Any) -> Any:
-    """Linear elastic work of two gradients turned back by the rotation of F."""
-    import ufl
-
-    c, s = (F[0, 0] + F[1, 1]) / _stretch(F), (F[1, 0] - F[0, 1]) / _stretch(F)
-    back = ufl.as_matrix([[c, s], [-s, c]])
-    one, other = (ufl.sym(back * gradient) for gradient in (rate, test))
+    one, other = (ufl.sym(turn.T * gradient) for gradient in (rate, test))
     return 2 * mu * ufl.inner(one, other) + lam * ufl.tr(one) * ufl.tr(other)
 
 

@@ -11,7 +11,7 @@ from reference.boundary_values import constrained_values
 from reference.linear_solvers import (
     Answer,
     direct_solver,
-    rigid_motions,
+    near_null_space,
     solve_by_multigrid,
     solve_directly,
 )
@@ -24,6 +24,7 @@ __all__ = [
     "LinearSolve",
     "lame",
     "load_form",
+    "mean_stiffness",
     "solve_linear",
     "stiffness_form",
 ]
@@ -106,7 +107,7 @@ def solve_linear(
     x.array[own] = values[at]
     # symmetric elimination; the free rows keep their equilibrium, and any component can be held
     rows = (own + d * V.dofmap.index_map.local_range[0]).astype(PETSc.IntType)
-    matrix.zeroRowsColumns(rows, _mean_stiffness(matrix), x, vector)
+    matrix.zeroRowsColumns(rows, mean_stiffness(matrix), x, vector)
     assembled = perf_counter()
     timings = {"assembly": assembled - start}
     if method == "direct":
@@ -115,9 +116,8 @@ def solve_linear(
         answer = solve_directly(solver, matrix, x, vector)
         solver.destroy()
     else:
-        mine = space.node_points[space.node_of_dof[: space.owned]]
-        motions = rigid_motions(mine, space.node_points.mean(axis=0))
-        answer = solve_by_multigrid(matrix, x, vector, motions, tolerance)
+        matrix.setNearNullSpace(near_null_space(matrix, space))
+        answer = solve_by_multigrid(matrix, x, vector, tolerance)
     timings["solve"] = perf_counter() - start - sum(timings.values())
     solution.x.scatter_forward()
     energy = fem.form(0.5 * stiffness_form(scene.material, solution, solution))
@@ -221,7 +221,7 @@ def lame(material: Material) -> tuple[float, float]:
     return (2 * lam * mu / (lam + 2 * mu), mu) if material.plane == "stress" else (lam, mu)
 
 
-def _mean_stiffness(matrix: Any) -> float:
+def mean_stiffness(matrix: Any) -> float:
     """Give a mean diagonal entry: a constrained unknown shall not stand out among the others."""
     diagonal = matrix.getDiagonal()
     mean = float(diagonal.sum()) / diagonal.getSize()

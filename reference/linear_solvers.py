@@ -5,7 +5,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Answer", "direct_solver", "rigid_motions", "solve_by_multigrid", "solve_directly"]
+from reference.space import ConformingSpace
+
+__all__ = [
+    "Answer",
+    "direct_solver",
+    "near_null_space",
+    "rigid_motions",
+    "set_multigrid",
+    "solve_by_multigrid",
+    "solve_directly",
+]
 
 _LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 _MOST_ITERATIONS = 2000
@@ -88,9 +98,7 @@ def solve_directly(solver: Any, matrix: Any, x: Any, vector: Any) -> Answer:
     return Answer("PETSc, MUMPS Cholesky", size, left, 0)
 
 
-def solve_by_multigrid(
-    matrix: Any, x: Any, vector: Any, motions: NDArray[np.float64], tolerance: float
-) -> Answer:
+def solve_by_multigrid(matrix: Any, x: Any, vector: Any, tolerance: float) -> Answer:
     """Solve by conjugate gradients with algebraic multigrid (GAMG), from x.
 
     PETSc judges convergence by a residual that it updates, and that drifts away from the true one:
@@ -99,9 +107,8 @@ def solve_by_multigrid(
     Parameters
     ----------
     matrix, x, vector : PETSc Mat and Vecs
-        x holds the values of the constrained unknowns and zeros else.
-    motions : (k, l) array
-        Rigid motions of the body at the unknowns of this rank.
+        x holds the values of the constrained unknowns and zeros else; the matrix knows its
+        near-null-space.
     tolerance : float
         Of the true residual, relative to that of the start.
 
@@ -113,20 +120,11 @@ def solve_by_multigrid(
     from petsc4py import PETSc
 
     matrix.setOption(PETSc.Mat.Option.SPD, True)
-    modes = _orthonormal(matrix, motions)
-    near = PETSc.NullSpace().create(vectors=modes, comm=matrix.comm)
-    matrix.setNearNullSpace(near)
     solver = PETSc.KSP().create(matrix.comm)
-    solver.setOptionsPrefix("reference_")
-    options: Any = PETSc.Options()
-    for name, value in _MULTIGRID.items():
-        options[f"reference_{name}"] = value
     solver.setOperators(matrix)
+    set_multigrid(solver)
     solver.setType("cg")
     solver.setInitialGuessNonzero(True)
-    solver.setFromOptions()
-    for name in _MULTIGRID:
-        options.delValue(f"reference_{name}")
     residual, before = vector.duplicate(), x.duplicate()
     loads = _residual(matrix, x, vector, residual)
     iterations, left, size = 0, 1.0, 0.0
@@ -143,7 +141,7 @@ def solve_by_multigrid(
         if left <= tolerance or _failed(solver):
             break
     reason = solver.getConvergedReason()
-    for entry in (solver, residual, before, near, *modes):
+    for entry in (solver, residual, before):
         entry.destroy()
     if not left <= tolerance:
         raise RuntimeError(
@@ -151,6 +149,31 @@ def solve_by_multigrid(
             f"{reason}); {tolerance:.1e} is wanted"
         )
     return Answer("PETSc, CG with GAMG", min(size, left), left, iterations)
+
+
+def set_multigrid(solver: Any) -> None:
+    """Let a PETSc KSP be preconditioned by GAMG, its norm that of the true residual."""
+    from petsc4py import PETSc
+
+    solver.setOptionsPrefix("reference_")
+    options: Any = PETSc.Options()
+    for name, value in _MULTIGRID.items():
+        options[f"reference_{name}"] = value
+    solver.setFromOptions()
+    for name in _MULTIGRID:
+        options.delValue(f"reference_{name}")
+
+
+def near_null_space(matrix: Any, space: ConformingSpace) -> Any:
+    """Give the rigid motions of a body as PETSc wants them for the multigrid of `matrix`."""
+    from petsc4py import PETSc
+
+    mine = space.node_points[space.node_of_dof[: space.owned]]
+    modes = _orthonormal(matrix, rigid_motions(mine, space.node_points.mean(axis=0)))
+    found = PETSc.NullSpace().create(vectors=modes, comm=matrix.comm)
+    for mode in modes:
+        mode.destroy()
+    return found
 
 
 def rigid_motions(points: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,28 +1,65 @@
-"""Densities of strain energy in the plane, as UFL expressions of the deformation gradient."""
+"""Densities of strain energy as UFL expressions of the deformation, in the plane and in space."""
 
 from typing import Any
 
-__all__ = ["ENERGIES", "corotated", "neo_hookean"]
+__all__ = [
+    "ENERGIES",
+    "VALUES",
+    "corotated",
+    "corotated_value",
+    "neo_hookean",
+    "st_venant_kirchhoff",
+]
 
 
-def corotated(F: Any, lam: Any, mu: Any) -> Any:
+def corotated(polar: Any, lam: Any, mu: Any) -> Any:
     """μ‖U−I‖² + ½λ tr²(U−I), the potential of corotational linear elasticity with polar rotations.
 
-    In the plane tr U = √((F₁₁+F₂₂)² + (F₁₂−F₂₁)²), so that no eigenvalues are needed. The
-    out-of-plane stretch is 1 in plane strain, and eliminated by λ in plane stress.
+    The out-of-plane stretch is 1 in plane strain, and eliminated by λ in plane stress.
+
+    Parameters
+    ----------
+    polar : PolarStretch
+    lam, mu : ufl expressions
+        Lamé constants, Pa.
     """
     import ufl
 
-    stretch = ufl.sqrt((F[0, 0] + F[1, 1]) ** 2 + (F[0, 1] - F[1, 0]) ** 2)
-    return mu * (ufl.inner(F, F) - 2 * stretch + 2) + lam / 2 * (stretch - 2) ** 2
+    d = len(polar.F[0, :])
+    return mu * (ufl.inner(polar.F, polar.F) - 2 * polar.s + d) + lam / 2 * (polar.s - d) ** 2
 
 
-def neo_hookean(F: Any, lam: Any, mu: Any) -> Any:
-    """½μ (tr C − 2 − 2 ln J) + ½λ ln² J, compressible neo-Hookean in plane strain."""
+def corotated_value(polar: Any, lam: Any, mu: Any) -> Any:
+    """Give the same energy as squares: right to round-off also where strains are small.
+
+    `corotated` is a difference of numbers of size μ, but quicker to differentiate.
+    """
     import ufl
 
-    J = ufl.det(F)
-    return mu / 2 * (ufl.inner(F, F) - 2 - 2 * ufl.ln(J)) + lam / 2 * ufl.ln(J) ** 2
+    d, away = len(polar.F[0, :]), polar.F - polar.R
+    return mu * ufl.inner(away, away) + lam / 2 * (polar.s - d) ** 2
 
 
-ENERGIES = {"corotated": corotated, "neo_hookean": neo_hookean}
+def neo_hookean(polar: Any, lam: Any, mu: Any) -> Any:
+    """½μ (tr C − d − 2 ln J) + ½λ ln² J, compressible neo-Hookean; in the plane, plane strain."""
+    import ufl
+
+    d, J = len(polar.F[0, :]), ufl.det(polar.F)
+    return mu / 2 * (ufl.inner(polar.F, polar.F) - d - 2 * ufl.ln(J)) + lam / 2 * ufl.ln(J) ** 2
+
+
+def st_venant_kirchhoff(polar: Any, lam: Any, mu: Any) -> Any:
+    """μ E:E + ½λ tr² E with E = ½ (C − I); softens when pressed, and has no barrier at J = 0."""
+    import ufl
+
+    E = 0.5 * (polar.F.T * polar.F - ufl.Identity(len(polar.F[0, :])))
+    return mu * ufl.inner(E, E) + lam / 2 * ufl.tr(E) ** 2
+
+
+ENERGIES = {
+    "corotated": corotated,
+    "neo_hookean": neo_hookean,
+    "st_venant_kirchhoff": st_venant_kirchhoff,
+}
+# densities to evaluate, where they are not those to differentiate
+VALUES = {**ENERGIES, "corotated": corotated_value}

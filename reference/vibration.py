@@ -22,7 +22,7 @@ class Vibration:
     ----------
     frequencies : (k,) array
         Angular frequencies ω, ascending, rad/s.
-    modes : (k, n, 2) array
+    modes : (k, n, d) array
         At the nodes of the space; of unit mass norm.
     residual : float
         Largest relative residual ‖Kv − ω²Mv‖ / ω²‖Mv‖ of a pair.
@@ -138,7 +138,7 @@ def _solve(
         value = float(np.real(solver.getEigenpair(i, vector)))
         stiffness.mult(vector, k_v)
         mass.mult(vector, m_v)
-        modes.append(np.array(vector.array, dtype=float).reshape(-1, 2))
+        modes.append(np.array(vector.array, dtype=float).reshape(-1, space.dimension))
         modes[-1] /= np.sqrt(vector.dot(m_v))
         k_v.axpy(-value, m_v)
         residuals.append(float(k_v.norm() / (abs(value) * m_v.norm() or 1.0)))

@@ -36,8 +36,6 @@ def _refusal(scene: Scene) -> str | None:
         return f"conforming meshes of a '{geometry.kind}' geometry are not offered yet"
     if any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
         return "a cut that grows while the body moves is played (verify play), not solved"
-    if scene.dimension == 3 and scene.analysis.kinematics != "linear":
-        return "finite rotations in space are not offered by the reference yet"
     return None
 
 

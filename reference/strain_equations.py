@@ -1,0 +1,236 @@
+"""Equilibrium of a strain energy at one load factor: residual, exact tangent, PETSc's Newton."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.elasticity import lame, mean_stiffness
+from reference.linear_solvers import near_null_space, set_multigrid
+from reference.polar_stretch import PolarStretch
+from reference.space import ConformingSpace
+from reference.strain_energies import ENERGIES, VALUES
+from verify.scene import Material
+
+__all__ = ["StrainEquations"]
+
+Array = NDArray[np.float64]
+_TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
+_GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall further
+_MOST_ITERATIONS = 25
+# share of the body that may be inside out: the corotated energy has no barrier, and at a tip or a
+# clamped corner its strains are unbounded, so that a well graded mesh always has such cells there
+_INVERTED = {"corotated": 1e-3, "neo_hookean": 0.0, "st_venant_kirchhoff": 0.0}
+# unknowns in space up to which the tangent is factorised; more are solved by multigrid
+_MOST_DIRECT = 40_000
+_LINEAR = 1e-6  # of the residual: what a linear solve by multigrid leaves
+
+
+class StrainEquations:
+    """Residual and tangent of a strain energy, with the constrained rows taken out.
+
+    Parameters
+    ----------
+    material : Material
+    space : ConformingSpace
+    unknowns : (k,) int array
+        Constrained scalar unknowns, by nodes.
+    load : callable or None
+        Gives the linear form of the dead loads for a test function.
+    energy : str
+        A name in `ENERGIES`.
+
+    Attributes
+    ----------
+    solution : dolfinx.fem.Function
+    iterations : int
+        Newton's so far.
+    """
+
+    def __init__(
+        self,
+        material: Material,
+        space: ConformingSpace,
+        unknowns: NDArray[np.int32],
+        load: Any,
+        energy: str,
+    ) -> None:
+        import ufl
+        from dolfinx import fem
+        from dolfinx.fem import petsc
+
+        V = space.function_space
+        self._space, self.iterations, self._most_inverted = space, 0, _INVERTED[energy]
+        self._own, self._at = space.own_unknowns(unknowns)
+        first = space.dimension * V.dofmap.index_map.local_range[0]
+        self._rows = (self._own + first).astype(np.int32)
+        self.solution = fem.Function(V)
+        self._factor = fem.Constant(V.mesh, 0.0)
+        lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
+        self._polar = polar = PolarStretch(self.solution, 4 * space.degree - 2)
+        total = ENERGIES[energy](polar, lam, mu) * polar.measure
+        v = ufl.TestFunction(V)
+        residual = polar.derivative(total, v)
+        if load is not None:
+            residual -= self._factor * load(v)
+        self._energy = fem.form(VALUES[energy](polar, lam, mu) * polar.measure)
+        self._residual = fem.form(residual)
+        self._tangent = fem.form(polar.derivative(residual, ufl.TrialFunction(V)))
+        self._jacobian = fem.Expression(ufl.det(polar.F), quadrature_points(space))
+        self._matrix: Any = petsc.create_matrix(self._tangent)
+        self._vector = self.solution.x.petsc_vec.duplicate()
+        self._increment = self._vector.duplicate()
+        self._force = self._diagonal = 0.0
+        self._solver = self._newton()
+
+    def advance(self, target: float, values: Array) -> str:
+        """Go to another load factor; say why not, or nothing.
+
+        Parameters
+        ----------
+        target : float
+        values : (k,) array
+            Of the constrained unknowns there, m.
+        """
+        self._factor.value = np.asarray(target)
+        self._predict(values[self._at])
+        x = self.solution.x.petsc_vec
+        # no step so small that it would count as converged: a line search that fails takes such
+        limit, solver = _TOLERANCE * self._force, self._solver
+        solver.setTolerances(atol=limit, rtol=0.0, stol=0.0, max_it=_MOST_ITERATIONS)
+        solver.solve(None, x)
+        self._take(x)
+        self.iterations += solver.getIterationNumber()
+        reason = solver.getConvergedReason()
+        if reason <= 0 and not solver.getFunctionNorm() <= _GOOD_ENOUGH * self._force:
+            from petsc4py import PETSc
+
+            names = vars(PETSc.SNES.ConvergedReason)
+            words = [n for n, value in names.items() if value == reason and n.isupper()]
+            return f"SNES {words[0].lower() if words else reason}"
+        least, inverted = self.jacobian()
+        if not inverted <= self._most_inverted:
+            part = "area" if self._space.dimension == 2 else "volume"
+            return f"{inverted:.2g} of the {part} turned inside out (least det F {least:.2g})"
+        return ""
+
+    def displacement(self) -> Array:
+        """Nodal displacements (n, d) on every rank, m."""
+        return self._space.everywhere(np.asarray(self.solution.x.array, dtype=float))
+
+    def energy(self) -> float:
+        """Return the stored energy, J (in the plane per metre)."""
+        from dolfinx import fem
+
+        comm = self._space.function_space.mesh.comm
+        return float(comm.allreduce(float(np.real(fem.assemble_scalar(self._energy)))))
+
+    def jacobian(self) -> tuple[float, float]:
+        """Give the least det F, and the share of the body where it is not positive."""
+        from mpi4py import MPI
+
+        space = self._space
+        domain, d = space.function_space.mesh, space.dimension
+        corners = space.mesh.points[space.mesh.cells]
+        volumes = np.linalg.det(corners[:, 1:] - corners[:, :1])
+        here = np.flatnonzero(space.dolfinx_cell >= 0)
+        cell_of = np.empty(len(here), dtype=np.int64)
+        cell_of[space.dolfinx_cell[here]] = here
+        own = domain.topology.index_map(d).size_local
+        values = self._jacobian.eval(domain, np.arange(own, dtype=np.int32)).reshape(own, -1)
+        share = np.count_nonzero(~(values > 0), axis=1) / max(values.shape[1], 1)
+        inverted = domain.comm.allreduce(float(share @ volumes[cell_of[:own]]))
+        least = domain.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
+        return float(least), float(inverted / volumes.sum())
+
+    def destroy(self) -> None:
+        """Free what PETSc holds."""
+        for entry in (self._solver, self._matrix, self._vector, self._increment):
+            entry.destroy()
+
+    def _assemble_residual(self, _snes: Any, x: Any, out: Any) -> None:
+        from dolfinx.fem import petsc
+
+        self._take(x)
+        with out.localForm() as local:
+            local.set(0.0)
+        petsc.assemble_vector(out, self._residual)
+        out.ghostUpdate(addv=True, mode="reverse")
+        out.array[self._own] = 0.0
+
+    def _assemble_tangent(self, _snes: Any, x: Any, matrix: Any, _preconditioner: Any) -> None:
+        self._take(x)
+        self._assemble(matrix)
+        matrix.zeroRowsColumns(self._rows, self._diagonal)
+
+    def _predict(self, values: Array) -> None:
+        """Add the linear response to the increments of the prescribed values and of the load."""
+        from dolfinx.fem import petsc
+
+        x, increment, vector = self.solution.x.petsc_vec, self._increment, self._vector
+        self._take(x)
+        self._assemble(self._matrix)
+        if not self._diagonal:
+            self._diagonal = mean_stiffness(self._matrix)
+        with vector.localForm() as local:
+            local.set(0.0)
+        petsc.assemble_vector(vector, self._residual)
+        vector.ghostUpdate(addv=True, mode="reverse")
+        vector.scale(-1.0)
+        increment.set(0.0)
+        increment.array[self._own] = values - x.array[self._own]
+        self._matrix.zeroRowsColumns(self._rows, self._diagonal, increment, vector)
+        linear = self._solver.getKSP()
+        linear.setOperators(self._matrix)
+        linear.solve(vector, increment)
+        self._assemble(self._matrix)
+        self._matrix.mult(increment, vector)
+        self._force = max(self._force, float(vector.norm()), 1e-300)
+        x.axpy(1.0, increment)
+        x.array[self._own] = values
+        self._take(x)
+
+    def _take(self, x: Any) -> None:
+        mine = self.solution.x.petsc_vec
+        if x.handle != mine.handle:
+            x.copy(mine)
+        self.solution.x.scatter_forward()
+        self._polar.update()
+
+    def _assemble(self, matrix: Any) -> None:
+        from dolfinx.fem import petsc
+
+        matrix.zeroEntries()
+        petsc.assemble_matrix(matrix, self._tangent)
+        matrix.assemble()
+
+    def _newton(self) -> Any:
+        from petsc4py import PETSc
+
+        space, matrix = self._space, self._matrix
+        solver = PETSc.SNES().create(matrix.comm)
+        solver.setType("newtonls")  # with backtracking, unless told otherwise
+        solver.setFunction(self._assemble_residual, self._vector.duplicate())
+        solver.setJacobian(self._assemble_tangent, matrix)
+        linear = solver.getKSP()
+        # symmetric, but a tangent at finite rotation need not be definite
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        if space.dimension == 2 or space.node_points.size <= _MOST_DIRECT:
+            linear.setType("preonly")
+            linear.getPC().setType("cholesky")
+            linear.getPC().setFactorSolverType("mumps")
+            return solver
+        matrix.setNearNullSpace(near_null_space(matrix, space))
+        set_multigrid(linear)
+        linear.setType("gmres")
+        linear.setGMRESRestart(100)
+        linear.setTolerances(rtol=_LINEAR, atol=0.0, max_it=400)
+        return solver
+
+
+def quadrature_points(space: ConformingSpace) -> Array:
+    """Points (q, d) of the reference cell at which energies of `space` are integrated."""
+    import basix
+
+    cell = basix.CellType.triangle if space.dimension == 2 else basix.CellType.tetrahedron
+    return np.asarray(basix.make_quadrature(cell, 4 * space.degree - 2)[0], dtype=float)

@@ -1,0 +1,120 @@
+"""Motion at finite rotation in space: what is conserved, and what a cut sets free."""
+
+import numpy as np
+import pytest
+from reference_scenes import needs_fenicsx
+from solid_scenes import polygon
+
+from reference.meshing import open_cut, structured_tetrahedra
+from verify.scene import Material, Scene
+
+pytestmark = needs_fenicsx
+
+TISSUE = Material(young=1e4, poisson=0.3, density=1000.0)
+MIDDLE = polygon("middle", (-1, -1, 0.5), (2, -1, 0.5), (2, 2, 0.5), (-1, 2, 0.5))
+NONE = np.zeros((0, 3), dtype=np.int64)
+SPIN = {
+    "kind": "moving",
+    "spin": [1.0, 3.0, -2.0],
+    "centre": [0.5, 0.5, 0.5],
+    "velocity": [0.3, -0.1, 0.2],
+}
+
+
+def moving(cuts=(), duration=0.5, **changes):
+    """Give a free unit cube of tissue."""
+    content = {
+        "title": "cube",
+        "requirement": "none",
+        "geometry": {"kind": "box", "lower": [0, 0, 0], "upper": [1, 1, 1]},
+        "mesh": {"cells": [[2, 2, 2]]},
+        "material": {"young": 1e4, "poisson": 0.3, "density": 1000.0},
+        "cuts": list(cuts),
+        "analysis": {
+            "kind": "dynamic",
+            "kinematics": "corotational",
+            "duration": duration,
+            "time_step": 0.01,
+            "outputs": 6,
+        },
+    }
+    return Scene.model_validate(content | changes)
+
+
+def solved(scene, **parameters):
+    from verify.solvers import find_solver
+
+    return find_solver("conforming").solve(scene, 0, repetitions=0, **parameters)
+
+
+def law(degree, counts=(1, 1, 1)):
+    from reference.dynamics_law import CorotatedLaw
+    from reference.space import conforming_space
+
+    mesh = open_cut(*structured_tetrahedra((0, 0, 0), (1, 1, 1), counts), NONE)
+    space = conforming_space(mesh, degree)
+    return CorotatedLaw(TISSUE, space), space.node_points
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_mean_force_of_a_step_is_a_discrete_gradient_and_turns_nothing(degree):
+    mechanics, x = law(degree)
+    random = np.random.default_rng(1)
+    for size in (1e-3, 0.1, 0.5):  # the last turns some cells inside out
+        u, later = size * random.standard_normal((2, *x.shape))
+        force = mechanics.averaged(u.ravel(), later.ravel())
+        reach = np.abs(force) @ np.abs(later - u).ravel()
+        gained = mechanics.energy(later.ravel()) - mechanics.energy(u.ravel())
+        scale = reach + mechanics.energy(later.ravel())
+        assert force @ (later - u).ravel() == pytest.approx(gained, abs=1e-12 * scale)
+        force, place = force.reshape(-1, 3), x + 0.5 * (u + later)
+        moment = np.cross(place, force).sum(axis=0)
+        assert np.abs(moment).max() < 1e-12 * np.abs(place).max() * np.abs(force).sum()
+        assert np.abs(force.sum(axis=0)).max() < 1e-12 * np.abs(force).sum()
+
+
+def test_the_mean_force_of_a_step_that_does_not_move_is_the_force_there():
+    mechanics, x = law(1)
+    u = 0.1 * np.random.default_rng(2).standard_normal(x.size)
+    force = mechanics.force(u)
+    assert mechanics.averaged(u, u) == pytest.approx(force, abs=1e-12 * np.abs(force).max())
+    # and its tangent is the slope of the mean force, half of that of the force
+    v = np.random.default_rng(3).standard_normal(u.size)
+    change = 1e-6 * v
+    slope = (mechanics.averaged(u, u + change) - mechanics.averaged(u, u - change)) / 2e-6
+    matrix = mechanics.averaged_tangent(u, u)
+    a, b = matrix.createVecs()
+    a.array[:] = v
+    matrix.mult(a, b)
+    assert b.array == pytest.approx(slope, abs=1e-7 * np.abs(slope).max())
+
+
+def test_a_cut_body_that_tumbles_keeps_energy_and_momenta():
+    """Spun about no axis of symmetry, its halves stretched by centrifugal forces."""
+    ledger = solved(moving([MIDDLE], initial=SPIN), scheme="energy_momentum").ledger
+    total = ledger["kinetic"] + ledger["strain"]
+    assert ledger["strain"].max() > 1e-3 * total[0]
+    # Newton's residual is 1e-11 of the forces; fifty steps
+    assert np.ptp(total) < 1e-10 * total[0]
+    for axis in "xyz":
+        assert np.ptp(ledger[f"angular_momentum_{axis}"]) < 1e-10 * total[0]
+        assert np.ptp(ledger[f"linear_momentum_{axis}"]) < 1e-10 * 1000
+
+
+def test_a_freed_half_falls_by_g_while_the_other_sags():
+    scene = moving(
+        [MIDDLE],
+        supports=[{"where": "top", "displacement": [0, 0, 0]}],
+        loads=[{"kind": "gravity", "acceleration": [0, 0, -0.98]}],
+    )
+    found = solved(scene, scheme="energy_momentum")
+    lower = np.unique(found.cells[found.points[found.cells, 2].mean(axis=1) < 0.5])
+    fall = np.tile([0.0, 0.0, -0.1225], (len(lower), 1))
+    assert found.displacement[-1][lower] == pytest.approx(fall, abs=1e-9)
+    assert np.ptp(found.ledger["total"]) < 1e-10 * found.ledger["kinetic"].max()
+
+
+@pytest.mark.parametrize("scheme", ["newmark", "implicit_euler", "generalised_alpha"])
+def test_the_account_of_every_other_scheme_closes(scheme):
+    ledger = solved(moving([MIDDLE], 0.1, initial=SPIN), scheme=scheme).ledger
+    assert np.ptp(ledger["total"]) < 1e-10 * ledger["kinetic"].max()
