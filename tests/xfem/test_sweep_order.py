@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from numba import njit
 
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.dynamics.real_time import _held_entries
-from verify.xfem.sweep_order_kernels import fill_lanes, number_upper_blocks, order_pieces
+from verify.xfem.lane_shuffles import add_vector, address, transpose_square
+from verify.xfem.polar_kernels import LANES
+from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.sweep_order_kernels import assign_slots, fill_lanes, order_pieces
 
-LANES = 8
 FIRST, SECOND = (0, 0, 0, 1, 1, 2), (1, 2, 3, 2, 3, 3)
 
 
@@ -42,21 +45,59 @@ def test_transposed_and_diagonal_blocks_are_where_a_sort_finds_them(body) -> Non
     np.testing.assert_array_equal(pattern.diagonal, np.flatnonzero(rows == pattern.columns))
 
 
-def test_blocks_above_the_diagonal_are_numbered_as_pieces_meet_them(body) -> None:
+def test_a_slot_is_of_one_block_from_its_first_piece_until_its_row_is_finished(body) -> None:
     _, cells, nodes = body
     pattern = block_pattern(cells, nodes)
-    pieces, corner, _ = order_pieces(cells, nodes)
-    ranks, source, met = number_upper_blocks(pieces, corner, pattern.targets, pattern.mirror)
+    pieces, corner, ordered = order_pieces(cells, nodes)
+    slots, slot_of, ends, count = assign_slots(
+        pieces, corner, ordered, pattern.targets, pattern.starts, pattern.diagonal, LANES
+    )
     each = np.arange(len(pieces))[:, None]
-    targets = pattern.targets[pieces][each, corner[:, FIRST], corner[:, SECOND]]
-    blocks, first, index = np.unique(targets, return_index=True, return_inverse=True)
-    number = np.empty(len(blocks), dtype=int)
-    number[np.argsort(first)] = np.arange(len(blocks))
-    np.testing.assert_array_equal(ranks, number[index].reshape(targets.shape))
-    expected = np.full(len(pattern.columns), len(blocks))
-    expected[blocks] = expected[pattern.mirror[blocks]] = number
-    np.testing.assert_array_equal(source, expected)
-    assert met == len(blocks)
+    blocks = pattern.targets[pieces][each, corner[:, FIRST], corner[:, SECOND]]
+    np.testing.assert_array_equal(slots, slot_of[blocks])
+    np.testing.assert_array_equal(ends, (ordered[:, :1] <= np.arange(nodes)).sum(axis=0))
+    rows = np.repeat(np.arange(nodes), np.diff(pattern.starts))
+    assert not slot_of[pattern.columns <= rows].any()
+    assert slots.min() == 1
+    assert slots.max() == count - 1
+    batch_of = {}
+    for place, met in enumerate(blocks):
+        for block in met:
+            batch_of.setdefault(block, place // LANES)
+    taken = {}  # slot: batch in which it is last used
+    for block in sorted(batch_of, key=batch_of.get):
+        assert batch_of[block] > taken.get(slot_of[block], -1)
+        taken[slot_of[block]] = (ends[rows[block]] - 1) // LANES
+    assert count <= len(batch_of) + 1
+
+
+def test_slots_are_as_many_as_a_front_of_the_mesh_has_blocks() -> None:
+    cells = box_mesh((30, 3, 3)).cells
+    pattern = block_pattern(cells, cells.max() + 1)
+    order = order_pieces(cells, cells.max() + 1)
+    *_, count = assign_slots(*order, pattern.targets, pattern.starts, pattern.diagonal, LANES)
+    assert count < 0.3 * (len(pattern.columns) - pattern.node_count) / 2
+
+
+def test_squares_of_lanes_are_transposed_and_vectors_added() -> None:
+    rng = np.random.default_rng(5)
+    before, numbers = rng.random(3 + LANES * LANES), rng.random(20)
+    entries, sums = before.copy(), np.zeros(20)
+    _shuffle(entries, numbers, sums)
+    np.testing.assert_array_equal(entries[:3], before[:3])
+    np.testing.assert_array_equal(
+        entries[3:].reshape(LANES, LANES), before[3:].reshape(LANES, LANES).T
+    )
+    np.testing.assert_array_equal(sums[5 : 5 + LANES], 2.0 * numbers[1 : 1 + LANES])
+    assert not sums[:5].any()
+    assert not sums[5 + LANES :].any()
+
+
+@njit
+def _shuffle(entries, numbers, sums):
+    transpose_square(address(entries), 3)
+    for _ in range(2):
+        add_vector(address(sums), 5, address(numbers), 1)
 
 
 def test_lanes_hold_gradients_and_moduli_of_their_pieces(body) -> None:
@@ -67,16 +108,15 @@ def test_lanes_hold_gradients_and_moduli_of_their_pieces(body) -> None:
     gradients, volumes = rng.random((parents, 4, 3)), rng.random(count)
     lam, mu = rng.random((2, parents))
     batches = -(-count // LANES)
-    slopes, moduli = np.zeros((batches, 9 * LANES)), np.zeros((batches, 2 * LANES))
-    fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, LANES, slopes, moduli)
-    of_piece = slopes.reshape(batches, 9, LANES).transpose(0, 2, 1).reshape(-1, 9)
+    constants = np.zeros((batches, 11 * LANES))
+    fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, LANES, constants)
+    of_piece = constants.reshape(batches, 11, LANES).transpose(0, 2, 1).reshape(-1, 11)
     cell = parent[pieces]
     wanted = np.take_along_axis(gradients[cell], corner[:, :, None], axis=1)[:, 1:].reshape(-1, 9)
-    np.testing.assert_array_equal(of_piece[:count], wanted)
+    np.testing.assert_array_equal(of_piece[:count, :9], wanted)
     assert not of_piece[count:].any()
-    both = moduli.reshape(batches, 2, LANES).transpose(0, 2, 1).reshape(-1, 2)[:count]
     weighed = volumes[pieces, None] * np.stack([lam[cell], mu[cell]], axis=1)
-    np.testing.assert_array_equal(both, weighed)
+    np.testing.assert_array_equal(of_piece[:count, 9:], weighed)
 
 
 def test_entries_beside_fixed_components_are_those_of_a_mask(body) -> None:

@@ -7,7 +7,7 @@ insertion; this is done anew at every cut.
 import numpy as np
 from numba import njit
 
-__all__ = ["fill_lanes", "number_upper_blocks", "order_pieces"]
+__all__ = ["assign_slots", "fill_lanes", "order_pieces"]
 
 
 @njit(cache=True)
@@ -71,7 +71,7 @@ def _is_before(p, q, cells, order):
 
 
 @njit(cache=True)
-def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, slopes, moduli):
+def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, constants):
     """Write gradients of three corners, and Lamé parameters times volume, lane by lane.
 
     Parameters
@@ -84,10 +84,8 @@ def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, slope
     volumes : (p,) float array
     lam, mu : (m,) float array
     lanes : int
-    slopes : (batches, 9 · lanes) float array
+    constants : (batches, 11 · lanes) float array
         Overwritten; what is beyond the last piece stays.
-    moduli : (batches, 2 · lanes) float array
-        Likewise.
     """
     for place in range(len(pieces)):
         p = pieces[place]
@@ -95,47 +93,69 @@ def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, slope
         for k in range(1, 4):
             for i in range(3):
                 entry = 3 * (k - 1) + i
-                slopes[batch, entry * lanes + lane] = gradients[cell, corner[place, k], i]
-        moduli[batch, lane] = volumes[p] * lam[cell]
-        moduli[batch, lanes + lane] = volumes[p] * mu[cell]
+                constants[batch, entry * lanes + lane] = gradients[cell, corner[place, k], i]
+        constants[batch, 9 * lanes + lane] = volumes[p] * lam[cell]
+        constants[batch, 10 * lanes + lane] = volumes[p] * mu[cell]
 
 
 @njit(cache=True)
-def number_upper_blocks(pieces, corner, targets, mirror):
-    """Give numbers to the blocks above the diagonal in the order in which pieces meet them.
+def assign_slots(pieces, corner, nodes, targets, starts, diagonal, lanes):
+    """Give each block above the diagonal a slot from its first piece until its row is finished.
+
+    Rows are finished when the batch is done that has the last piece that begins with their node;
+    their slots are then free again, so that there are as many as a front of the mesh has blocks.
+    The first slot stays empty: it is that of blocks to which no piece adds.
 
     Parameters
     ----------
-    pieces, corner : (p,), (p, 4) int arrays
+    pieces, corner, nodes : (p,), (p, 4), (p, 4) int arrays
         As from `order_pieces`.
     targets : (p, 4, 4) int array
         Block of each pair of corners.
-    mirror : (B,) int array
-        Place of the transposed of each block.
+    starts, diagonal : int arrays
+        Pattern.
+    lanes : int
+        Pieces in a batch.
 
     Returns
     -------
-    ranks : (p, 6) int32 array
-        Numbers of the blocks of the pairs (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3).
-    source : (B,) int32 array
-        Number of each block or of its transposed; of the diagonal how many there are.
-    met : int
-        How many there are.
+    slots : (p, 6) uint32 array
+        Of the blocks of the pairs (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3).
+    slot_of : (B,) uint32 array
+        Of the blocks above the diagonal.
+    ends : (N,) int array
+        Pieces that begin with the node of the row or one before.
+    count : int
+        How many slots there are.
     """
-    rank = np.full(len(mirror), -1, dtype=np.int32)
-    ranks = np.empty((len(pieces), 6), dtype=np.int32)
-    met = 0
+    rows = len(diagonal)
+    ends = np.zeros(rows, dtype=np.int64)
+    for place in range(len(pieces)):
+        ends[nodes[place, 0]] += 1
+    for row in range(1, rows):
+        ends[row] += ends[row - 1]
+    slots = np.empty((len(pieces), 6), dtype=np.uint32)
+    slot_of = np.zeros(starts[rows], dtype=np.uint32)
+    free, waiting, count, row = np.empty(starts[rows], dtype=np.uint32), 0, 1, 0
     for place in range(len(pieces)):
         pair = 0
         for a in range(3):
             for b in range(a + 1, 4):
                 block = targets[pieces[place], corner[place, a], corner[place, b]]
-                if rank[block] < 0:
-                    rank[block] = rank[mirror[block]] = met
-                    met += 1
-                ranks[place, pair] = rank[block]
+                if slot_of[block] == 0:
+                    if waiting > 0:
+                        waiting -= 1
+                        slot_of[block] = free[waiting]
+                    else:
+                        slot_of[block] = count
+                        count += 1
+                slots[place, pair] = slot_of[block]
                 pair += 1
-    for block in range(len(rank)):
-        if rank[block] < 0:
-            rank[block] = met
-    return ranks, rank, met
+        if (place + 1) % lanes == 0:
+            while row < rows and ends[row] <= place + 1:
+                for block in range(diagonal[row] + 1, starts[row + 1]):
+                    if slot_of[block] != 0:
+                        free[waiting] = slot_of[block]
+                        waiting += 1
+                row += 1
+    return slots, slot_of, ends, count

@@ -4,73 +4,74 @@ With b_i the material gradients of a piece (i = 1, 2, 3; b_0 = −Σ b_i), R its
 g_i = R b_i, the force is f_i = τ g_i, τ = w (2μ ε + λ tr(ε) I), ε the symmetric part of
 F Rᵀ − I; the stiffness with frozen rotations is K_ij = w (λ g_i g_jᵀ + μ g_j g_iᵀ + μ g_i·g_j I).
 As Σ_j K_ij = 0 (a translation is free of force), only the six blocks above the diagonal are formed
-per piece; `complete` finds the diagonal from them, row by row.
+per piece; `symmetric_rows` finds the diagonal from them.
 
 The corners of each piece are sorted by node, so that a block above the diagonal of the piece is
-one above the diagonal of the matrix.
+one above the diagonal of the matrix. All that a batch computes with is in one array: loops that
+write one array and read another are not turned into vector instructions.
 """
 
 import numpy as np
 from numba import njit
 
-from verify.xfem.polar_kernels import (
-    LANES,
-    mend_lane,
-    new_lanes,
-    rotation_matrix,
-    turn_lanes,
-)
+from verify.xfem.polar_kernels import LANES, mend_lane, rotation_matrix, turn_lanes
+from verify.xfem.symmetric_rows import add_blocks, add_forces, finish_row
 
-__all__ = ["complete", "linearise", "unpack_rotations"]
+__all__ = ["ENTRIES", "linearise", "unpack_rotations"]
 
 # places in the memory of the lanes, in entries of `LANES` numbers; 0 to 14 are of the rotations
 _SLOPE = 15  # u_i − u_0, then moved_i − moved_0
 _MOVED = 33  # deformation gradient of what is moved
-_FORCE = 42
-_BLOCKS = 54
-_ENTRIES = 108
+_B = 42  # b_1, b_2, b_3
+_MODULI = 51  # w λ and w μ
+_FORCE = 53
+_BLOCKS = 65
+ENTRIES = 119  #: of the memory of the lanes
 
 
 @njit(cache=True)
-def _gather(cells, start, count, displacement, moved, v):
-    for l in range(count):
-        a, b, c, d = (
-            cells[start + l, 0],
-            cells[start + l, 1],
-            cells[start + l, 2],
-            cells[start + l, 3],
-        )
-        for k in range(3):
-            first, other = displacement[a, k], moved[a, k]
-            v[(_SLOPE + k) * LANES + l] = displacement[b, k] - first
-            v[(_SLOPE + 3 + k) * LANES + l] = displacement[c, k] - first
-            v[(_SLOPE + 6 + k) * LANES + l] = displacement[d, k] - first
-            v[(_SLOPE + 9 + k) * LANES + l] = moved[b, k] - other
-            v[(_SLOPE + 12 + k) * LANES + l] = moved[c, k] - other
-            v[(_SLOPE + 15 + k) * LANES + l] = moved[d, k] - other
+def _gather(corners, start, displacement, moved, v):
+    for l in range(LANES):
+        at = start + np.uint64(l)
+        for component in range(3):
+            k = np.uint64(component)
+            a, b = np.uint64(corners[at, 0]) + k, np.uint64(corners[at, 1]) + k
+            c, d = np.uint64(corners[at, 2]) + k, np.uint64(corners[at, 3]) + k
+            first, other = displacement[a], moved[a]
+            v[(_SLOPE + component) * LANES + l] = displacement[b] - first
+            v[(_SLOPE + 3 + component) * LANES + l] = displacement[c] - first
+            v[(_SLOPE + 6 + component) * LANES + l] = displacement[d] - first
+            v[(_SLOPE + 9 + component) * LANES + l] = moved[b] - other
+            v[(_SLOPE + 12 + component) * LANES + l] = moved[c] - other
+            v[(_SLOPE + 15 + component) * LANES + l] = moved[d] - other
+
+
+@njit(cache=True, inline="always")
+def _gradient_row(v, l, slope, into, x, y, z):
+    """Write one row of a gradient, from slopes and the rows of b_1, b_2, b_3."""
+    p, q, r = v[slope * LANES + l], v[(slope + 3) * LANES + l], v[(slope + 6) * LANES + l]
+    v[into * LANES + l] = x[0] * p + y[0] * q + z[0] * r
+    v[(into + 1) * LANES + l] = x[1] * p + y[1] * q + z[1] * r
+    v[(into + 2) * LANES + l] = x[2] * p + y[2] * q + z[2] * r
 
 
 @njit(cache=True, fastmath={"contract"})
-def _deform(b, v):
-    """Write both deformation gradients, from gradients b (9 · LANES)."""
-    for row in range(3):
-        one = _SLOPE + row
-        for l in range(LANES):
-            p, q, r = v[one * LANES + l], v[(one + 3) * LANES + l], v[(one + 6) * LANES + l]
-            s, t, u = v[(one + 9) * LANES + l], v[(one + 12) * LANES + l], v[(one + 15) * LANES + l]
-            x, y, z = b[l], b[3 * LANES + l], b[6 * LANES + l]
-            v[3 * row * LANES + l] = p * x + q * y + r * z
-            v[(_MOVED + 3 * row) * LANES + l] = s * x + t * y + u * z
-            x, y, z = b[LANES + l], b[4 * LANES + l], b[7 * LANES + l]
-            v[(3 * row + 1) * LANES + l] = p * x + q * y + r * z
-            v[(_MOVED + 3 * row + 1) * LANES + l] = s * x + t * y + u * z
-            x, y, z = b[2 * LANES + l], b[5 * LANES + l], b[8 * LANES + l]
-            v[(3 * row + 2) * LANES + l] = p * x + q * y + r * z
-            v[(_MOVED + 3 * row + 2) * LANES + l] = s * x + t * y + u * z
-    for row in range(3):
-        for l in range(LANES):
-            v[4 * row * LANES + l] += 1.0
-            v[(_MOVED + 4 * row) * LANES + l] += 1.0
+def _deform(v):
+    """Write both deformation gradients."""
+    for l in range(LANES):
+        at = _B * LANES + l
+        x = (v[at], v[at + LANES], v[at + 2 * LANES])
+        y = (v[at + 3 * LANES], v[at + 4 * LANES], v[at + 5 * LANES])
+        z = (v[at + 6 * LANES], v[at + 7 * LANES], v[at + 8 * LANES])
+        _gradient_row(v, l, _SLOPE, 0, x, y, z)
+        _gradient_row(v, l, _SLOPE + 1, 3, x, y, z)
+        _gradient_row(v, l, _SLOPE + 2, 6, x, y, z)
+        _gradient_row(v, l, _SLOPE + 9, _MOVED, x, y, z)
+        _gradient_row(v, l, _SLOPE + 10, _MOVED + 3, x, y, z)
+        _gradient_row(v, l, _SLOPE + 11, _MOVED + 6, x, y, z)
+        for k in (0, 4, 8):
+            v[k * LANES + l] += 1.0
+            v[(_MOVED + k) * LANES + l] += 1.0
 
 
 @njit(cache=True, inline="always")
@@ -89,7 +90,7 @@ def _block(v, at, l, x, y, z, p, q, r, wl, wm, sum_):
 
 
 @njit(cache=True, fastmath={"contract"})
-def _resist(b, moduli, factor, v):
+def _resist(factor, v):
     """Write the forces on the corners and the blocks above the diagonal."""
     for l in range(LANES):
         w, x, y, z = v[9 * LANES + l], v[10 * LANES + l], v[11 * LANES + l], v[12 * LANES + l]
@@ -100,7 +101,7 @@ def _resist(b, moduli, factor, v):
         f00, f01, f02 = v[m], v[m + LANES], v[m + 2 * LANES]
         f10, f11, f12 = v[m + 3 * LANES], v[m + 4 * LANES], v[m + 5 * LANES]
         f20, f21, f22 = v[m + 6 * LANES], v[m + 7 * LANES], v[m + 8 * LANES]
-        wl, wm = moduli[l], moduli[LANES + l]
+        wl, wm = v[_MODULI * LANES + l], v[(_MODULI + 1) * LANES + l]
         e00 = f00 * r00 + f01 * r01 + f02 * r02 - 1.0
         e11 = f10 * r10 + f11 * r11 + f12 * r12 - 1.0
         e22 = f20 * r20 + f21 * r21 + f22 * r22 - 1.0
@@ -113,19 +114,20 @@ def _resist(b, moduli, factor, v):
             2.0 * wm * e11 + pressure,
             2.0 * wm * e22 + pressure,
         )
-        p, q, r = b[l], b[LANES + l], b[2 * LANES + l]
+        at = _B * LANES + l
+        p, q, r = v[at], v[at + LANES], v[at + 2 * LANES]
         b0, b1, b2 = (
             r00 * p + r01 * q + r02 * r,
             r10 * p + r11 * q + r12 * r,
             r20 * p + r21 * q + r22 * r,
         )
-        p, q, r = b[3 * LANES + l], b[4 * LANES + l], b[5 * LANES + l]
+        p, q, r = v[at + 3 * LANES], v[at + 4 * LANES], v[at + 5 * LANES]
         c0, c1, c2 = (
             r00 * p + r01 * q + r02 * r,
             r10 * p + r11 * q + r12 * r,
             r20 * p + r21 * q + r22 * r,
         )
-        p, q, r = b[6 * LANES + l], b[7 * LANES + l], b[8 * LANES + l]
+        p, q, r = v[at + 6 * LANES], v[at + 7 * LANES], v[at + 8 * LANES]
         d0, d1, d2 = (
             r00 * p + r01 * q + r02 * r,
             r10 * p + r11 * q + r12 * r,
@@ -156,47 +158,32 @@ def _resist(b, moduli, factor, v):
 
 
 @njit(cache=True)
-def _scatter(cells, targets, start, count, v, force, blocks):
-    for l in range(count):
-        for corner in range(4):
-            node = cells[start + l, corner]
-            at = (_FORCE + 3 * corner) * LANES + l
-            force[node, 0] += v[at]
-            force[node, 1] += v[at + LANES]
-            force[node, 2] += v[at + 2 * LANES]
-        for pair in range(6):
-            block = targets[start + l, pair]
-            at = (_BLOCKS + 9 * pair) * LANES + l
-            blocks[block, 0, 0] += v[at]
-            blocks[block, 0, 1] += v[at + LANES]
-            blocks[block, 0, 2] += v[at + 2 * LANES]
-            blocks[block, 1, 0] += v[at + 3 * LANES]
-            blocks[block, 1, 1] += v[at + 4 * LANES]
-            blocks[block, 1, 2] += v[at + 5 * LANES]
-            blocks[block, 2, 0] += v[at + 6 * LANES]
-            blocks[block, 2, 1] += v[at + 7 * LANES]
-            blocks[block, 2, 2] += v[at + 8 * LANES]
-
-
-@njit(cache=True)
 def linearise(
-    cells, targets, gradients, moduli, quaternions, displacement, moved, turning, factor,
-    force, half,
+    v, corners, slots, constants, quaternions, ends, starts, columns, diagonal, mirror, slot_of,
+    displacement, moved, turning, factor, waiting, beside, force, blocks,
 ):  # fmt: skip
-    """Add the force of a displacement to `force` and its stiffness above the diagonal to `half`.
+    """Add the force of a displacement to `force` and write its stiffness to `blocks`.
+
+    Pieces beyond the last one fill a batch: they have no stiffness, and their slot is the first.
 
     Parameters
     ----------
-    cells : (p, 4) int array
-        Nodes of each piece, ascending.
-    targets : (p, 6) int array
-        Blocks of the pairs of corners 01, 02, 03, 12, 13, 23.
-    gradients : (batches, 9 · LANES) float array
-        b_1, b_2, b_3 of the pieces of a batch, lane by lane.
-    moduli : (batches, 2 · LANES) float array
-        w λ and w μ.
+    v : (`ENTRIES` · LANES,) float array
+        Memory of the lanes, begun by `new_lanes`.
+    corners : (batches · LANES, 4) uint32 array
+        Three times the nodes of each piece, ascending.
+    slots : (batches · LANES, 6) uint32 array
+        Where in `waiting` blocks of the pairs of corners 01, 02, 03, 12, 13, 23 are added up.
+    constants : (batches, 11 · LANES) float array
+        b_1, b_2, b_3, w λ and w μ of the pieces of a batch, lane by lane.
     quaternions : (batches, 4 · LANES) float array
         Rotations: where to start from, and what they have become.
+    ends : (N,) int array
+        Pieces whose first node is that of the row or one before.
+    starts, columns, diagonal, mirror : int arrays
+        Pattern.
+    slot_of : (B,) uint32 array
+        As `slots`, of each block above the diagonal.
     displacement : (N, 3) float array
         From which the rotations are taken.
     moved : (N, 3) float array
@@ -205,78 +192,36 @@ def linearise(
         Without it rotations stay as they are.
     factor : float
         Of the stiffness.
+    waiting : float array
+        Zero; zero again afterwards.
+    beside : (N, 6) float array
+        Zero; zero again afterwards.
     force : (N, 3) float array
-    half : (U, 3, 3) float array
-        Blocks above the diagonal, in the order in which they are met.
-    """
-    v = np.zeros(_ENTRIES * LANES)
-    rest = new_lanes()
-    for entry in range(len(rest)):
-        v[entry] = rest[entry]
-    for batch in range(len(gradients)):
-        start = batch * LANES
-        count = min(LANES, len(cells) - start)
-        b = gradients[batch]
-        _gather(cells, start, count, displacement, moved, v)
-        _deform(b, v)
-        turned = quaternions[batch]
-        for entry in range(4 * LANES):
-            v[9 * LANES + entry] = turned[entry]
-        if turning:
-            if not turn_lanes(v):
-                for l in range(count):
-                    mend_lane(v, l)
-            for entry in range(4 * LANES):
-                turned[entry] = v[9 * LANES + entry]
-        _resist(b, moduli[batch], factor, v)
-        _scatter(cells, targets, start, count, v, force, half)
-
-
-@njit(cache=True)
-def complete(starts, columns, source, half, blocks):
-    """Write the whole of a matrix without force in translation, from its upper part.
-
-    Parameters
-    ----------
-    starts, columns : int arrays
-        Pattern, with the diagonal.
-    source : (B,) int array
-        Of each block off the diagonal, its place in `half`, or that of its transpose.
-    half : (U + 1, 3, 3) float array
-        The last for blocks to which no piece adds. Zero afterwards, ready for the next sum.
     blocks : (B, 3, 3) float array
         Overwritten.
     """
-    for row in range(len(starts) - 1):
-        d00 = d01 = d02 = d11 = d12 = d22 = 0.0
-        diagonal = starts[row]
-        for at in range(starts[row], starts[row + 1]):
-            if columns[at] == row:
-                diagonal = at
-                continue
-            h = source[at]
-            b00, b01, b02 = half[h, 0, 0], half[h, 0, 1], half[h, 0, 2]
-            b10, b11, b12 = half[h, 1, 0], half[h, 1, 1], half[h, 1, 2]
-            b20, b21, b22 = half[h, 2, 0], half[h, 2, 1], half[h, 2, 2]
-            if columns[at] < row:  # the second of the two rows that read it
-                b01, b02, b12, b10, b20, b21 = b10, b20, b21, b01, b02, b12
-                half[h, 0, 0] = half[h, 0, 1] = half[h, 0, 2] = 0.0
-                half[h, 1, 0] = half[h, 1, 1] = half[h, 1, 2] = 0.0
-                half[h, 2, 0] = half[h, 2, 1] = half[h, 2, 2] = 0.0
-            blocks[at, 0, 0], blocks[at, 0, 1], blocks[at, 0, 2] = b00, b01, b02
-            blocks[at, 1, 0], blocks[at, 1, 1], blocks[at, 1, 2] = b10, b11, b12
-            blocks[at, 2, 0], blocks[at, 2, 1], blocks[at, 2, 2] = b20, b21, b22
-            d00 -= b00
-            d11 -= b11
-            d22 -= b22
-            d01 -= b01 + b10
-            d02 -= b02 + b20
-            d12 -= b12 + b21
-        # a sum of blocks that are not symmetric is so but for round-off
-        d01, d02, d12 = 0.5 * d01, 0.5 * d02, 0.5 * d12
-        blocks[diagonal, 0, 0], blocks[diagonal, 0, 1], blocks[diagonal, 0, 2] = d00, d01, d02
-        blocks[diagonal, 1, 0], blocks[diagonal, 1, 1], blocks[diagonal, 1, 2] = d01, d11, d12
-        blocks[diagonal, 2, 0], blocks[diagonal, 2, 1], blocks[diagonal, 2, 2] = d02, d12, d22
+    u, m, f, K = displacement.reshape(-1), moved.reshape(-1), force.reshape(-1), blocks.reshape(-1)
+    row, rows = 0, len(ends)
+    for batch in range(len(constants)):
+        start = np.uint64(batch * LANES)
+        for entry in range(11 * LANES):
+            v[_B * LANES + entry] = constants[batch, entry]
+        _gather(corners, start, u, m, v)
+        _deform(v)
+        for entry in range(4 * LANES):
+            v[9 * LANES + entry] = quaternions[batch, entry]
+        if turning:
+            if not turn_lanes(v):
+                for l in range(LANES):
+                    mend_lane(v, l)
+            for entry in range(4 * LANES):
+                quaternions[batch, entry] = v[9 * LANES + entry]
+        _resist(factor, v)
+        add_forces(corners, start, v, _FORCE, f)
+        add_blocks(slots, start, v, _BLOCKS, waiting)
+        while row < rows and ends[row] <= (batch + 1) * LANES:
+            finish_row(row, starts, columns, diagonal, mirror, slot_of, waiting, beside, K)
+            row += 1
 
 
 @njit(cache=True)
