@@ -4,6 +4,7 @@ from reference.meshing.background import background_mesh
 from reference.meshing.conforming import conforming_mesh
 from reference.meshing.grading import Grading, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
+from reference.meshing.imprint_facets import Realised, imprint_facets
 from reference.meshing.imprint_solid import imprint_polygons, structured_tetrahedra
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.refinement import refine_uniformly
@@ -11,9 +12,11 @@ from reference.meshing.refinement import refine_uniformly
 __all__ = [
     "ConformingMesh",
     "Grading",
+    "Realised",
     "background_mesh",
     "conforming_mesh",
     "imprint",
+    "imprint_facets",
     "imprint_polygons",
     "open_cut",
     "refine_uniformly",

@@ -16,12 +16,12 @@ from reference.meshing.session import oriented
 from verify.errors import InputError
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["imprint_polygons", "structured_tetrahedra"]
+__all__ = ["ON", "imprint_polygons", "structured_tetrahedra"]
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 Mesh = tuple[Array, Cells, Cells]  # points, cells, facets of the cuts so far
-_ON = 3e-5  # of an edge: a closer node counts as on the plane; a corner cut off has its cube
+ON = 3e-5  # of an edge: a closer node counts as on the plane; a corner cut off has its cube
 
 
 def structured_tetrahedra(
@@ -110,7 +110,7 @@ def _split_by_plane(
     shortest = np.full(len(points), np.inf)
     for k in range(2):
         np.minimum.at(shortest, edges[:, k], step)
-    height[np.abs(height) <= _ON * shortest] = 0.0
+    height[np.abs(height) <= ON * shortest] = 0.0
     corner = height[cells]
     crossed = np.flatnonzero((corner.min(axis=1) < 0) & (corner.max(axis=1) > 0))
     middles = (points[cells[crossed]].mean(axis=1) - origin) @ axes[:2].T
@@ -141,11 +141,11 @@ def _split_by_line(
     length = float(np.linalg.norm(b - a))
     step = np.linalg.norm(place[edges[:, 1]] - place[edges[:, 0]], axis=1)
     one, two = height[edges].T
-    crossing = (one * two < 0) & (np.minimum(np.abs(one), np.abs(two)) > _ON * step)
+    crossing = (one * two < 0) & (np.minimum(np.abs(one), np.abs(two)) > ON * step)
     edges, one, two, step = (v[crossing] for v in (edges, one, two, step))
     share = (one / (one - two))[:, None]
     at = ((1 - share) * place[edges[:, 0]] + share * place[edges[:, 1]] - a) @ along
-    inside = (at > _ON * step) & (at < length - _ON * step)
+    inside = (at > ON * step) & (at < length - ON * step)
     edges, share = edges[inside], share[inside]
     places = (1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]]
     on_plane = np.concatenate([on_plane, np.ones(len(edges), dtype=bool)])
@@ -165,13 +165,13 @@ def _insert(
     s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / det
     t = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / det
     shares = np.column_stack([1 - s - t, s, t])
-    inside = np.flatnonzero((shares >= -_ON).all(axis=1))
-    if not len(inside) or (shares[inside] > 1 - 2 * _ON).any():
+    inside = np.flatnonzero((shares >= -ON).all(axis=1))
+    if not len(inside) or (shares[inside] > 1 - 2 * ON).any():
         return mesh, on_plane  # outside the body, or a node already
     facet, share = mine[inside[0]], shares[inside[0]]
     at = (origin + end @ axes[:2])[None]
     on_plane = np.append(on_plane, True)
-    if share.min() <= _ON:
+    if share.min() <= ON:
         edge = np.sort(np.delete(facet, np.argmin(share)))[None]
         return split_edges(points, cells, facets, edge, at), on_plane
     new = len(points)

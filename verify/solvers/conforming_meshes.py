@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from reference.meshing import (
     ConformingMesh,
     Grading,
+    Realised,
     background_mesh,
     conforming_mesh,
     imprint,
+    imprint_facets,
     imprint_polygons,
     open_cut,
     refine_uniformly,
@@ -20,6 +22,7 @@ from reference.meshing import (
     structured_triangles,
 )
 from reference.meshing.edge_splitting import mesh_edges
+from verify.errors import InputError
 from verify.scene import (
     Box,
     MeshFile,
@@ -98,9 +101,10 @@ def peer_mesh(scene: Scene, level: int, mesh: str) -> ConformingMesh:
 def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
     """Make a level of the reference and give its size far from what is singular, m.
 
-    A given mesh is refined uniformly after the cuts are imprinted; others are made anew, graded.
+    A given mesh is refined uniformly after the cuts are imprinted, and so is the scene's own where
+    the cut is what another solver realised on it; others are made anew, graded.
     """
-    if isinstance(scene.geometry, MeshFile):
+    if isinstance(scene.geometry, MeshFile) or _realised(scene, structure(scene, 0)) is not None:
         size = structure(scene, 0)
         mesh = refine_uniformly(*_imprinted(scene, size), times=level)
         return open_cut(*mesh), size.size / 2**level
@@ -124,20 +128,40 @@ def _solid_grading(scene: Scene) -> Grading:
     return Grading(size, np.zeros((0, 3)), extent / 2, exponent=2 / 3, curves=True)
 
 
-def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
-    """Imprint the cuts of the scene on its background mesh."""
+def _background(scene: Scene, level: Structure) -> tuple[Array, Cells]:
+    """Make the scene's own mesh without its cuts."""
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
-        points, cells = read_mesh(scene)
-    elif level.counts is None:
+        return read_mesh(scene)
+    if level.counts is None:
         assert isinstance(geometry, Rectangle | Polygon)
-        points, cells = background_mesh(geometry.outline(), level.size)
-    elif isinstance(geometry, Box):
-        points, cells = structured_tetrahedra(geometry.lower, geometry.upper, level.counts)
-    else:
-        assert isinstance(geometry, Rectangle)
-        n, m = level.counts
-        points, cells = structured_triangles(geometry.lower, geometry.upper, (n, m))
+        return background_mesh(geometry.outline(), level.size)
+    if isinstance(geometry, Box):
+        return structured_tetrahedra(geometry.lower, geometry.upper, level.counts)
+    assert isinstance(geometry, Rectangle)
+    n, m = level.counts
+    return structured_triangles(geometry.lower, geometry.upper, (n, m))
+
+
+def _realised(scene: Scene, level: Structure) -> Realised | None:
+    """Imprint cuts that are triangles which fit the scene's own mesh, or give None."""
+    triangles = [c.points for c in scene.cuts if isinstance(c, PolygonCut) and len(c.points) == 3]
+    given = isinstance(scene.geometry, MeshFile) or level.counts is not None
+    if not given or not triangles or len(triangles) < len(scene.cuts):
+        return None
+    try:
+        found = imprint_facets(*_background(scene, level), np.array(triangles, dtype=float))
+    except InputError:  # they reach beyond the body
+        return None
+    return found if found.fitted else None
+
+
+def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
+    """Imprint the cuts of the scene on its background mesh."""
+    realised = _realised(scene, level)
+    if realised is not None:
+        return realised.points, realised.cells, realised.facets
+    points, cells = _background(scene, level)
     if scene.dimension == 2:
         return imprint(points, cells, [c.vertices() for c in scene.cuts if c.kind == "polyline"])
     return imprint_polygons(points, cells, [p for cut in scene.cuts for p in _polygons(cut)])
