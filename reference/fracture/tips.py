@@ -65,12 +65,15 @@ def _tip(
     assert isinstance(scene.geometry, Rectangle | Polygon)
     outline = scene.geometry.outline()
     touching = 1e-9 * float(np.ptp(outline, axis=0).max())
-    away = [
-        float(feature.distance(point[None])[0])
-        for feature in plane_features(scene)
-        if not any(np.array_equal(point, p) for p in (feature.start, feature.end))
-    ]
-    if not inside_polygon(point[None], outline)[0] or min(away) <= touching:
+    ending, away = 0, []
+    for feature in plane_features(scene):
+        if np.array_equal(point, feature.start) or np.array_equal(point, feature.end):
+            ending += 1
+        else:
+            away.append(float(feature.distance(point[None])[0]))
+    # where more than its own end ends, branches meet
+    junction = ending > 1 or min(away) <= touching
+    if junction or not inside_polygon(point[None], outline)[0]:
         return None
     singular = np.linalg.norm(singular_points(scene) - point, axis=1)
     length = float(np.linalg.norm(point - before))

@@ -34,6 +34,30 @@ def square(cuts=(), **changes):
     return Scene.model_validate(content | changes)
 
 
+TENSION = {"top": [0, 1], "bottom": [0, -1]}
+
+
+def plate(width, height, cuts, loads, supports=None, left=0.0, **changes):
+    """Give a plate under tractions in balance, held at two corners so that nothing reacts."""
+    corner = f"x > {width - 1e-12 * width} and y"
+    held = [
+        {"where": f"{corner} < {1e-12 * height}", "displacement": [0, 0]},
+        {
+            "where": f"{corner} > {height - 1e-12 * height}",
+            "displacement": [0],
+            "components": ["x"],
+        },
+    ]
+    return square(
+        cuts,
+        geometry={"kind": "rectangle", "lower": [left, 0], "upper": [width, height]},
+        material={"young": 1.0, "poisson": 0.3, "plane": "strain"},
+        supports=supports or held,
+        loads=[{"kind": "traction", "where": w, "traction": t} for w, t in loads.items()],
+        **changes,
+    )
+
+
 def areas(mesh):
     """Areas (m,) of the cells of a conforming mesh."""
     a, b, c = (mesh.points[mesh.cells[:, k]] for k in range(3))
