@@ -5,6 +5,7 @@ import pytest
 
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
+from verify.compare.motion import ExactMotion
 from verify.result import Verdict
 from verify.scene import load_scene
 from verify.study.budget import Candidate, cheapest_adequate, error_budget, on_realised_cut
@@ -33,7 +34,13 @@ SCENE = "statics/f1_patch"
 def chain(*strains, width=0.0):
     names = ["", "model", "mesh", "solver"]
     return [
-        Answer(f"link {i}", names[i], Affine(a), {"length": (a, width)}, {"displacement_l2": width})
+        Answer(
+            f"link {i}",
+            names[i],
+            ExactMotion(Affine(a)),
+            {"length": (a, width)},
+            {"displacement_l2": width},
+        )
         for i, a in enumerate(strains)
     ]
 
@@ -64,7 +71,9 @@ def test_each_source_gets_what_it_changed(scene):
 
 def test_uncertain_links_make_both_of_their_parts_uncertain(scene):
     links = chain(1.0, 1.1, 1.05)
-    links[1] = Answer("", "model", Affine(1.1), {"length": (1.1, 0.01)}, {"displacement_l2": 0.0})
+    links[1] = Answer(
+        "", "model", ExactMotion(Affine(1.1)), {"length": (1.1, 0.01)}, {"displacement_l2": 0.0}
+    )
     found = budgets(scene, links)["length"]
     assert [part.uncertainty for part in found.parts] == pytest.approx([0.01, 0.01])
     assert found.total.uncertainty == 0.0

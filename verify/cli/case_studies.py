@@ -7,8 +7,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from verify.errors import InputError
-
 if TYPE_CHECKING:
     from verify.result import CaseResult
     from verify.scene import Scene
@@ -45,43 +43,30 @@ def cost(arguments: argparse.Namespace, announce: Announce) -> "CostStudy":
 def budget(arguments: argparse.Namespace, announce: Announce) -> "BudgetStudy":
     """Solve the links of the chain, and take the error apart."""
     from verify.scene import load_scene
-    from verify.study.budget import (
-        budget_study,
-        is_realised_as_asked,
-        on_realised_cut,
-        with_kinematics,
-    )
+    from verify.study.budget import budget_study
 
     scene = load_scene(arguments.case)
-    where = str(scene.file or scene.name)
-    if scene.dimension != 2 or scene.analysis.kind != "static":
-        raise InputError("the budget is offered for plane, static scenes", where)
-    level = scene.mesh.count - 1 if arguments.level is None else arguments.level
-    if not 0 <= level < scene.mesh.count:
-        raise InputError(f"level {level}; expected 0..{scene.mesh.count - 1}", "--level")
-    exact = _exact(scene)
-    own = scene.analysis.kinematics
-    kinds = ["linear"] if exact is not None else ["corotational", "linear"]
+    repetitions = arguments.repetitions or (2 if arguments.quick else 5)
     folder = arguments.out / f"budget-{scene.name.replace('/', '__')}"
-    start = perf_counter()
-    announce(f"the problem as asked, {' and '.join(kinds)}, into {folder}")
-    solvers = ("xfem", "conforming")
-    asked = dict(
-        zip(kinds, _solved([with_kinematics(scene, k) for k in kinds], folder / "asked", solvers,
-                           arguments.repetitions), strict=True)
+
+    def solve(
+        scenes: "Sequence[Scene]",
+        place: str,
+        solvers: tuple[str, ...],
+        parameters: Mapping[str, Mapping[str, Any]] | None = None,
+        timed: bool = False,
+    ) -> "list[Solved]":
+        announce(f"{place}: {', '.join(solvers)} on {', '.join(s.name for s in scenes)}")
+        given = {name: dict(values) for name, values in (parameters or {}).items() if values}
+        return _solved(scenes, folder / place, solvers, repetitions if timed else 1, given)
+
+    study = budget_study(
+        scene, arguments.level, arguments.tolerance, arguments.metric, _exact(scene), solve,
+        arguments.quick,
     )  # fmt: skip
-    judged = asked[own].solutions.get("xfem", {}).get(level)
-    realised = None
-    if judged is not None and not is_realised_as_asked(scene, judged):
-        links = list(dict.fromkeys([kinds[0], own]))
-        announce(f"the cut as level {level} realised it, {' and '.join(links)}")
-        scenes = [on_realised_cut(scene, judged.cut_facets, level, k) for k in links]
-        found = _solved(scenes, folder / f"realised-{level}", ("conforming", "reference"), 1)
-        realised = dict(zip(links, found, strict=True))
-    return budget_study(
-        scene, level, arguments.tolerance, arguments.metric, asked, realised, exact,
-        perf_counter() - start,
-    )  # fmt: skip
+    for missing in study.missing:
+        announce(f"not available: {missing.source}: {missing.reason} ({missing.where})")
+    return study
 
 
 def thesis(arguments: argparse.Namespace, announce: Announce) -> "ThesisStudy":
@@ -119,6 +104,7 @@ def _run(
     solvers: tuple[str, ...],
     repetitions: int,
     parameters: dict[str, dict[str, Any]] | None = None,
+    judged: bool = True,
 ) -> "list[CaseResult]":
     from verify.cli.progress import progress_on
     from verify.runner import Options, run_cases
@@ -129,22 +115,28 @@ def _run(
         repetitions=repetitions,
         parameters=parameters or {},
         cache=cache_folder(),
+        judged=judged,
     )
     with progress_on(sys.stderr) as progress:
         return run_cases(scenes, folder, options, progress).results
 
 
 def _solved(
-    scenes: "Sequence[Scene]", folder: Path, solvers: tuple[str, ...], repetitions: int
+    scenes: "Sequence[Scene]",
+    folder: Path,
+    solvers: tuple[str, ...],
+    repetitions: int,
+    parameters: dict[str, dict[str, Any]],
 ) -> "list[Solved]":
-    """Run scenes, and read the solutions back."""
+    """Run scenes by some solvers and no reference beside them, and read the solutions back."""
     from verify.runner.directory import RunDirectory
     from verify.solution import read_solution
     from verify.study.budget import Solved
 
     place = RunDirectory(folder)
     found = []
-    for scene, result in zip(scenes, _run(scenes, folder, solvers, repetitions), strict=True):
+    results = _run(scenes, folder, solvers, repetitions, parameters, judged=False)
+    for scene, result in zip(scenes, results, strict=True):
         solutions: dict[str, dict[int, Solution]] = {}
         for record in result.solves:
             if record.status == "solved":

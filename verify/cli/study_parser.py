@@ -75,7 +75,7 @@ def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
 def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
     text = "where the error of the XFEM answer comes from, and the cheapest adequate model"
     kind = add("budget", help=text, description=f"{text[0].upper()}{text[1:]}.")
-    kind.add_argument("case", metavar="CASE", help="name of a case, or a case file; plane, static")
+    kind.add_argument("case", metavar="CASE", help="name of a case, or a case file")
     kind.add_argument(
         "--level", metavar="K", type=int, help="mesh level that is taken apart (default: finest)"
     )
@@ -84,13 +84,17 @@ def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
         help="relative error that is good enough (default: 0.05)",
     )  # fmt: skip
     kind.add_argument(
-        "--metric", default="displacement_l2",
-        help="displacement_l2, energy_norm or a quantity of the case (default: displacement_l2)",
+        "--metric",
+        help="displacement_l2, energy_norm (in motion their means, displacement_l2_mean, "
+        "energy_norm_mean) or a quantity of the case (default: the first of these)",
     )  # fmt: skip
     kind.add_argument(
-        "--repetitions", metavar="N", type=count, default=5,
-        help="timed repetitions of each solve (default: 5)",
+        "--repetitions", metavar="N", type=count,
+        help="timed repetitions of each solve (default: 5; with --quick 2)",
     )  # fmt: skip
+    kind.add_argument(
+        "--quick", action="store_true", help="the two coarsest mesh levels, fewer models"
+    )
     kind.add_argument(
         "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
     )

@@ -31,6 +31,7 @@ def budget_section(record: Mapping[str, Any]) -> Markup:
             ),
             links,
             notes,
+            _missing(record),
             tag("div", figures, class_="panels"),
         ),
         tag(
@@ -38,13 +39,30 @@ def budget_section(record: Mapping[str, Any]) -> Markup:
             tag("h2", "What each model costs"),
             tag(
                 "p",
-                "Against the problem with finite rotations and the cut as asked; one thread, "
-                "without the background mesh. In bold: certain to be within "
+                "Against the problem, the first of the links above; one thread, without the "
+                "background mesh. A static answer to a motion is held against it at all times. "
+                "In bold: certain to be within "
                 f"{100 * record['tolerance']:.3g} % of {metric_title(record['metric'])}.",
                 class_="quiet",
             ),
             tag("div", _candidates(record), class_="scroll"),
         ),
+    )
+
+
+def _missing(record: Mapping[str, Any]) -> Markup | None:
+    """Say which links could not be made."""
+    if not record.get("missing"):
+        return None
+    titles = ("not available", "because", "where it is instead")
+    head = tag("tr", [tag("th", title, scope="col") for title in titles])
+    rows = [
+        tag("tr", tag("th", one["source"], scope="row"), tag("td", one["reason"]),
+            tag("td", one["where"]))
+        for one in record["missing"]
+    ]  # fmt: skip
+    return tag(
+        "div", tag("table", tag("thead", head), tag("tbody", rows), class_="map"), class_="scroll"
     )
 
 
@@ -81,24 +99,27 @@ def _bars(budget: Mapping[str, Any]) -> Markup:
 
 
 def _candidates(record: Mapping[str, Any]) -> Markup:
-    titles = ("kinematics", "level", "h, m", "unknowns", "error", "between", "time, ms")
+    listed = record["candidates"]
+    chosen = any(one["choices"] for one in listed)  # at rest only the kinematics differ
+    titles = ["kinematics", *(["model"] if chosen else []), "level", "h, m", "unknowns", "error",
+              "between", "time, ms"]  # fmt: skip
     head = tag("tr", [tag("th", title, scope="col") for title in titles])
     rows = []
-    for one in record["candidates"]:
+    for one in listed:
+        cells = [one["choices"]] if chosen else []
+        cells.append(str(one["level"]))
         if one["reason"]:
-            cells = [str(one["level"]), one["reason"], "", "", "", ""]
-            rows.append(tag("tr", tag("th", one["kinematics"], scope="row"),
-                            [tag("td", c) for c in cells]))  # fmt: skip
-            continue
-        enough = one["high"] is not None and one["high"] <= record["tolerance"]
-        times = f"{1e3 * one['seconds']:.3g} ({1e3 * one['fastest']:.3g} to "
-        cells = [
-            tag("td", str(one["level"])),
-            tag("td", f"{one['size']:.3g}"),
-            tag("td", str(one["unknowns"])),
-            tag("td", tag("b", number(one["error"])) if enough else number(one["error"])),
-            tag("td", f"{one['low']:.3g} to {one['high']:.3g}"),
-            tag("td", f"{times}{1e3 * one['slowest']:.3g})"),
-        ]
-        rows.append(tag("tr", tag("th", one["kinematics"], scope="row"), cells))
+            cells += [one["reason"], "", "", "", ""]
+        else:
+            enough = one["high"] is not None and one["high"] <= record["tolerance"]
+            times = f"{1e3 * one['seconds']:.3g} ({1e3 * one['fastest']:.3g} to "
+            cells += [
+                f"{one['size']:.3g}",
+                str(one["unknowns"]),
+                tag("b", number(one["error"])) if enough else number(one["error"]),
+                f"{one['low']:.3g} to {one['high']:.3g}",
+                f"{times}{1e3 * one['slowest']:.3g})",
+            ]
+        rows.append(tag("tr", tag("th", one["kinematics"], scope="row"),
+                        [tag("td", cell) for cell in cells]))  # fmt: skip
     return tag("table", tag("thead", head), tag("tbody", rows), class_="map")

@@ -36,6 +36,8 @@ class Options:
         A bundle of references, which judges instead of solving any.
     cluster : str or None
         Scheduler of a Dask cluster whose workers solve; None: processes of this machine do.
+    judged : bool
+        Whether the references that judge are solved with the rest; without them only `solvers` run.
     """
 
     solvers: tuple[str, ...] = ()
@@ -47,6 +49,7 @@ class Options:
     cache: Path | None = None
     references: Path | None = None
     cluster: str | None = None
+    judged: bool = True
 
     def of_result(self) -> dict[str, Any]:
         """Return those that change what is computed; a resumed run must have the same."""

@@ -1,15 +1,20 @@
 """Where the error of an XFEM answer comes from, and the cheapest model that is good enough."""
 
-from verify.study.budget.budget import Budget, Part, error_budget
+from verify.study.budget.budget import Answer, Budget, Part, error_budget
+from verify.study.budget.chain import Missing, is_realised_as_asked
 from verify.study.budget.cheapest import Candidate, cheapest_adequate
 from verify.study.budget.scenes import on_realised_cut, with_kinematics
-from verify.study.budget.study import BudgetStudy, Solved, budget_study, is_realised_as_asked
+from verify.study.budget.solved import Solve, Solved
+from verify.study.budget.study import BudgetStudy, budget_study
 
 __all__ = [
+    "Answer",
     "Budget",
     "BudgetStudy",
     "Candidate",
+    "Missing",
     "Part",
+    "Solve",
     "Solved",
     "budget_study",
     "cheapest_adequate",

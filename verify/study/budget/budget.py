@@ -2,21 +2,22 @@
 
 From the user's problem to the answer of the judged solver: the cut as asked, then as realised;
 finite rotations, then linear kinematics (if the answer is linear); a fine mesh, then the solver's
-own element size on a conforming mesh; then the solver. What a quantity of interest changes by
-along the chain adds up to its total error exactly; norms of the differences bound the norm of
-the total (triangle inequality).
+own element size on a conforming mesh; then the solver; in motion its mass, its time step and its
+scheme. What a quantity of interest changes by along the chain adds up to its total error exactly;
+norms of the differences, and their means over time, bound the norm of the total (triangle
+inequality).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from verify.compare.body import AnyBody
-from verify.compare.displacement_error import displacement_error
-from verify.compare.energy_error import energy_error
 from verify.compare.hooke import Hooke
 from verify.compare.integration import rules
-from verify.compare.locate import Field
-from verify.compare.sampled import Sampled
+from verify.compare.motion import Motion
+from verify.study.budget.distances import Distances, Times, distances, norm_names
 
 __all__ = ["Answer", "Budget", "Part", "error_budget"]
 
@@ -31,7 +32,8 @@ class Answer:
         What it is, in words.
     change : str
         What changed against the link before; empty for the first.
-    field : Field
+    motion : Motion
+        Its field, over time.
     quantities : dict of str to (float, float)
         Value and half-width per quantity of interest; those it does not have are missing.
     norms : dict of str to float
@@ -40,7 +42,7 @@ class Answer:
 
     name: str
     change: str
-    field: Field
+    motion: Motion
     quantities: Mapping[str, tuple[float, float]]
     norms: Mapping[str, float]
 
@@ -99,7 +101,12 @@ class Budget:
 
 
 def error_budget(
-    chain: Sequence[Answer], body: AnyBody, size: float, law: Hooke, units: Mapping[str, str]
+    chain: Sequence[Answer],
+    body: AnyBody,
+    size: float,
+    law: Hooke,
+    units: Mapping[str, str],
+    times: Times = (None,),
 ) -> list[Budget]:
     """Split the difference between the first and the last link of `chain`.
 
@@ -115,43 +122,37 @@ def error_budget(
         Linear elasticity: the energy norm of a difference of fields.
     units : mapping of str to str
         Unit per quantity of interest that is wanted.
+    times : sequence of float or None
+        Output times of motions, s; [None] at rest.
 
     Returns
     -------
     list of Budget
-        Displacement (L2), energy norm, then the quantities that every link has.
+        The norms of `norm_names`, then the quantities that every link has.
     """
-    sampled = [Sampled(answer.field) for answer in chain]
-    family = rules(body, size)
-
-    def l2(one: Field, other: Field, rule: object) -> tuple[float, float]:
-        norm = displacement_error(one, other, rule)  # type: ignore[arg-type]
-        return norm.absolute, norm.scale
-
-    def energy(one: Field, other: Field, rule: object) -> tuple[float, float]:
-        norm = energy_error(one, other, rule, law)  # type: ignore[arg-type]
-        return norm.absolute, norm.scale
-
-    budgets = []
-    for name, measure in (("displacement_l2", l2), ("energy_norm", energy)):
-        scale = measure(sampled[-1], sampled[0], family[0])[1]
-        if scale > 0.0:
-            budgets.append(_of_norm(name, chain, sampled, measure, family, scale))
+    last = len(chain) - 1
+    pairs = [*((i + 1, i) for i in range(last)), (last, 0)]
+    family = rules(body, size, 3 if len(times) == 1 else 2)
+    found = distances([answer.motion for answer in chain], pairs, times, family, law)
+    budgets = [_of_norm(name, chain, found) for name in norm_names(times)]
+    budgets = [budget for budget in budgets if budget.scale > 0.0]
     for name, unit in units.items():
         if all(name in answer.quantities for answer in chain):
             budgets.append(_of_quantity(name, unit, chain))
     return budgets
 
 
-def _of_norm(name, chain, sampled, measure, family, scale) -> Budget:  # type: ignore[no-untyped-def]
-    def part(source: str, i: int, j: int) -> Part:
-        values = [measure(sampled[j], sampled[i], rule)[0] for rule in family]
-        spread = max(abs(value - values[0]) for value in values)
-        known = chain[i].norms.get(name, 0.0) + chain[j].norms.get(name, 0.0)
-        return Part(source, values[0] / scale, (known + spread) / scale)
+def _of_norm(name: str, chain: Sequence[Answer], found: Distances) -> Budget:
+    values, scale = found.of(name)
+    spread = np.abs(values - values[:, :1]).max(axis=1)
+    unit = scale or 1.0
 
-    parts = [part(answer.change, i, i + 1) for i, answer in enumerate(chain[1:])]
-    total = part("total", 0, len(chain) - 1)
+    def part(source: str, row: int, i: int, j: int) -> Part:
+        known = chain[i].norms.get(name, 0.0) + chain[j].norms.get(name, 0.0)
+        return Part(source, float(values[row, 0]) / unit, float(known + spread[row]) / unit)
+
+    parts = [part(answer.change, i, i, i + 1) for i, answer in enumerate(chain[1:])]
+    total = part("total", -1, 0, len(chain) - 1)
     room = total.uncertainty + sum(p.uncertainty for p in parts)
     closes = bool(total.value <= sum(p.value for p in parts) + room)
     return Budget(name, "1", scale, parts, total, closes)

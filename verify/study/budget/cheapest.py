@@ -28,6 +28,8 @@ class Candidate:
         Wall time: median, least and most of the repetitions; one thread.
     reason : str
         Why there is no error: the solve failed or was refused; empty otherwise.
+    analysis : str
+        ``"static"`` or ``"dynamic"``.
     """
 
     kinematics: str
@@ -42,6 +44,7 @@ class Candidate:
     fastest: float
     slowest: float
     reason: str = ""
+    analysis: str = ""
 
     @property
     def title(self) -> str:
@@ -76,20 +79,8 @@ def cheapest_adequate(
         f"{first.title}: {100 * first.error:.3g} % (at most {100 * first.high:.3g} %) in "
         f"{1e3 * first.seconds:.3g} ms with {first.unknowns} unknowns."
     )
-    others = [c for c in adequate[1:] if c.kinematics != first.kinematics]
-    if others:
-        other = others[0]
-        sentence += (
-            f" {other.kinematics.capitalize()} kinematics needs {1e3 * other.seconds:.3g} ms "
-            f"(h = {other.size:.3g} m) for the same."
-        )
-    elif any(c.kinematics != first.kinematics for c in known):
-        missing = next(c.kinematics for c in known if c.kinematics != first.kinematics)
-        least = min(c.error for c in known if c.kinematics == missing)
-        sentence += (
-            f" {missing.capitalize()} kinematics is not adequate on any mesh tried "
-            f"({100 * least:.3g} % at best)."
-        )
+    sentence += _of_the_others(first, adequate[1:], known, "kinematics")
+    sentence += _of_the_others(first, adequate[1:], known, "analysis")
     room = 2.0 if contended else 1.0
     rivals = [c for c in adequate[1:] if c.fastest <= room * first.slowest]
     maybe = [c for c in known if c.low <= tolerance < c.high and c.seconds < first.seconds]
@@ -99,3 +90,26 @@ def cheapest_adequate(
         sentence += f" {maybe[0].title} is faster and may be adequate; the reference is too coarse."
     verdict = Verdict.UNDECIDED if rivals or maybe else Verdict.PASS
     return first, Finding(topic, sentence, wanted, verdict)
+
+
+def _of_the_others(
+    first: Candidate, adequate: Sequence[Candidate], known: Sequence[Candidate], axis: str
+) -> str:
+    """Say of the models that differ from the chosen one along an axis what they cost or lack."""
+    own = getattr(first, axis)
+    word = "kinematics" if axis == "kinematics" else "analysis"
+    for other in adequate:
+        name = getattr(other, axis)
+        if name != own:
+            return (
+                f" {name.capitalize()} {word} needs {1e3 * other.seconds:.3g} ms "
+                f"(h = {other.size:.3g} m) for the same."
+            )
+    rest = [c for c in known if getattr(c, axis) != own]
+    if not rest:
+        return ""
+    least = min(c.error for c in rest)
+    return (
+        f" {getattr(rest[0], axis).capitalize()} {word} is not adequate on any mesh tried "
+        f"({100 * least:.3g} % at best)."
+    )

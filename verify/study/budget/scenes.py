@@ -1,4 +1,4 @@
-"""Scenes that differ from a given one in one thing: its kinematics, or its cut."""
+"""Scenes that differ from a given one in one thing: its kinematics, cut, mesh, step, or motion."""
 
 from collections import defaultdict
 from pathlib import Path
@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 
-__all__ = ["on_realised_cut", "polylines_of", "with_kinematics"]
+__all__ = [
+    "at_rest",
+    "coarsest",
+    "on_one_level",
+    "on_realised_cut",
+    "polylines_of",
+    "with_kinematics",
+    "with_time_step",
+]
 
 Array = NDArray[np.float64]
 
@@ -21,6 +29,41 @@ _STRAIGHT = 1e-9
 def with_kinematics(scene: Scene, kinematics: str) -> Scene:
     """Return `scene` in ``"linear"`` or ``"corotational"`` kinematics, without acceptance."""
     return _changed(scene, kinematics, {"analysis": {"kinematics": kinematics}})
+
+
+def coarsest(scene: Scene, count: int) -> Scene:
+    """Return `scene` with its first `count` mesh levels only, under its own name."""
+    return _changed(scene, "", {"mesh": _levels(scene, slice(0, count))})
+
+
+def on_one_level(scene: Scene, level: int) -> Scene:
+    """Return `scene` with one of its mesh levels only."""
+    return _changed(scene, f"level-{level}", {"mesh": _levels(scene, slice(level, level + 1))})
+
+
+def with_time_step(scene: Scene, step: float) -> Scene:
+    """Return a dynamic `scene` with another largest time step, s."""
+    return _changed(scene, f"step-{step:.3g}", {"analysis": {"time_step": step}})
+
+
+def at_rest(scene: Scene) -> Scene:
+    """Return the static scene of what a dynamic one ends with.
+
+    Supports and loads have the last factors of their histories, and all cuts are open.
+    """
+    content = scene.model_dump(mode="json", by_alias=True)
+    update: dict[str, Any] = {
+        "analysis": {"kind": "static", "duration": None, "time_step": None, "outputs": None,
+                     "damping": [0.0, 0.0]},
+        "initial": {"kind": "rest"},
+        "cuts": [{**cut, "opens_at": 0.0} for cut in content["cuts"]],
+        "quantities": [
+            {key: value for key, value in q.items() if key != "time"} for q in content["quantities"]
+        ],
+    }  # fmt: skip
+    for key, value in (("supports", "displacement"), ("loads", "traction")):
+        update[key] = [_at_last(part, value) for part in content[key]]
+    return _changed(scene, "static", update)
 
 
 def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) -> Scene:
@@ -39,24 +82,48 @@ def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) ->
     Raises
     ------
     UnsupportedSceneError
-        If the scene is not plane.
+        If the scene is not plane, or its cuts open at different times.
     """
     if scene.dimension != 2:
         raise UnsupportedSceneError("the realised cut is taken as geometry in the plane only")
+    opens = {float(getattr(cut, "opens_at", 0.0)) for cut in scene.cuts}
+    if len(opens) > 1:
+        raise UnsupportedSceneError(
+            "its cuts open at different times, and the realised cut does not say which is which"
+        )
     size = float(np.ptp(facets.reshape(-1, 2), axis=0).max()) if len(facets) else 0.0
     cuts = [
-        {"kind": "polyline", "name": f"realised{i}", "points": line.tolist()}
+        {"kind": "polyline", "name": f"realised{i}", "points": line.tolist(), "opens_at": when}
+        for when in opens
         for i, line in enumerate(polylines_of(facets, _SAME * size))
     ]
     energy = [{"kind": "strain_energy"}]  # the others may speak of a cut by its old name
-    mesh: dict[str, Any] = {}
-    if scene.mesh.cells is not None:
-        mesh["cells"] = [list(scene.mesh.cells[level])]
-    if scene.mesh.sizes is not None:
-        mesh["sizes"] = [scene.mesh.sizes[level]]
-    changes = {"cuts": cuts, "quantities": energy, "mesh": mesh}
+    changes = {"cuts": cuts, "quantities": energy, "mesh": _levels(scene, slice(level, level + 1))}
     changes["analysis"] = {"kinematics": kinematics}
     return _changed(scene, f"realised-{kinematics}", changes)
+
+
+def _levels(scene: Scene, chosen: slice) -> dict[str, Any]:
+    if scene.mesh.cells is not None:
+        return {"cells": [list(cells) for cells in scene.mesh.cells[chosen]]}
+    return {"sizes": scene.mesh.sizes[chosen]} if scene.mesh.sizes is not None else {}
+
+
+def _at_last(part: dict[str, Any], value: str) -> dict[str, Any]:
+    """Return a support or a load with its last factor, for good."""
+    kept = {key: entry for key, entry in part.items() if key != "history"}
+    history = part.get("history")
+    if not history:
+        return kept
+    factor = float(history[-1][1])
+    value = "force" if part.get("kind") == "body_force" else value
+    if isinstance(kept[value], str) and factor != 1.0:
+        raise UnsupportedSceneError("what is taken from the exact solution has no factor at rest")
+    if not isinstance(kept[value], str):
+        kept[value] = [factor * entry for entry in kept[value]]
+    if kept.get("rotation"):
+        kept["rotation"] = {**kept["rotation"], "angle": factor * kept["rotation"]["angle"]}
+    return kept
 
 
 def _changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
@@ -66,7 +133,7 @@ def _changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
         content[key] = {**content[key], **value} if isinstance(value, dict) else value
     changed = Scene.model_validate(content)
     changed._file = scene.file or Path(f"{scene.name}.toml")
-    changed._name = f"{scene.name}@{name}"
+    changed._name = f"{scene.name}@{name}" if name else scene.name
     return changed
 
 
