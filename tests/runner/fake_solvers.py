@@ -143,3 +143,22 @@ class HangingOnce(Instant):
             mark.write_text(str(os.getpid()))
             time.sleep(600)
         return super().solve(scene, level, repetitions)
+
+
+class HangingRanks(Instant):
+    """Each MPI rank says so in a file of its own, and hangs."""
+
+    def solve(self, scene, level, repetitions=1, **parameters):
+        Path(os.environ["HANG_MARK"], str(os.getpid())).touch()
+        time.sleep(600)
+
+
+class FailingOnOneRank(Instant):
+    """The second MPI rank fails; the first waits for it for ever."""
+
+    def solve(self, scene, level, repetitions=1, **parameters):
+        from mpi4py import MPI
+
+        if MPI.COMM_WORLD.rank == 1:
+            raise ZeroDivisionError("the pivot is zero")
+        MPI.COMM_WORLD.Barrier()

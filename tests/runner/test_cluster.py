@@ -85,6 +85,19 @@ def test_a_killed_worker_loses_nothing(verify, cluster):
     assert len(solves) == 2  # what the dead worker had finished was not solved again
 
 
+def test_references_take_their_ranks_on_the_worker(verify, cluster):
+    pytest.importorskip("mpi4py")
+    case = (verify.folder / "square.toml").read_text() + "[reference]\nsize = 0.5\ndegree = 1\n"
+    cut = '[[cuts]]\nkind = "polyline"\npoints = [[-0.1, 0.53], [0.5, 0.53]]\n'
+    (verify.folder / "square.toml").write_text(case + cut)
+    done = verify("run", "square.toml", "--out", "out", "--solver", "reference", "--no-cache",
+                  "--cluster", cluster, "--ranks", "2")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    notes = [record["notes"] for record in verify.records().values()]
+    assert [note["ranks"] for note in notes] == ["2"] * 3
+    assert all("worker" in note for note in notes)
+
+
 def test_a_stopped_run_leaves_nothing_running_on_the_workers(verify, cluster):
     mark = verify.folder / "mark"
     process = run(verify, cluster, "fake_solvers:HangingOnce")

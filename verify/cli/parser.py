@@ -193,6 +193,10 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         help="solve on the workers of the Dask scheduler at tcp://HOST:PORT or in this file",
     )  # fmt: skip
     command.add_argument(
+        "--ranks", metavar="N", type=count, default=1,
+        help="MPI ranks of each reference of linear statics, here or on its worker (default: 1)",
+    )  # fmt: skip
+    command.add_argument(
         "--references", metavar="BUNDLE", type=Path,
         help="judge by the references in this file (`verify cache export`); solve none",
     )  # fmt: skip

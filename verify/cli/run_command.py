@@ -42,6 +42,7 @@ def execute(arguments: argparse.Namespace) -> int:
         cache=None if arguments.no_cache else cache_folder(),
         references=arguments.references,
         cluster=arguments.cluster,
+        ranks=arguments.ranks,
     )
     with progress_on(sys.stderr) as progress:
         try:

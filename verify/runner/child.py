@@ -38,20 +38,33 @@ class Ending:
 
 
 class Child:
-    """A running ``python -m MODULE ARGUMENT`` with its log, watched by calling `poll`."""
+    """A running ``python -m MODULE ARGUMENT`` with its log, watched by calling `poll`.
+
+    With more than one of `ranks` it is mpiexec that runs it as often; the limits are for all
+    ranks together.
+    """
 
     def __init__(
-        self, module: str, argument: Path, log: Path, timeout: float, memory: float
+        self,
+        module: str,
+        argument: Path,
+        log: Path,
+        timeout: float,
+        memory: float,
+        ranks: int = 1,
     ) -> None:
         environment = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
         environment[PARENT_VARIABLE] = str(os.getpid())
         self.log, self.timeout, self.memory = log, timeout, memory
         self.peak, self.killed_for = 0.0, ""
         self.start = time.monotonic()
+        run = [module, str(argument)]
+        if ranks > 1:
+            run = ["verify.runner.ranks", str(ranks), *run]
         with log.open("wb") as stream:
             self._process = subprocess.Popen(
                 # -P: a stray numpy.py in the working directory is not imported
-                [sys.executable, "-P", "-X", "faulthandler", "-m", module, str(argument)],
+                [sys.executable, "-P", "-X", "faulthandler", "-m", *run],
                 stdin=subprocess.DEVNULL,
                 stdout=stream,
                 stderr=stream,

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from verify.runner.child import PARENT_VARIABLE
 
-__all__ = ["die_with_parent", "peak_memory"]
+__all__ = ["die_with_parent", "peak_memory", "under_a_launcher"]
 
 _PR_SET_PDEATHSIG = 1
+_LAUNCHER = "launcher"  # instead of a number: started by something that the runner started
 
 
 def die_with_parent() -> None:
@@ -19,8 +20,14 @@ def die_with_parent() -> None:
     if parent is None or not sys.platform.startswith("linux"):
         return
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != int(parent):  # it died before we asked
+    if parent != _LAUNCHER and os.getppid() != int(parent):  # it died before we asked
         os.kill(os.getpid(), signal.SIGKILL)
+
+
+def under_a_launcher() -> None:
+    """Have what this process starts die with its own parent, which is not the runner."""
+    if PARENT_VARIABLE in os.environ:
+        os.environ[PARENT_VARIABLE] = _LAUNCHER
 
 
 def peak_memory() -> float:

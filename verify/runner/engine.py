@@ -63,6 +63,7 @@ class LocalEngine:
             folder / "log.txt",
             self._timeout,
             self._memory,
+            job.get("ranks", 1),
         )
 
     def close(self) -> None:

@@ -36,6 +36,8 @@ class Options:
         A bundle of references, which judges instead of solving any.
     cluster : str or None
         Scheduler of a Dask cluster whose workers solve; None: processes of this machine do.
+    ranks : int
+        MPI ranks of each reference that can be distributed.
     judged : bool
         Whether the references that judge are solved with the rest; without them only `solvers` run.
     """
@@ -49,6 +51,7 @@ class Options:
     cache: Path | None = None
     references: Path | None = None
     cluster: str | None = None
+    ranks: int = 1
     judged: bool = True
 
     def of_result(self) -> dict[str, Any]:

@@ -53,7 +53,12 @@ def solve_remotely(
             _take_along(job, mesh, folder)
         write_json(job, folder / "job.json")
         child = Child(
-            "verify.runner.solve", folder / "job.json", folder / "log.txt", timeout, limit
+            "verify.runner.solve",
+            folder / "job.json",
+            folder / "log.txt",
+            timeout,
+            limit,
+            job.get("ranks", 1),
         )
         try:
             ending = _watched(child, worker)

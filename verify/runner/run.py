@@ -23,6 +23,7 @@ from verify.runner.job import Job, store_record, stored_record
 from verify.runner.log import telling_line
 from verify.runner.options import Options
 from verify.runner.plan import CasePlan, plan_case, survey_solvers
+from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
 from verify.runner.storage import read_json, write_json
@@ -80,7 +81,8 @@ def run_cases(
     Raises
     ------
     InputError
-        If a case or `out` is bad; then nothing was written.
+        If a case or `out` is bad, or there is no mpiexec for several ranks; then nothing was
+        written.
     RunStoppedError
         If SIGINT, SIGTERM or SIGHUP came; what is finished stays and is taken over next time.
     OSError
@@ -92,6 +94,8 @@ def run_cases(
         "cases": [scene.name for scene in scenes],
         "options_of_result": options.of_result(),
     }
+    if options.ranks > 1 and not options.cluster:
+        mpiexec()  # or say now that there is none
     bundle = ReferenceBundle(options.references) if options.references else None
     cluster = (
         ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
@@ -216,10 +220,17 @@ class _Work:
             "level": job.level,
             "repetitions": job.repetitions,
             "parameters": job.parameters,
+            "ranks": self._ranks(job),
         }
         write_json(content, job.folder / "job.json")
         self.running[self.engine.start(content, job.folder)] = job
         self.progress.started(job.label)
+
+    def _ranks(self, job: Job) -> int:
+        """MPI ranks of a solve: several for references of linear statics, else one."""
+        analysis = self.plans[job.case].scene.analysis
+        linear = (analysis.kind, analysis.kinematics) == ("static", "linear")
+        return self.options.ranks if job.solver == REFERENCE and linear else 1
 
     def _known(self, job: Job) -> SolveRecord | None:
         """Take a reference from the bundle or the cache."""

@@ -1,9 +1,11 @@
 """One solve in a process of its own: ``python -m verify.runner.solve JOB.json``.
 
 Writes ``solution.json``/``.vtu`` and, last, ``outcome.json``; a process that dies without an
-outcome has failed, and its log says how.
+outcome has failed, and its log says how. As one of several MPI ranks it solves its part; the
+first rank writes.
 """
 
+import contextlib
 import errno
 import os
 import sys
@@ -14,6 +16,7 @@ from typing import Any
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Status
 from verify.runner.childhood import die_with_parent, peak_memory
+from verify.runner.ranks import give_up, world
 from verify.runner.storage import read_json, write_json
 
 __all__ = ["main", "solve_job"]
@@ -22,14 +25,28 @@ __all__ = ["main", "solve_job"]
 def main(job_file: Path) -> None:
     """Solve what `job_file` says and write down how it went."""
     die_with_parent()
-    outcome = solve_job(read_json(job_file), job_file.parent)
-    write_json({**outcome, "peak_memory": peak_memory()}, job_file.parent / "outcome.json")
-
-
-def solve_job(job: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Solve and store; every way to fail is an outcome with its reason."""
+    job, folder = read_json(job_file), job_file.parent
     try:
-        return _solved(job, folder)
+        comm = world() if job.get("ranks", 1) > 1 else None
+    except InputError as error:
+        outcome = {"status": Status.FAILED, "reason": str(error)}
+        with contextlib.suppress(OSError):  # the others write the same
+            write_json(outcome, folder / "outcome.json")
+        return
+    first = comm is None or comm.rank == 0
+    outcome = solve_job(job, folder, first)
+    if comm is not None:
+        outcome.setdefault("notes", {})["ranks"] = str(comm.size)
+    if first:
+        write_json({**outcome, "peak_memory": peak_memory()}, folder / "outcome.json")
+    if comm is not None and outcome["status"] != Status.SOLVED:
+        give_up(comm, outcome, folder / "outcome.json")
+
+
+def solve_job(job: dict[str, Any], folder: Path, store: bool = True) -> dict[str, Any]:
+    """Solve and `store`; every way to fail is an outcome with its reason."""
+    try:
+        return _solved(job, folder, store)
     except UnsupportedSceneError as refusal:
         return {"status": Status.REFUSED, "reason": str(refusal)}
     except InputError as error:
@@ -48,7 +65,7 @@ def solve_job(job: dict[str, Any], folder: Path) -> dict[str, Any]:
         return {"status": Status.FAILED, "reason": reason}
 
 
-def _solved(job: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
     from verify.calibration import calibration_note
     from verify.scene import restore_scene
     from verify.solution import write_solution
@@ -63,7 +80,8 @@ def _solved(job: dict[str, Any], folder: Path) -> dict[str, Any]:
     solution = solver.solve(
         scene, job["level"], repetitions=job["repetitions"], **job["parameters"]
     )
-    write_solution(solution, folder / "solution")
+    if store:
+        write_solution(solution, folder / "solution")
     return {
         "status": Status.SOLVED,
         "reason": "",

@@ -169,24 +169,43 @@ def _solve(
     if scene.exact is not None:
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
+    comm = _comm(scene)
+
     def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
         if scene.analysis.kind == "static":
-            return _equilibrium(scene, conforming_space(mesh, degree), exact)
+            return _equilibrium(scene, conforming_space(mesh, degree, comm), exact)
         largest = motion.largest(level, size)
         return _moved(scene, mesh, degree, exact, motion.scheme, largest, trial)
 
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
-        answer(0, *make_mesh(0), trial=True)
+        answer(0, *_shared(comm, lambda: make_mesh(0)), trial=True)
     for _ in range(max(repetitions, 1)):
         start = perf_counter()
-        mesh, size = make_mesh(level)
+        mesh, size = _shared(comm, lambda: make_mesh(level))
         meshed = perf_counter() - start
         result = answer(level, mesh, size)
         if repetitions:
             for phase, seconds in {"meshing": meshed, **result.timings}.items():
                 timings.setdefault(phase, []).append(seconds)
     return _solution(mesh, result, size, timings)
+
+
+def _comm(scene: Scene) -> Any:
+    """Communicator over which a scene is distributed: all ranks for linear statics, else none."""
+    from mpi4py import MPI
+
+    linear = scene.analysis.kind == "static" and scene.analysis.kinematics == "linear"
+    return MPI.COMM_WORLD if linear and MPI.COMM_WORLD.size > 1 else None
+
+
+def _shared(
+    comm: Any, make_mesh: Callable[[], tuple[ConformingMesh, float]]
+) -> tuple[ConformingMesh, float]:
+    """Make a mesh on the first rank, for all."""
+    if comm is None:
+        return make_mesh()
+    return comm.bcast(make_mesh() if comm.rank == 0 else None)  # type: ignore[no-any-return]
 
 
 def _moved(

@@ -130,7 +130,8 @@ def _changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
     content = scene.model_dump(mode="json", by_alias=True)
     content |= {"acceptance": [], "tags": []}
     for key, value in update.items():
-        content[key] = {**content[key], **value} if isinstance(value, dict) else value
+        merged = isinstance(value, dict) and key != "initial"  # of which each kind has its own keys
+        content[key] = {**content[key], **value} if merged else value
     changed = Scene.model_validate(content)
     changed._file = scene.file or Path(f"{scene.name}.toml")
     changed._name = f"{scene.name}@{name}" if name else scene.name

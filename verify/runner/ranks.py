@@ -1,0 +1,87 @@
+"""A solve on several MPI ranks of one machine: ``python -m verify.runner.ranks N MODULE JOB``.
+
+Turns itself into mpiexec, which starts N times ``python -m MODULE JOB``. MPI programs find each
+other only if mpiexec and mpi4py belong to the same MPI: each rank counts them before it works.
+"""
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+from typing import Any, NoReturn
+
+from verify.errors import InputError
+from verify.runner.childhood import die_with_parent, under_a_launcher
+from verify.runner.storage import write_json
+
+__all__ = ["RANKS_VARIABLE", "give_up", "main", "mpiexec", "world"]
+
+RANKS_VARIABLE = "VERIFY_RANKS"
+_WAIT_SECONDS = 2.0
+
+
+def mpiexec() -> str:
+    """Return the path of mpiexec: that beside this Python, or else the first in the path.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    beside = Path(sys.executable).with_name("mpiexec")
+    found = str(beside) if beside.exists() else shutil.which("mpiexec")
+    if found is None:
+        text = "needs mpiexec, which is neither beside this Python nor in the path"
+        raise InputError(text, "--ranks")
+    return found
+
+
+def main(count: int, module: str, argument: str) -> NoReturn:
+    """Become mpiexec."""
+    die_with_parent()  # holds after exec
+    under_a_launcher()
+    # the ranks stay on this machine, whatever a batch system would have mpiexec do
+    here = {"HYDRA_RMK": "user", "HYDRA_LAUNCHER": "fork", RANKS_VARIABLE: str(count)}
+    flags = ["-P", "-X", "faulthandler", "-m", module, argument]
+    command = [mpiexec(), "-n", str(count), sys.executable, *flags]
+    os.execve(command[0], command, {**os.environ, **here})
+
+
+def world() -> Any:
+    """Return the communicator of all ranks, or None where there is only this process.
+
+    Raises
+    ------
+    InputError
+        If the ranks do not find each other.
+    """
+    wanted = int(os.environ.get(RANKS_VARIABLE, "1"))
+    if wanted == 1:
+        return None
+    from mpi4py import MPI
+
+    if MPI.COMM_WORLD.size != wanted:
+        raise InputError(
+            f"mpiexec started {wanted} processes of which each finds {MPI.COMM_WORLD.size}: it is "
+            f"of another MPI than mpi4py ({MPI.get_vendor()[0]})",
+            "--ranks",
+        )
+    return MPI.COMM_WORLD
+
+
+def give_up(comm: Any, outcome: dict[str, Any], file: Path) -> None:
+    """End all ranks: one has failed, and the others may wait for it for ever.
+
+    What the first rank says counts, if it says anything within a moment; else what this one does.
+    """
+    end = time.monotonic() + _WAIT_SECONDS
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    if not file.exists():
+        write_json({**outcome, "reason": f"{outcome['reason']} (on rank {comm.rank})"}, file)
+    comm.Abort(1)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2], sys.argv[3])
