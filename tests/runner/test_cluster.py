@@ -85,6 +85,7 @@ def test_a_killed_worker_loses_nothing(verify, cluster):
     assert len(solves) == 2  # what the dead worker had finished was not solved again
 
 
+@pytest.mark.heavy
 def test_references_take_their_ranks_on_the_worker(verify, cluster):
     pytest.importorskip("mpi4py")
     case = (verify.folder / "square.toml").read_text() + "[reference]\nsize = 0.5\ndegree = 1\n"

@@ -108,7 +108,7 @@ def test_two_ranks_give_the_answer_of_one_and_say_so(verify, job):
 
 
 def test_a_time_limit_ends_all_ranks(job):
-    child = job("fake_solvers:HangingRanks", timeout=8.0)
+    child = job("fake_solvers:HangingRanks", timeout=5.0)
     ending = ended(child)
     assert ending.killed_for == "timeout"
     started = [int(p.name) for p in Path(os.environ["HANG_MARK"]).iterdir()]

@@ -29,9 +29,9 @@ def main(job_file: Path) -> None:
     try:
         comm = world() if job.get("ranks", 1) > 1 else None
     except InputError as error:
-        outcome = {"status": Status.FAILED, "reason": str(error)}
         with contextlib.suppress(OSError):  # the others write the same
-            write_json(outcome, folder / "outcome.json")
+            failed = {"status": Status.FAILED, "reason": str(error)}
+            write_json(failed, folder / "outcome.json")
         return
     first = comm is None or comm.rank == 0
     outcome = solve_job(job, folder, first)

@@ -205,7 +205,8 @@ def _shared(
     """Make a mesh on the first rank, for all."""
     if comm is None:
         return make_mesh()
-    return comm.bcast(make_mesh() if comm.rank == 0 else None)  # type: ignore[no-any-return]
+    shared: tuple[ConformingMesh, float] = comm.bcast(make_mesh() if comm.rank == 0 else None)
+    return shared
 
 
 def _moved(
