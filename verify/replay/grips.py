@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from verify.replay.stage import Hold, Hook
 from verify.xfem.dynamics import MovingSupports
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Grips", "gripped", "held_unknowns"]
+__all__ = ["Grips", "gripped", "held_facets", "held_unknowns"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -27,31 +29,49 @@ def gripped(virtual: VirtualMesh, hook: Hook) -> _Ints:
     return on_side[away <= max(hook.radius, float(away.min()))]
 
 
-def held_unknowns(virtual: VirtualMesh, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def held_unknowns(
+    virtual: VirtualMesh, nodes: NDArray[np.bool_], on_held: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
     """Unknown nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
 
     The unknown of the material at a node is held. Another one there, of material beyond a cut, is
     held only if that material reaches a held facet: else a part that is cut free would hang on a
-    node that is no part of it.
+    node that is no part of it. `on_held` is what `held_facets` gives, if it is known.
     """
-    mesh = virtual.mesh
     held = np.zeros(virtual.node_count, dtype=bool)
     held[: len(nodes)] = nodes
+    sub = virtual.sub_cells
+    facets = held_facets(virtual.mesh, nodes) if on_held is None else on_held
+    _hold_parts(facets, virtual.cells, virtual.parent, sub.piece, sub.barycentric, held)
+    return held
+
+
+def held_facets(mesh: SimplexMesh, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(m, d + 1) whether the facet opposite to a corner is on the boundary, its nodes all held."""
     cell, local = mesh.boundary_facets.T
     facet = nodes[mesh.cells[cell]]
     facet[np.arange(len(cell)), local] = True
     on_held = np.zeros(mesh.cells.shape, dtype=bool)
-    on_held[cell[facet.all(axis=1)], local[facet.all(axis=1)]] = True
-    sub = virtual.sub_cells
-    parent = virtual.parent[sub.piece]
-    near = np.flatnonzero(on_held[parent].any(axis=1))
-    for opposite in range(mesh.dim + 1):
-        # a sub-simplex lies on the facet if all its corners but one do
-        flat = (sub.barycentric[near][:, :, opposite] == 0.0).sum(axis=1) == mesh.dim
-        piece = sub.piece[near[flat & on_held[parent[near], opposite]]]
-        others = [corner for corner in range(mesh.dim + 1) if corner != opposite]
-        held[virtual.cells[piece][:, others]] = True
-    return held
+    on_held[cell, local] = facet.all(axis=1)
+    return on_held
+
+
+@njit(cache=True)
+def _hold_parts(on_held, cells, parent, piece, barycentric, held):
+    """Hold the unknowns of sub-simplices on held facets: all corners but one lie on these."""
+    corners = cells.shape[1]
+    for k in range(len(piece)):
+        for opposite in range(corners):
+            if not on_held[parent[piece[k]], opposite]:
+                continue
+            away = 0
+            for corner in range(corners):
+                away += barycentric[k, corner, opposite] != 0.0
+            if away != 1:
+                continue
+            for corner in range(corners):
+                if corner != opposite:
+                    held[cells[piece[k], corner]] = True
 
 
 class Grips:
@@ -66,6 +86,8 @@ class Grips:
         Lumped masses: a force is shared in proportion, so that slivers get next to nothing.
     start : dict
         Displacement (N, s) at which each hook (by its number) has gripped.
+    facets : sequence of (m, d + 1) bool arrays, optional
+        `held_facets` of each hold; they do not change as the body is cut.
     """
 
     def __init__(
@@ -75,11 +97,12 @@ class Grips:
         hooks: Sequence[Hook],
         weights: _Floats,
         start: dict[int, _Floats],
+        facets: Sequence[NDArray[np.bool_]] | None = None,
     ) -> None:
-        shape = virtual.node_points.shape
+        shape = (virtual.node_count, virtual.mesh.space)
         self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
-        for hold in holds:
-            at = held_unknowns(virtual, hold.nodes)
+        for k, hold in enumerate(holds):
+            at = held_unknowns(virtual, hold.nodes, None if facets is None else facets[k])
             for axis, value in zip(hold.components, hold.values, strict=True):
                 self._fixed[at, axis], self._values[at, axis] = True, value
         self._moved: list[tuple[Hook, _Ints, _Floats]] = []

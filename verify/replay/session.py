@@ -7,11 +7,12 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.replay.grips import Grips
+from verify.replay.grips import Grips, held_facets
 from verify.replay.stage import Stage
 from verify.replay.step_record import PHASES, StepRecord
 from verify.replay.surfaces import Picture, Surfaces
 from verify.xfem.collision.surface_collider import Contacts, SurfaceCollider
+from verify.xfem.cholesky import Cholesky
 from verify.xfem.corotational import InternalForce
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
@@ -24,6 +25,8 @@ from verify.xfem.virtual import VirtualMesh
 __all__ = ["Session"]
 
 _Floats = NDArray[np.float64]
+
+_NONE = np.empty(0, dtype=np.int64)
 
 
 class Session:
@@ -70,7 +73,9 @@ class Session:
         self._crossed = 0
         self._spent = np.zeros(2)  # work and dissipation until the body was last made anew
         self._seconds = dict.fromkeys(PHASES, 0.0)
-        self._assemble()
+        self._held = [held_facets(stage.mesh, hold.nodes) for hold in stage.holds]
+        self._solver: Cholesky | None = None
+        self._assemble(_NONE)
         self.state = self.body.rest()
         self._ledger = EnergyLedger(self.body, self.state)
 
@@ -93,7 +98,7 @@ class Session:
     def begin(self, path: ToolPath) -> None:
         """Begin another stroke, to be extended through `cutter.extend` if the tool is live."""
         self.cutter.begin(path)
-        self._assemble()
+        self._assemble(_NONE)
 
     def step(self) -> StepRecord:
         """Take one step.
@@ -112,10 +117,15 @@ class Session:
                 self.surfaces.update(increment)
         if self._hooks_begun(end) or increment is not None:
             with self._timed("assembly"):
-                self._assemble()
+                self._assemble(_NONE if increment is None else increment.source)
             if self._account:
                 self._spent = self._spent_so_far()
                 self._ledger = EnergyLedger(self.body, self.state)
+        elif self._solver is not None and self._solver.is_worn:
+            # what can wait until a step in which nothing is split
+            with self._timed("assembly"):
+                self._solver = Cholesky(self.body.pattern, self.body.shape[1])
+                self.integrator.solver = self._solver
         with self._timed("motion"):
             if not self._account:
                 self.integrator.advance(self.state)
@@ -150,12 +160,17 @@ class Session:
                 self._start[number] = self.state.displacement.copy()
         return len(self._start) > before
 
-    def _assemble(self) -> None:
-        """Make the body anew: mass, supports, loads, sparsity and solver."""
+    def _assemble(self, source: NDArray[np.int64]) -> None:
+        """Make the body anew: mass, supports, loads, sparsity and solver.
+
+        `source` (k,) are the unknowns from which those come that are new since the last time.
+        """
         stage = self.stage
         self.virtual: VirtualMesh = self.cutter.virtual_mesh()
         mass = side_wise_mass(self.virtual, stage.density)
-        self._grips = Grips(self.virtual, stage.holds, stage.hooks, mass.weights, self._start)
+        self._grips = Grips(
+            self.virtual, stage.holds, stage.hooks, mass.weights, self._start, self._held
+        )
         self._tool_load = None
         self.body = DynamicBody(
             InternalForce(self.virtual, stage.material),
@@ -165,7 +180,11 @@ class Session:
             supports=self._grips.supports,
             damping=stage.damping,
         )
-        self.integrator = RealTimeEuler(self.body, stage.time_step)
+        if self._solver is None:
+            self._solver = Cholesky(self.body.pattern, stage.mesh.space)
+        else:
+            self._solver = self._solver.extended(self.body.pattern, source)
+        self.integrator = RealTimeEuler(self.body, stage.time_step, self._solver)
 
     def _load(self, time: float) -> _Floats:
         force = self._grips.force(time)

@@ -8,6 +8,7 @@ scaling, so slivers do not hurt it (Higham 2002, section 10.1).
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from verify.xfem.block_pattern import BlockPattern
@@ -24,6 +25,9 @@ from verify.xfem.minimum_degree import minimum_degree
 __all__ = ["Cholesky", "SingularStiffnessError"]
 
 _Ints = NDArray[np.int64]
+
+_ANYWHERE = np.empty(0, dtype=np.int64)
+_WORN = 1.25  # entries of the factor per unknown, over those when the order was found
 
 
 class SingularStiffnessError(XfemError):
@@ -57,22 +61,59 @@ class Cholesky:
     def __init__(self, pattern: BlockPattern, block: int) -> None:
         graph = (pattern.starts, pattern.columns)
         order, bounds = minimum_degree(*graph)
-        row_start, _, parent = front_rows(*graph, order, bounds)
+        row_start, _, parent = front_rows(*graph, order, bounds, _ANYWHERE)
         order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
-        row_start, rows, parent = front_rows(*graph, order, bounds)
+        self._block = block
+        self._factor = self._stack = self._update = np.empty(0)
+        self._diagonal = self._gathered = np.empty(0)
+        self._place = np.empty(0, dtype=np.int64)
+        self._plan(pattern, order, bounds, _ANYWHERE)
+        self._ordered = (self.factor_entries, len(order))
+
+    def extended(self, pattern: BlockPattern, source: _Ints) -> "Cholesky":
+        """Solver for this body cut further, in the order of this one: no search for another.
+
+        A new unknown has some of the neighbours of the one from which it comes, and is eliminated
+        with it. Takes the memory of this solver, which is of no use any more.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Of more unknowns: old ones keep their numbers and are coupled, through themselves or
+            through what has come from them, to none that were not coupled before.
+        source : (k,) int array
+            Unknown before from which each new one comes.
+        """
+        other = object.__new__(Cholesky)
+        other.__dict__.update(self.__dict__)
+        order, bounds = _insert(self._order, self._bounds, source)
+        other._plan(pattern, order, bounds, self._parent)
+        return other
+
+    @property
+    def is_worn(self) -> bool:
+        """Whether extensions have made the order so bad that a new one would pay."""
+        entries, nodes = self._ordered
+        return self.factor_entries > _WORN * entries * (len(self._order) / nodes)
+
+    def _plan(self, pattern: BlockPattern, order: _Ints, bounds: _Ints, nearest: _Ints) -> None:
+        """Find fronts and room for an order, and where each block goes."""
+        graph = (pattern.starts, pattern.columns)
+        row_start, rows, parent = front_rows(*graph, order, bounds, nearest)
         lists = assembly_lists(*graph, order, bounds, row_start, rows, parent)
-        self._order, self._bounds, self._block = order, bounds, block
+        self._order, self._bounds = order, bounds
         self._row_start, self._rows, self._parent = row_start, rows, parent
         self._relative, self._entry_start, self._entry_block, self._entry_row = lists
-        width = np.diff(bounds) * block
-        below = np.diff(self._row_start) * block
+        width = np.diff(bounds) * self._block
+        below = np.diff(row_start) * self._block
         self._offset = np.concatenate([[0], np.cumsum(width * (width + below))])
-        self._factor = np.zeros(self._offset[-1])
-        self._stack = np.empty(stack_depth(self._parent, below))
-        self._update = np.empty(int(below.max(initial=0)) ** 2)
-        self._place = np.empty(int(below.max(initial=0)), dtype=np.int64)
-        self._diagonal = np.empty(int(width.max(initial=0)))
-        self._gathered = np.empty(int(below.max(initial=0)))
+        most = int(below.max(initial=0))
+        self._factor = _room(self._factor, int(self._offset[-1]))
+        self._stack = _room(self._stack, stack_depth(parent, below))
+        self._update = _room(self._update, most**2)
+        self._place = _room(self._place, most)
+        self._diagonal = _room(self._diagonal, int(width.max(initial=0)))
+        self._gathered = _room(self._gathered, most)
 
     @property
     def factor_entries(self) -> int:
@@ -123,3 +164,33 @@ class Cholesky:
         solution = np.empty_like(x)
         solution[self._order] = x
         return solution
+
+
+def _room[T: np.generic](store: NDArray[T], size: int) -> NDArray[T]:
+    """Array of at least that size: the given one, or a larger one with room to grow."""
+    return store if len(store) >= size else np.empty(size + size // 4, dtype=store.dtype)
+
+
+@njit(cache=True)
+def _insert(order, bounds, source):
+    """Order and bounds of fronts with new nodes after those from which they come."""
+    nodes, fronts = len(order), len(bounds) - 1
+    # of each node the last new one that comes from it, and of each new one that before
+    newest, earlier = np.full(nodes, -1, dtype=np.int64), np.empty(len(source), dtype=np.int64)
+    for k in range(len(source)):
+        earlier[k] = newest[source[k]]
+        newest[source[k]] = k
+    grown = np.empty(nodes + len(source), dtype=np.int64)
+    ends = np.zeros(fronts + 1, dtype=np.int64)
+    count = 0
+    for s in range(fronts):
+        for k in range(bounds[s], bounds[s + 1]):
+            grown[count] = order[k]
+            count += 1
+            new = newest[order[k]]
+            while new >= 0:
+                grown[count] = nodes + new
+                count += 1
+                new = earlier[new]
+        ends[s + 1] = count
+    return grown, ends

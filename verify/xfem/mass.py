@@ -176,6 +176,31 @@ def cell_densities(virtual: VirtualMesh, density: ArrayLike) -> _Floats:
     return np.broadcast_to(values, count)
 
 
+class _SideWiseMass(Mass):
+    """A diagonal mass, of which the matrices are made only if somebody asks for them."""
+
+    def __init__(self, weights: _Floats) -> None:
+        # a body is cut often, and to make a sparse matrix takes longer than all else here
+        self.__dict__["weights"] = weights
+
+    @cached_property
+    def matrix(self) -> csr_array:  # type: ignore[override]
+        return _diagonal_matrix(self.weights)
+
+    @cached_property
+    def root(self) -> csr_array:  # type: ignore[override]
+        return _diagonal_matrix(1.0 / np.sqrt(self.weights))
+
+    @cached_property
+    def diagonal(self) -> _Floats:
+        return self.weights
+
+    @cached_property
+    def entries(self) -> tuple[_Ints, _Ints, _Floats]:
+        rows = np.arange(len(self.weights))
+        return rows, rows, self.weights
+
+
 def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     """Side-wise lumped mass: diag(ρ V_piece/n) in side-wise unknowns.
 
@@ -185,20 +210,16 @@ def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     density : float or (m,) array_like
         In kg/m³; for membranes times the thickness.
     """
-    corners = virtual.cells.shape[1]
-    share = virtual.volumes * cell_densities(virtual, density)[virtual.parent] / corners
-    weights = np.bincount(
-        virtual.cells.ravel(), np.repeat(share, corners), minlength=virtual.node_count
-    )
-    return Mass(
-        matrix=_diagonal_matrix(weights),
-        root=_diagonal_matrix(1.0 / np.sqrt(weights)),
-        weights=weights,
-    )
+    densities = cell_densities(virtual, density)
+    share = virtual.volumes * densities[virtual.parent] / virtual.cells.shape[1]
+    weights = np.zeros(virtual.node_count)
+    for corner in virtual.cells.T:
+        weights += np.bincount(corner, share, minlength=len(weights))
+    return _SideWiseMass(weights)
 
 
 def _diagonal_matrix(values: _Floats) -> csr_array:
-    rows = np.arange(len(values) + 1)  # a body is cut often: `diags_array` takes a millisecond
+    rows = np.arange(len(values) + 1)
     return csr_array((values, rows[:-1], rows), shape=(len(values), len(values)))
 
 

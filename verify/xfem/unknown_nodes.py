@@ -1,6 +1,7 @@
 """Numbers of the unknown nodes of a cut mesh, and on which side of the cuts each lies."""
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from verify.xfem.joining import PatchSlots
@@ -71,11 +72,24 @@ def node_sides(values: _Floats, cells: _Ints, label: NDArray[np.int8]) -> NDArra
     label : (p, cuts) int8 array
         Its sides, as in `VirtualMesh`.
     """
-    side = np.where(values >= 0.0, 1, -1).astype(np.int8)
-    for cut in range(label.shape[1]):
-        seen = np.zeros((2, len(values)), dtype=bool)
-        for k, sign in enumerate((1, -1)):
-            seen[k, cells[label[:, cut] == sign]] = True
-        side[seen[0] & ~seen[1], cut] = 1
-        side[seen[1] & ~seen[0], cut] = -1
+    side = np.zeros(values.shape, dtype=np.int8)
+    _write_sides(values, cells, label, side)
     return side
+
+
+@njit(cache=True)
+def _write_sides(values, cells, label, side):
+    disagreed = 2
+    for p in range(len(cells)):
+        for cut in range(label.shape[1]):
+            if label[p, cut] == 0:
+                continue
+            for node in cells[p]:
+                if side[node, cut] == 0:
+                    side[node, cut] = label[p, cut]
+                elif side[node, cut] != label[p, cut]:
+                    side[node, cut] = disagreed
+    for node in range(len(values)):
+        for cut in range(label.shape[1]):
+            if side[node, cut] == 0 or side[node, cut] == disagreed:
+                side[node, cut] = 1 if values[node, cut] >= 0.0 else -1

@@ -1,5 +1,7 @@
 """The growing body as a `VirtualMesh`, for solvers that want all of it in one piece."""
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,25 +43,39 @@ def whole_mesh(body: GrowingBody, level_sets: _Floats) -> VirtualMesh:
         node_parent=node_parent,
         level_sets=level_sets,
         node_side=node_sides(level_sets[node_parent], cells, label),
-        sub_cells=SubCells(
-            piece=number[body.sub_piece.rows[used]],
-            points=body.sub_points.rows[used],
-            barycentric=body.sub_barycentric.rows[used],
-            fraction=body.sub_fraction.rows[used],
-            zero_points=_zero_points(body, level_sets),
-        ),
-        snapped=int((level_sets == 0.0).sum()),
+        sub_cells=_GrownSubCells(body, number, used, level_sets),
+        snapped=int(np.count_nonzero(level_sets == 0.0)),
         dropped=body.dropped,
     )
 
 
-def _zero_points(body: GrowingBody, level_sets: _Floats) -> ZeroPoints:
-    points = ZeroPoints(body.mesh.points, level_sets, 0.0)
-    ends, cut = body.points.ends.rows.copy(), body.points.cut.rows.copy()
-    nodes, count = len(level_sets), len(cut)
-    values = np.full((nodes + count, level_sets.shape[1]), np.nan)
-    values[:nodes] = level_sets
-    missing = np.arange(count)
+class _GrownSubCells(SubCells):
+    """Sub-simplices of a growing body; what is not asked for at every cut is made when it is."""
+
+    def __init__(self, body: GrowingBody, number: _Ints, used: _Ints, level_sets: _Floats) -> None:
+        self.__dict__.update(
+            piece=number[body.sub_piece.rows[used]],
+            points=body.sub_points.rows[used],
+            barycentric=body.sub_barycentric.rows[used],
+            fraction=body.sub_fraction.rows[used],
+            # rows that are there never change, so these stay those of the body as it is now
+            _points=(body.points.positions.rows, body.points.ends.rows, body.points.cut.rows),
+            _nodes=(body.mesh.points, level_sets),
+        )
+
+    @cached_property
+    def zero_points(self) -> ZeroPoints:  # type: ignore[override]
+        """Positions of all numbered points, and the edges on which the new ones lie."""
+        return _zero_points(*self._nodes, *self._points)
+
+
+def _zero_points(
+    nodes: _Floats, level_sets: _Floats, positions: _Floats, ends: _Ints, cut: _Ints
+) -> ZeroPoints:
+    points = ZeroPoints(nodes, level_sets, 0.0)
+    values = np.full((len(nodes) + len(cut), level_sets.shape[1]), np.nan)
+    values[: len(nodes)] = level_sets
+    missing = np.arange(len(cut))
     while len(missing):
         # ends that are zero points themselves come first
         ready = ~np.isnan(values[ends[missing], 0]).any(axis=1)
@@ -68,8 +84,8 @@ def _zero_points(body: GrowingBody, level_sets: _Floats) -> ZeroPoints:
         k = np.arange(len(rows))
         above, below = plus[k, cut[rows]], minus[k, cut[rows]]
         r = (above / (above - below))[:, None]
-        values[nodes + rows] = (1.0 - r) * plus + r * minus
-        values[nodes + rows, cut[rows]] = 0.0
-    points.positions = np.concatenate([body.mesh.points, body.points.positions.rows])
-    points.values, points.ends, points.cut = values, ends, cut
+        values[len(nodes) + rows] = (1.0 - r) * plus + r * minus
+        values[len(nodes) + rows, cut[rows]] = 0.0
+    points.positions = np.concatenate([nodes, positions])
+    points.values, points.ends, points.cut = values, ends.copy(), cut.copy()
     return points

@@ -128,9 +128,9 @@ class DynamicBody:
     def __post_init__(self) -> None:
         virtual = self.force.virtual
         self.shape: tuple[int, int] = (virtual.node_count, virtual.mesh.space)
-        if self.mass.matrix.shape[0] != self.shape[0]:
+        if len(self.mass.weights) != self.shape[0]:
             raise XfemError(
-                f"mass of {self.mass.matrix.shape[0]} unknown nodes; the body has {self.shape[0]}"
+                f"mass of {len(self.mass.weights)} unknown nodes; the body has {self.shape[0]}"
             )
         if self.weight is None:
             self.weight = np.zeros(self.shape)
