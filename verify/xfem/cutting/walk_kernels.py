@@ -16,22 +16,42 @@ __all__ = ["cells_hit", "walk"]
 
 
 @njit(cache=True)
+def _box_between(corners, travel, after, front, floor, ceiling):
+    """Write the box of the part of a facet between two travels; whether there is any."""
+    some = False
+    for i in range(len(floor)):
+        floor[i], ceiling[i] = np.inf, -np.inf
+    for k in range(len(travel)):
+        for j in range(k, len(travel)):
+            # corners between the two, and where an edge passes one of them
+            for limit in (after, front):
+                share = 0.0
+                if j == k:
+                    if travel[k] < after or travel[k] > front:
+                        continue
+                elif (travel[k] < limit) == (travel[j] < limit):
+                    continue
+                else:
+                    share = (limit - travel[k]) / (travel[j] - travel[k])
+                some = True
+                for i in range(len(floor)):
+                    x = (1.0 - share) * corners[k, i] + share * corners[j, i]
+                    floor[i], ceiling[i] = min(floor[i], x), max(ceiling[i], x)
+    return some
+
+
+@njit(cache=True)
 def cells_hit(sweep, after, front, margin, low, high, order):
-    """Items of a tree near the facets swept between two travels; may hold doubles."""
+    """Items of a tree near what is swept between two travels; may hold doubles."""
     found = [np.int64(0) for _ in range(0)]
     corners = sweep.corners
     floor, ceiling = np.empty(corners.shape[2]), np.empty(corners.shape[2])
     for t in range(len(corners)):
-        first, last = np.inf, -np.inf
-        for k in range(corners.shape[1]):
-            first, last = min(first, sweep.travel[t, k]), max(last, sweep.travel[t, k])
-        if last < after or first > front:
+        if not _box_between(corners[t], sweep.travel[t], after, front, floor, ceiling):
             continue
-        for i in range(corners.shape[2]):
-            floor[i], ceiling[i] = np.inf, -np.inf
-            for k in range(corners.shape[1]):
-                floor[i] = min(floor[i], corners[t, k, i] - margin)
-                ceiling[i] = max(ceiling[i], corners[t, k, i] + margin)
+        for i in range(len(floor)):
+            floor[i] -= margin
+            ceiling[i] += margin
         for item in items_near_plane(
             low, high, order, floor, ceiling, sweep.normals[t], corners[t, 0], margin
         ):

@@ -36,6 +36,28 @@ def barycentric(x, cell, cells, points, gradients, out):
 
 
 @njit(cache=True)
+def _first_reach(x, reach, low, high, order, stack):
+    """Give the reach, doubled until the box of a cell comes within it."""
+    least, top = np.inf, 1
+    stack[0] = 1
+    while top > 0:
+        top -= 1
+        node, gap = stack[top], 0.0
+        for i in range(len(x)):
+            gap = max(gap, low[node, i] - x[i], x[i] - high[node, i])
+        if gap >= least:
+            continue
+        if node < len(order):
+            stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+            top += 2
+        else:
+            least = gap
+    while reach < least:
+        reach *= 2.0
+    return reach
+
+
+@njit(cache=True)
 def _cells_about(x, reach, low, high, order, stack, found):
     """Write the cells whose boxes come within reach of x; give their count."""
     count, top = 0, 1
@@ -61,6 +83,7 @@ def locate(x, reach, low, high, order, cells, points, gradients):
     """Give the cell of x."""
     trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
     best, at = -np.inf, -1
+    reach = _first_reach(x, reach, low, high, order, stack)
     while at < 0:
         stack[0], top = 1, 1
         while top > 0:
@@ -104,7 +127,8 @@ def cut_at(
     trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
     about, least = np.empty(len(order), dtype=np.int64), np.empty(len(order))
     for q in range(len(places)):
-        count, wider, best = 0, reach, -np.inf
+        count, best = 0, -np.inf
+        wider = _first_reach(places[q], reach, low, high, order, stack)
         while count == 0:
             count = _cells_about(places[q], wider, low, high, order, stack, about)
             wider *= 2.0
