@@ -7,6 +7,7 @@ the number of goes is what costs.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.collision.bounding_tree import BoundingTree
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.growing_array import GrowingArray
 from verify.xfem.mapping.embedded_surface import EmbeddedSurface
@@ -29,7 +30,8 @@ class SurfacePart:
 
     def __init__(self, embedded: EmbeddedSurface, begin: int, end: int) -> None:
         self._embedded, self._whole = embedded, embedded.surface
-        self._begin, self._end = begin, end
+        # along a curve that fills space, so that a tree over them need not sort them at each cut
+        self._given = begin + BoundingTree(embedded.points, embedded.facets[begin:end]).order
 
     @property
     def material(self) -> GrowingArray:
@@ -53,10 +55,13 @@ class SurfacePart:
 
     @property
     def used(self) -> _Ints:
-        """Numbers of the facets of this part in use."""
-        given = self._embedded.given.rows
-        mine = (given >= self._begin) & (given < self._end)
-        return np.flatnonzero(mine & (self._whole.facets.rows[:, 0] >= 0))
+        """Numbers of the facets of this part in use, neighbours near each other."""
+        return self._embedded.parts_of(self._given)
+
+    @property
+    def in_order(self) -> bool:
+        """Whether neighbours among these are near each other."""
+        return True
 
     @property
     def retired(self) -> int:

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from verify.xfem.bisection import Simplices, bisect_at
 from verify.xfem.clipping import staircase
-from verify.xfem.crossing import Crossing, TipRule, crossed_through
+from verify.xfem.crossing import AT_END, REACH, Crossing, TipRule, crossed_through
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.split_kernels import crossed_edges, divide_simplices
+from verify.xfem.split_kernels import crossed_cells, crossed_edges, divide_simplices
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["ROUND_OFF", "Held", "Partition", "split_cells"]
@@ -130,6 +130,10 @@ def split_cells(
         raise XfemError(f"tip rule '{tip}'; expected inside, through or nearest")
     values, snapped = _nodal_values(mesh, cuts)
     snap = ROUND_OFF * mesh.extent
+    if len(cuts) == 1 and tip != "nearest":
+        return _split_by_one(
+            mesh, cuts[0], ZeroPoints(mesh.points, values, snap), snapped, tip, held
+        )
     plus = values[mesh.cells] >= 0.0
     candidates = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
     corners = mesh.dim + 1
@@ -156,6 +160,54 @@ def split_cells(
         if len(partition.parent) == before:
             break
     return _only_split(partition)
+
+
+def _split_by_one(
+    mesh: SimplexMesh, cut: Cut, points: ZeroPoints, snapped: int, tip: TipRule, held: Held | None
+) -> Partition:
+    """Do the same for a single cut: whole cells are divided, once, and nothing lies beside.
+
+    A blade meets a few dozen cells at a step, and with so few only the number of calls costs.
+    """
+    crossed = crossed_cells(mesh.cells, points.values)
+    edges, places, size = points.cross(crossed, mesh.cells)
+    active = np.zeros(len(crossed), dtype=bool)
+    if len(crossed):
+        level, depth = np.abs(cut.level_set(places))[edges], cut.depth(places)[edges]
+        margin = AT_END if tip == "through" else -AT_END
+        inside = (level <= REACH * size[:, None]) & (depth >= margin * size[:, None])
+        there = edges >= 0
+        active = (inside & there).any(axis=1) if tip == "through" else (inside | ~there).all(axis=1)
+    if held is not None and not active.all():
+        doubtful = np.flatnonzero(~active)
+        label = np.zeros((len(doubtful), 1), dtype=np.int8)
+        active[doubtful] = held(crossed[doubtful], label, 0)
+    cells = crossed[active]
+    count, corners = len(cells), mesh.dim + 1
+    whole = np.arange(count)
+    identity = np.zeros((count, corners, corners))
+    identity[:, range(corners), range(corners)] = 1.0
+    simplices, kept = divide_simplices(
+        (whole, mesh.cells[cells], identity, np.ones(count), np.ones(count, dtype=np.int8)),
+        points.values,
+        0,
+        np.ones(count, dtype=bool),
+        whole + count,
+        staircase(corners),
+        points.table,
+    )
+    points.divided(simplices[1][kept:])
+    piece = simplices[0]
+    label = np.ones((2 * count, 1), dtype=np.int8)
+    label[1::2] = -1
+    return Partition(
+        np.repeat(cells, 2),
+        label,
+        np.where(piece < count, 2 * piece, 2 * (piece - count) + 1),
+        *simplices[1:],
+        points,
+        snapped,
+    )
 
 
 def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
@@ -197,8 +249,7 @@ def _split_by(
     if not active.any():
         return partition
     divided = _divide(partition, index, active)
-    # of a single cut, what it leaves whole is left out in the end
-    return divided if divided.label.shape[1] == 1 else _bisect_beside(divided, index)
+    return _bisect_beside(divided, index)
 
 
 def _divide(partition: Partition, index: int, active: NDArray[np.bool_]) -> Partition:

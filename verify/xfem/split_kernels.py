@@ -3,9 +3,51 @@
 import numpy as np
 from numba import njit
 
-from verify.xfem.row_numbers import point_on_edge
+from verify.xfem.row_numbers import number_of_row, point_on_edge
 
-__all__ = ["crossed_edges", "divide_simplices"]
+__all__ = ["crossed_cells", "crossed_edges", "divide_simplices", "edges_of_cells"]
+
+
+@njit(cache=True)
+def crossed_cells(cells, values):
+    """Cells that have corners on both sides of the only cut there is, given (n, 1) level sets."""
+    found, count = np.empty(len(cells), dtype=np.int64), 0
+    for cell in range(len(cells)):
+        above = 0
+        for a in range(cells.shape[1]):
+            above += values[cells[cell, a], 0] >= 0.0
+        if 0 < above < cells.shape[1]:
+            found[count] = cell
+            count += 1
+    return found[:count].copy()
+
+
+@njit(cache=True)
+def edges_of_cells(chosen, cells, points, values, table, known, edges, size):
+    """Number the edges of cells that the only cut crosses, as rows (0, plus, minus); their count.
+
+    Writes the numbers of those of each cell (q, e), -1 where it has no more, and the length (q,)
+    of the longest edge from its first corner.
+    """
+    count, row, corners = np.int64(0), np.zeros(3, dtype=np.int64), cells.shape[1]
+    for q in range(len(chosen)):
+        cell, own, longest = chosen[q], 0, 0.0
+        for a in range(corners):
+            length = 0.0
+            for i in range(points.shape[1]):
+                length += (points[cells[cell, a], i] - points[cells[cell, 0], i]) ** 2
+            longest = max(longest, length)
+            if values[cells[cell, a], 0] < 0.0:
+                continue
+            for b in range(corners):
+                if values[cells[cell, b], 0] < 0.0:
+                    row[1], row[2] = cells[cell, a], cells[cell, b]
+                    edges[q, own], count = number_of_row(row, table, known, count)
+                    own += 1
+        for k in range(own, edges.shape[1]):
+            edges[q, k] = -1
+        size[q] = np.sqrt(longest)
+    return count
 
 
 @njit(cache=True)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import EdgeTable, RowNumbers
+from verify.xfem.split_kernels import edges_of_cells
 
 __all__ = ["ZeroPoints"]
 
@@ -78,6 +79,48 @@ class ZeroPoints:
         if len(self._edges) > before:
             self._append(cut, before)
         return self._point.rows[edge]
+
+    def cross(self, chosen: _Ints, cells: _Ints) -> tuple[_Ints, _Floats, _Floats]:
+        """Find the points at which the only cut crosses the edges of cells, before any other.
+
+        Parameters
+        ----------
+        chosen : (q,) int array
+            Cells that have corners on both sides.
+        cells : (m, d + 1) int array
+
+        Returns
+        -------
+        edges : (q, e) int array
+            Edges of each cell that are crossed, -1 where there are no more.
+        places : (k, s) float array
+            Where each edge is crossed, in metres.
+        size : (q,) float array
+            Longest edge from the first corner of each cell, in metres.
+        """
+        corners = cells.shape[1]
+        most = (corners // 2) * (corners - corners // 2)
+        edges, size = np.empty((len(chosen), most), dtype=np.int64), np.empty(len(chosen))
+        table, known, _ = self._edges.open_for(edges.size)
+        count = edges_of_cells(
+            chosen, cells, self.positions, self.values, table, known, edges, size
+        )
+        self._edges.close(count)
+        plus, minus = known[:count, 1], known[:count, 2]
+        r, s = self.shares(0, plus, minus)
+        places = s[:, None] * self.positions[plus] + r[:, None] * self.positions[minus]
+        order = np.argsort(plus << 32 | minus)
+        new = r[order] > 0.0
+        point = np.empty(count, dtype=np.int64)
+        point[order] = np.where(new, len(self.positions) - 1 + np.cumsum(new), plus[order])
+        self._point.append(point)
+        first = order[new]
+        self.values = np.concatenate([self.values, np.zeros((len(first), 1))])
+        self.positions = np.concatenate([self.positions, places[first]])
+        self.ends = known[first, 1:]
+        self.cut = np.zeros(len(first), dtype=np.int64)
+        self.turn = np.full(len(first), np.iinfo(np.int64).max)
+        return edges, places, size
 
     def divided(self, numbers: _Ints) -> None:
         """Note that cells were divided at these points (mesh nodes among them do not count)."""

@@ -26,6 +26,8 @@ class BoundingTree:
         In metres.
     simplices : (n, k) int array
         May be empty.
+    in_order : bool
+        Whether neighbours in the list are near each other, so that it need not be sorted.
 
     Attributes
     ----------
@@ -35,13 +37,13 @@ class BoundingTree:
         Simplex of each leaf.
     """
 
-    def __init__(self, points: _Floats, simplices: _Ints) -> None:
+    def __init__(self, points: _Floats, simplices: _Ints, in_order: bool = False) -> None:
         count, space = len(simplices), points.shape[1]
         self.simplices = np.ascontiguousarray(simplices)
         self.low, self.high = np.zeros((2 * count, space)), np.zeros((2 * count, space))
         self.order = np.arange(count)
         self.refit(points)
-        if count > 1:
+        if count > 1 and not in_order:
             codes = morton_codes(self.low[count:], self.high[count:])
             self.order = np.argsort(codes, kind="stable")
             self.refit(points)

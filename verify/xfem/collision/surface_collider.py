@@ -46,6 +46,11 @@ class DeformingFacets(Protocol):
         ...
 
     @property
+    def in_order(self) -> bool:
+        """Whether neighbours among these are near each other."""
+        ...
+
+    @property
     def retired(self) -> int:
         """How many facets have been taken out of use."""
         ...
@@ -189,7 +194,7 @@ class SurfaceCollider:
     def _rebuild(self) -> None:
         self._numbers = self.surface.used
         self._facets = self.surface.facets.rows[self._numbers]
-        self._tree = BoundingTree(self.positions, self._facets)
+        self._tree = BoundingTree(self.positions, self._facets, self.surface.in_order)
         self._state = self._now()
 
     def _check(self, points: ArrayLike) -> _Floats:

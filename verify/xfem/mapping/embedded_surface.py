@@ -105,7 +105,8 @@ class EmbeddedSurface:
         self._numbers = PointNumbers(len(self.points), mesh.space)
         self._edges = EdgePoints(self.points, self._numbers)
         self._near = self._facets_near_cells()
-        self._corners = corner_cells(self.points[self.facets], *self._elements)
+        own = self._vertex_cell[self.facets]
+        self._corners = corner_cells(self.points[self.facets], own, *self._elements)
         self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
         self._cover(np.arange(len(self.facets)))
 
@@ -117,6 +118,10 @@ class EmbeddedSurface:
         near = facets[ranges(np.stack([starts[increment.moved], starts[increment.moved + 1]], 1))]
         if len(near):
             self._cover(distinct(near))
+
+    def parts_of(self, given: _Ints) -> _Ints:
+        """Facets in use that are parts of some given ones, in the order of these."""
+        return ranges(self._facet_range[given])
 
     def is_cut(self, places: _Floats, cut: int) -> NDArray[np.bool_]:
         """Whether the element at each material place (q, s) is split by a cut."""
@@ -153,7 +158,7 @@ class EmbeddedSurface:
         if not whole.all():
             parts = ~whole
             material[parts] = at[parts] @ material[parts]
-            found = corner_cells(material[parts], *self._elements)
+            found = corner_cells(material[parts], cell[parts], *self._elements)
             cell[parts], weights[parts], inside[parts] = found
         piece = corner_pieces(
             cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,

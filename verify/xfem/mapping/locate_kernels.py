@@ -83,7 +83,6 @@ def locate(x, reach, low, high, order, cells, points, gradients):
     """Give the cell of x."""
     trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
     best, at = -np.inf, -1
-    reach = _first_reach(x, reach, low, high, order, stack)
     while at < 0:
         stack[0], top = 1, 1
         while top > 0:
@@ -102,7 +101,8 @@ def locate(x, reach, low, high, order, cells, points, gradients):
             smallest = barycentric(x, cell, cells, points, gradients, trial)
             if smallest > best:
                 best, at = smallest, cell
-        reach *= 2.0
+        if at < 0:
+            reach = _first_reach(x, 2.0 * reach, low, high, order, stack)
     return at
 
 
@@ -127,11 +127,11 @@ def cut_at(
     trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
     about, least = np.empty(len(order), dtype=np.int64), np.empty(len(order))
     for q in range(len(places)):
-        count, best = 0, -np.inf
-        wider = _first_reach(places[q], reach, low, high, order, stack)
+        count, wider, best = 0, reach, -np.inf
         while count == 0:
             count = _cells_about(places[q], wider, low, high, order, stack, about)
-            wider *= 2.0
+            if count == 0:
+                wider = _first_reach(places[q], 2.0 * wider, low, high, order, stack)
         for k in range(count):
             least[k] = barycentric(places[q], about[k], cells, points, gradients, trial)
             best = max(best, least[k])
@@ -146,10 +146,11 @@ def cut_at(
 
 
 @njit(cache=True)
-def corner_cells(corners, reach, low, high, order, cells, points, gradients):
+def corner_cells(corners, likely, reach, low, high, order, cells, points, gradients):
     """Cell (q, k) of each corner of facets (q, k, s), looked up a little inside the facet.
 
-    Returns the cells and the coordinates (q, k, d + 1) of the corner, and of the place inside.
+    Cells that are `likely` (q, n) are tried first: where a place is inside of one, it is in no
+    other. Returns the cells and the coordinates (q, k, d + 1) of the corner, and of the place inside.
     """
     count, size, space = corners.shape
     found = np.empty((count, size), dtype=np.int64)
@@ -161,9 +162,15 @@ def corner_cells(corners, reach, low, high, order, cells, points, gradients):
                 inside[i] = (1.0 - _INWARDS) * corners[q, k, i]
                 for j in range(size):
                     inside[i] += _INWARDS / size * corners[q, j, i]
-            cell = locate(inside, reach, low, high, order, cells, points, gradients)
+            cell = np.int64(-1)
+            for trial in likely[q]:
+                if barycentric(inside, trial, cells, points, gradients, at[q, k]) > _TIE:
+                    cell = trial
+                    break
+            if cell < 0:
+                cell = locate(inside, reach, low, high, order, cells, points, gradients)
+                barycentric(inside, cell, cells, points, gradients, at[q, k])
             found[q, k] = cell
-            barycentric(inside, cell, cells, points, gradients, at[q, k])
             barycentric(corners[q, k], cell, cells, points, gradients, weights[q, k])
             total = 0.0
             for a in range(cells.shape[1]):

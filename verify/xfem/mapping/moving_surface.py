@@ -44,7 +44,11 @@ class MovingSurface:
         (f,) whether it lies on a cut.
     retired : int
         How many facets have been taken out of use.
+    in_order : bool
+        Whether neighbours among the facets in use are near each other: not always.
     """
+
+    in_order = False
 
     def __init__(self, corners: int, space: int, facet_corners: int) -> None:
         self.material = GrowingArray(np.empty((0, space)))
