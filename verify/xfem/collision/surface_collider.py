@@ -193,7 +193,7 @@ class SurfaceCollider:
 
     def _rebuild(self) -> None:
         self._numbers = self.surface.used
-        self._facets = self.surface.facets.rows[self._numbers]
+        self._facets = self.surface.facets.rows.take(self._numbers, axis=0)
         self._tree = BoundingTree(self.positions, self._facets, self.surface.in_order)
         self._state = self._now()
 

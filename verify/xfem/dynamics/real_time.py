@@ -148,8 +148,14 @@ def _held_entries(starts, columns, diagonal, fixed):
     """Entries of the blocks, flat, in a row or column of a fixed component, but the diagonal's."""
     space = fixed.shape[1]
     found, count = np.empty(len(columns) * space * space, dtype=np.int64), 0
+    some = np.zeros(len(fixed), dtype=np.bool_)
+    for i in range(len(fixed)):
+        for a in range(space):
+            some[i] |= fixed[i, a]
     for i in range(len(starts) - 1):
         for k in range(starts[i], starts[i + 1]):
+            if not (some[i] or some[columns[k]]):
+                continue
             for a in range(space):
                 for b in range(space):
                     held = fixed[i, a] or fixed[columns[k], b]

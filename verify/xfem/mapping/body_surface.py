@@ -73,23 +73,19 @@ class BodySurface:
         ids, at, piece, cell, inner = self._facets_of(cells)
         ids, at, source = self._edges.bisect(ids, at)
         piece, cell = piece[source], cell[source]
-        corners = ids.shape[1]
-        row = np.repeat(np.arange(len(ids)), corners)
-        weights = at.reshape(len(row), at.shape[2])
-        material = np.einsum("qc,qcs->qs", weights, mesh.points[mesh.cells[cell[row]]])
-        point = ids.ravel()
-        vertex = self.surface.weld(
-            point,
-            material,
-            body.piece_cells.rows[piece[row]],
-            weights,
-            body.points.supported(point, mesh.cells[cell[row]]),
+        nodes = mesh.cells[cell]
+        corner_nodes = np.repeat(nodes, ids.shape[1], axis=0)
+        self.surface.add(
+            ids,
+            at @ mesh.points[nodes],
+            at,
+            body.points.supported(ids.ravel(), corner_nodes).reshape(at.shape),
+            np.repeat(piece, ids.shape[1]).reshape(ids.shape),
+            inner[source],
+            body.piece_cells.rows,
+            cell,
+            self._facet_range,
         )
-        numbers = self.surface.add(vertex.reshape(ids.shape), piece, inner[source])
-        # facets come cell by cell
-        starts = np.flatnonzero(np.diff(cell, prepend=-1))
-        self._facet_range[cell[starts], 0] = numbers[starts]
-        self._facet_range[cell[starts], 1] = np.append(numbers[starts[1:]], numbers[-1:] + 1)
 
     def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:
         """Point numbers, barycentric corners, piece, cell, whether on a cut, of their facets."""

@@ -121,7 +121,7 @@ class EmbeddedSurface:
 
     def parts_of(self, given: _Ints) -> _Ints:
         """Facets in use that are parts of some given ones, in the order of these."""
-        return ranges(self._facet_range[given])
+        return ranges(self._facet_range.take(given, axis=0))
 
     def is_cut(self, places: _Floats, cut: int) -> NDArray[np.bool_]:
         """Whether the element at each material place (q, s) is split by a cut."""
@@ -164,22 +164,11 @@ class EmbeddedSurface:
             cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,
             body.first_piece, body.next_piece.rows,
         )  # fmt: skip
-        weights = weights.reshape(ids.size, weights.shape[2])
-        vertex = self.surface.weld(
-            ids.ravel(),
-            material.reshape(-1, material.shape[2]),
-            body.piece_cells.rows[piece.ravel()],
-            weights,
-            weights != 0.0,
-        )
-        numbers = self.surface.add(
-            vertex.reshape(ids.shape), piece[:, 0], np.zeros(len(ids), dtype=bool)
-        )
+        self.surface.add(
+            ids, material, weights, weights != 0.0, piece, np.zeros(len(ids), dtype=bool),
+            body.piece_cells.rows, source, self._facet_range,
+        )  # fmt: skip
         self.given.append(source)
-        # facets come one after the other, each with its parts
-        starts = np.flatnonzero(np.diff(source, prepend=-1))
-        self._facet_range[source[starts], 0] = numbers[starts]
-        self._facet_range[source[starts], 1] = np.append(numbers[starts[1:]], numbers[-1:] + 1)
 
     def _fragments(
         self, facets: _Ints

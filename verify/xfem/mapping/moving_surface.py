@@ -60,44 +60,58 @@ class MovingSurface:
         self.retired: int = 0
         self._keys = RowNumbers(corners + 1)
 
-    def weld(
+    def add(
         self,
         point: _Ints,
         material: _Floats,
-        nodes: _Ints,
         weights: _Floats,
         counts: NDArray[np.bool_],
-    ) -> _Ints:
-        """Vertices (q,) of corners: one for each point and set of unknowns from which it moves.
+        piece: _Ints,
+        inner: NDArray[np.bool_],
+        piece_cells: _Ints,
+        owner: _Ints,
+        bounds: _Ints,
+    ) -> None:
+        """Append facets, and a vertex for each point and set of unknowns from which it moves.
 
         Parameters
         ----------
-        point : (q,) int array
-            Number of the material point.
-        material : (q, s) float array
-        nodes, weights : (q, corners) arrays
-            Unknown nodes and weights.
-        counts : (q, corners) bool array
+        point : (q, k) int array
+            Number of the material point of each corner.
+        material : (q, k, s) float array
+            Where it is, in metres.
+        weights : (q, k, c) float array
+            Of the unknown nodes of its piece.
+        counts : (q, k, c) bool array
             Whether a corner moves with a node: where it is not, the weight is zero; where it is,
             the weight may still round to zero.
+        piece : (q, k) int array
+            Piece of each corner; that of the first is the facet's.
+        inner : (q,) bool array
+        piece_cells : (p, c) int array
+            Unknown nodes of each piece.
+        owner : (q,) int array
+            To what each facet belongs; facets of one owner come one after the other.
+        bounds : (o, 2) int array
+            First facet of each owner and one past the last; written.
         """
-        vertex, first = np.empty_like(point), np.empty_like(point)
-        table, known, before = self._keys.open_for(len(point))
-        count = _weld(point, nodes, counts, table, known, before, vertex, first)
+        corners = point.size
+        table, known, before = self._keys.open_for(corners)
+        stores = (self.material, self.nodes, self.weights)
+        for store in stores:
+            store.extend(corners)
+        begin = self.facets.extend(len(point))
+        self.facet_piece.extend(len(point))
+        self.inner.extend(len(point))
+        self.facet_piece.rows[begin:] = piece[:, 0]
+        self.inner.rows[begin:] = inner
+        count = _add(
+            point, material, weights, counts, piece, piece_cells, owner, table, known, before,
+            begin, self.material.rows, self.nodes.rows, self.weights.rows, self.facets.rows, bounds,
+        )  # fmt: skip
         self._keys.close(count)
-        first = first[: count - before]
-        self.material.append(material[first])
-        self.nodes.append(nodes[first])
-        self.weights.append(weights[first])
-        return vertex
-
-    def add(self, facets: _Ints, piece: _Ints, inner: NDArray[np.bool_]) -> _Ints:
-        """Append facets (q, k); their numbers."""
-        begin = len(self.facets)
-        self.facets.append(facets)
-        self.facet_piece.append(piece)
-        self.inner.append(inner)
-        return np.arange(begin, len(self.facets))
+        for store in stores:
+            store.rows = store.rows[:count]
 
     def retire(self, facets: _Ints) -> None:
         """Take facets out of use."""
@@ -174,22 +188,34 @@ class MovingSurface:
 
 
 @njit(cache=True)
-def _weld(point, nodes, counts, table, known, count, vertex, first):
-    """Write the vertex of each corner, and the corner that is the first of each new vertex."""
-    before, size = count, nodes.shape[1]
+def _add(
+    point, material, weights, counts, piece, piece_cells, owner, table, known, count,
+    begin, places, nodes, shares, facets, bounds,
+):  # fmt: skip
+    """Write facets, new vertices and the facets of each owner; the count of vertices."""
+    size = nodes.shape[1]
     key = np.empty(size + 1, dtype=np.int64)
-    for q in range(len(point)):
-        key[0] = point[q]
-        for a in range(size):
-            node, k = nodes[q, a] if counts[q, a] else -1, a
-            while k > 0 and key[k] > node:
-                key[k + 1] = key[k]
-                k -= 1
-            key[k + 1] = node
-        vertex[q], after = number_of_row(key, table, known, count)
-        if after > count:
-            first[count - before] = q
-        count = after
+    for f in range(len(point)):
+        if f == 0 or owner[f] != owner[f - 1]:
+            bounds[owner[f], 0] = begin + f
+        bounds[owner[f], 1] = begin + f + 1
+        for c in range(point.shape[1]):
+            key[0] = point[f, c]
+            for a in range(size):
+                node, k = piece_cells[piece[f, c], a] if counts[f, c, a] else -1, a
+                while k > 0 and key[k] > node:
+                    key[k + 1] = key[k]
+                    k -= 1
+                key[k + 1] = node
+            before = count
+            vertex, count = number_of_row(key, table, known, count)
+            facets[begin + f, c] = vertex
+            if count > before:
+                for i in range(places.shape[1]):
+                    places[vertex, i] = material[f, c, i]
+                for a in range(size):
+                    nodes[vertex, a] = piece_cells[piece[f, c], a]
+                    shares[vertex, a] = weights[f, c, a]
     return count
 
 
