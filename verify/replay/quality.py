@@ -55,7 +55,7 @@ class Quality:
 
 def quality_of(session: Session) -> Quality:
     """Measure the body of a session as it is now."""
-    virtual, displacement = session.virtual, session.state.displacement
+    virtual, displacement = session.virtual, session.displacement
     whole = float(virtual.mesh.measures.sum())
     body = session.cutter.body  # surfaces count pieces as it does
     gradients = deformation_gradients(

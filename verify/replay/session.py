@@ -11,8 +11,8 @@ from verify.replay.grips import Grips, held_facets
 from verify.replay.stage import Stage
 from verify.replay.step_record import PHASES, StepRecord
 from verify.replay.surfaces import Picture, Surfaces
-from verify.xfem.collision.surface_collider import Contacts, SurfaceCollider
 from verify.xfem.cholesky import Cholesky
+from verify.xfem.collision.surface_collider import Contacts, SurfaceCollider
 from verify.xfem.corotational import InternalForce
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
@@ -38,6 +38,12 @@ class Session:
     account : bool
         Whether to keep the account of the energies. Without it the hot path is that of a
         simulator: that is what is timed.
+    spread : bool
+        Whether what a cut asks for is spread over three steps: which elements are split, then the
+        surfaces to see and to touch, then the surface of the material and the mechanics. Only then
+        is the blade asked again how far it has come. The largest step is much shorter, and there
+        are fewer increments; an element opens up to four steps later. Until the mechanics follow,
+        new unknowns move as those from which they come, so that nothing jumps.
     clock : callable
         What phases are timed by: wall time in s, or `time.thread_time` where other work on the
         machine shall not be counted.
@@ -59,9 +65,17 @@ class Session:
     """
 
     def __init__(
-        self, stage: Stage, account: bool = True, clock: Callable[[], float] = perf_counter
+        self,
+        stage: Stage,
+        account: bool = True,
+        spread: bool = False,
+        clock: Callable[[], float] = perf_counter,
     ) -> None:
         self.stage, self._account, self._clock = stage, account, clock
+        self._spread = spread
+        self._due: list[Callable[[], None]] = []  # what is left to be done of a cut
+        self._ahead: Increment | None = None  # of which the mechanics do not know yet
+        self._new: NDArray[np.int64] | None = None  # sources of unknowns not yet assembled
         self.cutter = SemiProgressiveCutter(stage.mesh)
         for path in stage.strokes:
             self.cutter.begin(path)
@@ -93,12 +107,22 @@ class Session:
         """Play to the end."""
         while not self.finished:
             self.step()
+        self.settle()
         return self.records
 
     def begin(self, path: ToolPath) -> None:
         """Begin another stroke, to be extended through `cutter.extend` if the tool is live."""
+        self.settle()
         self.cutter.begin(path)
         self._assemble(_NONE)
+
+    def settle(self) -> None:
+        """Finish what is left of a cut whose work is spread."""
+        while self._due:
+            self._due.pop(0)()
+        if self._new is not None:
+            self._assemble(self._new)
+            self._begin_account()
 
     def step(self) -> StepRecord:
         """Take one step.
@@ -110,19 +134,24 @@ class Session:
         """
         self._seconds = dict.fromkeys(PHASES, 0.0)
         end = self.state.time + self.stage.time_step
-        with self._timed("cutting"):
-            increment = self.cutter.advance(end)
-            if increment is not None:
-                self._inherit(increment)
-                self.surfaces.update(increment)
-        if self._hooks_begun(end) or increment is not None:
+        busy, increment = bool(self._due), None
+        if not busy:
+            with self._timed("cutting"):
+                increment = self.cutter.advance(end)
+                if increment is not None:
+                    self._ahead = increment
+                    self._due = [self._update_embedded, self._take_over]
+        # a hook grips the body as it is cut by then
+        parts = len(self._due) if not self._spread or self._hooks_to_begin(end) else int(busy)
+        for _ in range(parts):
+            self._due.pop(0)()
+        assert self._solver is not None
+        if self._hooks_begun(end) or self._new is not None:
             with self._timed("assembly"):
-                self._assemble(_NONE if increment is None else increment.source)
-            if self._account:
-                self._spent = self._spent_so_far()
-                self._ledger = EnergyLedger(self.body, self.state)
-        elif self._solver is not None and self._solver.is_worn:
-            # what can wait until a step in which nothing is split
+                self._assemble(_NONE if self._new is None else self._new)
+            self._begin_account()
+        elif self._solver.is_worn and not busy and increment is None:
+            # what can wait until a step in which nothing else is to be done
             with self._timed("assembly"):
                 self._solver = Cholesky(self.body.pattern, self.body.shape[1])
                 self.integrator.solver = self._solver
@@ -132,40 +161,68 @@ class Session:
             else:
                 self._ledger.record(self.state, self.integrator.step(self.state))
         with self._timed("mapping"):
-            self.surfaces.move(self.state.displacement)
+            self.surfaces.move(self.displacement)
         with self._timed("collision"):
             contacts = self._collide()
-        record = self._record(increment, contacts)
+        record = self._record(increment, contacts, busy or increment is not None)
         self.records.append(record)
         return record
 
+    @property
+    def displacement(self) -> _Floats:
+        """(N, s) displacement of all unknowns of the cut body, known to the mechanics or not, m."""
+        known = self.state.displacement
+        return known if self._ahead is None else self._ahead.inherit(known)
+
     def picture(self) -> Picture:
         """Draw the body as it is now."""
-        return self.surfaces.picture(self.virtual, self.state.displacement)
+        return self.surfaces.picture(self.virtual, self.displacement)
 
     def blades(self) -> list[tuple[_Floats, _Floats]]:
         """Tip and other end of each blade under way, m."""
         now = self.state.time
         return [_blade_at(path, now) for path in self._under_way()]
 
+    def _update_embedded(self) -> None:
+        assert self._ahead is not None
+        with self._timed("cutting"):
+            self.surfaces.update_embedded(self._ahead)
+
+    def _take_over(self) -> None:
+        """Let the material's own surface and the state of motion follow the cut."""
+        assert self._ahead is not None
+        increment, self._ahead = self._ahead, None
+        with self._timed("cutting"):
+            self._inherit(increment)
+            self.surfaces.material.update(increment)
+        self._new = increment.source
+
+    def _begin_account(self) -> None:
+        if self._account:
+            self._spent = self._spent_so_far()
+            self._ledger = EnergyLedger(self.body, self.state)
+
     def _inherit(self, increment: Increment) -> None:
         self.state.displacement = increment.inherit(self.state.displacement)
         self.state.velocity = increment.inherit(self.state.velocity)
         self._start = {hook: increment.inherit(values) for hook, values in self._start.items()}
 
+    def _hooks_to_begin(self, time: float) -> list[int]:
+        hooks = enumerate(self.stage.hooks)
+        return [n for n, hook in hooks if n not in self._start and hook.begin < time]
+
     def _hooks_begun(self, time: float) -> bool:
-        before = len(self._start)
-        for number, hook in enumerate(self.stage.hooks):
-            if number not in self._start and hook.begin < time:
-                self._start[number] = self.state.displacement.copy()
-        return len(self._start) > before
+        begun = self._hooks_to_begin(time)
+        for number in begun:
+            self._start[number] = self.state.displacement.copy()
+        return len(begun) > 0
 
     def _assemble(self, source: NDArray[np.int64]) -> None:
         """Make the body anew: mass, supports, loads, sparsity and solver.
 
         `source` (k,) are the unknowns from which those come that are new since the last time.
         """
-        stage = self.stage
+        stage, self._new = self.stage, None
         self.virtual: VirtualMesh = self.cutter.virtual_mesh()
         mass = side_wise_mass(self.virtual, stage.density)
         self._grips = Grips(
@@ -213,7 +270,7 @@ class Session:
         surface = self.surfaces.touchable
         if self.stage.tool_force == 0.0:
             return
-        load, h = np.zeros(self.body.shape), self.stage.time_step
+        load, h = np.zeros(self.displacement.shape), self.stage.time_step
         for contacts, path in touched:
             here, before = (_blade_at(path, self.state.time - back)[0] for back in (0.0, h))
             length = float(np.linalg.norm(here - before))
@@ -222,7 +279,11 @@ class Session:
             force = self.stage.tool_force / (length * len(contacts.facet)) * (here - before)
             for facet, at in zip(contacts.facet, contacts.at, strict=True):
                 surface.facet_force(int(facet), at, force, load)
-        self._tool_load = load
+        known = len(self.state.displacement)
+        if self._ahead is not None:
+            # what pulls at an unknown that still moves as another one does, pulls at that
+            np.add.at(load, self._ahead.source, load[known:])
+        self._tool_load = load[:known]
 
     def _spent_so_far(self) -> _Floats:
         account = self._ledger.close()
@@ -230,7 +291,7 @@ class Session:
         lost = account.algorithmic[-1] + account.damping[-1]
         return self._spent + np.array([work, lost])
 
-    def _record(self, increment: Increment | None, contacts: int) -> StepRecord:
+    def _record(self, increment: Increment | None, contacts: int, busy: bool) -> StepRecord:
         crossings = self.cutter.crossings if increment is not None else None
         delay = np.empty(0) if crossings is None else crossings.delay[self._crossed :]
         self._crossed += len(delay)
@@ -252,13 +313,14 @@ class Session:
             work=float(work),
             dissipated=float(lost),
             contacts=contacts,
+            busy=busy,
         )
 
     @contextmanager
     def _timed(self, phase: str) -> Iterator[None]:
         start = self._clock()
         yield
-        self._seconds[phase] = self._clock() - start
+        self._seconds[phase] += self._clock() - start
 
 
 def _blade_at(path: ToolPath, time: float) -> tuple[_Floats, _Floats]:

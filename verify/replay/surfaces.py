@@ -66,10 +66,10 @@ class Surfaces:
         self._followers = [surface for surface in followers if surface is not None]
         self._positions = [np.empty((0, stage.mesh.space)) for _ in self._followers]
 
-    def update(self, increment: Increment) -> None:
-        """Follow a cut."""
-        for surface in self._followers:
-            surface.update(increment)
+    def update_embedded(self, increment: Increment) -> None:
+        """Let the surfaces beside that of the material follow a cut."""
+        if self._embedded is not None:
+            self._embedded.update(increment)
 
     def move(self, displacement: _Floats) -> None:
         """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""

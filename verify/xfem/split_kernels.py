@@ -24,10 +24,10 @@ def crossed_cells(cells, values):
 
 @njit(cache=True)
 def edges_of_cells(chosen, cells, points, values, table, known, edges, size):
-    """Number the edges of cells that the only cut crosses, as rows (0, plus, minus); their count.
+    """Give numbers to the edges of cells that the only cut crosses, rows (0, plus, minus).
 
-    Writes the numbers of those of each cell (q, e), -1 where it has no more, and the length (q,)
-    of the longest edge from its first corner.
+    Returns their count. Writes the numbers of those of each cell (q, e), -1 where it has no more,
+    and the length (q,) of the longest edge from its first corner.
     """
     count, row, corners = np.int64(0), np.zeros(3, dtype=np.int64), cells.shape[1]
     for q in range(len(chosen)):

@@ -150,7 +150,8 @@ def corner_cells(corners, likely, reach, low, high, order, cells, points, gradie
     """Cell (q, k) of each corner of facets (q, k, s), looked up a little inside the facet.
 
     Cells that are `likely` (q, n) are tried first: where a place is inside of one, it is in no
-    other. Returns the cells and the coordinates (q, k, d + 1) of the corner, and of the place inside.
+    other. Returns the cells and the coordinates (q, k, d + 1) of the corner, and of the place
+    inside.
     """
     count, size, space = corners.shape
     found = np.empty((count, size), dtype=np.int64)
