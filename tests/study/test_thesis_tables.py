@@ -241,8 +241,8 @@ def measured(strips, face, crossed, slivers) -> Measured:
     ]
     shares = dict.fromkeys(LIMITS, 1.0)
     phases = {"motion": 5e-4, "step": 8e-4}
-    hand = RealTime(1005, 240, 1674, 276, 76, shares, shares, phases, phases, 9e-4, 0.01, 0.0, 0,
-                    0, 0.0)  # fmt: skip
+    hand = RealTime(1005, 240, 1674, 276, 76, shares, shares, shares, phases, phases, 9e-4, 9e-4,
+                    0.01, 0.0, 0, 0, 0.0)  # fmt: skip
     methods = [method("xfem", 0, 0.100), method("conforming", 0, 0.100), method("uncut", 0, 0.9)]
     return Measured(
         strips, face, steps, crossed, with_other_frames(200, crossed[2].speed, (0.1,)), hand,
@@ -284,10 +284,15 @@ def test_a_verdict_falls_with_its_evidence(measured) -> None:
 
 def test_a_missed_limit_is_undecided_only_where_a_busy_machine_may_explain_it(measured) -> None:
     topic = "real time: every step within 1 ms"
-    missed = replace(measured.hand, within={**measured.hand.within, "1 ms": 0.5}, slowest=1.5e-3)
+    shares = {**measured.hand.within, "1 ms": 0.5}
+    missed = replace(
+        measured.hand, within=shares, within_spread=shares, slowest=1.5e-3, slowest_spread=1.5e-3
+    )
     assert verdict(replace(measured, hand=missed), topic) is Verdict.FAIL
     assert verdict(replace(measured, hand=missed, contended="busy"), topic) is Verdict.UNDECIDED
-    far = replace(measured, hand=replace(missed, slowest=9e-3), contended="busy")
+    far = replace(
+        measured, hand=replace(missed, slowest=9e-3, slowest_spread=9e-3), contended="busy"
+    )
     assert verdict(far, topic) is Verdict.FAIL
 
 

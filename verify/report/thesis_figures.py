@@ -163,7 +163,8 @@ def _real_time(hand: Mapping[str, Any], contended: str) -> Markup:
         "steps that cut": lambda row: seconds_text(row["cutting"]),
     }
     shares = ", ".join(
-        f"within {name} {share:.1%} ({hand['within_wall'][name]:.1%} in wall time)"
+        f"within {name} {share:.1%} ({hand['within_wall'][name]:.1%} in wall time; "
+        f"{hand['within_spread'][name]:.1%} with the work of a cut spread over three)"
         for name, share in hand["within"].items()
     )
     return tag(

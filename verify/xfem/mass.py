@@ -184,11 +184,11 @@ class _SideWiseMass(Mass):
         self.__dict__["weights"] = weights
 
     @cached_property
-    def matrix(self) -> csr_array:  # type: ignore[override]
+    def matrix(self) -> csr_array:
         return _diagonal_matrix(self.weights)
 
     @cached_property
-    def root(self) -> csr_array:  # type: ignore[override]
+    def root(self) -> csr_array:
         return _diagonal_matrix(1.0 / np.sqrt(self.weights))
 
     @cached_property

@@ -197,17 +197,12 @@ def _split_by_one(
         points.table,
     )
     points.divided(simplices[1][kept:])
-    piece = simplices[0]
+    piece, ids, at, share, sign = simplices
     label = np.ones((2 * count, 1), dtype=np.int8)
     label[1::2] = -1
-    return Partition(
-        np.repeat(cells, 2),
-        label,
-        np.where(piece < count, 2 * piece, 2 * (piece - count) + 1),
-        *simplices[1:],
-        points,
-        snapped,
-    )
+    number = np.where(piece < count, 2 * piece, 2 * (piece - count) + 1)
+    parent = np.repeat(cells, 2)
+    return Partition(parent, label, number, ids, at, share, sign, points, snapped)
 
 
 def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter, thread_time
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.calibration import kernel_seconds
 from verify.replay import PHASES, Session, Stage, quality_of
@@ -30,11 +31,13 @@ class RealTime:
         Share of all steps within each of the `LIMITS`, in processor time of one thread.
     within_wall : dict
         Likewise in wall time, the other work of the machine included.
+    within_spread : dict
+        Likewise in processor time, the work of a cut spread over three steps.
     resting, cutting : dict
         Median by phase, and of the whole step, of steps without and with newly split elements:
         processor time, s.
-    slowest : float
-        Processor time, s.
+    slowest, slowest_spread : float
+        Processor time, at once and with the work of a cut spread, s.
     kernel : float
         Processor time of the calibration kernel beside it, s.
     volume_error, loose_edges, inverted : float, int, int
@@ -50,9 +53,11 @@ class RealTime:
     cutting_steps: int
     within: dict[str, float]
     within_wall: dict[str, float]
+    within_spread: dict[str, float]
     resting: dict[str, float]
     cutting: dict[str, float]
     slowest: float
+    slowest_spread: float
     kernel: float
     volume_error: float
     loose_edges: int
@@ -72,6 +77,8 @@ def real_time() -> RealTime:
         start = perf_counter()
         session.step()
         wall.append(perf_counter() - start)
+    spread = Session(stage, account=False, spread=True, clock=thread_time)
+    spread_total = np.array([record.total_seconds for record in spread.run()])
     kernel = float(np.median(kernel_seconds(clock=thread_time)))
     total = np.array([record.total_seconds for record in session.records])
     cutting = np.array([record.newly_split > 0 for record in session.records])
@@ -83,19 +90,23 @@ def real_time() -> RealTime:
         unknowns=session.records[-1].unknowns,
         steps=len(total),
         cutting_steps=int(cutting.sum()),
-        within={name: float(np.mean(total <= limit)) for name, limit in LIMITS.items()},
-        within_wall={
-            name: float(np.mean(np.array(wall) <= limit)) for name, limit in LIMITS.items()
-        },
+        within=_shares(total),
+        within_wall=_shares(np.array(wall)),
+        within_spread=_shares(spread_total),
         resting={name: float(np.median(values[~cutting])) for name, values in phases.items()},
         cutting={name: float(np.median(values[cutting])) for name, values in phases.items()},
         slowest=float(total.max()),
+        slowest_spread=float(spread_total.max()),
         kernel=kernel,
         volume_error=volume,
         loose_edges=loose,
         inverted=inverted,
         energy_gain=gain,
     )
+
+
+def _shares(seconds: NDArray[np.float64]) -> dict[str, float]:
+    return {name: float(np.mean(seconds <= limit)) for name, limit in LIMITS.items()}
 
 
 def _soundness(stage: Stage) -> tuple[float, int, int, float]:

@@ -52,6 +52,9 @@ def whole_mesh(body: GrowingBody, level_sets: _Floats) -> VirtualMesh:
 class _GrownSubCells(SubCells):
     """Sub-simplices of a growing body; what is not asked for at every cut is made when it is."""
 
+    _points: tuple[_Floats, _Ints, _Ints]
+    _nodes: tuple[_Floats, _Floats]
+
     def __init__(self, body: GrowingBody, number: _Ints, used: _Ints, level_sets: _Floats) -> None:
         self.__dict__.update(
             piece=number[body.sub_piece.rows[used]],
@@ -64,9 +67,10 @@ class _GrownSubCells(SubCells):
         )
 
     @cached_property
-    def zero_points(self) -> ZeroPoints:  # type: ignore[override]
+    def zero_points(self) -> ZeroPoints:
         """Positions of all numbered points, and the edges on which the new ones lie."""
-        return _zero_points(*self._nodes, *self._points)
+        (nodes, level_sets), (positions, ends, cut) = self._nodes, self._points
+        return _zero_points(nodes, level_sets, positions, ends, cut)
 
 
 def _zero_points(

@@ -17,7 +17,6 @@ from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.point_numbers import FoundPoints, PointNumbers
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
-from verify.xfem.growing_array import GrowingArray
 from verify.xfem.mapping.cut_facet_kernels import divide_facets
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.locate_kernels import (
@@ -79,8 +78,6 @@ class EmbeddedSurface:
     ----------
     surface : MovingSurface
         Its first v vertices are those given, as far as they have not been doubled.
-    given : GrowingArray
-        (q,) given facet of which each facet of `surface` is a part.
 
     Raises
     ------
@@ -94,7 +91,6 @@ class EmbeddedSurface:
         self.facets = np.ascontiguousarray(facets, dtype=np.int64)
         _check(self.points, self.facets, mesh.space)
         self.surface = MovingSurface(mesh.dim + 1, mesh.space, self.facets.shape[1])
-        self.given = GrowingArray(np.empty(0, dtype=np.int64))
         self._cutter, self._snap = cutter, ROUND_OFF * mesh.extent
         tree = cutter.interior
         self._elements = _Elements(
@@ -168,7 +164,6 @@ class EmbeddedSurface:
             ids, material, weights, weights != 0.0, piece, np.zeros(len(ids), dtype=bool),
             body.piece_cells.rows, source, self._facet_range,
         )  # fmt: skip
-        self.given.append(source)
 
     def _fragments(
         self, facets: _Ints
