@@ -2,12 +2,17 @@
 
 import argparse
 import json
+import sys
+from collections import Counter
+from dataclasses import asdict
 
 __all__ = ["execute"]
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Examine the installation; exit code 3 if something that a full run needs is missing."""
+    if arguments.compile:
+        return _compile(arguments.json)
     from verify.doctor import examine
 
     findings = examine()
@@ -22,3 +27,32 @@ def execute(arguments: argparse.Namespace) -> int:
         if finding.cure and not finding.works:
             print(f"         {'':<{width}}  → {finding.cure}")
     return 3 if missing else 0
+
+
+def _compile(as_json: bool) -> int:
+    from verify.first_use import FirstUseError, compile_all
+
+    try:
+        use = compile_all()
+    except FirstUseError as error:
+        print(f"verify: error: {error}", file=sys.stderr)
+        return 3
+    if as_json:
+        print(json.dumps(asdict(use), indent=2))
+        return 0
+    whole = sum(use.seconds.values())
+    print(f"{use.kernels} compilations in {use.wall:.1f} s, {whole:.1f} s of processor time")
+    for title, spent in (("stage", use.stages), ("module", _by_module(use.seconds))):
+        if whole > 0.0:
+            print(f"\nseconds  {title}")
+        for name, seconds in spent.items():
+            if seconds >= 0.05:
+                print(f"{seconds:7.1f}  {name}")
+    return 0
+
+
+def _by_module(seconds: dict[str, float]) -> dict[str, float]:
+    found: Counter[str] = Counter()
+    for kernel, spent in seconds.items():
+        found[kernel.partition(":")[0]] += spent  # type: ignore[assignment]
+    return dict(found.most_common())

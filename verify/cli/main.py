@@ -19,6 +19,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except (InputError, UnsupportedSceneError) as error:
         return _fail(str(error), 2)
+    except ModuleNotFoundError as error:
+        if error.name != "numba":  # all else that may be missing is asked for by name
+            raise
+        return _fail(
+            "this command needs numba, which is not installed: python -m pip install numba", 3
+        )
     except KeyboardInterrupt:
         return _fail("interrupted", 130)
     except BrokenPipeError:  # `verify list | head`

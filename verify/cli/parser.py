@@ -88,14 +88,24 @@ def build_parser() -> argparse.ArgumentParser:
     add_study_command(add)
     add_play_commands(add)
     add_cache_command(add)
-    add(
+    _add_doctor(add)
+    return parser
+
+
+def _add_doctor(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+    command = add(
         "doctor",
         "say what of the software that the solvers stand on is here, works, or is missing",
-        "examples:\n  verify doctor\n\n"
+        "examples:\n  verify doctor\n  verify doctor --compile\n\n"
         "Exit code 0 if everything that a full run needs works, 3 if something is missing; each\n"
         "missing thing comes with the line that installs it.",
-    ).add_argument("--json", action="store_true", help="print JSON")
-    return parser
+    )
+    command.add_argument(
+        "--compile",
+        action="store_true",
+        help="compile all kernels now, in two processes, and say what each module took",
+    )
+    command.add_argument("--json", action="store_true", help="print JSON")
 
 
 def _add_reading_commands(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None:

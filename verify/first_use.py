@@ -1,0 +1,292 @@
+"""First use of every compiled kernel, on bodies of a few elements, and what compiling it takes.
+
+numba compiles a kernel when it is first called and keeps it in `NUMBA_CACHE_DIR` (by default beside
+the source). `STAGES` call the kernels of one kind of scene after another; `compile_all` runs them
+in two processes that share the cache. Seconds are processor time and exclusive: a kernel compiled
+while another is being compiled counts for itself only.
+
+``python -m verify.first_use [STAGE …]`` runs stages in this process and prints JSON.
+"""
+
+import gc
+import json
+import os
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+from numba.core import event
+
+from verify.compare.cell_tree import build_cell_tree
+from verify.compare.facet_kernels import crossings, distance_to_segments
+from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
+from verify.compare.simplices import simplices
+from verify.provenance import THREAD_VARIABLES
+from verify.replay.session import Session
+from verify.replay.stage import Stage
+from verify.xfem.conjugate_gradients import ConjugateGradients
+from verify.xfem.corotational import InternalForce
+from verify.xfem.corotational_static import static_equilibrium
+from verify.xfem.cuts import Plane
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    RealTimeEuler,
+    Trapezoidal,
+)
+from verify.xfem.elasticity import State, isotropic
+from verify.xfem.loads import body_force
+from verify.xfem.mapping.pull_back import pull_back
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.slivers import treat_slivers
+from verify.xfem.static import solve_static
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.tool_path import ToolPath
+from verify.xfem.virtual import VirtualMesh, cut_mesh
+
+__all__ = ["STAGES", "CompileTimes", "FirstUse", "FirstUseError", "compile_all", "compile_here"]
+
+_SECONDS = 1200.0  # ten times what a slow core takes
+
+
+class FirstUseError(RuntimeError):
+    """A kernel could not be compiled or run."""
+
+
+class CompileTimes(event.Listener):
+    """Processor seconds of compilation by kernel, each without what it had compiled.
+
+    Attributes
+    ----------
+    seconds : dict
+        By ``module:kernel``, over all argument types that were compiled.
+    kernels : int
+        Compilations.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = defaultdict(float)
+        self.kernels = 0
+        self._open: list[list[float]] = []
+
+    def on_start(self, event_: Any) -> None:
+        """Begin a kernel."""
+        self._open.append([process_time(), 0.0])
+
+    def on_end(self, event_: Any) -> None:
+        """End the kernel that was begun last."""
+        start, inner = self._open.pop()
+        whole = process_time() - start
+        kernel = event_.data["dispatcher"].py_func
+        self.seconds[f"{kernel.__module__}:{kernel.__name__}"] += whole - inner
+        self.kernels += 1
+        if self._open:
+            self._open[-1][1] += whole
+
+
+def _plane() -> tuple[VirtualMesh, State]:
+    return cut_mesh(rectangle_mesh((3, 3)), [Plane([0.5, 0.45], [0.1, 1.0])]), "plane strain"
+
+
+def _membrane() -> tuple[VirtualMesh, State]:
+    flat = rectangle_mesh((3, 3))
+    points = np.column_stack([flat.points, np.zeros(len(flat.points))])
+    cut = Plane([0.5, 0.45, 0.0], [0.1, 1.0, 0.2])
+    return cut_mesh(SimplexMesh(points, flat.cells), [cut]), "plane stress"
+
+
+def _solid() -> tuple[VirtualMesh, State]:
+    return cut_mesh(box_mesh((2, 2, 2)), [Plane([0.5, 0.45, 0.5], [0.1, 1.0, 0.2])]), "solid"
+
+
+def _held(virtual: VirtualMesh) -> Supports:
+    held = Supports.none(virtual).prescribe(virtual, virtual.mesh.points[:, 1] % 1.0 == 0.0)
+    if virtual.mesh.dim < virtual.mesh.space:
+        whole = np.ones(len(virtual.mesh.points), dtype=bool)
+        held = held.prescribe(virtual, whole, components=(2,))
+    return held
+
+
+def _linear(virtual: VirtualMesh, kind: State) -> None:
+    material, load = isotropic(1.0, 0.3, kind), body_force(virtual, -np.ones(virtual.mesh.space))
+    for solver in ("direct", "iterative"):
+        solve_static(virtual, material, _held(virtual), load, solver=solver)
+
+
+def _turning(virtual: VirtualMesh, kind: State) -> None:
+    """Finite rotation in statics, and every scheme in motion."""
+    force = InternalForce(virtual, isotropic(1.0, 0.3, kind))
+    held = _held(virtual)
+    load = body_force(virtual, -0.01 * np.ones(virtual.mesh.space))
+    static_equilibrium(force, held.fixed, load=load)
+    body = DynamicBody(force, side_wise_mass(virtual, 1.0), supports=held)
+    for scheme in (
+        RealTimeEuler(body, 1e-3),
+        RealTimeEuler(body, 1e-3, solver=ConjugateGradients(body.pattern, body.shape[1])),
+        Trapezoidal(body, 1e-3),
+        EnergyMomentum(body, 1e-3),
+        CentralDifferences(body, 1e-3),
+    ):
+        state = body.rest()
+        state.velocity[:] = 0.01 * virtual.node_points
+        scheme.step(state)
+
+
+def _without_slivers(
+    body: Callable[[], tuple[VirtualMesh, State]], use: Callable[[VirtualMesh, State], None]
+) -> None:
+    virtual, kind = body()
+    use(treat_slivers(virtual)[0], kind)
+
+
+def _scalpel() -> None:
+    """Move a blade through a block in motion, with its skin, an inner surface and collision."""
+    mesh = box_mesh((3, 3, 3))
+    skin = mesh.points, mesh.cells[:1, :3].copy()
+    path = ToolPath.of_tip([[-0.5, 0.4, -0.2], [1.5, 0.5, -0.2]], [0.0, 1.0], [0, 0, 1.5])
+    session = Session(
+        Stage(
+            mesh, isotropic(1.0, 0.3, "solid"), 1.0, np.array([0.0, 0.0, -0.01]), 0.25, 1.0,
+            strokes=[path], visual=skin, tool_radius=0.05, tool_force=1e-3,
+        )
+    )  # fmt: skip
+    session.run()
+    pull_back(session.cutter, session.state.displacement, [[0.4, 0.4, 0.9]], [0])
+
+
+def _comparison() -> None:
+    """Ask fields in the plane and in space for values, and cuts for distances."""
+    for mesh in (rectangle_mesh((3, 3)), box_mesh((2, 2, 2))):
+        points, corners = mesh.points[:3] + 0.1, mesh.points[mesh.cells]
+        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
+        shape = simplices(mesh.points, mesh.cells)
+        for near in (np.empty((0, mesh.space)), points):
+            cells = find_cells(
+                points, near, tree.lower, tree.upper, tree.cells, shape.corners, shape.normals,
+                corners.mean(axis=1), 1e-12,
+            )  # fmt: skip
+        origin = np.ascontiguousarray(corners[:, 0])
+        evaluate_linear(points, cells, origin, origin, np.ascontiguousarray(shape.gradients[:, 1:]))
+        nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
+        evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
+        distance_to_segments(points, points, points)
+    facets = np.ascontiguousarray(corners[:, :3])
+    crossings(points, points, tree.lower, tree.upper, tree.cells, facets)
+
+
+_STAGES: list[tuple[str, Callable[[], None]]] = [
+    ("plane: statics", partial(_without_slivers, _plane, _linear)),
+    ("plane: rotation and motion", partial(_without_slivers, _plane, _turning)),
+    ("membrane: rotation and motion", partial(_without_slivers, _membrane, _turning)),
+    ("comparison", _comparison),
+    ("space: scalpel", _scalpel),
+    ("space: statics", partial(_without_slivers, _solid, _linear)),
+    ("space: rotation and motion", partial(_without_slivers, _solid, _turning)),
+]
+STAGES = dict(_STAGES)
+_SHARES = (list(STAGES)[:4], list(STAGES)[4:])  # of two processes
+
+
+@dataclass(frozen=True)
+class FirstUse:
+    """What compiling took.
+
+    Attributes
+    ----------
+    kernels : int
+        Compilations; 0 if all were found in the cache.
+    stages : dict
+        Processor seconds of compilation by stage, in the order in which they were run: of later
+        ones only what earlier ones had not compiled.
+    seconds : dict
+        The same by ``module:kernel``.
+    wall : float
+        Seconds until all was done.
+    """
+
+    kernels: int
+    stages: dict[str, float]
+    seconds: dict[str, float]
+    wall: float
+
+
+def compile_here(stages: list[str]) -> FirstUse:
+    """Run stages in this process.
+
+    Parameters
+    ----------
+    stages : list of str
+        Of `STAGES`.
+    """
+    begun, times, spent = perf_counter(), CompileTimes(), {}
+    collecting = gc.isenabled()
+    gc.disable()  # the compiler makes millions of objects that live on: 8 % of its time
+    try:
+        with event.install_listener("numba:compile", times):
+            for stage in stages:
+                before = sum(times.seconds.values())
+                STAGES[stage]()
+                spent[stage] = sum(times.seconds.values()) - before
+    finally:
+        if collecting:
+            gc.enable()
+    return FirstUse(times.kernels, spent, dict(times.seconds), perf_counter() - begun)
+
+
+def compile_all() -> FirstUse:
+    """Run all stages, in two processes with one cache.
+
+    Both may meet the same kernel at once and compile it twice; numba replaces a cache entry as a
+    whole, so that neither reads half of one.
+
+    Raises
+    ------
+    FirstUseError
+        If a process fails, with its last line.
+    """
+    begun = perf_counter()
+    environment = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
+    root = str(Path(__file__).resolve().parent.parent)
+    paths = filter(None, [root, os.environ.get("PYTHONPATH")])
+    environment["PYTHONPATH"] = os.pathsep.join(paths)
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-m", "verify.first_use", *share],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
+        )
+        for share in _SHARES
+    ]  # fmt: skip
+    kernels, stages = 0, {}
+    seconds: dict[str, float] = defaultdict(float)
+    try:
+        for process in running:
+            said, complaint = process.communicate(timeout=_SECONDS)
+            if process.returncode != 0:
+                last = complaint.strip().splitlines()[-1:] or [f"exit code {process.returncode}"]
+                raise FirstUseError(f"a kernel does not compile: {last[0]}")
+            found = json.loads(said)
+            kernels += found["kernels"]
+            stages.update(found["stages"])
+            for kernel, spent in found["seconds"].items():
+                seconds[kernel] += spent
+    except subprocess.TimeoutExpired:
+        raise FirstUseError(f"compiling takes more than {_SECONDS:g} s") from None
+    finally:
+        for process in running:
+            process.kill()
+            process.wait()
+    return FirstUse(kernels, stages, dict(seconds), perf_counter() - begun)
+
+
+if __name__ == "__main__":
+    print(json.dumps(asdict(compile_here(sys.argv[1:] or list(STAGES)))))
