@@ -5,6 +5,7 @@ from typing import Any
 
 from reference.exact.airy import Airy
 from reference.exact.bending import Bending
+from reference.exact.circular_cut import CircularCut
 from reference.exact.crack_tip import CrackTip
 from reference.exact.griffith import Griffith
 from reference.exact.hooke import Hooke, hooke
@@ -47,6 +48,10 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     "griffith": (
         Griffith,
         "crack in an infinite plate: centre, a, angle, remote stress (sxx, syy, sxy)",
+    ),
+    "circular_cut": (
+        CircularCut,
+        "disc at rest, cut out of a body that is drawn outwards: centre, radius, outward, at",
     ),
     "solid_patch": (
         SolidPatch,

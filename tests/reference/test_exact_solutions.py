@@ -27,6 +27,7 @@ SOLUTIONS = {
     },
     "tip": {"tip": [0.1, 0.2], "angle": 20.0, "intensity": [1.0, 0.7]},
     "griffith": {"a": 0.4, "centre": [0.1, 0.2], "angle": 20.0, "stress": [0.3, 1.0, 0.5]},
+    "circular_cut": {"centre": [0.1, 0.2], "radius": 0.4, "outward": 0.1, "at": 1.0},
 }
 
 
@@ -149,6 +150,40 @@ def test_the_body_force_energy_agrees_with_the_boundary_work_where_there_is_none
 
     u = solution("airy")
     assert elastic_energy(u, SQUARE) == pytest.approx(u.strain_energy(SQUARE), rel=1e-11)
+
+
+@pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
+def test_a_body_drawn_off_a_disc_leaves_its_edge_free_and_the_known_gap(material):
+    u = exact_solution("circular_cut", {"radius": 0.4, "outward": 0.1, "at": 1.0}, material)
+    turn = np.linspace(0, 2 * np.pi, 17)
+    normal = np.column_stack([np.cos(turn), np.sin(turn)])
+    outside, inside = (u.displacement(0.4 * normal, s * normal) for s in (0.5, 0.3))
+    assert np.abs(np.einsum("nij,nj->ni", u.stress(0.4 * normal, normal), normal)).max() < 1e-15
+    assert np.sum(u.displacement(normal) * normal, axis=1) == pytest.approx(np.full(17, 0.1))
+    assert np.abs(inside).max() == 0
+    if material is STRAIN:
+        assert np.sum(outside * normal, axis=1) == pytest.approx(np.full(17, 0.1), rel=1e-12)
+
+
+def test_the_energy_of_a_ring_around_a_disc_is_the_known_one():
+    u = exact_solution("circular_cut", {"radius": 0.4, "outward": 0.1, "at": 1.0}, STRAIN)
+
+    def inscribed(n):
+        turn = 2 * np.pi * np.arange(n) / n
+        return u.strain_energy(np.column_stack([np.cos(turn), np.sin(turn)]))
+
+    # polygons approach the circle like n⁻²
+    one, two, four = (inscribed(n) for n in (64, 128, 256))
+    assert (4 * two - one) / 3 == pytest.approx(0.036249146003, rel=1e-5)
+    better = (16 * (4 * four - two) / 3 - (4 * two - one) / 3) / 15
+    assert better == pytest.approx(0.036249146003, rel=1e-9)
+    # an outline that crosses the cut: the sum of parts
+    halves = [u.strain_energy(np.array(c)) for c in (
+        [[-0.6, -0.6], [0.1, -0.6], [0.1, 0.6], [-0.6, 0.6]],
+        [[0.1, -0.6], [0.6, -0.6], [0.6, 0.6], [0.1, 0.6]],
+    )]  # fmt: skip
+    whole = u.strain_energy(np.array([[-0.6, -0.6], [0.6, -0.6], [0.6, 0.6], [-0.6, 0.6]]))
+    assert sum(halves) == pytest.approx(whole, rel=1e-11)
 
 
 def test_a_griffith_crack_opens_by_its_ellipse():

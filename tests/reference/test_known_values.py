@@ -171,3 +171,26 @@ def test_a_notch_is_known_to_a_millionth_in_seconds_and_to_a_thousandth_in_one()
         assert value[0] == pytest.approx(should[0], rel=accuracy)
         # 5 s and 1 s where the kernel takes the 0.01 s that it is made for
         assert seconds < kernels * np.median(kernel_seconds())
+
+
+def test_a_faceted_circle_converges_with_the_square_of_its_facets():
+    from reference.exact import exact_solution
+    from verify.solvers import find_solver
+
+    # a quarter of the body, so that the supports hold both pieces
+    scene = square(
+        [{"kind": "arc", "name": "a", "centre": [0, 0], "radius": 0.4, "start": -9, "sweep": 108}],
+        exact={
+            "solution": "circular_cut",
+            "parameters": {"radius": 0.4, "outward": 0.1, "at": 1.0},
+        },
+        supports=[{"where": "boundary", "displacement": "exact"}],
+        loads=[],
+    )
+    known = exact_solution("circular_cut", scene.exact.parameters, scene.material)
+    exact = known.strain_energy(scene)
+    levels = [find_solver("reference").solve(scene, k, repetitions=0) for k in (1, 2, 3)]
+    errors = [level.ledger["strain"][0] / exact - 1 for level in levels]
+    # P2 would be of order 4 on the facets; what is left is the area between them and the arc
+    assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2.0, abs=0.1)
+    assert 0 < errors[2] < 5e-5
