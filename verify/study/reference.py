@@ -39,6 +39,7 @@ from verify.study.richardson import (
     place_uncertainty,
 )
 from verify.study.stress_intensity import exact_intensity
+from verify.study.time_to_accuracy import time_to_accuracy
 
 __all__ = ["ExactField", "Reference", "conforming_reference", "exact_reference", "size_of"]
 
@@ -206,6 +207,7 @@ def conforming_reference(
             {"level": level, "size": h, "unknowns": int(levels[level].unknowns)}
             for level, h in zip(sorted(levels), sizes, strict=True)
         ],
+        "time_to_accuracy": time_to_accuracy(levels, metrics),
         "metrics": metrics,
     }
     if missing:
