@@ -114,6 +114,7 @@ class Cholesky:
         self._place = _room(self._place, most)
         self._diagonal = _room(self._diagonal, int(width.max(initial=0)))
         self._gathered = _room(self._gathered, most)
+        self._permuted = np.empty((len(order), self._block))
 
     @property
     def factor_entries(self) -> int:
@@ -148,9 +149,12 @@ class Cholesky:
         if failed >= 0:
             raise SingularStiffnessError(int(self._order[failed // self._block]))
 
-    def solve(self, load: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Solution (N, block) for a right-hand side (N, block)."""
-        x = np.ascontiguousarray(load[self._order])
+    def solve(
+        self, load: NDArray[np.float64], out: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """Solution (N, block) for a right-hand side (N, block), in `out` if that is given."""
+        solution = np.empty(load.shape) if out is None else out
+        np.take(load, self._order, axis=0, out=self._permuted, mode="clip")
         solve_fronts(
             self._bounds,
             self._row_start,
@@ -159,10 +163,9 @@ class Cholesky:
             self._factor,
             self._block,
             self._gathered,
-            x.reshape(-1),
+            self._permuted.reshape(-1),
         )
-        solution = np.empty_like(x)
-        solution[self._order] = x
+        solution[self._order] = self._permuted
         return solution
 
 

@@ -1,7 +1,8 @@
-"""Conjugate gradients preconditioned by the inverse nodal blocks, with a warm start.
+"""Conjugate gradients preconditioned by symmetric Gauß–Seidel on nodal blocks, with a warm start.
 
-Nodal-block Jacobi scaling bounds the condition number of the side-wise unknowns whatever the
-size of the slivers, so the number of iterations does not see them.
+Scaling by nodal blocks bounds the condition number of the side-wise unknowns whatever the size of
+the slivers. Gauß–Seidel does not depend on such a scaling, so the number of iterations does not see
+them either.
 """
 
 import numpy as np
@@ -47,7 +48,7 @@ class ConjugateGradients:
             raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
         self._pattern, self._tolerance, self._limit = pattern, tolerance, limit
         self._inverse = np.empty((pattern.node_count, block, block))
-        self._work = np.empty((4, pattern.node_count, block))
+        self._work = np.empty((7, pattern.node_count, block))
         self._blocks = np.zeros((0, block, block))
         self.iterations = 0
 
@@ -74,18 +75,24 @@ class ConjugateGradients:
         NotConvergedError
             If the iterations run out.
         """
-        x = np.zeros_like(load) if start is None else start.copy()
+        x = np.empty(load.shape)
+        self.improve(load, x, start)
+        return x
+
+    def improve(self, load: _Floats, x: _Floats, start: _Floats | None = None) -> None:
+        """Overwrite x (N, d) with the solution, from a first guess (x itself, or by default 0).
+
+        Nothing is allocated. Errors are those of `solve`.
+        """
+        if start is None:
+            x[:] = 0.0
+        elif start is not x:
+            x[:] = start
+        pattern = self._pattern
         iterations, residual = conjugate_gradients(
-            self._pattern.starts,
-            self._pattern.columns,
-            self._blocks,
-            self._inverse,
-            load,
-            x,
-            self._work,
-            self._tolerance,
-            self._limit,
-        )
+            pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._inverse,
+            np.ascontiguousarray(load), x, start is None, self._work, self._tolerance, self._limit,
+        )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)
         if residual > self._tolerance:
@@ -94,4 +101,3 @@ class ConjugateGradients:
                 f"expected {self._tolerance:g}"
             )
         self.iterations = iterations
-        return x

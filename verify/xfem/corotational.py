@@ -155,6 +155,7 @@ class InternalForce:
         scale: float,
         force: _Floats,
         blocks: _Floats,
+        whole: bool = True,
     ) -> None:
         """Overwrite force and stiffness as a semi-implicit step wants them; update rotations.
 
@@ -173,6 +174,8 @@ class InternalForce:
             Overwritten.
         blocks : (B, d, d) float array
             Overwritten.
+        whole : bool
+            Without it what is below the diagonal may be anything.
         """
         mesh = self.virtual.mesh
         if mesh.dim < 3:
@@ -184,7 +187,7 @@ class InternalForce:
             self._sweep = Linearisation(self.virtual, self.lam, self.mu, pattern, self.turning)
         np.multiply(velocity, implicit, out=self._moved)
         self._moved += displacement
-        self._sweep(displacement, self._moved, scale, force, blocks)
+        self._sweep(displacement, self._moved, scale, force, blocks, whole)
         self._swept = self.turning
 
     def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:

@@ -75,6 +75,7 @@ class Linearisation:
         scale: float,
         force: _Floats,
         blocks: _Floats,
+        whole: bool = True,
     ) -> None:
         """Overwrite force (N, 3) and blocks (B, 3, 3): `scale` times the stiffness.
 
@@ -86,13 +87,16 @@ class Linearisation:
             From which, with these rotations, the force is taken; with displacement + h velocity
             it is that of the displacement plus h K velocity.
         scale : float
+        whole : bool
+            Without it blocks below the diagonal are not written, which are symmetric.
         """
         pattern = self.pattern
         force[:] = 0.0
         linearise(
             self._lanes, self._corners, self._slots, self._constants, self._quaternions, self._ends,
             pattern.starts, pattern.columns, pattern.diagonal, pattern.mirror, self._slot_of,
-            displacement, moved, self.turning, scale, self._waiting, self._beside, force, blocks,
+            displacement, moved, self.turning, whole, scale, self._waiting, self._beside,
+            force, blocks,
         )  # fmt: skip
 
     def write_rotations(self, rotations: _Floats) -> None:

@@ -98,8 +98,12 @@ class PenalisedForce(InternalForce):
         scale: float,
         force: _Floats,
         blocks: _Floats,
+        whole: bool = True,
     ) -> None:
         """Overwrite force and stiffness of a semi-implicit step, the penalty's included."""
-        self.evaluate(displacement, force, velocity, implicit)
-        blocks[:] = 0.0
-        self.add_stiffness(pattern, blocks, scale)
+        if self.virtual.mesh.dim < 3:  # the material calls `evaluate` and `add_stiffness` of here
+            super().linearise(pattern, displacement, velocity, implicit, scale, force, blocks)
+            return
+        super().linearise(pattern, displacement, velocity, implicit, scale, force, blocks, whole)
+        self.add_penalty(displacement + implicit * velocity, 1.0, force)
+        self.ghost.add_stiffness(pattern, blocks, scale)

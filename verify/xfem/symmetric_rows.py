@@ -74,14 +74,16 @@ def add_blocks(slots, start, v, at, waiting):
 
 
 @njit(cache=True)
-def finish_row(row, starts, columns, diagonal, mirror, slot_of, waiting, beside, blocks):
-    """Write a row from the diagonal on, and its mirror's blocks; empty its slots.
+def finish_row(row, starts, columns, diagonal, mirror, whole, slot_of, waiting, beside, blocks):
+    """Write a row from the diagonal on, and its mirror's blocks if wanted; empty its slots.
 
     Parameters
     ----------
     row : int
     starts, columns, diagonal, mirror : int arrays
         Pattern.
+    whole : bool
+        Whether what is below the diagonal is wanted.
     slot_of : (B,) uint32 array
         Of each block above the diagonal, the place of its first entry in `waiting`.
     waiting : float array
@@ -94,7 +96,7 @@ def finish_row(row, starts, columns, diagonal, mirror, slot_of, waiting, beside,
     d00, d01, d02, d11, d12, d22 = d[0], d[1], d[2], d[3], d[4], d[5]
     d[0] = d[1] = d[2] = d[3] = d[4] = d[5] = 0.0
     for place in range(np.uint64(diagonal[row] + 1), np.uint64(starts[row + 1])):
-        w, b, m = np.uint64(slot_of[place]), _9 * place, _9 * np.uint64(mirror[place])
+        w, b = np.uint64(slot_of[place]), _9 * place
         b00, b01, b02 = waiting[w], waiting[w + _1], waiting[w + _2]
         b10, b11, b12 = waiting[w + _3], waiting[w + _4], waiting[w + _5]
         b20, b21, b22 = waiting[w + _6], waiting[w + _7], waiting[w + _8]
@@ -104,9 +106,11 @@ def finish_row(row, starts, columns, diagonal, mirror, slot_of, waiting, beside,
         blocks[b], blocks[b + _1], blocks[b + _2] = b00, b01, b02
         blocks[b + _3], blocks[b + _4], blocks[b + _5] = b10, b11, b12
         blocks[b + _6], blocks[b + _7], blocks[b + _8] = b20, b21, b22
-        blocks[m], blocks[m + _1], blocks[m + _2] = b00, b10, b20
-        blocks[m + _3], blocks[m + _4], blocks[m + _5] = b01, b11, b21
-        blocks[m + _6], blocks[m + _7], blocks[m + _8] = b02, b12, b22
+        if whole:
+            m = _9 * np.uint64(mirror[place])
+            blocks[m], blocks[m + _1], blocks[m + _2] = b00, b10, b20
+            blocks[m + _3], blocks[m + _4], blocks[m + _5] = b01, b11, b21
+            blocks[m + _6], blocks[m + _7], blocks[m + _8] = b02, b12, b22
         # a sum of blocks that are not symmetric is so but for round-off
         s01, s02, s12 = 0.5 * (b01 + b10), 0.5 * (b02 + b20), 0.5 * (b12 + b21)
         other = beside[np.uint64(columns[place])]

@@ -160,7 +160,7 @@ def _resist(factor, v):
 @njit(cache=True)
 def linearise(
     v, corners, slots, constants, quaternions, ends, starts, columns, diagonal, mirror, slot_of,
-    displacement, moved, turning, factor, waiting, beside, force, blocks,
+    displacement, moved, turning, whole, factor, waiting, beside, force, blocks,
 ):  # fmt: skip
     """Add the force of a displacement to `force` and write its stiffness to `blocks`.
 
@@ -190,6 +190,8 @@ def linearise(
         From which, with these rotations, the force is taken.
     turning : bool
         Without it rotations stay as they are.
+    whole : bool
+        Without it blocks below the diagonal are not written.
     factor : float
         Of the stiffness.
     waiting : float array
@@ -220,7 +222,7 @@ def linearise(
         add_forces(corners, start, v, _FORCE, f)
         add_blocks(slots, start, v, _BLOCKS, waiting)
         while row < rows and ends[row] <= (batch + 1) * LANES:
-            finish_row(row, starts, columns, diagonal, mirror, slot_of, waiting, beside, K)
+            finish_row(row, starts, columns, diagonal, mirror, whole, slot_of, waiting, beside, K)
             row += 1
 
 

@@ -21,6 +21,8 @@ from verify.xfem.dynamics.integrator import (
 )
 from verify.xfem.dynamics.linear_solver import LinearSolver
 from verify.xfem.errors import XfemError
+from verify.xfem.supports import Supports
+from verify.xfem.symmetric_sweep_kernels import symmetric_product
 
 __all__ = ["RealTimeEuler"]
 
@@ -51,12 +53,16 @@ class RealTimeEuler:
         self._places = body.mass.places(body.pattern)
         self._values = body.mass.entries[2]
         self._internal = np.empty(body.shape)
-        self._last: _Floats | None = None
+        # sweeps of the matrix' upper half are all that conjugate gradients need
+        self._whole = not isinstance(self.solver, ConjugateGradients)
+        self._change = np.zeros(body.shape)  # of the velocity, in this step
+        self._changes = np.zeros((3, *body.shape))  # in the last ones, the last first
         self._any_fixed = bool(body.fixed.any())
         self._held = _held_entries(
             body.pattern.starts, body.pattern.columns, body.pattern.diagonal, body.fixed
         )
-        self._change = np.empty(body.shape)
+        self._driven = np.zeros(body.shape)
+        self._resisted = np.empty(body.shape)
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
@@ -89,24 +95,33 @@ class RealTimeEuler:
             self._support(state)
         try:
             self.solver.factorize(self.blocks)
-            change = self._solve()
+            self._solve()
         except XfemError as failure:
             raise StepFailedError(
                 f"RealTimeEuler at t = {state.time:.6g} s: {failure}"
             ) from failure
-        if not _advance(change, self.step_size, state.velocity, state.displacement):
+        if not _advance(self._change, self.step_size, state.velocity, state.displacement):
             raise StepFailedError(
                 f"RealTimeEuler: not finite after t = {state.time:.6g} s with a step of "
                 f"{self.step_size:.6g} s"
             )
         state.time += self.step_size
 
-    def _solve(self) -> _Floats:
-        """Change of velocity; an iterative solver starts from the last one."""
-        if not isinstance(self.solver, ConjugateGradients):
-            return self.solver.solve(self.load)
-        self._last = self.solver.solve(self.load, self._last)
-        return self._last
+    def _solve(self) -> None:
+        """Write the change of velocity; an iterative solver starts from where the last three point.
+
+        A parabola through them takes one iteration in five off steps of a millisecond, one in
+        eight off those of ten, and adds one in twenty where steps are so long that nothing goes on
+        as it was (measured with the bodies of the benchmarks).
+        """
+        if isinstance(self.solver, ConjugateGradients):
+            _extrapolate(self._changes, self._change)
+            self.solver.improve(self.load, self._change, self._change)
+            _remember(self._change, self._changes)
+        elif isinstance(self.solver, Cholesky):
+            self.solver.solve(self.load, self._change)
+        else:
+            self._change[:] = self.solver.solve(self.load)
 
     def linearise(self, state: MotionState) -> None:
         """Write M + hC + h²K into `blocks` and the right-hand side into `load`."""
@@ -115,7 +130,7 @@ class RealTimeEuler:
         implicit = h + damping.stiffness
         body.force.linearise(
             body.pattern, state.displacement, state.velocity, implicit, h * implicit,
-            self._internal, self.blocks,
+            self._internal, self.blocks, self._whole,
         )  # fmt: skip
         if body.force.is_membrane:
             # what tension holds it with across its plane is as stiff as it is thin: implicit too
@@ -132,15 +147,21 @@ class RealTimeEuler:
     def _support(self, state: MotionState) -> None:
         """Let fixed components move as prescribed; what that does to the others goes right."""
         body = self.body
-        where, _ = body.prescribed(state.time + self.step_size)
+        if isinstance(body.supports, Supports):
+            where = body.supports.values
+        else:
+            where, _ = body.prescribed(state.time + self.step_size)
         driven = _driven_change(
-            body.fixed, where, state.displacement, state.velocity, self.step_size, self._change
+            body.fixed, where, state.displacement, state.velocity, self.step_size, self._driven
         )
         if driven:
-            self.load -= (body.pattern.matrix(self.blocks) @ self._change.ravel()).reshape(
-                body.shape
-            )
-        _hold(body.pattern.diagonal, body.fixed, self._held, self._change, self.blocks, self.load)
+            pattern = body.pattern
+            symmetric_product(
+                pattern.starts, pattern.columns, pattern.diagonal, self.blocks, self._driven,
+                self._resisted,
+            )  # fmt: skip
+            self.load -= self._resisted
+        _hold(body.pattern.diagonal, body.fixed, self._held, self._driven, self.blocks, self.load)
 
 
 @njit(cache=True)
@@ -190,6 +211,23 @@ def _hold(diagonal, fixed, held, change, blocks, load):
                 if blocks[diagonal[i], k, k] == 0.0:  # a flat membrane
                     blocks[diagonal[i], k, k] = 1.0
                 load[i, k] = blocks[diagonal[i], k, k] * change[i, k]
+
+
+@njit(cache=True)
+def _extrapolate(last, guess):
+    """Write what a parabola through the last three (3, N, d) gives next."""
+    for i in range(guess.shape[0]):
+        for k in range(guess.shape[1]):
+            guess[i, k] = 3.0 * (last[0, i, k] - last[1, i, k]) + last[2, i, k]
+
+
+@njit(cache=True)
+def _remember(change, last):
+    """Let a change be the first of the last three."""
+    for i in range(change.shape[0]):
+        for k in range(change.shape[1]):
+            last[2, i, k], last[1, i, k] = last[1, i, k], last[0, i, k]
+            last[0, i, k] = change[i, k]
 
 
 @njit(cache=True)
