@@ -6,7 +6,6 @@ It bounds the stiffness of slivers from below, which an explicit step pays for u
 grows alike: `GhostPenalty.mass`.
 """
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -138,7 +137,7 @@ class GhostPenalty:
         rho = self._of_faces(cell_densities(self.virtual, density))
         weights = self.factor * rho * self._heights**2 * self.weights
         extra = self.jumps.T @ (self.jumps * weights[:, None])
-        return replace(mass, matrix=csr_array(mass.matrix + extra), root=None)
+        return Mass(csr_array(mass.matrix + extra), None, mass.weights)
 
     def _of_faces(self, values: NDArray) -> _Floats:
         """Larger of the values of both cells at each face."""
