@@ -15,6 +15,7 @@ __all__ = [
     "set_multigrid",
     "solve_by_multigrid",
     "solve_directly",
+    "symmetric_solver",
 ]
 
 _LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
@@ -58,6 +59,14 @@ def direct_solver(matrix: Any) -> Any:
     from petsc4py import PETSc
 
     matrix.setOption(PETSc.Mat.Option.SPD, True)
+    return symmetric_solver(matrix)
+
+
+def symmetric_solver(matrix: Any) -> Any:
+    """Factorise a symmetric matrix, definite or not, by MUMPS; gives a PETSc KSP."""
+    from petsc4py import PETSc
+
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
     solver.setType("preonly")

@@ -1,6 +1,16 @@
-"""Locking: what an element loses more at Poisson's ratio 0.49 than it does at 0.3."""
+"""Locking: what an element loses as Poisson's ratio goes to 1/2, and a pressure gains."""
 
+import subprocess
+import sys
+from pathlib import Path
+from shutil import which
+
+import numpy as np
+import pytest
 from reference_scenes import energy_of, needs_fenicsx, polyline, square
+from solid_scenes import cube, polygon
+
+from reference.exact import exact_solution
 
 pytestmark = needs_fenicsx
 
@@ -27,3 +37,143 @@ def test_linear_elements_lock_and_quadratic_ones_do_not():
     stiff, soft = ([loss(plane(nu), p, 1) for p in (1, 2)] for nu in (0.49, 0.3))
     assert stiff[0] > 2 * soft[0] > 0  # 44 % of the energy missing, 19 % at 0.3
     assert 0 < stiff[1] < 1.5 * soft[1]  # 7.1 % and 5.3 %: tip and clamps
+
+
+HALVES = polygon("a", (-1, -1, 0.5), (2, -1, 0.5), (2, 2, 0.5), (-1, 2, 0.5))
+EXACT = {
+    "supports": [{"where": "boundary", "displacement": "exact"}],
+    "loads": [{"kind": "body_force", "force": "exact"}],
+}
+# waves on either side of a cut whose pressure stays bounded: nothing bends the cut
+WAVES = {
+    "solution": "smooth",
+    "parameters": {
+        "point": [0.0, 0.5],
+        "slope": 0.0,
+        "above": [[1.0, 3.0, 20.0], [0.0, 1.0, 0.0]],
+        "below": [[0.5, 2.0, 70.0], [0.0, 1.0, 0.0]],
+    },
+}
+SOLID_WAVES = {
+    "solution": "solid_smooth",
+    "parameters": {
+        "point": [0.0, 0.0, 0.5],
+        "normal": [0.0, 0.0, 1.0],
+        "axis": [1.0, 0.0, 0.0],
+        "above": [[0.1, 2.0, 1.0, 20.0], [0.1, 1.0, -2.0, 50.0], [0.0, 1.0, 1.0, 0.0]],
+        "below": [[0.05, 2.0, 1.0, 70.0], [0.1, -1.0, 2.0, 10.0], [0.0, 1.0, 1.0, 0.0]],
+    },
+}
+
+
+def waving(poisson, n, d):
+    """Give sinusoids on both sides of a cut; in the plane or in space."""
+    material = {"young": 1.0, "poisson": poisson, "density": 1.0}
+    if d == 3:
+        return cube(
+            [HALVES], material=material, mesh={"cells": [[n] * 3]}, exact=SOLID_WAVES, **EXACT
+        )
+    through = [polyline("a", (-0.1, 0.5), (1.1, 0.5))]
+    material["plane"] = "strain"
+    return square(through, material=material, mesh={"cells": [[n, n]]}, exact=WAVES, **EXACT)
+
+
+def errors(poisson, n, d, **parameters):
+    """Largest nodal errors over the largest displacement without and with a pressure."""
+    from reference.elasticity import solve_linear
+    from reference.nearly_incompressible import solve_mixed
+    from reference.space import conforming_space
+    from verify.solvers.conforming_meshes import peer_mesh
+
+    scene = waving(poisson, n, d)
+    exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    space = conforming_space(peer_mesh(scene, 0, "imprinted"), 2)
+    near = np.empty_like(space.node_points)
+    near[space.cell_nodes] = space.centroids[:, None]
+    wanted = exact.displacement(space.node_points, near)
+    found = solve_linear(scene, space, exact), solve_mixed(scene, space, exact, **parameters)
+    return [np.abs(f.displacement - wanted).max() / np.abs(wanted).max() for f in found]
+
+
+@pytest.mark.parametrize("d, n", [(2, 8), (3, 2)])
+def test_a_pressure_keeps_the_error_that_the_element_has_at_a_third_up_to_a_half(d, n):
+    pure, mixed = zip(*(errors(nu, n, d) for nu in (0.3, 0.49, 0.4999)), strict=True)
+    assert max(mixed) < 2 * mixed[0]
+    assert pure[1] > 1.5 * pure[0]
+    assert pure[2] > 4 * mixed[2]
+
+
+def test_the_error_with_a_pressure_falls_with_the_order_of_the_element_at_4999():
+    (pure, mixed), (finer, mixed_finer) = (errors(0.4999, n, 2) for n in (8, 16))
+    assert np.log2(mixed / mixed_finer) > 2.7  # 3 for quadratic elements
+    assert np.log2(pure / finer) < 2.5
+
+
+def test_a_pressure_changes_little_where_nothing_locks():
+    pure, mixed = errors(0.3, 8, 2)
+    assert mixed == pytest.approx(pure, rel=0.3)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def test_minres_gives_the_answer_of_a_factorisation(poisson):
+    direct, iterated = (errors(poisson, 3, 3, method=m)[1] for m in ("direct", "multigrid"))
+    assert iterated == pytest.approx(direct, rel=1e-6)  # residual 1e-10, errors of some 1e-3
+
+
+def test_the_reference_takes_a_pressure_by_itself_and_converges_from_the_first_level():
+    from verify.solvers import find_solver
+
+    solver = find_solver("reference")
+    one, two = (solver.solve(plane(0.49), level, repetitions=0) for level in (0, 1))
+    assert one.notes["unknowns"] == "displacement and pressure"
+    assert solver.solve(plane(0.3), 0, repetitions=0).notes["unknowns"] == "displacement"
+    # the potential energy is a saddle value: no bound, but close
+    assert one.ledger["strain"][0] == pytest.approx(two.ledger["strain"][0], rel=5e-4)
+
+
+_PARALLEL = """
+import sys
+sys.path.insert(0, {tests!r})
+from mpi4py import MPI
+from reference.dolfinx_versions import import_dolfinx
+import_dolfinx()
+import numpy as np
+from test_near_incompressible import waving
+from reference.exact import exact_solution
+from reference.nearly_incompressible import solve_mixed
+from reference.space import conforming_space
+from verify.solvers.conforming_meshes import peer_mesh
+
+scene = waving(0.49, 2, 3)
+exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+space = conforming_space(peer_mesh(scene, 0, "imprinted"), 2, MPI.COMM_WORLD)
+values = []
+for method in ("direct", "multigrid"):
+    found = solve_mixed(scene, space, exact, method, 1e-12)
+    values += [found.strain_energy, float(np.linalg.norm(found.displacement))]
+if MPI.COMM_WORLD.rank == 0:
+    print(MPI.COMM_WORLD.size, *map(repr, values))
+"""
+
+
+def on_ranks(count):
+    beside = Path(sys.executable).with_name("mpiexec")
+    mpiexec = str(beside) if beside.exists() else which("mpiexec")
+    if mpiexec is None:
+        pytest.skip("needs mpiexec")
+    script = _PARALLEL.format(tests=str(Path(__file__).parent))
+    done = subprocess.run(
+        [mpiexec, "-n", str(count), sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        cwd=Path(__file__).parents[2],
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    ranks, *values = done.stdout.split()
+    assert int(ranks) == count
+    return [float(value) for value in values]
+
+
+def test_two_ranks_give_the_answer_of_one():
+    assert on_ranks(2) == pytest.approx(on_ranks(1), rel=1e-10)

@@ -13,6 +13,7 @@ from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_solution
 from reference.large_strain import solve_large_strain
 from reference.meshing import ConformingMesh
+from reference.nearly_incompressible import solve_mixed, wants_pressure
 from reference.space import ConformingSpace, conforming_space
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
@@ -120,6 +121,9 @@ class ConformingSolver:
 class ReferenceSolver:
     """Elements of the degree that the scene asks for, graded to every singular point.
 
+    Quadratic elements of a linear static scene have a pressure of their own from Poisson's ratio
+    0.45 on, so that they do not lock, unless a stress intensity is asked for.
+
     A motion is integrated by the trapezoidal rule, at finite rotation by the energy–momentum
     scheme, with the scene's time step on level 0; every level halves it with the elements, so
     that what the levels say of their error is said of both.
@@ -152,6 +156,7 @@ class ReferenceSolver:
             scene.reference.degree,
             min(repetitions, 1),
             _Motion("newmark" if linear else "energy_momentum", largest),
+            wants_pressure(scene, scene.reference.degree),
         )
 
 
@@ -162,6 +167,7 @@ def _solve(
     degree: int,
     repetitions: int,
     motion: _Motion,
+    pressure: bool = False,
 ) -> Solution:
     if reason := _refusal(scene):
         raise UnsupportedSceneError(reason)
@@ -173,7 +179,7 @@ def _solve(
 
     def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
         if scene.analysis.kind == "static":
-            return _equilibrium(scene, conforming_space(mesh, degree, comm), exact)
+            return _equilibrium(scene, conforming_space(mesh, degree, comm), exact, pressure)
         largest = motion.largest(level, size)
         return _moved(scene, mesh, degree, exact, motion.scheme, largest, trial)
 
@@ -232,10 +238,10 @@ def _moved(
     )
 
 
-def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Answer:
-    """Solve a scene by its kinematics."""
+def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: bool) -> _Answer:
+    """Solve a scene by its kinematics; linearly with a pressure if that is wanted."""
     if scene.analysis.kinematics == "linear":
-        linear = solve_linear(scene, space, exact)
+        linear = (solve_mixed if pressure else solve_linear)(scene, space, exact)
         return _Answer(
             space,
             np.zeros(1),
@@ -245,6 +251,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any) -> _Answer:
             linear.timings,
             {"cg": linear.answer.iterations} if linear.answer.iterations else {},
             {
+                "unknowns": "displacement and pressure" if pressure else "displacement",
                 "linear solver": linear.answer.method,
                 "round-off": f"{linear.answer.round_off:.1e}",
                 "residual": f"{linear.answer.residual:.1e}",

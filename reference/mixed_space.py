@@ -1,0 +1,90 @@
+"""Displacement and pressure as unknowns of their own: quadratic and linear (Taylor–Hood)."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.space import ConformingSpace
+
+__all__ = ["MixedSpace", "mixed_space"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MixedSpace:
+    """Quadratic displacements and continuous linear pressures on a conforming mesh.
+
+    Both jump across the cut, whose nodes are doubled.
+
+    Attributes
+    ----------
+    space : ConformingSpace
+        Of the displacements alone; nodes are numbered as there.
+    function_space : dolfinx.fem.FunctionSpace
+        Of both together.
+    displacement_dofs : (l, d) int array
+        Unknown of both, on this rank, of each (vector) unknown of `space`.
+    pressure_dofs : (q,) int array
+        Unknowns of the pressure that this rank owns.
+    """
+
+    space: ConformingSpace
+    function_space: Any
+    displacement_dofs: NDArray[np.int64]
+    pressure_dofs: NDArray[np.int64]
+
+    @property
+    def owned(self) -> int:
+        """Number of unknowns that this rank owns."""
+        index_map = self.function_space.dofmap.index_map
+        return int(index_map.size_local * self.function_space.dofmap.index_map_bs)
+
+    @property
+    def first(self) -> int:
+        """Global number of the first unknown of this rank."""
+        index_map = self.function_space.dofmap.index_map
+        return int(index_map.local_range[0] * self.function_space.dofmap.index_map_bs)
+
+    def own_unknowns(
+        self, unknowns: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Find some scalar displacements, numbered by nodes, among the unknowns of this rank.
+
+        Returns
+        -------
+        own : (l,) array
+            Their numbers on this rank.
+        at : (l,) array
+            Their places in `unknowns`.
+        """
+        own, at = self.space.own_unknowns(unknowns)
+        return self.displacement_dofs.ravel()[own], at
+
+    def displacement(self, values: Array) -> Array:
+        """Gather nodal displacements (n, d) on all ranks from the unknowns of each, m."""
+        return self.space.everywhere(values[self.displacement_dofs.ravel()])
+
+
+def mixed_space(space: ConformingSpace) -> MixedSpace:
+    """Add pressures to quadratic displacements."""
+    import basix.ufl
+    from dolfinx import fem
+
+    V, d = space.function_space, space.dimension
+    domain = V.mesh
+    cell = "triangle" if d == 2 else "tetrahedron"
+    pair = [
+        basix.ufl.element("Lagrange", cell, 2, shape=(d,)),
+        basix.ufl.element("Lagrange", cell, 1),
+    ]
+    both = fem.functionspace(domain, basix.ufl.mixed_element(pair))
+    vectors = np.asarray(V.dofmap.list, dtype=np.int64)
+    dofs = np.full((int(vectors.max()) + 1, d), -1, dtype=np.int64)
+    for k in range(d):
+        dofs[vectors, k] = both.sub(0).sub(k).dofmap.list
+    pressures = np.unique(np.asarray(both.sub(1).dofmap.list, dtype=np.int64))
+    found = MixedSpace(space, both, dofs, pressures)
+    return MixedSpace(space, both, dofs, pressures[pressures < found.owned])

@@ -1,0 +1,147 @@
+"""Linear elasticity with the pressure as an unknown, which does not lock as ν goes to ½.
+
+Stationary for ∫ μ ε:ε + p div u − p² / 2λ less the work of the loads, whose p is λ div u: with
+quadratic displacements and linear pressures the error is bounded evenly in λ (Brezzi & Fortin,
+Mixed and Hybrid Finite Element Methods, 1991, VI).
+"""
+
+from time import perf_counter
+from typing import Any, Literal
+
+import numpy as np
+
+from reference.boundary_values import constrained_values
+from reference.elasticity import LinearSolve, lame, load_form, mean_stiffness
+from reference.linear_solvers import solve_directly, symmetric_solver
+from reference.mixed_solver import solve_saddle
+from reference.mixed_space import MixedSpace, mixed_space
+from reference.space import ConformingSpace
+from verify.errors import InputError
+from verify.scene import Material, Scene
+
+__all__ = ["LEAST_POISSON", "solve_mixed", "wants_pressure"]
+
+# Poisson's ratio from which the pressure pays, measured: docs/reference-in-space.md
+LEAST_POISSON = 0.45
+# unknowns in space up to which the saddle point is factorised
+_MOST_DIRECT = 60_000
+
+
+def wants_pressure(scene: Scene, degree: int) -> bool:
+    """Whether a scene is solved better with a pressure.
+
+    In plane stress nothing locks: the sheet is free to become thicker. And the stress that stress
+    intensities are computed from is Hooke's of the displacement alone, whose trace a mixed
+    displacement meets in the mean only: there one without a pressure is better.
+    """
+    material = scene.material
+    stresses = any(quantity.kind == "stress_intensity" for quantity in scene.quantities)
+    nearly = material.poisson >= LEAST_POISSON and material.plane != "stress"
+    return degree == 2 and nearly and not stresses
+
+
+def solve_mixed(
+    scene: Scene,
+    space: ConformingSpace,
+    exact: Any,
+    method: Literal["direct", "multigrid"] | None = None,
+    tolerance: float = 1e-10,
+) -> LinearSolve:
+    """Solve the linear static problem of `scene` for displacement and pressure.
+
+    Parameters
+    ----------
+    scene : Scene
+        Plane strain or in space.
+    space : ConformingSpace
+        Of degree 2.
+    exact : ExactSolution or None
+        For supports and loads that are said to be exact.
+    method : {"direct", "multigrid"}, optional
+        MUMPS, or MINRES with GAMG for the displacements; default by the number of unknowns.
+    tolerance : float
+        Of multigrid: the norm of the true residual over that of the loads.
+
+    Raises
+    ------
+    InputError
+        If a support or load acts nowhere, a piece of the body is not held, or ν is not positive.
+    RuntimeError
+        If PETSc did not solve the system; the message says why.
+    """
+    import ufl
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+    from petsc4py import PETSc
+
+    if not scene.material.poisson > 0:
+        raise InputError(
+            f"material.poisson {scene.material.poisson}; a pressure expects it above 0",
+            str(scene.file or ""),
+        )
+    start = perf_counter()
+    mixed = mixed_space(space)
+    W = mixed.function_space
+    unknowns, values = constrained_values(scene, space, exact)
+    own, at = mixed.own_unknowns(unknowns)
+    tests = ufl.TestFunctions(W)
+    load = fem.form(load_form(scene, space, tests[0], exact))
+    matrix = petsc.assemble_matrix(fem.form(_saddle(scene.material, ufl.TrialFunctions(W), tests)))
+    matrix.assemble()
+    vector = petsc.assemble_vector(load)
+    vector.ghostUpdate(addv=True, mode="reverse")
+    solution = fem.Function(W)
+    x = solution.x.petsc_vec
+    x.array[own] = values[at]
+    rows = (own + mixed.first).astype(PETSc.IntType)
+    matrix.zeroRowsColumns(rows, mean_stiffness(matrix), x, vector)
+    timings = {"assembly": perf_counter() - start}
+    if method is None:
+        small = space.dimension == 2 or W.dofmap.index_map.size_global <= _MOST_DIRECT
+        method = "direct" if small else "multigrid"
+    if method == "direct":
+        solver = symmetric_solver(matrix)
+        answer = solve_directly(solver, matrix, x, vector)
+        solver.destroy()
+    else:
+        weight = _pressure_mass(scene.material, mixed)
+        answer = solve_saddle(matrix, weight, mixed, x, vector, tolerance)
+        weight.destroy()
+    timings["solve"] = perf_counter() - start - timings["assembly"]
+    solution.x.scatter_forward()
+    u, p = ufl.split(solution)
+    lam, mu = lame(scene.material)
+    strain = ufl.sym(ufl.grad(u))
+    density = mu * ufl.inner(strain, strain) + p**2 / (2 * lam)
+    stored = fem.assemble_scalar(fem.form(density * ufl.dx))
+    energy = W.mesh.comm.allreduce(float(np.real(stored)))
+    displacement = mixed.displacement(np.asarray(solution.x.array, dtype=float))
+    for entry in (matrix, vector):
+        entry.destroy()
+    return LinearSolve(displacement, energy, answer, timings)
+
+
+def _saddle(material: Material, trial: Any, test: Any) -> Any:
+    import ufl
+    from dolfinx import fem
+
+    (u, p), (v, q) = trial, test
+    domain = ufl.domain.extract_unique_domain(v)
+    lam, mu = (fem.Constant(domain, value) for value in lame(material))
+    work = 2 * mu * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v)))
+    return (work + p * ufl.div(v) + q * ufl.div(u) - p * q / lam) * ufl.dx
+
+
+def _pressure_mass(material: Material, mixed: MixedSpace) -> Any:
+    """Mass of the pressures over 2μ and λ in series: spectrally like their Schur complement."""
+    import ufl
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
+    W = mixed.function_space
+    lam, mu = lame(material)
+    p, q = ufl.TrialFunctions(W)[1], ufl.TestFunctions(W)[1]
+    share = fem.Constant(W.mesh, 1 / (2 * mu) + 1 / lam)
+    matrix = petsc.assemble_matrix(fem.form(share * p * q * ufl.dx))
+    matrix.assemble()
+    return matrix
