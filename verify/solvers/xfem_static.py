@@ -85,7 +85,8 @@ def _linear(
         ghost = GhostPenalty(virtual, material) if penalise else None
         static = solve_static(virtual, material, supports, load, ghost=ghost)
         share = static.penalty_energy / max(static.strain_energy, np.finfo(float).tiny)
-        notes = {"linear solver": "own sparse Cholesky", "residual": f"{static.residual:.3e}"}
+        own = "sparse Cholesky" if static.solver == "direct" else "conjugate gradients"
+        notes = {"linear solver": f"own {own}", "residual": f"{static.residual:.3e}"}
         return Equilibrium(
             static.displacement,
             static.strain_energy,

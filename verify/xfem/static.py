@@ -22,6 +22,9 @@ __all__ = ["StaticSolution", "solve_static"]
 
 _Floats = NDArray[np.float64]
 
+_ITERATE_FROM = 2000  # nodes in space: docs/xfem-linear-solvers.md has the measurement
+_ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
+
 
 @dataclass(frozen=True)
 class StaticSolution:
@@ -42,6 +45,8 @@ class StaticSolution:
         ``factorisation`` and ``solve``.
     penalty_energy : float
         Energy of a ghost penalty, not part of the strain energy.
+    solver : {"direct", "iterative"}
+        What has solved it.
     """
 
     displacement: _Floats
@@ -50,6 +55,7 @@ class StaticSolution:
     residual: float
     timings: dict[str, float]
     penalty_energy: float = 0.0
+    solver: str = "direct"
 
 
 def solve_static(
@@ -57,7 +63,7 @@ def solve_static(
     material: Material,
     supports: Supports,
     load: _Floats | None = None,
-    solver: Literal["direct", "iterative"] = "direct",
+    solver: Literal["auto", "direct", "iterative"] = "auto",
     ghost: GhostPenalty | None = None,
 ) -> StaticSolution:
     """Solve K u = f.
@@ -70,9 +76,10 @@ def solve_static(
     supports : Supports
     load : (N, d) float array, optional
         Nodal forces in newtons.
-    solver : {"direct", "iterative"}
-        Sparse Cholesky factorisation, or conjugate gradients with nodal-block Jacobi: in 3D the
-        faster one from some 10⁴ unknowns on.
+    solver : {"auto", "direct", "iterative"}
+        Sparse Cholesky factorisation, or conjugate gradients with nodal-block Jacobi down to the
+        residual that a factorisation leaves. ``auto`` takes the faster one: the latter for solids of
+        2000 nodes and more, without a ghost penalty.
     ghost : GhostPenalty, optional
         Added to the stiffness.
 
@@ -95,10 +102,16 @@ def solve_static(
     stiffness = LinearStiffness(virtual, material)
     clock = [perf_counter()]
     pattern = ghost.pattern() if ghost else block_pattern(virtual.cells, virtual.node_count)
-    if solver not in ("direct", "iterative"):
-        raise XfemError(f"solver '{solver}'; expected direct or iterative")
-    method = ConjugateGradients if solver == "iterative" else Cholesky
-    inverse = method(pattern, shape[1])
+    if solver not in ("auto", "direct", "iterative"):
+        raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
+    if solver == "auto":
+        large = virtual.cells.shape[1] == 4 and virtual.node_count >= _ITERATE_FROM
+        solver = "iterative" if large and ghost is None else "direct"
+    inverse: Cholesky | ConjugateGradients
+    if solver == "iterative":
+        inverse = ConjugateGradients(pattern, shape[1], _ROUNDING)
+    else:
+        inverse = Cholesky(pattern, shape[1])
     clock.append(perf_counter())
     blocks = stiffness.assemble(pattern)
     internal, _ = stiffness.force(supports.values)
@@ -125,4 +138,5 @@ def solve_static(
         residual=float(np.abs(unbalanced[~supports.fixed]).max(initial=0.0) / scale),
         timings=dict(zip(phases, np.diff(clock).tolist(), strict=True)),
         penalty_energy=penalty_energy,
+        solver=solver,
     )
