@@ -78,8 +78,8 @@ def solve_static(
         Nodal forces in newtons.
     solver : {"auto", "direct", "iterative"}
         Sparse Cholesky factorisation, or conjugate gradients with nodal-block Jacobi down to the
-        residual that a factorisation leaves. ``auto`` takes the faster one: the latter for solids of
-        2000 nodes and more, without a ghost penalty.
+        residual that a factorisation leaves. ``auto`` takes the faster one: the latter for solids
+        of 2000 nodes and more, without a ghost penalty.
     ghost : GhostPenalty, optional
         Added to the stiffness.
 
