@@ -135,6 +135,11 @@ def _fragment(gmsh: ModuleType, surface: int, curves: list[int]) -> list[int]:
             inside.append(curve)
         elif not sides:
             beyond.append((1, curve))
+        else:
+            raise InputError(
+                "cuts: a part of a cut was taken for a part of the boundary that it touches; "
+                "move it away from the boundary"
+            )
     occ.remove(beyond, recursive=True)
     occ.synchronize()
     return inside

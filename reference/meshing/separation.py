@@ -51,7 +51,49 @@ def check_separation(features: list[Feature], size: float, where: str) -> None:
             f"resolves {_RESOLVED * size:.3g} m (below {_TOUCHING * size:.3g} m they touch)",
             where,
         )
+    _check_no_cusp(features, size, where)
     _check_no_overlap(features, size, where)
+
+
+def _check_no_cusp(features: list[Feature], size: float, where: str) -> None:
+    """Refuse arcs that touch another part tangentially: no cell fits a wedge that ends in 0°."""
+    for arc in features:
+        for other in features:
+            if arc.centre is None or other is arc:
+                continue
+            points = _bulges([arc, other] if other.centre is None else [other, arc])
+            on_both = (arc.distance(points) <= _TOUCHING * size) & (
+                other.distance(points) <= _TOUCHING * size
+            )
+            # at ends of both it may be a line that runs on smoothly
+            inside = np.zeros(len(points), dtype=bool)
+            for one in (arc, other):
+                inside |= _off_ends(one, points, features, size)
+            for x, y in points[on_both & inside]:
+                raise InputError(
+                    f"cuts: {_pair(arc.name, other.name)} touch tangentially at ({x:.6g}, {y:.6g});"
+                    " a conforming mesh cannot resolve the wedge between them: move them apart, or "
+                    "let them cross",
+                    where,
+                )
+
+
+def _off_ends(
+    feature: Feature, points: NDArray[np.float64], features: list[Feature], size: float
+) -> NDArray[np.bool_]:
+    """Whether points lie off the ends of a feature; those at which an arc is halved are none."""
+    halves = [f for f in features if f is not feature and f.name == feature.name]
+    if feature.centre is None:
+        halves = []
+    ends = [
+        end
+        for end in (feature.start, feature.end)
+        if not any(np.array_equal(end, other) for f in halves for other in (f.start, f.end))
+    ]
+    if not ends:
+        return np.ones(len(points), dtype=bool)
+    away = np.linalg.norm(points[:, None] - np.stack(ends), axis=2).min(axis=1)
+    return np.asarray(away > _RESOLVED * size)
 
 
 def _check_no_overlap(features: list[Feature], size: float, where: str) -> None:

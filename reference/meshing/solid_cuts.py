@@ -7,9 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.errors import InputError
+
 __all__ = ["CutFaces", "add_surface", "imprint_surfaces"]
 
 Array = NDArray[np.float64]
+_MERGED = 1e-6  # of the body's size
 _KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matter
 
 
@@ -56,10 +59,17 @@ def add_surface(gmsh: ModuleType, cut: Any, origin: Array, scale: float) -> list
     raise AssertionError(f"a {cut.kind} cut in space")  # the scene has checked it
 
 
-def imprint_surfaces(gmsh: ModuleType, body: int, faces: list[int], lines: list[int]) -> CutFaces:
+def imprint_surfaces(
+    gmsh: ModuleType, body: int, faces: dict[int, str], lines: list[int]
+) -> CutFaces:
     """Fragment the body by the faces of the cuts; what lies outside or along it is removed.
 
-    `lines` on the surface of the body become edges of it.
+    `faces` have the names of their cuts; `lines` on the surface of the body become edges of it.
+
+    Raises
+    ------
+    InputError
+        If OpenCASCADE takes two cuts, or a cut and the surface of the body, for one.
     """
     occ = gmsh.model.occ
     if not faces and not lines:
@@ -68,18 +78,47 @@ def imprint_surfaces(gmsh: ModuleType, body: int, faces: list[int], lines: list[
     tools = [(2, tag) for tag in faces] + [(1, tag) for tag in lines]
     _, images = occ.fragment([(3, body)], tools)
     occ.synchronize()
+    _check_not_merged(dict(zip(faces, images[1:], strict=False)), faces)
     volumes = [tag for dim, tag in images[0] if dim == 3]
     embedded = {tag for v in volumes for dim, tag in gmsh.model.mesh.getEmbedded(3, v) if dim == 2}
-    inside, beyond = [], []
+    inside, beyond, one_sided = [], [], []
     for face in sorted({abs(tag) for image in images[1:] for dim, tag in image if dim == 2}):
         sides = gmsh.model.getAdjacencies(2, face)[0]
         if len(sides) == 2 or face in embedded:
             inside.append(face)
         elif not len(sides):
             beyond.append((2, face))
+        else:
+            one_sided.append(face)
     occ.remove(beyond, recursive=True)
     occ.synchronize()
+    if not all(_on_surface(gmsh, face) for face in one_sided):
+        raise InputError(
+            "cuts: a part of a cut was taken for a part of the body's surface, which it touches; "
+            "move it away from the surface"
+        )
     return CutFaces(inside, *_rims(gmsh, inside))
+
+
+def _check_not_merged(images: dict[int, list[tuple[int, int]]], names: dict[int, str]) -> None:
+    """Refuse faces of two cuts of which a part became one and the same face."""
+    owner: dict[int, int] = {}
+    for face, image in images.items():
+        for dim, tag in image:
+            if dim == 2 and owner.setdefault(abs(tag), face) != face:
+                one, other = names[owner[abs(tag)]], names[face]
+                raise InputError(
+                    f"cuts: '{one}' and '{other}' come so close to each other that a part of them "
+                    "is taken for one; a conforming mesh resolves about 1e-6 of the body's size: "
+                    "move them apart, or merge them"
+                )
+
+
+def _on_surface(gmsh: ModuleType, face: int) -> bool:
+    """Whether the centre of a face lies on the surface of the box, to what gmsh merges."""
+    box = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
+    centre = np.array(gmsh.model.occ.getCenterOfMass(2, face))
+    return bool(np.abs(box - centre).min() < _MERGED * np.ptp(box, axis=0).max())
 
 
 def _polygon(occ: ModuleType, corners: Array) -> int:

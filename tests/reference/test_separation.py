@@ -136,3 +136,55 @@ def test_a_curve_given_as_a_polyline_of_many_vertices_is_no_strip():
     assert close_pairs(plane_features(square([polyline("a", *ring)])), 1e-7, 0.1) == []
     hairpin = polyline("a", (0.2, 0.5), (0.8, 0.5), (0.8, 0.51), (0.2, 0.51))
     assert close_pairs(plane_features(square([hairpin])), 1e-7, 0.1) == [(4, 6)]
+
+
+def circle(name, x, y, radius, start=0.0, sweep=360.0):
+    centre = [x, y]
+    return {"kind": "arc", "name": name, "centre": centre, "radius": radius, "start": start,
+            "sweep": sweep}  # fmt: skip
+
+
+TANGENT = {
+    # half of this circle used to be taken for the boundary, and stayed uncut without a word
+    "a circle and the boundary": ([circle("a", 0.5, 0.2, 0.2)], "cut 'a' and the boundary"),
+    "an arc and the boundary": (
+        [circle("a", 0.5, 0.2, 0.2, 200.0, 140.0)],
+        "cut 'a' and the boundary",
+    ),
+    "an arc and a line": (
+        [circle("a", 0.5, 0.3, 0.2, 30.0, 120.0), polyline("b", (0.2, 0.5), (0.8, 0.5))],
+        "cut 'a' and cut 'b'",
+    ),
+    "an arc that ends on a line": (
+        [circle("a", 0.5, 0.3, 0.2, 30.0, 60.0), polyline("b", (0.2, 0.5), (0.8, 0.5))],
+        "cut 'a' and cut 'b'",
+    ),
+    "two circles": (
+        [circle("a", 0.3, 0.5, 0.1, 200.0, 320.0), circle("b", 0.6, 0.5, 0.2, 20.0, 320.0)],
+        "cut 'a' and cut 'b'",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", TANGENT)
+def test_an_arc_that_touches_tangentially_is_refused(what):
+    cuts, names = TANGENT[what]
+    with pytest.raises(InputError, match=f"{names} touch tangentially"):
+        graded(square(cuts))
+
+
+def test_an_arc_that_goes_on_where_a_line_ends_is_no_contact():
+    cuts = [polyline("a", (0.2, 0.3), (0.5, 0.3)), circle("b", 0.5, 0.5, 0.2, 270.0, 90.0)]
+    mesh = graded(square(cuts))
+    length = np.linalg.norm(np.diff(mesh.realised_cut, axis=1), axis=2).sum()
+    assert length == pytest.approx(0.3 + 0.1 * np.pi, rel=1e-3)
+
+
+def test_a_cut_that_ends_in_a_support_opens_there_and_its_levels_approach_each_other():
+    held = [{"where": "bottom", "displacement": [0, 0]}]
+    push = [{"kind": "traction", "where": "right", "traction": [1, 0]}]
+    scene = square([polyline("a", (0.4, -0.1), (0.4, 0.6))], supports=held, loads=push)
+    values = [energy_of(scene, level=level) for level in range(3)]
+    assert abs(values[2] - values[1]) < 0.2 * abs(values[1] - values[0]) < 1e-3 * values[2]
+    # an uncut body is stiffer: the mouth on the support is not closed
+    assert values[2] > 1.02 * energy_of(square(supports=held, loads=push), level=1)

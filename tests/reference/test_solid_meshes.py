@@ -169,3 +169,47 @@ def test_uniform_refinement_keeps_volume_cut_and_shapes():
     assert len(fine.cells) == 64 * len(before.cells)
     # a tetrahedron and its descendants have three shapes: no decay from the second level on
     assert worst[2] == pytest.approx(worst[1], rel=1e-6)
+
+
+class TestBadGeometry:
+    """Surfaces that almost touch: told apart, or refused by name."""
+
+    pytestmark = needs_fenicsx
+
+    def mesh(self, cuts, size=0.1):
+        from reference.meshing import conforming_mesh
+
+        return conforming_mesh(cube(cuts), Grading(size, np.zeros((0, 3))))
+
+    def discs(self, apart):
+        low, high = (
+            {"kind": "disc", "name": name, "centre": [0.5, 0.5, z], "normal": [0.0, 0, 1],
+             "radius": 0.2}
+            for name, z in (("low", 0.5), ("high", 0.5 + apart))
+        )  # fmt: skip
+        return [low, high]
+
+    @pytest.mark.parametrize("apart", [1e-8, 1e-7])
+    def test_two_discs_that_would_be_merged_are_refused_by_name(self, apart):
+        with pytest.raises(InputError, match="'low' and 'high' come so close"):
+            self.mesh(self.discs(apart))
+
+    @pytest.mark.parametrize("apart", [1e-2, 1e-3])
+    def test_two_discs_a_small_gap_apart_are_both_cut(self, apart):
+        # a circle of chords h loses h²/6R² of its area
+        check(self.mesh(self.discs(apart)), 2 * np.pi * 0.04, 1, 1.2 * 0.1**2 / (6 * 0.2**2))
+
+    def test_a_rim_that_touches_the_surface_of_the_body_keeps_its_area(self):
+        rim = {"kind": "disc", "name": "d", "centre": [0.5, 0.5, 0.2], "normal": [1.0, 0, 0],
+               "radius": 0.2}  # fmt: skip
+        check(self.mesh([rim]), np.pi * 0.04, 1, 1.2 * 0.1**2 / (6 * 0.2**2))
+
+    def test_a_tube_that_touches_the_surface_along_a_line_frees_its_core(self):
+        tube = {"kind": "cylinder", "name": "c", "base": [0.5, 0.2, -0.1], "axis": [0.0, 0, 1],
+                "radius": 0.2, "height": 1.2}  # fmt: skip
+        check(self.mesh([tube]), 0.4 * np.pi, 2, 1.2 * 0.1**2 / (6 * 0.2**2))
+
+    def test_a_cut_through_a_support_opens_it(self):
+        plane = {"kind": "polygon", "name": "p", "points": [
+            [0.5, -0.1, -0.1], [0.5, 1.1, -0.1], [0.5, 1.1, 0.5], [0.5, -0.1, 0.5]]}  # fmt: skip
+        check(self.mesh([plane]), 0.5, 1, 1e-12)
