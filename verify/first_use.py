@@ -185,16 +185,18 @@ def _comparison() -> None:
 
 
 _STAGES: list[tuple[str, Callable[[], None]]] = [
+    ("comparison", _comparison),
     ("plane: statics", partial(_without_slivers, _plane, _linear)),
     ("plane: rotation and motion", partial(_without_slivers, _plane, _turning)),
     ("membrane: rotation and motion", partial(_without_slivers, _membrane, _turning)),
-    ("comparison", _comparison),
     ("space: scalpel", _scalpel),
     ("space: statics", partial(_without_slivers, _solid, _linear)),
     ("space: rotation and motion", partial(_without_slivers, _solid, _turning)),
 ]
 STAGES = dict(_STAGES)
-_SHARES = (list(STAGES)[:4], list(STAGES)[4:])  # of two processes
+# Of two processes. The first begins with what the other does not need, and finds in the cache how
+# a body is split and joined, with which the other begins.
+_SHARES = (list(STAGES)[:4], list(STAGES)[4:])
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ LAM, MU = 1.3, 0.7
 
 def _rotation(F):
     R = np.empty_like(F)
-    nearest_rotation(F, np.array([1.0, 0.0, 0.0, 0.0]), R)
+    nearest_rotation(F, R)
     return R
 
 

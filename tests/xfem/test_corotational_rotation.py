@@ -3,13 +3,35 @@
 import numpy as np
 import pytest
 
-from verify.xfem.polar_kernels import nearest_rotation
+from verify.xfem.polar_kernels import (
+    LANES,
+    mend_lane,
+    nearest_rotation,
+    new_lanes,
+    rotation_matrix,
+    turn_lanes,
+)
 
 
 def _rotation(F, start=None):
-    q = np.array([1.0, 0.0, 0.0, 0.0]) if start is None else start.copy()
+    """In space in the last of the lanes, by Newton's method from a quaternion."""
     R = np.empty_like(F)
-    nearest_rotation(F, q, R)
+    if len(F) == 2:
+        nearest_rotation(F, R)
+        return R
+    lanes = new_lanes()
+    last = lanes.reshape(-1, LANES)[:, -1]
+    last[:9] = F.ravel()
+    last[9:13] = [1.0, 0.0, 0.0, 0.0] if start is None else start
+    if not turn_lanes(lanes):
+        mend_lane(lanes, LANES - 1)
+    rotation_matrix(last[9:13].copy(), R)
+    return R
+
+
+def _by_eigenvector(F, _start=None):
+    R = np.empty_like(F)
+    nearest_rotation(F, R)
     return R
 
 
@@ -20,13 +42,15 @@ def _by_svd(F):
     return U @ flip @ V
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_rotation_equals_that_of_the_singular_value_decomposition_also_when_inverted(dim):
+@pytest.mark.parametrize(
+    ("dim", "rotation"), [(2, _rotation), (3, _rotation), (3, _by_eigenvector)]
+)
+def test_rotation_equals_that_of_the_singular_value_decomposition_also_when_inverted(dim, rotation):
     rng = np.random.default_rng(7)
     for _ in range(2000):
         F = rng.normal(size=(dim, dim))
         start = rng.normal(size=4)
-        R = _rotation(F, start / np.linalg.norm(start))
+        R = rotation(F, start / np.linalg.norm(start))
         s = np.linalg.svd(F)[1]
         # the rotation is as sensitive as 1/(σ₂ ± σ₃)
         gap = (s[-2] + np.sign(np.linalg.det(F)) * s[-1]) / s[0]
@@ -48,12 +72,15 @@ def test_rotation_equals_that_of_the_singular_value_decomposition_also_when_inve
         (1e120, 1e120, -1e120),
     ],
 )
-def test_collapsed_and_inverted_pieces_have_a_rotation_that_attains_the_largest_trace(stretches):
+@pytest.mark.parametrize("rotation", [_rotation, _by_eigenvector])
+def test_collapsed_and_inverted_pieces_have_a_rotation_that_attains_the_largest_trace(
+    stretches, rotation
+):
     rng = np.random.default_rng(1)
     for _ in range(20):
         Q = [_by_svd(rng.normal(size=(3, 3))) for _ in range(2)]
         F = Q[0] @ np.diag(stretches) @ Q[1].T
-        R = _rotation(F)
+        R = rotation(F)
         s = np.sort(np.abs(stretches))
         most = s[2] + s[1] + np.copysign(s[0], np.prod(np.sign(stretches)))
         assert np.abs(R.T @ R - np.eye(3)).max() < 1e-14
@@ -71,4 +98,5 @@ def test_the_start_does_not_change_the_rotation():
 
 def test_what_is_not_finite_ends_without_hanging():
     _rotation(np.full((3, 3), np.nan))
+    _by_eigenvector(np.full((3, 3), np.nan))
     _rotation(np.full((2, 2), np.inf))

@@ -71,15 +71,20 @@ def crossings(points, steps, lower, upper, cells, facets):
 @njit(cache=True)
 def _crossing(x, step, facet):
     """Parameter in [0, 1] at which a way crosses a triangle, or −∞."""
-    e1, e2, off = facet[1] - facet[0], facet[2] - facet[0], x - facet[0]
-    p = np.cross(step, e2)
-    det = np.dot(e1, p)
+    det = u = v = t = 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        e1, e2, off = facet[1, a] - facet[0, a], facet[2, a] - facet[0, a], x[a] - facet[0, a]
+        p = step[b] * (facet[2, c] - facet[0, c]) - step[c] * (facet[2, b] - facet[0, b])
+        q = (x[b] - facet[0, b]) * (facet[1, c] - facet[0, c])
+        q -= (x[c] - facet[0, c]) * (facet[1, b] - facet[0, b])
+        det += e1 * p
+        u += off * p
+        v += step[a] * q
+        t += e2 * q
     if det == 0.0:
         return -np.inf
-    u = np.dot(off, p) / det
-    q = np.cross(off, e1)
-    v = np.dot(step, q) / det
-    t = np.dot(e2, q) / det
+    u, v, t = u / det, v / det, t / det
     if u < -_EDGE or v < -_EDGE or u + v > 1.0 + _EDGE or t < -_EDGE or t > 1.0:
         return -np.inf
     return t

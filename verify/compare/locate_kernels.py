@@ -53,24 +53,32 @@ def _outside_distance2(x, normals, corners):
         height = 0.0
         for a in range(3):
             height += normals[facet, a] * (x[a] - corners[on_it, a])
-        if height >= 0.0:
-            continue
-        foot = x - height * normals[facet]
-        inside = True
-        for other in range(4):
-            if other == facet:
-                continue
-            p, q = corners[(facet + 1) % 4], corners[(facet + 1) % 4]
-            for k in range(4):
-                if k not in (facet, other):
-                    p, q = q, corners[k]
-            edge_normal = np.cross(q - p, normals[facet])
-            side = np.dot(edge_normal, foot - p)
-            if side * np.dot(edge_normal, corners[other] - p) < 0.0:
-                inside = False
-        if inside:
+        if height < 0.0 and _is_over(x, height, facet, normals, corners):
             best = min(best, height * height)
     return best
+
+
+@njit(cache=True)
+def _is_over(x, height, facet, normals, corners):
+    """Whether the foot of `x` on the plane of a facet of a tetrahedron is in the facet."""
+    for other in range(4):
+        if other == facet:
+            continue
+        p, q = (facet + 1) % 4, (facet + 1) % 4
+        for k in range(4):
+            if k != facet and k != other:  # `in` takes longer to compile
+                p, q = q, k
+        side = opposite = 0.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            # across the edge pq, in the facet
+            across = (corners[q, b] - corners[p, b]) * normals[facet, c]
+            across -= (corners[q, c] - corners[p, c]) * normals[facet, b]
+            side += across * (x[a] - height * normals[facet, a] - corners[p, a])
+            opposite += across * (corners[other, a] - corners[p, a])
+        if side * opposite < 0.0:
+            return False
+    return True
 
 
 @njit(cache=True)

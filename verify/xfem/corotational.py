@@ -71,7 +71,7 @@ class InternalForce:
         self._rotations = np.tile(np.eye(space), (pieces, 1, 1))
         self._quaternions = np.zeros((pieces, 4))
         self._quaternions[:, 0] = 1.0
-        self._kernels = corotational_kernels(mesh.dim, space)
+        self._kernels = corotational_kernels(space)
         self._gradients = np.ascontiguousarray(mesh.gradients)
         self._normals = _unit_normals(virtual)
         self._shape = (virtual.node_count, space)

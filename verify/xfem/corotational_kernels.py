@@ -6,7 +6,8 @@ w (μ‖E‖² + ½λ tr² E). The stiffness with frozen rotations is that of li
 and the exact one adds [g_i]ₓᵀ H [g_j]ₓ, H = μI + (λ tr E − 2μ)(tr(V) I − V)⁻¹, V = R Uᵀ Rᵀ.
 
 A membrane is the same with F and I restricted to its tangent plane. The loops are compiled once
-for each pair of dimensions, so that the innermost ones have a constant length.
+for the plane and once for space, so that the innermost ones have a constant length; that over the
+corners of an element need not.
 """
 
 from functools import cache
@@ -18,8 +19,8 @@ from numba import njit
 from verify.xfem.polar_kernels import (
     LANES,
     mend_lane,
-    nearest_rotation,
     new_lanes,
+    rotation_in_plane,
     rotation_matrix,
     turn_lanes,
 )
@@ -46,9 +47,17 @@ def _deformation(nodes, b, displacement, normals, cell, F):
 
 
 @njit(cache=True)
-def _project(D, R, normals, cell):
+def _turned_normal(R, normals, cell, n):
+    """Write the normal of a turned membrane to n (3,)."""
+    for k in range(3):
+        n[k] = 0.0
+        for l in range(3):
+            n[k] += R[k, l] * normals[cell, l]
+
+
+@njit(cache=True)
+def _project(D, n):
     """Take from D what points across the turned plane of a membrane: nothing resists there."""
-    n = R @ normals[cell]
     for l in range(3):
         across = 0.0
         for k in range(3):
@@ -69,7 +78,7 @@ def _spin_row(g, out):
 
 
 @njit(cache=True)
-def _spin_stiffness(V, lam_trace, mu, dim, H):
+def _spin_stiffness(V, lam_trace, mu, H):
     """Write H (1, 1) or (3, 3); without the inverse, and False, where that does not exist."""
     trace = 0.0
     for k in range(V.shape[0]):
@@ -97,9 +106,58 @@ def _spin_stiffness(V, lam_trace, mu, dim, H):
     return True
 
 
+@njit(cache=True)
+def _turn_in_plane(cells, gradients, parent, normals, displacement, quaternions, rotations):
+    """Update the rotations (p, 2, 2); normals and quaternions are of bodies in space."""
+    F = np.empty((2, 2))
+    for piece in range(len(cells)):
+        cell = parent[piece]
+        for k in range(2):
+            for l in range(2):
+                F[k, l] = 1.0 if k == l else 0.0
+                for i in range(3):
+                    F[k, l] += displacement[cells[piece, i], k] * gradients[cell, i, l]
+        rotation_in_plane(F, rotations[piece])
+
+
+@njit(cache=True)
+def _turn_in_space(cells, gradients, parent, normals, displacement, quaternions, rotations):
+    """Update the rotations (p, 3, 3) of a solid or a membrane, and their quaternions (p, 4)."""
+    F, lanes = np.empty((3, 3)), new_lanes()
+    corners = cells.shape[1]
+    for start in range(0, len(cells), LANES):
+        count = min(LANES, len(cells) - start)
+        for lane in range(count):
+            piece = start + lane
+            cell = parent[piece]
+            for k in range(3):
+                for l in range(3):
+                    F[k, l] = 1.0 if k == l else 0.0
+                    if corners == 3:
+                        F[k, l] -= normals[cell, k] * normals[cell, l]
+            for i in range(corners):
+                node = cells[piece, i]
+                for k in range(3):
+                    for l in range(3):
+                        F[k, l] += displacement[node, k] * gradients[cell, i, l]
+            for k in range(3):
+                for l in range(3):
+                    lanes[(3 * k + l) * LANES + lane] = F[k, l]
+            for k in range(4):
+                lanes[(9 + k) * LANES + lane] = quaternions[piece, k]
+        if not turn_lanes(lanes):
+            for lane in range(count):
+                mend_lane(lanes, lane)
+        for lane in range(count):
+            piece = start + lane
+            for k in range(4):
+                quaternions[piece, k] = lanes[(9 + k) * LANES + lane]
+            rotation_matrix(quaternions[piece], rotations[piece])
+
+
 @cache
-def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
-    """Loops for simplices of dimension `dim` in `space`.
+def corotational_kernels(space: int) -> SimpleNamespace:
+    """Loops for the plane or for space.
 
     Returns
     -------
@@ -107,49 +165,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         ``turn``, ``internal_force``, ``frozen_product``, ``add_frozen_stiffness``,
         ``add_spin_stiffness``.
     """
-    corners = dim + 1
-    membrane = dim < space
     spins = 1 if space == 2 else 3
-
-    @njit(cache=True)
-    def turn(cells, gradients, parent, normals, displacement, quaternions, rotations):
-        """Update the rotations (p, d, d), from and to the quaternions (p, 4) in space."""
-        F = np.empty((space, space))
-        if space == 2:
-            for piece in range(len(cells)):
-                cell = parent[piece]
-                _deformation(cells[piece], gradients[cell], displacement, normals, cell, F)
-                nearest_rotation(F, quaternions[piece], rotations[piece])
-            return
-        lanes = new_lanes()
-        for start in range(0, len(cells), LANES):
-            count = min(LANES, len(cells) - start)
-            for lane in range(count):
-                piece = start + lane
-                cell = parent[piece]
-                for k in range(space):
-                    for l in range(space):
-                        F[k, l] = 1.0 if k == l else 0.0
-                        if membrane:
-                            F[k, l] -= normals[cell, k] * normals[cell, l]
-                for i in range(corners):
-                    node = cells[piece, i]
-                    for k in range(space):
-                        for l in range(space):
-                            F[k, l] += displacement[node, k] * gradients[cell, i, l]
-                for k in range(space):
-                    for l in range(space):
-                        lanes[(3 * k + l) * LANES + lane] = F[k, l]
-                for k in range(4):
-                    lanes[(9 + k) * LANES + lane] = quaternions[piece, k]
-            if not turn_lanes(lanes):
-                for lane in range(count):
-                    mend_lane(lanes, lane)
-            for lane in range(count):
-                piece = start + lane
-                for k in range(4):
-                    quaternions[piece, k] = lanes[(9 + k) * LANES + lane]
-                rotation_matrix(quaternions[piece], rotations[piece])
 
     @njit(cache=True)
     def internal_force(
@@ -170,6 +186,8 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         """
         F = np.empty((space, space))
         E = np.empty((space, space))
+        corners = 3 if space == 2 else cells.shape[1]
+        membrane = space == 3 and corners == 3
         energy = 0.0
         for piece in range(len(cells)):
             cell = parent[piece]
@@ -220,6 +238,9 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         cells, gradients, parent, volumes, normals, lam, mu, rotations, vector, scale, product
     ):
         """Add `scale` times the stiffness with frozen rotations times `vector` to `product`."""
+        corners = 3 if space == 2 else cells.shape[1]
+        membrane = space == 3 and corners == 3
+        n = np.empty(3)
         D = np.empty((space, space))
         E = np.empty((space, space))
         for piece in range(len(cells)):
@@ -235,7 +256,8 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                     for l in range(space):
                         D[k, l] += vector[node, k] * gradients[cell, i, l]
             if membrane:
-                _project(D, R, normals, cell)
+                _turned_normal(R, normals, cell, n)
+                _project(D, n)
             for k in range(space):
                 for l in range(space):
                     for m in range(space):
@@ -266,6 +288,9 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         targets, gradients, parent, volumes, normals, lam, mu, rotations, scale, blocks
     ):
         """Add `scale` times the stiffness with frozen rotations to the nodal blocks."""
+        corners = 3 if space == 2 else targets.shape[1]
+        membrane = space == 3 and corners == 3
+        n = np.empty(3)
         g = np.empty((corners, space))
         T = np.empty((space, space))
         for piece in range(len(targets)):
@@ -283,7 +308,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                 for l in range(space):
                     T[k, l] = wm if k == l else 0.0
             if membrane:
-                n = R @ normals[cell]
+                _turned_normal(R, normals, cell, n)
                 for k in range(space):
                     for l in range(space):
                         T[k, l] -= wm * n[k] * n[l]
@@ -311,6 +336,9 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
 
         A piece is left out where its rotation is not differentiable (tr(V) I − V singular).
         """
+        corners = 3 if space == 2 else cells.shape[1]
+        membrane = space == 3 and corners == 3
+        n = np.empty(3)
         F = np.empty((space, space))
         V = np.empty((space, space))
         g = np.empty((corners, space))
@@ -328,14 +356,14 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                     for l in range(space):
                         g[i, k] += R[k, l] * gradients[cell, i, l]
                 _spin_row(g[i], X[i])
-            trace = -float(dim)
+            trace = 1.0 - corners
             for k in range(space):
                 for l in range(space):
                     V[k, l] = 0.0
                     for m in range(space):
                         V[k, l] += F[k, m] * R[l, m]
                 trace += V[k, k]
-            if not _spin_stiffness(V, lam[cell] * trace, mu[cell], dim, H):
+            if not _spin_stiffness(V, lam[cell] * trace, mu[cell], H):
                 left_out += 1
                 continue
             w = scale * volumes[piece]
@@ -345,7 +373,8 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
                         Y[j, a, l] = 0.0
                         for b in range(spins):
                             Y[j, a, l] += w * H[a, b] * X[j, b, l]
-            n = R @ normals[cell] if membrane else F[0]
+            if membrane:
+                _turned_normal(R, normals, cell, n)
             for i in range(corners):
                 for j in range(corners):
                     at = targets[piece, i, j]
@@ -362,7 +391,7 @@ def corotational_kernels(dim: int, space: int) -> SimpleNamespace:
         return left_out
 
     return SimpleNamespace(
-        turn=turn,
+        turn=_turn_in_plane if space == 2 else _turn_in_space,
         internal_force=internal_force,
         frozen_product=frozen_product,
         add_frozen_stiffness=add_frozen_stiffness,

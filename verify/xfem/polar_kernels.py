@@ -17,6 +17,7 @@ __all__ = [
     "mend_lane",
     "nearest_rotation",
     "new_lanes",
+    "rotation_in_plane",
     "rotation_matrix",
     "turn_lanes",
 ]
@@ -45,39 +46,36 @@ def rotation_matrix(q, R):
 
 
 @njit(cache=True)
-def nearest_rotation(F, q, R):
-    """Write the rotation nearest to F (d, d) to R; a warm start changes its cost only.
+def rotation_in_plane(F, R):
+    """Write the rotation nearest to F (2, 2) to R."""
+    along, across = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
+    length = np.hypot(along, across)
+    cosine, sine = 1.0, 0.0
+    if length > 0.0:
+        cosine, sine = along / length, across / length
+    R[0, 0] = R[1, 1] = cosine
+    R[0, 1] = -sine
+    R[1, 0] = sine
+
+
+@njit(cache=True)
+def nearest_rotation(F, R):
+    """Write the rotation nearest to F (d, d) to R: of a single one, in space by the eigenvector.
+
+    Without the lanes, which whatever calls this would have to be compiled with.
 
     Parameters
     ----------
     F : (d, d) float array
         Deformation gradient, d = 2 or 3; any, also singular or inverted.
-    q : (4,) float array
-        Quaternion from which to start; in space replaced by that of the result.
     R : (d, d) float array
         Overwritten.
     """
     if F.shape[0] == 2:
-        along, across = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
-        length = np.hypot(along, across)
-        cosine, sine = 1.0, 0.0
-        if length > 0.0:
-            cosine, sine = along / length, across / length
-        R[0, 0] = cosine
-        R[0, 1] = -sine
-        R[1, 0] = sine
-        R[1, 1] = cosine
+        rotation_in_plane(F, R)
         return
-    lanes = new_lanes()
-    for k in range(3):
-        for l in range(3):
-            lanes[(3 * k + l) * LANES] = F[k, l]
-    for k in range(4):
-        lanes[(9 + k) * LANES] = q[k]
-    if not turn_lanes(lanes):
-        mend_lane(lanes, 0)
-    for k in range(4):
-        q[k] = lanes[(9 + k) * LANES]
+    q = np.empty(4)
+    _largest_eigenvector(F, q)
     rotation_matrix(q, R)
 
 

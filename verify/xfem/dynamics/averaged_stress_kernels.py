@@ -101,9 +101,7 @@ def _secant(F0, F1, R0, R1, t0, t1, normal, substituted, work, T):
         if _invert(A, B):
             _product(middle, B, False, T)
             return False
-    q = np.zeros(4)
-    q[0] = 1.0
-    nearest_rotation(middle, q, T)
+    nearest_rotation(middle, T)
     _product(F0, F0, True, A)
     _product(F1, F1, True, B)
     size = _inner(B, B)

@@ -85,7 +85,7 @@ def _substitute(
     G = F0 + F1
     Rm = np.empty_like(G)
     for piece in range(len(G)):
-        nearest_rotation(G[piece], np.array([1.0, 0.0, 0.0, 0.0]), Rm[piece])
+        nearest_rotation(G[piece], Rm[piece])
     dT, _ = _polar_slope(Rm, G)
     C1 = F1.transpose(0, 2, 1) @ F1
     change = C1 - F0.transpose(0, 2, 1) @ F0
