@@ -96,9 +96,28 @@ def test_a_damaged_solution_or_record_is_solved_again(verify):
     vtu.write_bytes(vtu.read_bytes()[:-20])
     verify(*command, COUNT_SOLVES=str(solves))
     assert count(solves) == 3
-    (folder / "record.json").write_text("{")
+    changed = bytearray(vtu.read_bytes())
+    changed[len(changed) // 2] ^= 1
+    vtu.write_bytes(changed)
+    (folder.with_name("fake_solvers_Instant-0") / "record.json").write_text("{")
     verify(*command, COUNT_SOLVES=str(solves))
-    assert count(solves) == 4
+    assert count(solves) == 5
+    assert vtu.read_bytes() != bytes(changed)
+
+
+def test_a_damaged_result_is_made_again_from_the_solutions(verify):
+    solves = verify.folder / "solves"
+    command = solved_once(verify, solves)
+    result = verify.folder / "out/cases/square/result.json"
+    before = json.loads(result.read_text())
+    for content in (b"{", b"\xff\x00garbage"):
+        result.write_bytes(content)
+        verify(*command, COUNT_SOLVES=str(solves))
+        assert count(solves) == 2
+        after = json.loads(result.read_text())
+        assert [after[key] for key in ("solves", "rates", "verdicts")] == [
+            before[key] for key in ("solves", "rates", "verdicts")
+        ]
 
 
 def test_failures_are_tried_again(verify):

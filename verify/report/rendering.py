@@ -98,5 +98,10 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
 
 def _write(path: Path, content: str) -> None:
     partial = path.with_name(path.name + ".partial")
-    partial.write_text(content, encoding="utf-8")
-    os.replace(partial, path)
+    try:
+        partial.write_text(content, encoding="utf-8")
+        os.replace(partial, path)
+    except OSError as error:
+        error.filename = error.filename or str(path)  # a full disk does not say where
+        partial.unlink(missing_ok=True)
+        raise

@@ -56,8 +56,13 @@ def render_study(directory: Path, kind: str) -> Path:
             raise InputError(f"{key} is {found!r}; expected {value!r}", str(source))
     target = directory / f"{kind}.html"
     partial = target.with_name(target.name + ".partial")
-    partial.write_text(_page(record, kind), encoding="utf-8")
-    os.replace(partial, target)
+    try:
+        partial.write_text(_page(record, kind), encoding="utf-8")
+        os.replace(partial, target)
+    except OSError as error:
+        error.filename = error.filename or str(target)  # a full disk does not say where
+        partial.unlink(missing_ok=True)
+        raise
     return target
 
 
