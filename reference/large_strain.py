@@ -59,7 +59,9 @@ def solve_large_strain(
     unknowns: NDArray[np.int32],
     prescribed: Callable[[float], Array],
     load: Any = None,
-    energy: Literal["corotated", "neo_hookean", "st_venant_kirchhoff"] = "corotated",
+    energy: Literal[
+        "corotated", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"
+    ] = "corotated",
     first_step: float = 0.25,
 ) -> LargeStrainSolve:
     """Find the equilibrium at load factor 1, from rest at load factor 0.
@@ -77,8 +79,9 @@ def solve_large_strain(
         Their values (k,) in m at a load factor in [0, 1].
     load : callable, optional
         Gives the linear form of the dead loads for a test function; scaled by the load factor.
-    energy : {"corotated", "neo_hookean", "st_venant_kirchhoff"}
-        Density: μ‖U−I‖² + ½λ tr²(U−I), or one of those in plane strain or in space.
+    energy : {"corotated", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"}
+        Density: μ‖U−I‖² + ½λ tr²(U−I), or one of those in plane strain or in space. Mixed: with
+        the pressure as an unknown, of quadratic elements, for nearly incompressible material.
     first_step : float
         First increment of the load factor.
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from reference.space import ConformingSpace
 
-__all__ = ["MixedSpace", "mixed_space"]
+__all__ = ["MixedDeformation", "MixedSpace", "mixed_space"]
 
 Array = NDArray[np.float64]
 
@@ -66,6 +66,43 @@ class MixedSpace:
     def displacement(self, values: Array) -> Array:
         """Gather nodal displacements (n, d) on all ranks from the unknowns of each, m."""
         return self.space.everywhere(values[self.displacement_dofs.ravel()])
+
+
+class MixedDeformation:
+    """Deformation gradient and pressure of an unknown of both, for forms.
+
+    Parameters
+    ----------
+    solution : dolfinx.fem.Function
+        Of the function space of a `MixedSpace`.
+    degree : int
+        Of the quadrature.
+
+    Attributes
+    ----------
+    F : ufl expression (d, d)
+    p : ufl expression
+        Pa; positive in tension.
+    measure : ufl.Measure
+    """
+
+    def __init__(self, solution: Any, degree: int) -> None:
+        import ufl
+
+        mesh = solution.function_space.mesh
+        self._solution = solution
+        displacement, self.p = ufl.split(solution)
+        self.F = ufl.Identity(mesh.geometry.dim) + ufl.grad(displacement)
+        self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
+
+    def update(self) -> None:
+        """Do nothing: forms know the solution."""
+
+    def derivative(self, form: Any, direction: Any) -> Any:
+        """Differentiate a form by displacement and pressure."""
+        import ufl
+
+        return ufl.derivative(form, self._solution, direction)
 
 
 def mixed_space(space: ConformingSpace) -> MixedSpace:

@@ -95,6 +95,10 @@ class ConformingSpace:
         own = np.flatnonzero(at >= 0)
         return own, at[own]
 
+    def displacement(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gather nodal displacements (n, d) on all ranks from the unknowns of each, m."""
+        return self.everywhere(values)
+
     def everywhere(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
         """Gather nodal values (n, d) on all ranks from the unknowns of each, its own first."""
         d = self.dimension

@@ -8,6 +8,7 @@ __all__ = [
     "corotated",
     "corotated_value",
     "neo_hookean",
+    "neo_hookean_mixed",
     "st_venant_kirchhoff",
 ]
 
@@ -48,6 +49,22 @@ def neo_hookean(polar: Any, lam: Any, mu: Any) -> Any:
     return mu / 2 * (ufl.inner(polar.F, polar.F) - d - 2 * ufl.ln(J)) + lam / 2 * ufl.ln(J) ** 2
 
 
+def neo_hookean_mixed(state: Any, lam: Any, mu: Any) -> Any:
+    """½μ (tr C − d − 2 ln J) + p ln J − p² / 2λ: the same where the pressure is p = λ ln J.
+
+    Parameters
+    ----------
+    state : MixedDeformation
+    lam, mu : ufl expressions
+        Lamé constants, Pa.
+    """
+    import ufl
+
+    d, J = len(state.F[0, :]), ufl.det(state.F)
+    shear = mu / 2 * (ufl.inner(state.F, state.F) - d - 2 * ufl.ln(J))
+    return shear + state.p * ufl.ln(J) - state.p**2 / (2 * lam)
+
+
 def st_venant_kirchhoff(polar: Any, lam: Any, mu: Any) -> Any:
     """μ E:E + ½λ tr² E with E = ½ (C − I); softens when pressed, and has no barrier at J = 0."""
     import ufl
@@ -59,6 +76,7 @@ def st_venant_kirchhoff(polar: Any, lam: Any, mu: Any) -> Any:
 ENERGIES = {
     "corotated": corotated,
     "neo_hookean": neo_hookean,
+    "neo_hookean_mixed": neo_hookean_mixed,
     "st_venant_kirchhoff": st_venant_kirchhoff,
 }
 # densities to evaluate, where they are not those to differentiate

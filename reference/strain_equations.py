@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from reference.elasticity import lame, mean_stiffness
 from reference.linear_solvers import near_null_space, set_multigrid
+from reference.mixed_space import MixedDeformation, mixed_space
 from reference.polar_stretch import PolarStretch
 from reference.space import ConformingSpace
 from reference.strain_energies import ENERGIES, VALUES
@@ -20,7 +21,7 @@ _GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall fur
 _MOST_ITERATIONS = 25
 # share of the body that may be inside out: the corotated energy has no barrier, and at a tip or a
 # clamped corner its strains are unbounded, so that a well graded mesh always has such cells there
-_INVERTED = {"corotated": 1e-3, "neo_hookean": 0.0, "st_venant_kirchhoff": 0.0}
+_INVERTED = {"corotated": 1e-3}  # none with the others
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
 _MOST_DIRECT = 40_000
 _LINEAR = 1e-6  # of the residual: what a linear solve by multigrid leaves
@@ -59,20 +60,23 @@ class StrainEquations:
         from dolfinx import fem
         from dolfinx.fem import petsc
 
-        V = space.function_space
-        self._space, self.iterations, self._most_inverted = space, 0, _INVERTED[energy]
-        self._own, self._at = space.own_unknowns(unknowns)
-        first = space.dimension * V.dofmap.index_map.local_range[0]
+        mixed = mixed_space(space) if energy.endswith("mixed") else None
+        V = space.function_space if mixed is None else mixed.function_space
+        self._mixed = mixed
+        self._space, self.iterations, self._most_inverted = space, 0, _INVERTED.get(energy, 0.0)
+        self._own, self._at = (mixed or space).own_unknowns(unknowns)
+        first = V.dofmap.index_map_bs * V.dofmap.index_map.local_range[0]
         self._rows = (self._own + first).astype(np.int32)
         self.solution = fem.Function(V)
         self._factor = fem.Constant(V.mesh, 0.0)
         lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
-        self._polar = polar = PolarStretch(self.solution, 4 * space.degree - 2)
+        polar: Any = PolarStretch if mixed is None else MixedDeformation
+        self._polar = polar = polar(self.solution, 4 * space.degree - 2)
         total = ENERGIES[energy](polar, lam, mu) * polar.measure
         v = ufl.TestFunction(V)
         residual = polar.derivative(total, v)
         if load is not None:
-            residual -= self._factor * load(v)
+            residual -= self._factor * load(v if mixed is None else ufl.split(v)[0])
         self._energy = fem.form(VALUES[energy](polar, lam, mu) * polar.measure)
         self._residual = fem.form(residual)
         self._tangent = fem.form(polar.derivative(residual, ufl.TrialFunction(V)))
@@ -116,7 +120,8 @@ class StrainEquations:
 
     def displacement(self) -> Array:
         """Nodal displacements (n, d) on every rank, m."""
-        return self._space.everywhere(np.asarray(self.solution.x.array, dtype=float))
+        values = np.asarray(self.solution.x.array, dtype=float)
+        return (self._mixed or self._space).displacement(values)
 
     def energy(self) -> float:
         """Return the stored energy, J (in the plane per metre)."""
@@ -215,7 +220,8 @@ class StrainEquations:
         linear = solver.getKSP()
         # symmetric, but a tangent at finite rotation need not be definite
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        if space.dimension == 2 or space.node_points.size <= _MOST_DIRECT:
+        few = space.dimension == 2 or space.node_points.size <= _MOST_DIRECT
+        if few or self._mixed is not None:  # multigrid is for displacements alone
             linear.setType("preonly")
             linear.getPC().setType("cholesky")
             linear.getPC().setFactorSolverType("mumps")

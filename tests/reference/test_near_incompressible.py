@@ -131,6 +131,83 @@ def test_the_reference_takes_a_pressure_by_itself_and_converges_from_the_first_l
     assert one.ledger["strain"][0] == pytest.approx(two.ledger["strain"][0], rel=5e-4)
 
 
+def sector(height, curvature):
+    """Give the radii of incompressible neo-Hookean material bent free of traction (Rivlin)."""
+    # r2² − r1² = 2 h / κ keeps the area, r1 r2 = 1 / κ² leaves both faces free
+    inner = -height / curvature + np.hypot(height / curvature, 1 / curvature**2)
+    return np.sqrt(inner), np.sqrt(inner + 2 * height / curvature)
+
+
+def bent(points, height, curvature):
+    """Displacement of a strip 0 < X < height bent to that sector."""
+    if curvature == 0.0:
+        return np.zeros_like(points)
+    X, Y = points.T
+    inner, _ = sector(height, curvature)
+    r = np.sqrt(inner**2 + 2 * X / curvature)
+    return np.column_stack([r * np.cos(curvature * Y), r * np.sin(curvature * Y)]) - points
+
+
+def bent_energy(height, curvature, mu, lam):
+    """Energy per length of the strip, with the first term in μ/λ of what little it gives."""
+    inner, _ = sector(height, curvature)
+    x, weights = np.polynomial.legendre.leggauss(40)
+    X = 0.5 * height * (1 + x)
+    square = (inner**2 + 2 * X / curvature) * curvature**2  # of the stretch around
+    W = 0.5 * mu * (square + 1 / square - 2)
+    start = 0.5 * mu * ((inner * curvature) ** 2 + (inner * curvature) ** -2 - 2)
+    pressure = mu + (W - start) - mu / square
+    return 0.5 * height * weights @ (W - pressure**2 / (2 * lam))
+
+
+def bending_errors(poisson, d):
+    """Errors of the energy without and with a pressure of a strip between turning ends."""
+    from reference.elasticity import lame
+    from reference.large_strain import solve_large_strain
+    from reference.meshing import open_cut, structured_tetrahedra, structured_triangles
+    from reference.space import conforming_space
+    from verify.scene import Material
+
+    height, curvature, none = 0.4, 2.0, np.zeros((0, d), dtype=np.int64)
+    material = Material(young=1.0, poisson=poisson, plane="strain" if d == 2 else None)
+    lam, mu = lame(material)
+    if d == 2:
+        mesh = structured_triangles((0, 0), (height, 1), (3, 8))
+    else:
+        mesh = structured_tetrahedra((0, 0, 0), (height, 1, 0.2), (3, 8, 1))
+    space = conforming_space(open_cut(*mesh, none), 2)
+    Y = space.node_points[:, 1]
+    held = np.zeros(space.node_points.shape, dtype=bool)
+    held[(Y < 1e-12) | (Y > 1 - 1e-12)] = True
+    held[:, 2:] = True  # in space: no motion across the plane
+
+    def prescribed(factor):
+        moved = np.zeros_like(space.node_points)
+        moved[:, :2] = bent(space.node_points[:, :2], height, factor * curvature)
+        return moved[held]
+
+    unknowns = np.flatnonzero(held).astype(np.int32)
+    wanted = bent_energy(height, curvature, mu, lam) * (1.0 if d == 2 else 0.2)
+    return [
+        abs(
+            solve_large_strain(material, space, unknowns, prescribed, energy=name).strain_energy
+            / wanted
+            - 1
+        )
+        for name in ("neo_hookean", "neo_hookean_mixed")
+    ]
+
+
+@pytest.mark.parametrize(
+    "poisson, d", [(0.49, 2), (0.4999, 2), pytest.param(0.4999, 3, marks=pytest.mark.heavy)]
+)
+def test_a_thick_strip_of_neo_hookean_material_bends_to_rivlins_sector(poisson, d):
+    pure, mixed = bending_errors(poisson, d)
+    # the next term of the energy is of the order of (μ/λ)², and the mesh is coarse
+    assert mixed < 5e-4 + 3 * ((1 - 2 * poisson) / (2 * poisson)) ** 2
+    assert pure > 10 * mixed
+
+
 _PARALLEL = """
 import sys
 sys.path.insert(0, {tests!r})

@@ -198,11 +198,11 @@ def _solve(
 
 
 def _comm(scene: Scene) -> Any:
-    """Communicator over which a scene is distributed: all ranks for linear statics, else none."""
+    """Communicator over which a scene is distributed: all ranks for statics, else none."""
     from mpi4py import MPI
 
-    linear = scene.analysis.kind == "static" and scene.analysis.kinematics == "linear"
-    return MPI.COMM_WORLD if linear and MPI.COMM_WORLD.size > 1 else None
+    static = scene.analysis.kind == "static"
+    return MPI.COMM_WORLD if static and MPI.COMM_WORLD.size > 1 else None
 
 
 def _shared(
