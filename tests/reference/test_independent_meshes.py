@@ -39,16 +39,16 @@ def known(scene):
     from verify.compare.hooke import law_of
     from verify.solvers import find_solver
     from verify.study.quantities import Measured
-    from verify.study.reference import size_of
-    from verify.study.richardson import extrapolate
+    from verify.study.reference import known_quantity, size_of
 
     body, law, solver = body_of(scene), law_of(scene), find_solver("reference")
     levels = [solver.solve(scene, level, repetitions=0) for level in range(scene.reference.levels)]
-    sizes, order = [size_of(level) for level in levels], levels[-1].order
+    sizes = [size_of(level) for level in levels]
+    measured = [Measured(level, body, law, scene) for level in levels]
     found = {}
     for asked in scene.quantities:
-        values = [Measured(level, body, law, scene).quantity(asked) for level in levels]
-        found[asked.name] = extrapolate(values, sizes, order, 2 * order)
+        values = [one.quantity(asked) for one in measured]
+        found[asked.name] = known_quantity(asked, measured, values, sizes)
     return found, [len(level.cells) for level in levels]
 
 

@@ -41,7 +41,14 @@ from verify.study.richardson import (
 from verify.study.stress_intensity import exact_intensity
 from verify.study.time_to_accuracy import time_to_accuracy
 
-__all__ = ["ExactField", "Reference", "conforming_reference", "exact_reference", "size_of"]
+__all__ = [
+    "ExactField",
+    "Reference",
+    "conforming_reference",
+    "exact_reference",
+    "known_quantity",
+    "size_of",
+]
 
 OTHER = "conforming"  # solver whose levels give a second estimate of quantities, if it was run
 
@@ -193,7 +200,7 @@ def conforming_reference(
         except UnsupportedSceneError as problem:
             missing[asked.name] = str(problem)
             continue
-        known = _known(asked, measured, values, sizes)
+        known = known_quantity(asked, measured, values, sizes)
         quantities[asked.name] = known.value, known.half_width
         metrics[asked.name] = _entry(values, known) | _second_opinion(asked, second, known)
     norms, entries = _field_norms(scene, measured, sizes, order, size)
@@ -215,10 +222,19 @@ def conforming_reference(
     return Reference(measured[-1].motion, source, norms, quantities, record)
 
 
-def _known(
+def known_quantity(
     asked: Quantity, measured: Sequence[Measured], values: list[float], sizes: list[float]
 ) -> Extrapolation:
-    """Judge a quantity from its levels; a value at a place also from what lies around it."""
+    """Judge a quantity from its levels; a value at a place by what lies around it.
+
+    Parameters
+    ----------
+    asked : Quantity
+    measured : sequence of Measured
+        Levels, coarse to fine.
+    values, sizes : list of float
+        The quantity on each of them, and their element sizes, m.
+    """
     order = measured[-1].solution.order
     if isinstance(asked, DisplacementQuantity | OpeningQuantity):
         around = [local_difference(asked, *pair) for pair in pairwise(measured)]
@@ -270,7 +286,7 @@ def _second_opinion(
     try:
         values = [one.quantity(asked) for one in others]
         sizes, order = [size_of(one.solution) for one in others], others[-1].solution.order
-        found = _known(asked, others, values, sizes)
+        found = known_quantity(asked, others, values, sizes)
     except (InputError, UnsupportedSceneError):
         return {}
     apart = abs(found.value - known.value)
