@@ -116,9 +116,9 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark)
     """Bound: what a sweep must read or write once, over the bandwidth of the triad.
 
     Nodes, places, gradients, moduli and vectors read once, rotations read and written, the matrix
-    written once (`Linearisation.least_traffic`): 400 bytes for each tetrahedron. Arithmetic, about
-    a thousand operations for each, limits it, not memory: a fifth, which was asked for, is not
-    reached (docs/xfem-linear-solvers.md).
+    written once (`Linearisation.least_traffic`): 400 bytes for each tetrahedron. A fifth, which was
+    asked for, is not reached: half of the time is arithmetic and adding up, and the blocks below
+    the diagonal cross the memory more than once (docs/xfem-linear-solvers.md).
     """
     virtual, pattern, force, blocks, _ = system()
     displacement = np.zeros_like(virtual.node_points)
@@ -130,7 +130,7 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark)
     benchmark(action)
     share = force._sweep.least_traffic / benchmark.stats.stats.median / bandwidth()
     benchmark.extra_info["share of the bandwidth bound"] = round(share, 3)
-    assert share > 0.04
+    assert share > 0.06
 
 
 def test_linear_assembly(benchmark):
