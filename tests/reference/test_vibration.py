@@ -79,3 +79,27 @@ def test_vibration_without_a_density_is_refused():
     weightless = Material(young=1.0, poisson=0.3, plane="strain")
     with pytest.raises(InputError, match="density is missing"):
         lowest_frequencies(weightless, *cantilever([], 0.1), 1)
+
+
+def test_a_body_in_space_has_six_motions_without_a_frequency_and_swings_as_long_bars_do():
+    from reference.meshing import open_cut, structured_tetrahedra
+    from reference.space import conforming_space
+    from reference.vibration import largest_frequency, lowest_frequencies
+
+    material = Material(young=1e4, poisson=0.0, density=1000.0)
+    mesh = open_cut(
+        *structured_tetrahedra((0, 0, 0), (1, 0.2, 0.1), (5, 1, 1)),
+        np.zeros((0, 3), dtype=np.int64),
+    )
+    space = conforming_space(mesh, 2)
+    free = lowest_frequencies(material, space, np.zeros(0, dtype=np.int32), 7)
+    assert free.modes.shape == (7, len(space.node_points), 3)
+    assert free.frequencies[5] < 1e-4 * free.frequencies[6]
+    # held across, the bar can only stretch: a quarter wave, exactly, as nothing contracts
+    held = np.zeros(space.node_points.shape, dtype=bool)
+    held[:, 1:] = True
+    held[space.node_points[:, 0] < 1e-12, 0] = True
+    unknowns = np.flatnonzero(held).astype(np.int32)
+    quarter = lowest_frequencies(material, space, unknowns, 1).frequencies[0]
+    assert quarter == pytest.approx(0.5 * np.pi * np.sqrt(10.0), rel=1e-5)
+    assert largest_frequency(material, space, unknowns) > 10 * quarter

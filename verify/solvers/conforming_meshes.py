@@ -104,10 +104,11 @@ def reference_mesh(scene: Scene, level: int) -> tuple[ConformingMesh, float]:
     A given mesh is refined uniformly after the cuts are imprinted, and so is the scene's own where
     the cut is what another solver realised on it; others are made anew, graded.
     """
-    if isinstance(scene.geometry, MeshFile) or _realised(scene, structure(scene, 0)) is not None:
-        size = structure(scene, 0)
-        mesh = refine_uniformly(*_imprinted(scene, size), times=level)
-        return open_cut(*mesh), size.size / 2**level
+    coarse = structure(scene, 0)
+    realised = _realised(scene, coarse)
+    if realised is not None or isinstance(scene.geometry, MeshFile):
+        given = _imprinted(scene, coarse) if realised is None else realised[:3]
+        return open_cut(*refine_uniformly(*given, times=level)), coarse.size / 2**level
     grading = _plane_grading(scene) if scene.dimension == 2 else _solid_grading(scene)
     grading = grading.halved(level)
     return conforming_mesh(scene, grading), grading.size
@@ -160,7 +161,7 @@ def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
     """Imprint the cuts of the scene on its background mesh."""
     realised = _realised(scene, level)
     if realised is not None:
-        return realised.points, realised.cells, realised.facets
+        return realised[:3]
     points, cells = _background(scene, level)
     if scene.dimension == 2:
         return imprint(points, cells, [c.vertices() for c in scene.cuts if c.kind == "polyline"])
