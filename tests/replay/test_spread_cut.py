@@ -63,18 +63,18 @@ def test_spread_or_not_the_same_elements_are_split_into_the_same_pieces(hand, pl
     np.testing.assert_array_equal(mine[2], other[2])
 
 
-def test_an_element_is_split_within_three_steps_of_being_crossed(hand) -> None:
+def test_an_element_is_split_within_five_steps_of_being_crossed(hand) -> None:
     session = Session(incised(hand, hooks=[]), account=False, spread=True)
     session.run()
     crossings, h = session.cutter.crossings, session.stage.time_step
     late = (crossings.seen - crossings.leave) / h
-    assert 0.0 <= late.min() <= late.max() <= 3.0 * (1.0 + 1e-9)
-    # and a step that splits is followed by two that follow the cut, in which none is split
+    assert 0.0 <= late.min() <= late.max() <= 5.0 * (1.0 + 1e-9)
+    # and a step that splits is followed by three that follow the cut, in which none is split
     split = np.array([record.newly_split > 0 for record in session.records])
-    assert split.sum() > 5
-    for k in np.flatnonzero(split[:-2]):
-        assert not split[k + 1 : k + 3].any()
-        assert all(record.busy for record in session.records[k : k + 3])
+    assert split.sum() > 4
+    for k in np.flatnonzero(split[:-3]):
+        assert not split[k + 1 : k + 4].any()
+        assert all(record.busy for record in session.records[k : k + 4])
 
 
 def test_what_is_new_moves_as_that_from_which_it_comes_until_mechanics_follow(hand) -> None:

@@ -39,10 +39,11 @@ class Session:
         Whether to keep the account of the energies. Without it the hot path is that of a
         simulator: that is what is timed.
     spread : bool
-        Whether what a cut asks for is spread over three steps: which elements are split, then the
-        surfaces to see and to touch, then the surface of the material and the mechanics. Only then
-        is the blade asked again how far it has come. The largest step is much shorter, and there
-        are fewer increments; an element opens up to four steps later. Until the mechanics follow,
+        Whether what a cut asks for is spread over four steps: which elements are split, the
+        surfaces to see and to touch, the surface of the material, the mechanics (and at times in a
+        fifth another order of elimination). Only then is the blade asked again how far it has come.
+        The longest step is much shorter, and there are fewer increments; an element opens up to
+        seven steps later than it would. Until the mechanics follow,
         new unknowns move as those from which they come, so that nothing jumps.
     clock : callable
         What phases are timed by: wall time in s, or `time.thread_time` where other work on the
@@ -118,11 +119,12 @@ class Session:
 
     def settle(self) -> None:
         """Finish what is left of a cut whose work is spread."""
-        while self._due:
-            self._due.pop(0)()
-        if self._new is not None:
-            self._assemble(self._new)
-            self._begin_account()
+        while self._due or self._new is not None:
+            if self._due:
+                self._due.pop(0)()
+            else:
+                self._assemble(_NONE if self._new is None else self._new)
+                self._begin_account()
 
     def step(self) -> StepRecord:
         """Take one step.
@@ -140,21 +142,15 @@ class Session:
                 increment = self.cutter.advance(end)
                 if increment is not None:
                     self._ahead = increment
-                    self._due = [self._update_embedded, self._take_over]
+                    self._due = [self._update_embedded, self._update_material, self._take_over]
         # a hook grips the body as it is cut by then
         parts = len(self._due) if not self._spread or self._hooks_to_begin(end) else int(busy)
         for _ in range(parts):
             self._due.pop(0)()
-        assert self._solver is not None
         if self._hooks_begun(end) or self._new is not None:
             with self._timed("assembly"):
                 self._assemble(_NONE if self._new is None else self._new)
             self._begin_account()
-        elif self._solver.is_worn and not busy and increment is None:
-            # what can wait until a step in which nothing else is to be done
-            with self._timed("assembly"):
-                self._solver = Cholesky(self.body.pattern, self.body.shape[1])
-                self.integrator.solver = self._solver
         with self._timed("motion"):
             if not self._account:
                 self.integrator.advance(self.state)
@@ -188,14 +184,16 @@ class Session:
         with self._timed("cutting"):
             self.surfaces.update_embedded(self._ahead)
 
-    def _take_over(self) -> None:
-        """Let the material's own surface and the state of motion follow the cut."""
-        assert self._ahead is not None
-        increment, self._ahead = self._ahead, None
+    def _update_material(self) -> None:
         with self._timed("cutting"):
-            self._inherit(increment)
-            self.surfaces.material.update(increment)
-        self._new = increment.source
+            self.surfaces.material.update(self._ahead)
+
+    def _take_over(self) -> None:
+        """Let the state of motion follow the cut; the body is then to be made anew."""
+        assert self._ahead is not None
+        with self._timed("cutting"):
+            self._inherit(self._ahead)
+        self._new, self._ahead = self._ahead.source, None
 
     def _begin_account(self) -> None:
         if self._account:
@@ -237,11 +235,21 @@ class Session:
             supports=self._grips.supports,
             damping=stage.damping,
         )
-        if self._solver is None:
-            self._solver = Cholesky(self.body.pattern, stage.mesh.space)
-        else:
-            self._solver = self._solver.extended(self.body.pattern, source)
-        self.integrator = RealTimeEuler(self.body, stage.time_step, self._solver)
+        solver = self._solver
+        if solver is not None:
+            solver = solver.extended(self.body.pattern, source)
+        if solver is None or (solver.is_worn and not self._spread):
+            solver = Cholesky(self.body.pattern, stage.mesh.space)
+        if solver.is_worn:
+            self._due.append(self._order_anew)
+        self._solver = solver
+        self.integrator = RealTimeEuler(self.body, stage.time_step, solver)
+
+    def _order_anew(self) -> None:
+        """Find another order of elimination: where work is spread, in a step of its own."""
+        with self._timed("assembly"):
+            self._solver = Cholesky(self.body.pattern, self.stage.mesh.space)
+            self.integrator.solver = self._solver
 
     def _load(self, time: float) -> _Floats:
         force = self._grips.force(time)

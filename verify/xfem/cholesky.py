@@ -27,7 +27,7 @@ __all__ = ["Cholesky", "SingularStiffnessError"]
 _Ints = NDArray[np.int64]
 
 _ANYWHERE = np.empty(0, dtype=np.int64)
-_WORN = 1.25  # entries of the factor per unknown, over those when the order was found
+_WORN = 1.25  # operations per unknown, over those when the order was found
 
 
 class SingularStiffnessError(XfemError):
@@ -68,7 +68,7 @@ class Cholesky:
         self._diagonal = self._gathered = np.empty(0)
         self._place = np.empty(0, dtype=np.int64)
         self._plan(pattern, order, bounds, _ANYWHERE)
-        self._ordered = (self.factor_entries, len(order))
+        self._ordered = (self._work, len(order))
 
     def extended(self, pattern: BlockPattern, source: _Ints) -> "Cholesky":
         """Solver for this body cut further, in the order of this one: no search for another.
@@ -93,8 +93,8 @@ class Cholesky:
     @property
     def is_worn(self) -> bool:
         """Whether extensions have made the order so bad that a new one would pay."""
-        entries, nodes = self._ordered
-        return self.factor_entries > _WORN * entries * (len(self._order) / nodes)
+        work, nodes = self._ordered
+        return self._work > _WORN * work * (len(self._order) / nodes)
 
     def _plan(self, pattern: BlockPattern, order: _Ints, bounds: _Ints, nearest: _Ints) -> None:
         """Find fronts and room for an order, and where each block goes."""
@@ -107,6 +107,7 @@ class Cholesky:
         width = np.diff(bounds) * self._block
         below = np.diff(row_start) * self._block
         self._offset = np.concatenate([[0], np.cumsum(width * (width + below))])
+        self._work = float(width @ (width + below) ** 2)  # about the operations of a factorisation
         most = int(below.max(initial=0))
         self._factor = _room(self._factor, int(self._offset[-1]))
         self._stack = _room(self._stack, stack_depth(parent, below))

@@ -68,7 +68,8 @@ class InternalForce:
         self.mu = np.broadcast_to(material.mu, count).astype(float)
         self.left_out = 0
         pieces, space = len(virtual.cells), mesh.space
-        self._rotations = np.tile(np.eye(space), (pieces, 1, 1))
+        self._rotations = np.zeros((pieces, space, space))
+        self._rotations[:, range(space), range(space)] = 1.0
         self._quaternions = np.zeros((pieces, 4))
         self._quaternions[:, 0] = 1.0
         self._kernels = corotational_kernels(space)

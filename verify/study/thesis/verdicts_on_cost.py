@@ -130,7 +130,7 @@ def _real_time(hand: RealTime, contended: str) -> Iterator[Finding]:
             f"{hand.within[name]:.1%} of {hand.steps} steps in processor time of one thread "
             f"({hand.within_wall[name]:.1%} in wall time); median {1e3 * hand.resting['step']:.2f} "
             f"ms, {1e3 * hand.cutting['step']:.2f} ms of the {hand.cutting_steps} that cut, "
-            f"slowest {1e3 * hand.slowest:.2f} ms; with the work of a cut spread over three steps "
+            f"slowest {1e3 * hand.slowest:.2f} ms; with the work of a cut spread over four steps "
             f"{hand.within_spread[name]:.1%}, slowest {1e3 * hand.slowest_spread:.2f} ms; "
             f"{hand.tetrahedra} tetrahedra, {hand.cuts} cut, "
             f"inner surface, mapping and collision included; kernel {1e3 * hand.kernel:.1f} ms"

@@ -104,7 +104,8 @@ class EmbeddedSurface:
         own = self._vertex_cell[self.facets]
         self._corners = corner_cells(self.points[self.facets], own, *self._elements)
         self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
-        self._cover(np.arange(len(self.facets)))
+        nodes = distinct(self.facets)
+        self._cover(np.arange(len(self.facets)), nodes, *self._values(nodes))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
@@ -112,8 +113,20 @@ class EmbeddedSurface:
             return
         starts, facets = self._near
         near = facets[ranges(np.stack([starts[increment.moved], starts[increment.moved + 1]], 1))]
-        if len(near):
-            self._cover(distinct(near))
+        if len(near) == 0:
+            return
+        near = distinct(near)
+        nodes = distinct(self.facets[near])
+        numbers, values = self._values(nodes)
+        # a facet on one side of all cuts, in cells that are as they were, stays as it is
+        moved = np.zeros(len(self._cutter.mesh.cells), dtype=bool)
+        moved[increment.moved] = True
+        above = (values > 0.0)[np.searchsorted(nodes, self.facets[near])]
+        below = (values < 0.0)[np.searchsorted(nodes, self.facets[near])]
+        whole = (above.all(axis=1) | below.all(axis=1)).all(axis=1)
+        concerned = near[~whole | moved[self._corners[0][near]].any(axis=1)]
+        if len(concerned):
+            self._cover(concerned, nodes, numbers, values)
 
     def parts_of(self, given: _Ints) -> _Ints:
         """Facets in use that are parts of some given ones, in the order of these."""
@@ -143,14 +156,14 @@ class EmbeddedSurface:
         counts = np.bincount(cell, minlength=len(self._cutter.mesh.cells))
         return np.concatenate([[0], np.cumsum(counts)]), facet[order]
 
-    def _cover(self, facets: _Ints) -> None:
-        """Split and embed some facets anew."""
+    def _cover(self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats) -> None:
+        """Split and embed some facets anew, given the cuts and their level sets at vertices."""
         body = self._cutter.body
         self.surface.retire(ranges(self._facet_range[facets]))
-        ids, source, at, label, whole = self._fragments(facets)
+        ids, source, at, label, whole = self._fragments(facets, nodes, numbers, values)
         # where the corners of a whole facet are is known; only which piece that is may be new
-        cell, weights, inside = (array[source] for array in self._corners)
-        material = self.points[self.facets[source]]
+        cell, weights, inside = (array.take(source, axis=0) for array in self._corners)
+        material = self.points.take(self.facets.take(source, axis=0), axis=0)
         if not whole.all():
             parts = ~whole
             material[parts] = at[parts] @ material[parts]
@@ -166,11 +179,9 @@ class EmbeddedSurface:
         )  # fmt: skip
 
     def _fragments(
-        self, facets: _Ints
+        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
     ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8], NDArray[np.bool_]]:
         """Parts of facets: points (q, k), facet, barycentric corners in it, sides, if whole."""
-        nodes = distinct(self.facets[facets])
-        numbers, values = self._values(nodes)
         several = len(numbers) > 1 or self.facets.shape[1] == 2
         divide = self._divided_by_several if several else self._divided_by_one
         ids, source, at, side = divide(facets, nodes, numbers, values)
