@@ -73,7 +73,7 @@ class Session:
         clock: Callable[[], float] = perf_counter,
     ) -> None:
         self.stage, self._account, self._clock = stage, account, clock
-        self._spread = spread
+        self._spread, self._led = spread, -np.inf  # time up to which the blades have been led
         self._due: list[Callable[[], None]] = []  # what is left to be done of a cut
         self._ahead: Increment | None = None  # of which the mechanics do not know yet
         self._new: NDArray[np.int64] | None = None  # sources of unknowns not yet assembled
@@ -139,7 +139,7 @@ class Session:
         busy, increment = bool(self._due), None
         if not busy:
             with self._timed("cutting"):
-                increment = self.cutter.advance(end)
+                increment = self.cutter.advance(self._next_stroke(end))
                 if increment is not None:
                     self._ahead = increment
                     self._due = [self._update_embedded, self._update_material, self._take_over]
@@ -178,6 +178,16 @@ class Session:
         """Tip and other end of each blade under way, m."""
         now = self.state.time
         return [_blade_at(path, now) for path in self._under_way()]
+
+    def _next_stroke(self, end: float) -> float:
+        """How far to lead the blades: where work is spread, two strokes are not cut in one go."""
+        until = end
+        if self._spread:
+            begins = [stroke.path.times[0] for stroke in self.cutter.strokes]
+            later = [t for t in begins if t > np.nextafter(self._led, np.inf)]
+            until = min([end, *np.nextafter(later, -np.inf)])
+        self._led = until
+        return float(until)
 
     def _update_embedded(self) -> None:
         assert self._ahead is not None

@@ -8,6 +8,7 @@ from there, and from the elements in which the tool was, the walk goes on to nei
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,8 @@ __all__ = ["Crossings", "SemiProgressiveCutter"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+
+_NONE = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,8 @@ class SemiProgressiveCutter:
         self._size = np.linalg.norm(mesh.edge_vectors, axis=2).max(axis=1)
         self.interior = BoundingTree(mesh.points, mesh.cells)
         self._strokes_near = np.zeros(len(mesh.cells), dtype=np.int64)
-        self._records: list[tuple[_Ints, int, _Floats, _Floats, float]] = []
+        self._records: list[_Record] = []
+        self._crossings = Crossings(_NONE, _NONE, np.empty(0), np.empty(0), np.empty(0))
 
     def begin(self, path: ToolPath) -> Stroke:
         """Begin a stroke along a path, known whole or to be extended as the tool moves.
@@ -125,7 +129,7 @@ class SemiProgressiveCutter:
             None if no element was split.
         """
         found = [stroke.advance(time, self.interior) for stroke in self.strokes]
-        candidates = np.concatenate([np.empty(0, dtype=np.int64), *found])
+        candidates = np.concatenate([_NONE, *found])
         if len(candidates) == 0:
             return None
         increment = self.body.split(candidates, self._cuts_near)
@@ -154,14 +158,18 @@ class SemiProgressiveCutter:
     @property
     def crossings(self) -> Crossings:
         """When each element was entered and split."""
-        rows = self._records
-        return Crossings(
-            np.concatenate([np.empty(0, dtype=np.int64), *(r[0] for r in rows)]),
-            np.repeat([r[1] for r in rows], [len(r[0]) for r in rows]).astype(np.int64),
-            np.concatenate([np.empty(0), *(r[2] for r in rows)]),
-            np.concatenate([np.empty(0), *(r[3] for r in rows)]),
-            np.repeat([r[4] for r in rows], [len(r[0]) for r in rows]).astype(float),
-        )
+        rows, before = self._records, self._crossings
+        if rows:
+            count = [len(row.cell) for row in rows]
+            self._crossings = Crossings(
+                np.concatenate([before.cell, *(row.cell for row in rows)]),
+                np.concatenate([before.stroke, np.repeat([row.stroke for row in rows], count)]),
+                np.concatenate([before.entry, *(row.path.time_at(row.entry) for row in rows)]),
+                np.concatenate([before.leave, *(row.path.time_at(row.leave) for row in rows)]),
+                np.concatenate([before.seen, np.repeat([row.seen for row in rows], count)]),
+            )
+            self._records = []
+        return self._crossings
 
     def _cuts_near(self, patch: MeshPatch) -> tuple[_Ints, list[Cut]]:
         near = [stroke for stroke in self.strokes if stroke.near[patch.whole_cells].any()]
@@ -180,12 +188,15 @@ class SemiProgressiveCutter:
             # a stroke that splits only a piece has not passed all edges of the element
             leave = np.minimum(stroke.leave[mine], stroke.front)
             entry = np.minimum(stroke.entry[mine], leave)
-            self._records.append(
-                (
-                    mine,
-                    stroke.number,
-                    stroke.path.time_at(entry),
-                    stroke.path.time_at(leave),
-                    time,
-                )
-            )
+            self._records.append(_Record(mine, stroke.number, entry, leave, time, stroke.path))
+
+
+class _Record(NamedTuple):
+    """Elements split by a stroke, with travels of the blade that are times only if asked for."""
+
+    cell: _Ints
+    stroke: int
+    entry: _Floats
+    leave: _Floats
+    seen: float
+    path: ToolPath
