@@ -148,10 +148,16 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
     positions of three surfaces; one that cuts also divides elements and surfaces and makes mass,
     sparsity and solver anew. Inner surface, mapping and collision are included, records are not.
     """
-    Session(slashed(hand), account=False).run()  # compiles
+    for spread in (False, True):
+        Session(slashed(hand), account=False, spread=spread).run()  # compiles
     found = {}
-    for name, clock in (("processor", thread_time), ("wall", perf_counter)):
-        session = Session(slashed(hand), account=False, clock=clock)
+    for name, clock, spread in (
+        ("processor time", thread_time, False),
+        ("wall time", perf_counter, False),
+        ("processor time, cuts spread", thread_time, True),
+        ("wall time, cuts spread", perf_counter, True),
+    ):
+        session = Session(slashed(hand), account=False, spread=spread, clock=clock)
         found[name] = timings_of(session.run())
     kernel = float(np.median(kernel_seconds(clock=thread_time)))
     last = session.records[-1]
@@ -159,11 +165,14 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
     with capsys.disabled():
         print(f"\nhand, {len(session.stage.mesh.cells)} tetrahedra, {last.split} cut; kernel "
               f"{1e3 * kernel:.2f} ms; the step of Table 4.4 takes "
-              f"{THESIS_STEP / found['processor'].resting.median:.0f} times as long")  # fmt: skip
+              f"{THESIS_STEP / found['processor time'].resting.median:.0f} times as long")  # fmt: skip
         for name, timings in found.items():
-            print(f"{name} time\n{timings.table}")
-    timings = found["processor"]
+            print(f"{name}\n{timings.table}")
+    timings, spread_timings = found["processor time"], found["processor time, cuts spread"]
     assert timings.resting.median < 0.35 * kernel
     assert timings.resting.most < 0.7 * kernel
     assert timings.cutting.median < 2.0 * kernel
-    assert timings.cutting.median < 12.0 * timings.resting.median
+    # seen: 4 to 4.5 and 2.2 to 2.6 times a resting step, on a machine with other things to do
+    assert timings.cutting.median < 6.5 * timings.resting.median
+    assert spread_timings.cutting.median < 3.6 * timings.resting.median
+    assert spread_timings.cutting.most < 0.8 * timings.cutting.most

@@ -1,0 +1,94 @@
+"""A body cut further keeps its order of elimination; a cut alone is split as one among others."""
+
+import numpy as np
+import pytest
+from cut_bodies import material
+
+from verify.xfem.cholesky import Cholesky
+from verify.xfem.corotational import InternalForce
+from verify.xfem.cuts import Plane
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.split import split_cells
+from verify.xfem.structured_meshes import box_mesh
+from verify.xfem.tool_path import ToolPath
+from verify.xfem.unknown_nodes import node_sides
+
+ROUND_OFF = 1e-10  # relative residual: thousands of operations on numbers within 1e4 of each other
+
+
+def under_the_knife():
+    """Block, and three strokes through it, one after the other."""
+    cutter = SemiProgressiveCutter(box_mesh((6, 6, 2)))
+    for k, x in enumerate((0.23, 0.51, 0.77)):
+        tips = np.array([[x, -0.1, 1.1], [x + 0.07, 1.1, 1.1]])
+        cutter.begin(ToolPath.of_tip(tips, [k, k + 1.0], [0.0, 0.0, -1.3]))
+    return cutter
+
+
+def system(cutter, rng):
+    """Sparsity, and blocks of a stiffness with a mass: positive definite."""
+    virtual = cutter.virtual_mesh()
+    pattern = side_wise_mass(virtual, 1000.0).pattern(virtual)
+    blocks = np.zeros((len(pattern.columns), 3, 3))
+    force = InternalForce(virtual, material(3))
+    force.evaluate(0.01 * rng.standard_normal((virtual.node_count, 3)))
+    force.add_stiffness(pattern, blocks)
+    blocks[pattern.diagonal] += np.abs(blocks).max() * 1e-3 * np.eye(3)
+    return pattern, blocks
+
+
+def test_a_solver_extended_at_every_cut_still_solves_its_system() -> None:
+    cutter, rng = under_the_knife(), np.random.default_rng(5)
+    solver = Cholesky(system(cutter, rng)[0], 3)
+    cuts, worn = 0, False
+    for time in np.linspace(0.1, 3.0, 24):
+        increment = cutter.advance(time)
+        if increment is None:
+            continue
+        pattern, blocks = system(cutter, rng)
+        solver = solver.extended(pattern, increment.source)
+        solver.factorize(blocks)
+        load = rng.standard_normal((pattern.node_count, 3))
+        error = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
+        assert np.linalg.norm(error) < ROUND_OFF * np.linalg.norm(load)
+        worn, cuts = worn or solver.is_worn, cuts + 1
+    assert cuts > 12
+    # kept too long an order costs more than another would, and the solver says so
+    assert worn
+    anew = Cholesky(pattern, 3)
+    assert not anew.is_worn
+    assert anew.factor_entries < solver.factor_entries
+
+
+@pytest.mark.parametrize("tip", ["inside", "through"])
+def test_a_cut_alone_is_split_as_it_is_beside_one_that_meets_nothing(tip) -> None:
+    """The path for one cut against that for several: cells, pieces, points, shares."""
+    mesh = box_mesh((3, 3, 3))
+    beyond = Plane((9.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    rng = np.random.default_rng(11)
+    cuts = [Plane(rng.random(3), rng.standard_normal(3)) for _ in range(6)]
+    cuts.append(Plane((1 / 3, 0.0, 0.0), (1.0, 0.0, 0.0)))  # along faces
+    cuts.append(Plane((0.0, 0.0, 0.0), (1.0, -1.0, 0.0)))  # through nodes
+    for cut in cuts:
+        alone, among = split_cells(mesh, [cut], tip), split_cells(mesh, [cut, beyond], tip)
+        np.testing.assert_array_equal(alone.parent, among.parent)
+        np.testing.assert_array_equal(alone.label, among.label[:, :1])
+        for mine, other in zip(alone.simplices, among.simplices, strict=True):
+            np.testing.assert_allclose(mine, other, rtol=1e-14, atol=1e-16)
+        np.testing.assert_allclose(alone.points.positions, among.points.positions, atol=1e-15)
+        np.testing.assert_array_equal(alone.points.ends, among.points.ends)
+
+
+def test_the_side_of_an_unknown_is_that_of_its_pieces_if_they_agree_else_of_its_node() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        cells = rng.integers(0, 12, (15, 4))
+        label = rng.integers(-1, 2, (15, 3)).astype(np.int8)
+        values = rng.standard_normal((12, 3))
+        side = node_sides(values, cells, label)
+        for node in range(12):
+            for cut in range(3):
+                seen = {int(s) for s in label[(cells == node).any(axis=1), cut] if s != 0}
+                own = 1 if values[node, cut] >= 0.0 else -1
+                assert side[node, cut] == (seen.pop() if len(seen) == 1 else own)
