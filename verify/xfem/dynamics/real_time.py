@@ -2,8 +2,7 @@
 
 (M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v), K with frozen rotations, and for membranes
 with what their tension resists across their plane: symmetric positive definite, so that the step
-always has a solution. Nothing is allocated per step but what the linear
-solver returns.
+always has a solution. Nothing is allocated per step with the linear solvers of this package.
 """
 
 import numpy as np
