@@ -1,4 +1,4 @@
-"""First use of every compiled kernel, on bodies of a few elements, and what compiling it takes.
+"""First use of the compiled kernels, on bodies of a few elements, and what compiling it takes.
 
 numba compiles a kernel when it is first called and keeps it in `NUMBA_CACHE_DIR` (by default beside
 the source). `STAGES` call the kernels of one kind of scene after another; `compile_all` runs them
@@ -98,11 +98,14 @@ def _plane() -> tuple[VirtualMesh, State]:
     return cut_mesh(rectangle_mesh((3, 3)), [Plane([0.5, 0.45], [0.1, 1.0])]), "plane strain"
 
 
-def _membrane() -> tuple[VirtualMesh, State]:
+def _flat_membrane() -> SimplexMesh:
     flat = rectangle_mesh((3, 3))
-    points = np.column_stack([flat.points, np.zeros(len(flat.points))])
+    return SimplexMesh(np.column_stack([flat.points, np.zeros(len(flat.points))]), flat.cells)
+
+
+def _membrane() -> tuple[VirtualMesh, State]:
     cut = Plane([0.5, 0.45, 0.0], [0.1, 1.0, 0.2])
-    return cut_mesh(SimplexMesh(points, flat.cells), [cut]), "plane stress"
+    return cut_mesh(_flat_membrane(), [cut]), "plane stress"
 
 
 def _solid() -> tuple[VirtualMesh, State]:
@@ -149,19 +152,21 @@ def _without_slivers(
     use(treat_slivers(virtual)[0], kind)
 
 
-def _scalpel() -> None:
-    """Move a blade through a block in motion, with its skin, an inner surface and collision."""
-    mesh = box_mesh((3, 3, 3))
-    skin = mesh.points, mesh.cells[:1, :3].copy()
+def _scalpel(mesh: SimplexMesh, kind: State) -> None:
+    """Move a blade through a body in motion, with its skin, an inner surface and collision."""
     path = ToolPath.of_tip([[-0.5, 0.4, -0.2], [1.5, 0.5, -0.2]], [0.0, 1.0], [0, 0, 1.5])
     session = Session(
         Stage(
-            mesh, isotropic(1.0, 0.3, "solid"), 1.0, np.array([0.0, 0.0, -0.01]), 0.25, 1.0,
-            strokes=[path], visual=skin, tool_radius=0.05, tool_force=1e-3,
+            mesh, isotropic(1.0, 0.3, kind), 1.0, np.array([0.0, 0.0, -0.01]), 0.25, 1.0,
+            strokes=[path], tool_radius=0.05, tool_force=1e-3,
+            visual=(mesh.points, mesh.cells[:1, :3].copy()) if kind == "solid" else None,
         )
     )  # fmt: skip
     session.run()
-    pull_back(session.cutter, session.state.displacement, [[0.4, 0.4, 0.9]], [0])
+    place = mesh.points[mesh.cells[0]].mean(axis=0)
+    pull_back(session.cutter, session.state.displacement, [place], [0])
+    session.collider.nearest([place])
+    session.collider.pierced(place - 1.0, place + 1.0)
 
 
 def _comparison() -> None:
@@ -189,7 +194,8 @@ _STAGES: list[tuple[str, Callable[[], None]]] = [
     ("plane: statics", partial(_without_slivers, _plane, _linear)),
     ("plane: rotation and motion", partial(_without_slivers, _plane, _turning)),
     ("membrane: rotation and motion", partial(_without_slivers, _membrane, _turning)),
-    ("space: scalpel", _scalpel),
+    ("space: scalpel", partial(_scalpel, box_mesh((3, 3, 3)), "solid")),
+    ("membrane: scalpel", partial(_scalpel, _flat_membrane(), "plane stress")),
     ("space: statics", partial(_without_slivers, _solid, _linear)),
     ("space: rotation and motion", partial(_without_slivers, _solid, _turning)),
 ]
