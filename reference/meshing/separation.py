@@ -61,7 +61,7 @@ def _check_no_cusp(features: list[Feature], size: float, where: str) -> None:
         for other in features:
             if arc.centre is None or other is arc:
                 continue
-            points = _bulges([arc, other] if other.centre is None else [other, arc])
+            points = _bulges([arc, other])
             on_both = (arc.distance(points) <= _TOUCHING * size) & (
                 other.distance(points) <= _TOUCHING * size
             )
@@ -82,9 +82,9 @@ def _off_ends(
     feature: Feature, points: NDArray[np.float64], features: list[Feature], size: float
 ) -> NDArray[np.bool_]:
     """Whether points lie off the ends of a feature; those at which an arc is halved are none."""
-    halves = [f for f in features if f is not feature and f.name == feature.name]
-    if feature.centre is None:
-        halves = []
+    halves = []
+    if feature.centre is not None:
+        halves = [f for f in features if f is not feature and f.name == feature.name]
     ends = [
         end
         for end in (feature.start, feature.end)
