@@ -59,15 +59,16 @@ def world() -> Any:
     wanted = int(os.environ.get(RANKS_VARIABLE, "1"))
     if wanted == 1:
         return None
-    from mpi4py import MPI
+    from reference.ranks import all_ranks
 
-    if MPI.COMM_WORLD.size != wanted:
+    ranks, vendor = all_ranks()
+    if ranks.size != wanted:
         raise InputError(
-            f"mpiexec started {wanted} processes of which each finds {MPI.COMM_WORLD.size}: it is "
-            f"of another MPI than mpi4py ({MPI.get_vendor()[0]})",
+            f"mpiexec started {wanted} processes of which each finds {ranks.size}: it is of "
+            f"another MPI than mpi4py ({vendor})",
             "--ranks",
         )
-    return MPI.COMM_WORLD
+    return ranks
 
 
 def give_up(comm: Any, outcome: dict[str, Any], file: Path) -> None:

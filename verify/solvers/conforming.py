@@ -199,10 +199,10 @@ def _solve(
 
 def _comm(scene: Scene) -> Any:
     """Communicator over which a scene is distributed: all ranks for statics, else none."""
-    from mpi4py import MPI
+    from reference.ranks import all_ranks
 
-    static = scene.analysis.kind == "static"
-    return MPI.COMM_WORLD if static and MPI.COMM_WORLD.size > 1 else None
+    ranks, _ = all_ranks()
+    return ranks if scene.analysis.kind == "static" and ranks.size > 1 else None
 
 
 def _shared(

@@ -24,8 +24,11 @@ from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
 
 __all__ = ["CASES", "SOLVERS", "ThesisStudy", "thesis_study"]
 
-# an exact answer without tips, one with tips inside elements, and a converged reference
-CASES = ("statics/f3_inclined", "statics/griffith_inside", "statics/tissue_strip")
+# exact without tips, exact with tips inside elements, and references in the plane and in space
+CASES = (
+    "statics/f3_inclined", "statics/griffith_inside", "statics/tissue_strip",
+    "statics/buried_cut",
+)  # fmt: skip
 SOLVERS = (
     "xfem", "conforming", "subdivision", "snapping", "snapping_subdivision", "removal",
     "removal_refined", "virtual_node", "virtual_node_arbitrary", "mass_spring", "uncut",

@@ -21,6 +21,7 @@ _TIPS = 3.0
 _LIMITS = {
     "statics/griffith_inside": (_TIPS, _TIPS),
     "statics/tissue_strip": (1.25**2, 1.25),
+    "statics/buried_cut": (_TIPS, _TIPS),
 }
 _TIP_CASE = "griffith_inside"
 

@@ -1,0 +1,12 @@
+"""The processes among which a reference is distributed."""
+
+from typing import Any
+
+__all__ = ["all_ranks"]
+
+
+def all_ranks() -> tuple[Any, str]:
+    """Return the communicator of all MPI ranks that find each other, and whose MPI it is."""
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD, MPI.get_vendor()[0]
