@@ -9,13 +9,15 @@ ending inside an element that it had already split.
 import numpy as np
 import pytest
 from cut_comparison import assert_same_cut
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 from random_strokes import meshes, strokes
 from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mapping.body_surface import BodySurface
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import cut_mesh
 
 QUICK = settings(
@@ -31,8 +33,19 @@ THOROUGH = settings(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
 
+# a move so short that its square is zero
+HARDLY_MOVES = ToolPath.of_tip([[0.0, 0.0], [0.0, 7.90408581e-297], [0.0, 1.0]], [0.0, 1.0, 2.0])
+# a blade that moves along itself, up to 1e-13 of its length
+ALONG = [[-0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]
+SWEEPS_NOTHING = ToolPath.of_tip(ALONG, [0.0, 1.0], [-0.1, 1e-13, 0.0])
+FAILED_ONCE = {
+    2: (rectangle_mesh([1, 1]), [HARDLY_MOVES], []),
+    3: (box_mesh([1, 1, 1]), [SWEEPS_NOTHING], []),
+}
+
 
 def _claims(dim: int, most: int):
+    @example(*FAILED_ONCE[dim])
     @given(meshes(dim), strokes(dim, most), st.lists(st.floats(0.0, 3.0), max_size=3))
     def claim(mesh, paths, moments):
         cutter = SemiProgressiveCutter(mesh)

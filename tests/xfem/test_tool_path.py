@@ -62,11 +62,32 @@ def test_a_blade_that_turns_about_its_end_sweeps_a_connected_fan() -> None:
     assert inner_edges == 2 * 5
 
 
-def test_a_path_without_length_sweeps_nothing() -> None:
-    path = ToolPath.of_tip([[0.2, 0.3], [0.2, 0.3]], [0.0, 1.0])
-    points = np.random.default_rng(3).uniform(0.0, 1.0, (20, 2))
+@pytest.mark.parametrize(
+    ("tips", "depth"),
+    [
+        ([[0.2, 0.3], [0.2, 0.3]], None),
+        ([[0.2, 0.3, 0.1], [0.2, 0.3, 0.1]], [0.0, 0.0, 0.5]),
+        ([[0.2, 0.3, 0.1], [0.2, 0.3, 0.9]], [0.0, 0.0, 0.5]),
+        ([[0.2, 0.3, 0.1], [0.2, 0.3 + 1e-13, 0.9]], [0.0, 0.0, 0.5]),
+    ],
+    ids=["rests", "blade rests", "moves along itself", "nearly along itself"],
+)
+def test_a_blade_that_stays_on_its_line_sweeps_nothing(tips, depth) -> None:
+    path = ToolPath.of_tip(tips, [0.0, 1.0], depth)
+    points = np.random.default_rng(3).uniform(0.0, 1.0, (20, len(tips[0])))
     assert (path.sweep.depth(points) < 0.0).all()
     assert (path.sweep.level_set(points) > 0.0).all()
+
+
+@pytest.mark.parametrize("move", [0.0, 1e-300, 1e-160, 1e-40, 1e-16])
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_a_move_of_round_off_size_does_not_change_the_sweep(move, at) -> None:
+    tips = np.array([[0.0, 0.0], [0.5, 0.2], [1.0, 0.9]])
+    points = np.random.default_rng(4).uniform(-0.5, 1.5, (50, 2))
+    jittered = np.insert(tips, at + 1, tips[at] + [0.0, move], axis=0)
+    sweeps = ToolPath.of_tip(tips, range(3)).sweep, ToolPath.of_tip(jittered, range(4)).sweep
+    for ask in ("level_set", "depth", "travel"):
+        np.testing.assert_allclose(*(getattr(one, ask)(points) for one in sweeps), atol=4e-16)
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from verify.xfem.errors import XfemError
 
-__all__ = ["SweepArrays", "SweepSurface", "sweep_surface"]
+__all__ = ["STILL", "SweepArrays", "SweepSurface", "sweep_surface"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 _FLAT = 1e-12  # area over squared edge below which a swept triangle counts as not swept
+STILL = 1e-14  # of the length of the path: shorter moves are none
 _TURNED_BACK = -1.0 + 1e-9  # cosine between the normals of neighbouring facets
 
 
@@ -104,8 +105,9 @@ def _facets(blades: _Floats, travel: _Floats) -> tuple[_Floats, _Floats, _Ints]:
     count, width, space = blades.shape
     ids = np.arange(count * width).reshape(count, width)
     for k in range(1, count):
-        # a point of the blade that stays is one vertex: what turns around it is connected
-        still = (blades[k] == blades[k - 1]).all(axis=1)
+        # a point of the blade that stays, up to round-off of the path, is one vertex: what turns
+        # around it is connected
+        still = np.linalg.norm(blades[k] - blades[k - 1], axis=1) <= STILL * travel[-1]
         ids[k, still] = ids[k - 1, still]
     points = blades.reshape(-1, space)
     lengths = np.repeat(travel, width)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.errors import XfemError
 from verify.xfem.polyline import Polyline
 from verify.xfem.sweep_kernels import probe_points
-from verify.xfem.sweep_surface import SweepSurface, sweep_surface
+from verify.xfem.sweep_surface import STILL, SweepSurface, sweep_surface
 
 __all__ = ["PartOfSweep", "Sweep", "ToolPath"]
 
@@ -51,7 +51,7 @@ class ToolPath:
         object.__setattr__(self, "times", moments)
         if self.length > 0.0:
             if positions.shape[2] == 2:
-                moves = np.flatnonzero(np.diff(self.travel, prepend=-1.0) > 0.0)
+                moves = np.flatnonzero(np.diff(self.travel, prepend=-np.inf) > STILL * self.length)
                 Polyline(positions[moves, 0])  # raises if it turns back or intersects itself
             _ = self.surface
 
@@ -90,6 +90,11 @@ class ToolPath:
     def length(self) -> float:
         """Length of the whole path, in metres; zero if the blade does not move."""
         return float(self.travel[-1])
+
+    @property
+    def sweeps(self) -> bool:
+        """Whether it sweeps anything: a blade may stay, or move along itself."""
+        return self.length > 0.0 and len(self.surface.facets) > 0
 
     @cached_property
     def surface(self) -> SweepSurface:
@@ -158,7 +163,7 @@ class Sweep:
         return PartOfSweep(self, travel)
 
     def _probe(self, points: _Floats) -> _Floats:
-        if self.path.length == 0.0:
+        if not self.path.sweeps:
             # nothing is swept: one side everywhere, and no point of the cut anywhere
             return np.tile([1.0, -np.inf, 0.0], (len(points), 1))
         return probe_points(np.ascontiguousarray(points, dtype=float), self.path.surface.arrays)

@@ -109,7 +109,7 @@ class Stroke:
             Of the cells: where the blade comes in.
         """
         front = self.path.travel_at(time)
-        if front <= self.front or self.path.length == 0.0:
+        if front <= self.front or not self.path.sweeps:
             return np.empty(0, dtype=np.int64)
         sweep = self.path.surface.arrays
         hit = cells_hit(

@@ -19,6 +19,7 @@ _NODES = 4
 _FACE = 3  # corners of a face
 LINE = _FACE + 1  # a line: the nodes of an edge or a face, and the cut that crosses it
 _NONE = np.iinfo(np.int64).max
+_SHORT = 1e-6  # of an edge: what has given a line its direction was too short to be trusted
 
 
 class EdgeRecord(NamedTuple):
@@ -126,20 +127,53 @@ def _after(at, number, than, other):
 
 
 @njit(cache=True)
+def _direct(x, y, line, record):
+    """Set the direction of a line if it has none, or one from points that nearly coincide.
+
+    That of an edge of the mesh is the edge's. Else it leads from one end of the edge that is asked
+    for to the farthest point known, and is replaced once there is one far beyond: what is 1e-14
+    long may point anywhere.
+    """
+    direction, space, nodes = record.directions[line], record.nodes.shape[1], len(record.nodes)
+    known = 0.0
+    for i in range(space):
+        known += direction[i] ** 2
+    if record.known[line, 0] >= 0 and record.known[line, _FACE - 1] == _NONE:
+        if known > 0.0:
+            return
+        x, y = record.known[line, 0], record.known[line, 1]
+    far, longest, entry = y, 0.0, record.first[line]
+    while True:
+        length = 0.0
+        for i in range(space):
+            length += (_place(y, i, record) - _place(x, i, record)) ** 2
+        if length > longest:
+            far, longest = y, length
+        if entry < 0:
+            break
+        y, entry = nodes + record.entries[entry, 0], record.entries[entry, 1]
+    if known >= _SHORT**2 * longest:
+        return
+    along = 0.0
+    for i in range(space):
+        along += (_place(far, i, record) - _place(x, i, record)) * direction[i]
+    for i in range(space):
+        step = _place(far, i, record) - _place(x, i, record)
+        direction[i] = step if along >= 0.0 else -step
+
+
+@njit(cache=True)
 def _between(x, y, line, record):
     """Give (a point of the line's list strictly between x and y or -1, its share from x to y).
 
-    The order on a line is that of projections on one direction, taken when the line is first
-    asked for: points that nearly coincide are in the same order for every facet.
+    The order on a line is that of projections on one direction: points that nearly coincide are in
+    the same order for every facet.
     """
-    direction, unset, space = record.directions[line], True, record.nodes.shape[1]
-    for i in range(space):
-        unset = unset and direction[i] == 0.0
+    _direct(x, y, line, record)
+    direction, space = record.directions[line], record.nodes.shape[1]
     total, start, end = 0.0, 0.0, 0.0
     for i in range(space):
         a, b = _place(x, i, record), _place(y, i, record)
-        if unset:
-            direction[i] = b - a
         total += (b - a) ** 2
         start += a * direction[i]
         end += b * direction[i]
