@@ -1,5 +1,6 @@
 """Claims about the calibration study: it tells a good error bar from a bad one."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -81,5 +82,18 @@ def test_norms_of_a_smooth_field_are_covered_and_drawn(tmp_path):
     study = CalibrationStudy(found, calibration_findings(found), True, 1.0)
     write_study(tmp_path, "calibration", study.as_record(), study.rows(), "by hand")
     page = render_study(tmp_path, "calibration").read_text(encoding="utf-8")
-    assert page.count("<circle") == sum(t.true > 0 and not t.left_out for t in found)
+    assert page.count('class="marker"') == sum(t.true > 0 and not t.left_out for t in found)
     assert "relative energy-norm error, level 2: stated" in page
+
+
+def test_every_family_has_a_mark_of_its_own_in_the_figure(tmp_path):
+    found = [
+        replace(made([2.0])[0], family=one.name, degree=one.degree, held_out=one.held_out)
+        for one in families(quick=False)
+    ]
+    study = CalibrationStudy(found, calibration_findings(found), False, 1.0)
+    write_study(tmp_path, "calibration", study.as_record(), study.rows(), "by hand")
+    page = render_study(tmp_path, "calibration").read_text(encoding="utf-8")
+    drawn = set(re.findall(r'<(circle|rect)(?=[^>]*class="marker")[^>]*stroke="([^"]*)"', page))
+    assert len(drawn) == len({one.name for one in families(quick=False)})
+    assert ("rect" in page) == any(one.held_out for one in found)

@@ -11,7 +11,9 @@ from verify.report.tables import table
 __all__ = ["calibration_section"]
 
 _COLOURS = ("#0067a5", "#c04a00", "#00785a", "#a3487b", "#8a6a00", "#5b4db5")
+_OTHER = "#333"
 _WASTED = 10.0
+_ROW, _FIRST_ROW = 18, 46
 
 
 def calibration_section(record: Mapping[str, Any]) -> Markup:
@@ -27,7 +29,7 @@ def calibration_section(record: Mapping[str, Any]) -> Markup:
         "Every mark is a number that a reference of three levels states its uncertainty of; above "
         "the line 1 the uncertainty covers the true error, above the line 10 it is wider than it "
         "need be. Open marks are quantities of interest: the error of a single number can vanish "
-        "by chance, and then lies far above."
+        "by chance, and then lies far above. Squares are families that no estimator was tuned on."
     )
     return tag(
         "section",
@@ -48,19 +50,36 @@ def _scatter(trials: Sequence[Mapping[str, Any]], degree: int) -> Markup:
         "true error, relative",
         f"P{degree}: stated uncertainty, relative",
     )
-    families = list(dict.fromkeys(t["family"] for t in shown))
-    colours = dict(zip(families, _COLOURS, strict=False))
+    colours = _colours(trials)
     parts = [_line(panel, 1.0), _line(panel, _WASTED)]
-    parts += [_mark(panel, t, colours.get(t["family"], "#333")) for t in shown]
+    parts += [_mark(panel, t, colours[t["family"]]) for t in shown]
     parts += [
-        text(panel.gutter, 46 + 18 * row, name, class_="note", fill=colours.get(name, "#333"))
-        for row, name in enumerate(families)
+        _legend(panel, row, t, colours[t["family"]])
+        for row, t in enumerate({t["family"]: t for t in shown}.values())
     ]
     below = sum(not t["covered"] for t in shown)
     label = (
         f"Stated uncertainty over true error, P{degree}: {len(shown)} marks, {below} not covered."
     )
     return panel.drawn(label, joined(*parts))
+
+
+def _colours(trials: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Give a colour to each field; its variants, named after a comma, have that of the field."""
+    families = list(dict.fromkeys(t["family"] for t in trials))
+    fields = list(dict.fromkeys(_field(name) for name in families))
+    own = dict(zip(fields, _COLOURS, strict=False))
+    return {name: own.get(_field(name), _OTHER) for name in families}
+
+
+def _field(family: str) -> str:
+    return family.split(",")[0]
+
+
+def _legend(panel: Panel, row: int, trial: Mapping[str, Any], colour: str) -> Markup:
+    y = _FIRST_ROW + _ROW * row
+    mark = _shape(panel.gutter + 3, y - 4, trial, fill=colour, stroke=colour)
+    return joined(mark, text(panel.gutter + 12, y, trial["family"], class_="note", fill=colour))
 
 
 def _line(panel: Panel, factor: float) -> Markup:
@@ -81,11 +100,18 @@ def _mark(panel: Panel, trial: Mapping[str, Any], colour: str) -> Markup:
         f"{trial['family']}, {metric_title(trial['quantity'])}, level {trial['level']}: "
         f"stated {trial['stated']:.3g}, true {trial['true']:.3g}"
     )
-    return tag(
-        "circle", tag("title", tip), cx=f"{panel.x.at(trial['true']):.1f}",
-        cy=f"{panel.y.at(trial['stated']):.1f}", r="3.4", stroke=colour,
-        fill=colour if norm else "#fff", class_="marker",
+    return _shape(
+        panel.x.at(trial["true"]), panel.y.at(trial["stated"]), trial, tag("title", tip),
+        stroke=colour, fill=colour if norm else "#fff", class_="marker",
     )  # fmt: skip
+
+
+def _shape(x: float, y: float, trial: Mapping[str, Any], *tip: Markup, **style: str) -> Markup:
+    """Draw a disc, or a square for a family that no estimator was tuned on."""
+    if not trial.get("held_out"):
+        return tag("circle", *tip, cx=f"{x:.1f}", cy=f"{y:.1f}", r="3.4", **style)
+    left, top = f"{x - 3.1:.1f}", f"{y - 3.1:.1f}"
+    return tag("rect", *tip, x=left, y=top, width="6.2", height="6.2", **style)
 
 
 def _trials_table(trials: Sequence[Mapping[str, Any]]) -> Markup:
