@@ -152,11 +152,11 @@ def conjugate_gradients(
         flat_x[:] = 0.0
         return 0, 0.0
     if is_zero:
-        flat_z[:] = flat_b
+        flat_z[:] = 0.0
     else:
         symmetric_product(starts, columns, diagonal, blocks, x, z)
-        for i in range(len(flat_b)):
-            flat_z[i] = flat_b[i] - flat_z[i]
+    for i in range(len(flat_b)):
+        flat_z[i] = flat_b[i] - flat_z[i]
     target, norm = tolerance**2 * size, _square(flat_z)
     if norm <= target or limit == 0:
         return 0, np.sqrt(norm / size)
@@ -175,7 +175,8 @@ def conjugate_gradients(
         old = rho
         rho = _advance(rho / curvature, flat_t, flat_q, flat_u, flat_x, flat_r, flat_z)
         if rho <= promise or iteration == limit:
-            flat_t[:] = flat_z
+            for i in range(len(flat_z)):  # not a slice: numba would compile its words for a misfit
+                flat_t[i] = flat_z[i]
             add_lower_product(starts, columns, diagonal, blocks, r, t)
             norm = _square(flat_t)
             if norm <= target:
