@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,17 @@ from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.energy_ledger import EnergyLedger
-from verify.xfem.mass import side_wise_mass
+from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Session"]
+__all__ = ["MOST", "Session"]
 
 _Floats = NDArray[np.float64]
 
 _NONE = np.empty(0, dtype=np.int64)
+
+MOST = 24  # elements that a cut whose work is spread may split
 
 
 class Session:
@@ -39,12 +42,11 @@ class Session:
         Whether to keep the account of the energies. Without it the hot path is that of a
         simulator: that is what is timed.
     spread : bool
-        Whether what a cut asks for is spread over four steps: which elements are split, the
-        surfaces to see and to touch, the surface of the material, the mechanics (and at times in a
-        fifth another order of elimination). Only then is the blade asked again how far it has come.
-        The longest step is much shorter, and there are fewer increments; an element opens up to
-        seven steps later than it would. Until the mechanics follow,
-        new unknowns move as those from which they come, so that nothing jumps.
+        Whether what a cut asks for is spread over steps, in the pieces of `_cut`, of which each
+        takes about as long as a step at rest, and of which a step does one. At most `MOST`
+        elements are split by a cut; the others wait for the next one. A replay is the same on any
+        machine. Until the mechanics follow, new unknowns move as those from which they come, so
+        that nothing jumps.
     clock : callable
         What phases are timed by: wall time in s, or `time.thread_time` where other work on the
         machine shall not be counted.
@@ -73,10 +75,9 @@ class Session:
         clock: Callable[[], float] = perf_counter,
     ) -> None:
         self.stage, self._account, self._clock = stage, account, clock
-        self._spread, self._led = spread, -np.inf  # time up to which the blades have been led
-        self._due: list[Callable[[], None]] = []  # what is left to be done of a cut
+        self._spread, self._led = spread, float("-inf")  # time up to which the blades have been led
+        self._work: Iterator[None] | None = None  # what is left to be done of a cut
         self._ahead: Increment | None = None  # of which the mechanics do not know yet
-        self._new: NDArray[np.int64] | None = None  # sources of unknowns not yet assembled
         self.cutter = SemiProgressiveCutter(stage.mesh)
         for path in stage.strokes:
             self.cutter.begin(path)
@@ -90,7 +91,8 @@ class Session:
         self._seconds = dict.fromkeys(PHASES, 0.0)
         self._held = [held_facets(stage.mesh, hold.nodes) for hold in stage.holds]
         self._solver: Cholesky | None = None
-        self._assemble(_NONE)
+        self.virtual: VirtualMesh
+        self._assemble()
         self.state = self.body.rest()
         self._ledger = EnergyLedger(self.body, self.state)
 
@@ -113,18 +115,16 @@ class Session:
 
     def begin(self, path: ToolPath) -> None:
         """Begin another stroke, to be extended through `cutter.extend` if the tool is live."""
-        self.settle()
+        self._finish()
         self.cutter.begin(path)
-        self._assemble(_NONE)
+        self._assemble()
 
     def settle(self) -> None:
-        """Finish what is left of a cut whose work is spread."""
-        while self._due or self._new is not None:
-            if self._due:
-                self._due.pop(0)()
-            else:
-                self._assemble(_NONE if self._new is None else self._new)
-                self._begin_account()
+        """Finish what is left of cuts whose work is spread."""
+        self._finish()
+        while self.cutter.waits:
+            self._work = self._cut(self._led)
+            self._finish()
 
     def step(self) -> StepRecord:
         """Take one step.
@@ -136,21 +136,18 @@ class Session:
         """
         self._seconds = dict.fromkeys(PHASES, 0.0)
         end = self.state.time + self.stage.time_step
-        busy, increment = bool(self._due), None
-        if not busy:
-            with self._timed("cutting"):
-                increment = self.cutter.advance(self._next_stroke(end))
-                if increment is not None:
-                    self._ahead = increment
-                    self._due = [self._update_embedded, self._update_material, self._take_over]
-        # a hook grips the body as it is cut by then
-        parts = len(self._due) if not self._spread or self._hooks_to_begin(end) else int(busy)
-        for _ in range(parts):
-            self._due.pop(0)()
-        if self._hooks_begun(end) or self._new is not None:
-            with self._timed("assembly"):
-                self._assemble(_NONE if self._new is None else self._new)
-            self._begin_account()
+        hooks = self._hooks_to_begin(end)
+        if hooks:
+            self._finish()
+        busy = self._work is not None
+        if self._work is None:
+            self._work = self._cut(self._next_stroke(end))
+        busy = self._advance() or busy
+        if not self._spread:
+            self._finish()
+        if hooks:
+            self.settle()  # a hook grips the body as it is cut by then
+            self._grip(hooks)
         with self._timed("motion"):
             if not self._account:
                 self.integrator.advance(self.state)
@@ -160,7 +157,7 @@ class Session:
             self.surfaces.move(self.displacement)
         with self._timed("collision"):
             contacts = self._collide()
-        record = self._record(increment, contacts, busy or increment is not None)
+        record = self._record(contacts, busy)
         self.records.append(record)
         return record
 
@@ -181,6 +178,8 @@ class Session:
 
     def _next_stroke(self, end: float) -> float:
         """How far to lead the blades: where work is spread, two strokes are not cut in one go."""
+        if self.cutter.waits:
+            return self._led
         until = end
         if self._spread:
             begins = [stroke.path.times[0] for stroke in self.cutter.strokes]
@@ -189,21 +188,54 @@ class Session:
         self._led = until
         return float(until)
 
-    def _update_embedded(self) -> None:
-        assert self._ahead is not None
-        with self._timed("cutting"):
-            self.surfaces.update_embedded(self._ahead)
+    def _advance(self) -> bool:
+        """Do the next piece of the work of a cut; whether there are more."""
+        if self._work is None:
+            return False
+        for _ in self._work:
+            return True
+        self._work = None
+        return False
 
-    def _update_material(self) -> None:
-        with self._timed("cutting"):
-            self.surfaces.material.update(self._ahead)
+    def _finish(self) -> None:
+        while self._advance():
+            pass
 
-    def _take_over(self) -> None:
-        """Let the state of motion follow the cut; the body is then to be made anew."""
-        assert self._ahead is not None
+    def _cut(self, until: float) -> Iterator[None]:
+        """Lead the blades to a time, and do piece by piece what that asks for."""
         with self._timed("cutting"):
-            self._inherit(self._ahead)
-        self._new, self._ahead = self._ahead.source, None
+            division = self.cutter.look(until, MOST if self._spread else None)
+        if division is None:
+            return
+        yield
+        with self._timed("cutting"):
+            self._ahead = increment = self.cutter.divide(
+                division, self.state.time + self.stage.time_step
+            )
+        with self._timed("assembly"):
+            start = {hook: increment.inherit(values) for hook, values in self._start.items()}
+            parts = self._parts_now(start)
+        yield
+        goes = self.surfaces.following(increment)
+        done = False
+        while not done:
+            with self._timed("cutting"):
+                done = next(goes, True)
+            yield
+        with self._timed("cutting"):
+            self.surfaces.material.update(increment)
+        with self._timed("assembly"):
+            body = self._body_of(parts)
+        yield
+        with self._timed("assembly"):
+            self._inherit(increment)
+            self._follow(body, parts.grips, increment.source)
+        self._begin_account()
+        if self._solver is not None and self._solver.is_worn:
+            if self._spread:
+                yield
+            with self._timed("assembly"):
+                self._order_anew()
 
     def _begin_account(self) -> None:
         if self._account:
@@ -219,47 +251,54 @@ class Session:
         hooks = enumerate(self.stage.hooks)
         return [n for n, hook in hooks if n not in self._start and hook.begin < time]
 
-    def _hooks_begun(self, time: float) -> bool:
-        begun = self._hooks_to_begin(time)
-        for number in begun:
+    def _grip(self, hooks: list[int]) -> None:
+        """Let hooks grip the body where it is now."""
+        for number in hooks:
             self._start[number] = self.state.displacement.copy()
-        return len(begun) > 0
+        with self._timed("assembly"):
+            self._assemble()
+        self._begin_account()
 
-    def _assemble(self, source: NDArray[np.int64]) -> None:
-        """Make the body anew: mass, supports, loads, sparsity and solver.
+    def _parts_now(self, start: dict[int, _Floats]) -> "_Parts":
+        """Make what the body is made of, as the cutter has it: mass, forces, what holds it."""
+        stage, virtual = self.stage, self.cutter.virtual_mesh()
+        mass = side_wise_mass(virtual, stage.density)
+        grips = Grips(virtual, stage.holds, stage.hooks, mass.weights, start, self._held)
+        return _Parts(InternalForce(virtual, stage.material), mass, grips)
 
-        `source` (k,) are the unknowns from which those come that are new since the last time.
-        """
-        stage, self._new = self.stage, None
-        self.virtual: VirtualMesh = self.cutter.virtual_mesh()
-        mass = side_wise_mass(self.virtual, stage.density)
-        self._grips = Grips(
-            self.virtual, stage.holds, stage.hooks, mass.weights, self._start, self._held
-        )
-        self._tool_load = None
-        self.body = DynamicBody(
-            InternalForce(self.virtual, stage.material),
-            mass,
-            weight=mass.weight(stage.gravity),
+    def _body_of(self, parts: "_Parts") -> DynamicBody:
+        """Make the body and its sparsity."""
+        return DynamicBody(
+            parts.force,
+            parts.mass,
+            weight=parts.mass.weight(self.stage.gravity),
             load=self._load,
-            supports=self._grips.supports,
-            damping=stage.damping,
+            supports=parts.grips.supports,
+            damping=self.stage.damping,
         )
-        solver = self._solver
-        if solver is not None:
-            solver = solver.extended(self.body.pattern, source)
-        if solver is None or (solver.is_worn and not self._spread):
-            solver = Cholesky(self.body.pattern, stage.mesh.space)
-        if solver.is_worn:
-            self._due.append(self._order_anew)
-        self._solver = solver
-        self.integrator = RealTimeEuler(self.body, stage.time_step, solver)
+
+    def _assemble(self) -> None:
+        """Make the body anew that is there already, with what holds it from now on."""
+        parts = self._parts_now(self._start)
+        self._follow(self._body_of(parts), parts.grips, _NONE)
+
+    def _follow(self, body: DynamicBody, grips: Grips, source: NDArray[np.int64]) -> None:
+        """Move with another body from now on; its solver keeps the order of elimination.
+
+        `source` (k,) are the unknowns from which those come that are new.
+        """
+        self.body, self._grips, self.virtual = body, grips, body.force.virtual
+        self._tool_load, self._ahead = None, None
+        if self._solver is None:
+            self._solver = Cholesky(self.body.pattern, self.stage.mesh.space)
+        else:
+            self._solver = self._solver.extended(self.body.pattern, source)
+        self.integrator = RealTimeEuler(self.body, self.stage.time_step, self._solver)
 
     def _order_anew(self) -> None:
-        """Find another order of elimination: where work is spread, in a step of its own."""
-        with self._timed("assembly"):
-            self._solver = Cholesky(self.body.pattern, self.stage.mesh.space)
-            self.integrator.solver = self._solver
+        """Find another order of elimination."""
+        self._solver = Cholesky(self.body.pattern, self.stage.mesh.space)
+        self.integrator.solver = self._solver
 
     def _load(self, time: float) -> _Floats:
         force = self._grips.force(time)
@@ -309,9 +348,8 @@ class Session:
         lost = account.algorithmic[-1] + account.damping[-1]
         return self._spent + np.array([work, lost])
 
-    def _record(self, increment: Increment | None, contacts: int, busy: bool) -> StepRecord:
-        crossings = self.cutter.crossings if increment is not None else None
-        delay = np.empty(0) if crossings is None else crossings.delay[self._crossed :]
+    def _record(self, contacts: int, busy: bool) -> StepRecord:
+        delay = self.cutter.crossings.delay[self._crossed :]
         self._crossed += len(delay)
         state, body = self.state, self.body
         kinetic = 0.5 * float(np.sum(state.velocity * body.mass.apply(state.velocity)))
@@ -339,6 +377,14 @@ class Session:
         start = self._clock()
         yield
         self._seconds[phase] += self._clock() - start
+
+
+class _Parts(NamedTuple):
+    """What a body is made of."""
+
+    force: InternalForce
+    mass: Mass
+    grips: Grips
 
 
 def _blade_at(path: ToolPath, time: float) -> tuple[_Floats, _Floats]:

@@ -3,6 +3,8 @@
 Those of a solid can be separate meshes. A plane body and a membrane are their own surface.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -66,10 +68,10 @@ class Surfaces:
         self._followers = [surface for surface in followers if surface is not None]
         self._positions = [np.empty((0, stage.mesh.space)) for _ in self._followers]
 
-    def update_embedded(self, increment: Increment) -> None:
-        """Let the surfaces beside that of the material follow a cut."""
+    def following(self, increment: Increment) -> Iterator[None]:
+        """Let the surfaces beside that of the material follow a cut, in two goes."""
         if self._embedded is not None:
-            self._embedded.update(increment)
+            yield from self._embedded.following(increment)
 
     def move(self, displacement: _Floats) -> None:
         """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""

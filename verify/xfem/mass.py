@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
@@ -210,12 +211,18 @@ def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     density : float or (m,) array_like
         In kg/m³; for membranes times the thickness.
     """
-    densities = cell_densities(virtual, density)
-    share = virtual.volumes * densities[virtual.parent] / virtual.cells.shape[1]
+    densities = np.ascontiguousarray(cell_densities(virtual, density))
     weights = np.zeros(virtual.node_count)
-    for corner in virtual.cells.T:
-        weights += np.bincount(corner, share, minlength=len(weights))
+    _add_shares(virtual.cells, virtual.parent, virtual.volumes, densities, weights)
     return _SideWiseMass(weights)
+
+
+@njit(cache=True)
+def _add_shares(cells, parent, volumes, densities, weights):
+    for piece in range(len(cells)):
+        share = volumes[piece] * densities[parent[piece]] / cells.shape[1]
+        for corner in range(cells.shape[1]):
+            weights[cells[piece, corner]] += share
 
 
 def _diagonal_matrix(values: _Floats) -> csr_array:

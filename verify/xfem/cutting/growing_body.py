@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.cuts import Cut
 from verify.xfem.cutting.distinct import distinct
+from verify.xfem.cutting.division import Division
 from verify.xfem.cutting.patch import MeshPatch, PatchCutter
 from verify.xfem.cutting.point_numbers import PointNumbers
 from verify.xfem.cutting.renumber_kernels import (
@@ -156,7 +157,12 @@ class GrowingBody:
         return self.cut_count - 1
 
     def split(self, candidates: _Ints, cuts_near: CutsNear) -> Increment | None:
-        """Bring some cells up to date with the cuts; None if nothing changes.
+        """Bring some cells up to date with the cuts; None if nothing changes: see `look`."""
+        division = self.look(candidates, cuts_near)
+        return None if division is None else self.divide(division)
+
+    def look(self, candidates: _Ints, cuts_near: CutsNear) -> Division | None:
+        """Find how some cells are to be divided, None if they are not; the body stays as it is.
 
         Parameters
         ----------
@@ -176,13 +182,34 @@ class GrowingBody:
             patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
             numbers, cuts = cuts_near(patch)
             partition = split_cells(patch, cuts, held=self._held_in(patch, numbers))
-            state = self._compare(patch, partition, numbers)
-            all_wanted = distinct(np.concatenate([wanted, state.changed_cells]))
+            division = self._compare(patch, partition, numbers)
+            all_wanted = distinct(np.concatenate([wanted, division.changed_cells]))
             if len(all_wanted) == len(wanted):
-                return self._update(patch, partition, numbers, state)
+                return division if len(division.changed_cells) else None
             # a cell at the edge of the patch changes too: its own surroundings are needed
             wanted = all_wanted
         return None
+
+    def divide(self, division: Division) -> Increment:
+        """Divide cells as has been found, by the body as it still is.
+
+        Raises
+        ------
+        XfemError
+            If a cut would join what is already separate.
+        """
+        cells = division.changed_cells
+        slots = join_slots(division.patch, division.partition)
+        before = self.node_count
+        place = self._renumber(slots, division)
+        self._store_simplices(division, cells, place)
+        self.split_cells[cells] = True
+        self._dropped[cells] = 0
+        empty = division.cell[~division.solid]
+        np.add.at(self._dropped, empty[_among(empty, cells)], 1)
+        touched = self.patches.cells_around(self.patches.nodes_of(cells))
+        moved = distinct(np.concatenate([cells, self._moved]))
+        return Increment(cells, touched, moved, before, self._source)
 
     def _held_in(self, patch: MeshPatch, numbers: _Ints) -> Held:
         """Make the rule that what a cut has separated it separates, whatever came later."""
@@ -202,7 +229,7 @@ class GrowingBody:
 
         return held
 
-    def _compare(self, patch: MeshPatch, partition: Partition, numbers: _Ints) -> "_Comparison":
+    def _compare(self, patch: MeshPatch, partition: Partition, numbers: _Ints) -> Division:
         """Match the pieces of a patch with the stored ones."""
         fraction = partition.fraction
         solid = fraction > 0.0
@@ -220,30 +247,11 @@ class GrowingBody:
             orphan = match_pieces(cell, label, side, solid, *store, old, changed)
         if orphan >= 0:
             raise XfemError(f"a cut would join parts of cell {cell[orphan]} that are separate")
-        return _Comparison(cell, label, fraction, solid, old, changed)
+        return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
 
-    def _update(
-        self, patch: MeshPatch, partition: Partition, numbers: _Ints, state: "_Comparison"
-    ) -> Increment | None:
-        cells = state.changed_cells
-        if len(cells) == 0:
-            return None
-        slots = join_slots(patch, partition)
-        before = self.node_count
-        place = self._renumber(patch, partition, slots, state)
-        self._store_simplices(patch, partition, numbers, cells, place)
-        self.split_cells[cells] = True
-        self._dropped[cells] = 0
-        empty = state.cell[~state.solid]
-        np.add.at(self._dropped, empty[_among(empty, cells)], 1)
-        touched = self.patches.cells_around(self.patches.nodes_of(cells))
-        moved = distinct(np.concatenate([cells, self._moved]))
-        return Increment(cells, touched, moved, before, self._source)
-
-    def _renumber(
-        self, patch: MeshPatch, partition: Partition, slots: PatchSlots, state: "_Comparison"
-    ) -> _Ints:
+    def _renumber(self, slots: PatchSlots, state: Division) -> _Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
+        patch, partition = state.patch, state.partition
         pieces, total = len(state.old), len(slots.piece_cell)
         local_cell = slots.cells[slots.piece_cell]
         cell = patch.whole_cells[local_cell]
@@ -289,7 +297,7 @@ class GrowingBody:
         number: _Ints,
         solid: NDArray[np.bool_],
         old: _Ints,
-        state: "_Comparison",
+        state: Division,
     ) -> _Ints:
         place = np.empty(len(old), dtype=np.int64)
         moved = np.zeros(len(old), dtype=bool)
@@ -329,16 +337,10 @@ class GrowingBody:
             store.rows = store.rows[:after]
         return place
 
-    def _store_simplices(
-        self,
-        patch: MeshPatch,
-        partition: Partition,
-        numbers: _Ints,
-        cells: _Ints,
-        place: _Ints,
-    ) -> None:
+    def _store_simplices(self, division: Division, cells: _Ints, place: _Ints) -> None:
         """Replace the sub-simplices of the changed cells."""
-        ids = self.points.number(partition.points, patch.whole_nodes, numbers)
+        patch, partition = division.patch, division.partition
+        ids = self.points.number(partition.points, patch.whole_nodes, division.numbers)
         cell = patch.whole_cells[partition.parent[partition.sub_piece]]
         rows = np.flatnonzero((partition.sub_fraction > 0.0) & _among(cell, cells))
         rows = rows[np.argsort(cell[rows], kind="stable")]
@@ -354,23 +356,6 @@ class GrowingBody:
             np.searchsorted(cell[rows], cells, side="right"),
         )
         self.sub_range[cells] = begin + np.stack(edges, axis=1)
-
-
-@dataclass(frozen=True)
-class _Comparison:
-    """Pieces of a patch against the stored ones: cell, labels, share, and the old piece."""
-
-    cell: _Ints
-    label: NDArray[np.int8]
-    fraction: _Floats
-    solid: NDArray[np.bool_]
-    old: _Ints
-    changed: NDArray[np.bool_]
-
-    @property
-    def changed_cells(self) -> _Ints:
-        """Cells of the pieces whose labels are new, ascending."""
-        return distinct(self.cell[self.changed & self.solid])
 
 
 def _among(values: _Ints, ascending: _Ints) -> NDArray[np.bool_]:

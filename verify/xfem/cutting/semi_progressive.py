@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.collision.bounding_tree import BoundingTree
 from verify.xfem.cuts import Cut
+from verify.xfem.cutting.division import Division
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
 from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.stroke import Stroke
@@ -128,14 +129,52 @@ class SemiProgressiveCutter:
         Increment or None
             None if no element was split.
         """
-        found = [stroke.advance(time, self.interior) for stroke in self.strokes]
+        division = self.look(time)
+        return None if division is None else self.divide(division, time)
+
+    def look(self, time: float, most: int | None = None) -> Division | None:
+        """Move all tools to where they are at that time, and find what they have crossed.
+
+        Parameters
+        ----------
+        time : float
+            In seconds.
+        most : int, optional
+            How many of the elements that a stroke has crossed through may be split. If there are
+            more, the others wait, and no tool moves on before they have had their turn.
+
+        Returns
+        -------
+        Division or None
+            For `divide`, with which the body must be divided before it is looked at again.
+        """
+        if self.waits:
+            found = [stroke.waiting for stroke in self.strokes]
+        else:
+            found = [stroke.advance(time, self.interior) for stroke in self.strokes]
+        if most is not None or self.waits:
+            limit = len(self.mesh.cells) if most is None else most
+            pairs = zip(self.strokes, found, strict=True)
+            found = [stroke.admit(candidates, limit) for stroke, candidates in pairs]
         candidates = np.concatenate([_NONE, *found])
-        if len(candidates) == 0:
-            return None
-        increment = self.body.split(candidates, self._cuts_near)
-        if increment is not None:
-            self._record(increment, time)
+        division = self.body.look(candidates, self._cuts_near) if len(candidates) else None
+        if division is not None:
+            self._fix(division)
+        elif self.waits:
+            # the first are crossed through so barely that they wait for the blade to go on
+            return self.look(time)
+        return division
+
+    def divide(self, division: Division, time: float) -> Increment:
+        """Divide the body as has been found; elements count as split at that time, in seconds."""
+        increment = self.body.divide(division)
+        self._record(increment, time)
         return increment
+
+    @property
+    def waits(self) -> bool:
+        """Whether elements that have been crossed through wait for their turn."""
+        return any(len(stroke.waiting) > 0 for stroke in self.strokes)
 
     @property
     def cuts(self) -> list[Cut]:
@@ -176,17 +215,23 @@ class SemiProgressiveCutter:
         numbers = np.array([stroke.number for stroke in near], dtype=np.int64)
         return numbers, [stroke.seen_by(patch) for stroke in near]
 
+    def _fix(self, division: Division) -> None:
+        """Let the level sets of strokes stay what they are where they divide cells."""
+        nodes = self.body.patches.nodes_of(division.changed_cells)
+        split = (division.label[division.changed & division.solid] != 0).any(axis=0)
+        for stroke in self.strokes:
+            if split[stroke.number]:
+                stroke.fix(nodes)
+
     def _record(self, increment: Increment, time: float) -> None:
         cells = increment.cells
-        nodes = self.body.patches.nodes_of(cells)
         for stroke in self.strokes:
             mine = cells[self.body.split_by(cells, stroke.number) & ~stroke.recorded[cells]]
             if len(mine) == 0:
                 continue
             stroke.recorded[mine] = True
-            stroke.fix(nodes)
             # a stroke that splits only a piece has not passed all edges of the element
-            leave = np.minimum(stroke.leave[mine], stroke.front)
+            leave = np.minimum(stroke.leave[mine], stroke.shown)
             entry = np.minimum(stroke.entry[mine], leave)
             self._records.append(_Record(mine, stroke.number, entry, leave, time, stroke.path))
 

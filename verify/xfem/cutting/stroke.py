@@ -68,6 +68,11 @@ class Stroke:
     ----------
     front : float
         How far the blade has come, in metres; negative before it starts.
+    shown : float
+        Travel up to which the body may be divided, in metres: `front`, or less where elements that
+        the blade has crossed through wait for their turn.
+    waiting : int array
+        Cells near those, to be asked again.
     entry, leave : (m,) float array
         Travel of the blade when it entered a cell and when it had crossed it through, in metres;
         infinite if it has not.
@@ -83,7 +88,8 @@ class Stroke:
         self, mesh: SimplexMesh, path: ToolPath, number: int, strokes_near: _Ints, size: _Floats
     ) -> None:
         self.path, self.number = path, number
-        self.front = -1.0
+        self.front = self.shown = -1.0
+        self.waiting = np.empty(0, dtype=np.int64)
         self.near = np.zeros(len(mesh.cells), dtype=bool)
         self.entry = np.full(len(mesh.cells), np.inf)
         self.leave = np.full(len(mesh.cells), np.inf)
@@ -121,7 +127,7 @@ class Stroke:
             elements.high,
             elements.order,
         )
-        self.front = front
+        self.front = self.shown = front
         self._turn += 1
         candidates, self._frontier = walk(
             np.concatenate([self._frontier, hit]),
@@ -144,6 +150,22 @@ class Stroke:
         )
         return candidates
 
+    def admit(self, candidates: _Ints, most: int) -> _Ints:
+        """Let at most some of the elements crossed through be split, the first first.
+
+        Returns the candidates for that; if elements are left, all of these are `waiting`.
+        """
+        self.shown = self.front
+        self.waiting = np.empty(0, dtype=np.int64)
+        candidates = candidates[~self.recorded[candidates] | (self._strokes_near[candidates] > 1)]
+        leave = self.leave[candidates[~self.recorded[candidates]]]
+        leave = leave[np.isfinite(leave)]
+        if len(leave) > most:
+            self.shown = min(self.front, float(np.partition(leave, most - 1)[most - 1]))
+            self.waiting = candidates
+            return candidates[self.leave[candidates] <= self.shown]
+        return candidates
+
     def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
         """Add positions to the path; level sets of nodes already used for a cut stay."""
         self.path = self.path.extended(blades, times)
@@ -164,10 +186,10 @@ class Stroke:
     def seen_by(self, patch: MeshPatch) -> Cut:
         """Give the cut so far, as a patch sees it."""
         values = self.level_sets(patch.whole_nodes)
-        return SeenCut(patch.points, values, self.path.sweep, self.front)
+        return SeenCut(patch.points, values, self.path.sweep, self.shown)
 
     @property
     def cut(self) -> Cut:
         """The cut so far, for `cut_mesh` on the whole mesh."""
         values = self.level_sets(np.arange(len(self._mesh.points)))
-        return SeenCut(self._mesh.points, values, self.path.sweep, self.front)
+        return SeenCut(self._mesh.points, values, self.path.sweep, self.shown)

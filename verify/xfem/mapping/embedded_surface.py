@@ -6,6 +6,7 @@ from the pieces, so the surface opens where the material does, and nowhere else.
 elements that a cut touched are looked at again (thesis 3.2.4, 4.4.2).
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,16 @@ class _Elements(NamedTuple):
     cells: _Ints
     points: _Floats
     gradients: _Floats
+
+
+class _Fragments(NamedTuple):
+    """Parts of facets: points (q, k), facet, barycentric corners in it, sides, if whole."""
+
+    ids: _Ints
+    source: _Ints
+    at: _Floats
+    label: NDArray[np.int8]
+    whole: NDArray[np.bool_]
 
 
 class _SurfaceCut:
@@ -100,17 +111,30 @@ class EmbeddedSurface:
         self._vertex_cell, self._vertex_at = locate_many(self.points, *self._elements)
         self._numbers = PointNumbers(len(self.points), mesh.space)
         self._edges = EdgePoints(self.points, self._numbers)
-        self._near = self._facets_near_cells()
+        self._near, self._around = self._facets_near_cells()
+        leaf, count = np.argsort(tree.order), len(tree.order)
+        self._boxes = tree.low[count + leaf], tree.high[count + leaf]
+        every = np.arange(len(self.facets))
         own = self._vertex_cell[self.facets]
-        self._corners = corner_cells(self.points[self.facets], own, *self._elements)
+        self._corners = corner_cells(
+            self.points[self.facets], every, own, *self._around, *self._boxes, *self._elements
+        )
         self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
         nodes = distinct(self.facets)
-        self._cover(np.arange(len(self.facets)), nodes, *self._values(nodes))
+        self._replace(every, self._fragments(every, nodes, *self._values(nodes)))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
-        if increment is None:
-            return
+        if increment is not None:
+            for _ in self.following(increment):
+                pass
+
+    def following(self, increment: Increment) -> Iterator[None]:
+        """Follow a cut in two goes; until the second one the surface is what it was.
+
+        The first divides facets, the second finds the pieces with which their parts move. The body
+        must not be cut again in between.
+        """
         starts, facets = self._near
         near = facets[ranges(np.stack([starts[increment.moved], starts[increment.moved + 1]], 1))]
         if len(near) == 0:
@@ -126,7 +150,9 @@ class EmbeddedSurface:
         whole = (above.all(axis=1) | below.all(axis=1)).all(axis=1)
         concerned = near[~whole | moved[self._corners[0][near]].any(axis=1)]
         if len(concerned):
-            self._cover(concerned, nodes, numbers, values)
+            fragments = self._fragments(concerned, nodes, numbers, values)
+            yield
+            self._replace(concerned, fragments)
 
     def parts_of(self, given: _Ints) -> _Ints:
         """Facets in use that are parts of some given ones, in the order of these."""
@@ -140,8 +166,11 @@ class EmbeddedSurface:
             body.next_piece.rows,
         )  # fmt: skip
 
-    def _facets_near_cells(self) -> tuple[_Ints, _Ints]:
-        """Facets near each cell: those whose box meets its box, and those of its vertices."""
+    def _facets_near_cells(self) -> tuple[tuple[_Ints, _Ints], tuple[_Ints, _Ints]]:
+        """Facets near each cell, and cells near each facet, as (first of each, all).
+
+        They are near if their boxes meet, or if a vertex of the facet belongs to the cell.
+        """
         tree, slack = self._cutter.interior, self._elements.reach
         cells, facets = [], []
         corners = self.points[self.facets]
@@ -154,20 +183,24 @@ class EmbeddedSurface:
         cell, facet = np.concatenate(cells), np.concatenate(facets)
         order = np.argsort(cell, kind="stable")
         counts = np.bincount(cell, minlength=len(self._cutter.mesh.cells))
-        return np.concatenate([[0], np.cumsum(counts)]), facet[order]
+        around = np.cumsum([0, *map(len, cells)])
+        return (np.concatenate([[0], np.cumsum(counts)]), facet[order]), (around, cell)
 
-    def _cover(self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats) -> None:
-        """Split and embed some facets anew, given the cuts and their level sets at vertices."""
+    def _replace(self, facets: _Ints, fragments: "_Fragments") -> None:
+        """Put the parts of some facets in the place of what there is of these."""
         body = self._cutter.body
         self.surface.retire(ranges(self._facet_range[facets]))
-        ids, source, at, label, whole = self._fragments(facets, nodes, numbers, values)
+        ids, source, at, label, whole = fragments
         # where the corners of a whole facet are is known; only which piece that is may be new
         cell, weights, inside = (array.take(source, axis=0) for array in self._corners)
         material = self.points.take(self.facets.take(source, axis=0), axis=0)
         if not whole.all():
             parts = ~whole
             material[parts] = at[parts] @ material[parts]
-            found = corner_cells(material[parts], cell[parts], *self._elements)
+            found = corner_cells(
+                material[parts], source[parts], cell[parts], *self._around, *self._boxes,
+                *self._elements,
+            )  # fmt: skip
             cell[parts], weights[parts], inside[parts] = found
         piece = corner_pieces(
             cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,
@@ -180,8 +213,8 @@ class EmbeddedSurface:
 
     def _fragments(
         self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
-    ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8], NDArray[np.bool_]]:
-        """Parts of facets: points (q, k), facet, barycentric corners in it, sides, if whole."""
+    ) -> "_Fragments":
+        """Divide some facets, given the cuts and their level sets (q, cuts) at the vertices."""
         several = len(numbers) > 1 or self.facets.shape[1] == 2
         divide = self._divided_by_several if several else self._divided_by_one
         ids, source, at, side = divide(facets, nodes, numbers, values)
@@ -192,7 +225,7 @@ class EmbeddedSurface:
         label[:, numbers] = side
         alone = np.bincount(source, minlength=len(facets)) == 1
         is_whole = alone[source] & ~side.any(axis=1)
-        return ids, facets[source], at, label, is_whole
+        return _Fragments(ids, facets[source], at, label, is_whole)
 
     def _divided_by_one(
         self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats

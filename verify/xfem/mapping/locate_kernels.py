@@ -146,18 +146,39 @@ def cut_at(
 
 
 @njit(cache=True)
-def corner_cells(corners, likely, reach, low, high, order, cells, points, gradients):
+def _among(x, reach, some, floor, ceiling, cells, points, gradients, room):
+    """Give the cell of x of some cells, as `locate` does of all; -1 if x is in the box of none."""
+    best, at = -np.inf, np.int64(-1)
+    for cell in some:
+        apart = False
+        for i in range(len(x)):
+            apart = apart or x[i] < floor[cell, i] - reach or x[i] > ceiling[cell, i] + reach
+        if not apart:
+            smallest = barycentric(x, cell, cells, points, gradients, room)
+            if smallest > best:
+                best, at = smallest, cell
+    return at
+
+
+@njit(cache=True)
+def corner_cells(
+    corners, facet, likely, near_start, near, floor, ceiling,
+    reach, low, high, order, cells, points, gradients,
+):  # fmt: skip
     """Cell (q, k) of each corner of facets (q, k, s), looked up a little inside the facet.
 
-    Cells that are `likely` (q, n) are tried first: where a place is inside of one, it is in no
-    other. Returns the cells and the coordinates (q, k, d + 1) of the corner, and of the place
-    inside.
+    Each is a part of a given `facet` (q,). Cells that are `likely` (q, n) are tried first: where a
+    place is inside of one, it is in no other. Then those of `near` whose boxes, `floor` and
+    `ceiling` (m, s), meet that of the given facet, from `near_start` (f + 1,) on: no box of
+    another cell holds the place. Returns the cells and the coordinates (q, k, d + 1) of the
+    corner, and of the place inside.
     """
     count, size, space = corners.shape
     found = np.empty((count, size), dtype=np.int64)
     weights = np.empty((count, size, cells.shape[1]))
     at, inside = np.empty_like(weights), np.empty(space)
     for q in range(count):
+        some = near[near_start[facet[q]] : near_start[facet[q] + 1]]
         for k in range(size):
             for i in range(space):
                 inside[i] = (1.0 - _INWARDS) * corners[q, k, i]
@@ -169,7 +190,11 @@ def corner_cells(corners, likely, reach, low, high, order, cells, points, gradie
                     cell = trial
                     break
             if cell < 0:
-                cell = locate(inside, reach, low, high, order, cells, points, gradients)
+                cell = _among(
+                    inside, reach, some, floor, ceiling, cells, points, gradients, at[q, k]
+                )
+                if cell < 0:
+                    cell = locate(inside, reach, low, high, order, cells, points, gradients)
                 barycentric(inside, cell, cells, points, gradients, at[q, k])
             found[q, k] = cell
             barycentric(corners[q, k], cell, cells, points, gradients, weights[q, k])
