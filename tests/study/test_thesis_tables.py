@@ -290,6 +290,11 @@ def test_a_missed_limit_is_undecided_only_where_a_busy_machine_may_explain_it(me
     )
     assert verdict(replace(measured, hand=missed), topic) is Verdict.FAIL
     assert verdict(replace(measured, hand=missed, contended="busy"), topic) is Verdict.UNDECIDED
+    # cuts done at once are no excuse, and no charge
+    at_once = replace(measured.hand, within=shares, slowest=9e-3)
+    assert verdict(replace(measured, hand=at_once), topic) is Verdict.PASS
+    spread = replace(measured.hand, within_spread=shares, slowest_spread=9e-3)
+    assert verdict(replace(measured, hand=spread), topic) is Verdict.FAIL
     far = replace(
         measured, hand=replace(missed, slowest=9e-3, slowest_spread=9e-3), contended="busy"
     )

@@ -41,7 +41,7 @@ def execute(arguments: argparse.Namespace) -> int:
     if arguments.window or (out is None and has_display):
         from verify.replay.window import play_in_window
 
-        play_in_window(stage, scene.title, arguments.stroke)
+        play_in_window(stage, scene.title, arguments.stroke, arguments.spread)
         return 0
     return _play(stage, scene.name, arguments)
 
@@ -51,13 +51,14 @@ def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
     from verify.replay.animation import Frame, view_of, write_animation, write_picture
     from verify.replay.timings import timings_of
 
-    session = Session(stage)
+    session = Session(stage, spread=arguments.spread)
     every = max(1, round(stage.steps / (arguments.frames - 1)))
     frames = [Frame(0.0, session.picture(), session.blades())]
     while not session.finished:
         record = session.step()
         if arguments.out is not None and (record.step % every == 0 or session.finished):
             frames.append(Frame(record.time, session.picture(), session.blades()))
+    session.settle()
     records, quality, timings = session.records, quality_of(session), timings_of(session.records)
     if arguments.out is not None:
         view = view_of(frames)
@@ -79,13 +80,13 @@ def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
                     [r.step, r.time, *r.seconds.values(), r.split, r.unknowns, delay, r.kinetic,
                      r.strain, r.potential, r.work, r.dissipated, r.contacts]
                 )  # fmt: skip
-    last = records[-1]
     summary = {
         "case": name,
         "steps": len(records),
         "elements": len(stage.mesh.cells),
-        "split": last.split,
-        "unknowns": last.unknowns,
+        "spread": arguments.spread,
+        "split": int(session.cutter.body.split_cells.sum()),
+        "unknowns": int(session.displacement.size),
         "median_seconds": {
             **{phase: spread[0].median for phase, spread in timings.phases.items()},
             "step": timings.step.median,

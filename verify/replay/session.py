@@ -27,9 +27,9 @@ __all__ = ["MOST", "Session"]
 
 _Floats = NDArray[np.float64]
 
-_NONE = np.empty(0, dtype=np.int64)
+_NONE, _DONE = np.empty(0, dtype=np.int64), object()
 
-MOST = 24  # elements that a cut whose work is spread may split
+MOST = 24  # elements that a cut whose work is spread may split, but for ties
 
 
 class Session:
@@ -216,11 +216,11 @@ class Session:
             start = {hook: increment.inherit(values) for hook, values in self._start.items()}
             parts = self._parts_now(start)
         yield
-        goes = self.surfaces.following(increment)
-        done = False
-        while not done:
+        goes: Iterator[object] = self.surfaces.following(increment)
+        going = True
+        while going:
             with self._timed("cutting"):
-                done = next(goes, True)
+                going = next(goes, _DONE) is not _DONE
             yield
         with self._timed("cutting"):
             self.surfaces.material.update(increment)

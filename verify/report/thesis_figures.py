@@ -164,7 +164,7 @@ def _real_time(hand: Mapping[str, Any], contended: str) -> Markup:
     }
     shares = ", ".join(
         f"within {name} {share:.1%} ({hand['within_wall'][name]:.1%} in wall time; "
-        f"{hand['within_spread'][name]:.1%} with the work of a cut spread over four)"
+        f"{hand['within_spread'][name]:.1%} with the work of a cut spread over steps)"
         for name, share in hand["within"].items()
     )
     return tag(

@@ -32,7 +32,7 @@ class RealTime:
     within_wall : dict
         Likewise in wall time, the other work of the machine included.
     within_spread : dict
-        Likewise in processor time, the work of a cut spread over four steps.
+        Likewise in processor time, the work of a cut spread over steps: by these it is judged.
     resting, cutting : dict
         Median by phase, and of the whole step, of steps without and with newly split elements:
         processor time, s.

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["distinct", "ranges"]
+__all__ = ["distinct", "distinct_in_lists", "distinct_in_rows", "ranges"]
 
 _Ints = NDArray[np.int64]
 
@@ -29,3 +29,37 @@ def ranges(bounds):
             found[count] = number
             count += 1
     return found
+
+
+@njit(cache=True)
+def distinct_in_rows(table, rows, place):
+    """Distinct integers of some rows of a table; `place` is -1 for each integer, and stays so."""
+    found = np.empty(len(rows) * table.shape[1], dtype=np.int64)
+    count = 0
+    for row in rows:
+        for item in table[row]:
+            if place[item] < 0:
+                place[item], found[count] = 0, item
+                count += 1
+    for k in range(count):
+        place[found[k]] = -1
+    return found[:count]
+
+
+@njit(cache=True)
+def distinct_in_lists(starts, items, rows, place):
+    """Distinct integers of some lists, of which each begins where the one before ends."""
+    room = 0
+    for row in rows:
+        room += starts[row + 1] - starts[row]
+    found = np.empty(room, dtype=np.int64)
+    count = 0
+    for row in rows:
+        for k in range(starts[row], starts[row + 1]):
+            item = items[k]
+            if place[item] < 0:
+                place[item], found[count] = 0, item
+                count += 1
+    for k in range(count):
+        place[found[k]] = -1
+    return found[:count]

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.xfem.cutting.distinct import distinct_in_lists, distinct_in_rows
 from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["MeshPatch", "PatchCutter"]
@@ -56,11 +57,11 @@ class PatchCutter:
 
     def nodes_of(self, cells: _Ints) -> _Ints:
         """Nodes of some cells, ascending."""
-        return np.sort(_nodes_of(self.mesh.cells, cells, self._node_place))
+        return np.sort(distinct_in_rows(self.mesh.cells, cells, self._node_place))
 
     def cells_around(self, nodes: _Ints) -> _Ints:
         """Cells that have one of the nodes, ascending."""
-        return np.sort(_cells_around(self._starts, self._around, nodes, self._cell_place))
+        return np.sort(distinct_in_lists(self._starts, self._around, nodes, self._cell_place))
 
     def patch(self, cells: _Ints) -> MeshPatch:
         """Make the patch of these cells, given ascending."""
@@ -74,38 +75,6 @@ class PatchCutter:
             self._node_place,
         )
         return MeshPatch(self.mesh.points, self.mesh.extent, cells, nodes, local, across)
-
-
-@njit(cache=True)
-def _nodes_of(mesh_cells, cells, place):
-    found = np.empty(len(cells) * mesh_cells.shape[1], dtype=np.int64)
-    count = 0
-    for cell in cells:
-        for node in mesh_cells[cell]:
-            if place[node] < 0:
-                place[node], found[count] = 0, node
-                count += 1
-    for k in range(count):
-        place[found[k]] = -1
-    return found[:count]
-
-
-@njit(cache=True)
-def _cells_around(starts, around, nodes, place):
-    room = 0
-    for node in nodes:
-        room += starts[node + 1] - starts[node]
-    found = np.empty(room, dtype=np.int64)
-    count = 0
-    for node in nodes:
-        for k in range(starts[node], starts[node + 1]):
-            cell = around[k]
-            if place[cell] < 0:
-                place[cell], found[count] = 0, cell
-                count += 1
-    for k in range(count):
-        place[found[k]] = -1
-    return found[:count]
 
 
 @njit(cache=True)

@@ -12,7 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.cutting.distinct import distinct, ranges
+from verify.xfem.cutting.distinct import (
+    distinct,
+    distinct_in_lists,
+    distinct_in_rows,
+    ranges,
+)
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.point_numbers import FoundPoints, PointNumbers
@@ -120,6 +125,7 @@ class EmbeddedSurface:
             self.points[self.facets], every, own, *self._around, *self._boxes, *self._elements
         )
         self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
+        self._place = np.full(max(len(self.points), len(self.facets)), -1)
         nodes = distinct(self.facets)
         self._replace(every, self._fragments(every, nodes, *self._values(nodes)))
 
@@ -135,19 +141,16 @@ class EmbeddedSurface:
         The first divides facets, the second finds the pieces with which their parts move. The body
         must not be cut again in between.
         """
-        starts, facets = self._near
-        near = facets[ranges(np.stack([starts[increment.moved], starts[increment.moved + 1]], 1))]
+        near = np.sort(distinct_in_lists(*self._near, increment.moved, self._place))
         if len(near) == 0:
             return
-        near = distinct(near)
-        nodes = distinct(self.facets[near])
+        nodes = np.sort(distinct_in_rows(self.facets, near, self._place))
         numbers, values = self._values(nodes)
         # a facet on one side of all cuts, in cells that are as they were, stays as it is
         moved = np.zeros(len(self._cutter.mesh.cells), dtype=bool)
         moved[increment.moved] = True
-        above = (values > 0.0)[np.searchsorted(nodes, self.facets[near])]
-        below = (values < 0.0)[np.searchsorted(nodes, self.facets[near])]
-        whole = (above.all(axis=1) | below.all(axis=1)).all(axis=1)
+        levels = values[np.searchsorted(nodes, self.facets[near])]
+        whole = ((levels > 0.0).all(axis=1) | (levels < 0.0).all(axis=1)).all(axis=1)
         concerned = near[~whole | moved[self._corners[0][near]].any(axis=1)]
         if len(concerned):
             fragments = self._fragments(concerned, nodes, numbers, values)

@@ -155,6 +155,8 @@ def _among(x, reach, some, floor, ceiling, cells, points, gradients, room):
             apart = apart or x[i] < floor[cell, i] - reach or x[i] > ceiling[cell, i] + reach
         if not apart:
             smallest = barycentric(x, cell, cells, points, gradients, room)
+            if smallest > _TIE:  # inside of it, so in no other
+                return cell
             if smallest > best:
                 best, at = smallest, cell
     return at
