@@ -90,8 +90,9 @@ def ended(child):
     return ending
 
 
-def test_two_ranks_give_the_answer_of_one_and_say_so(verify, job):
-    (verify.folder / "box.toml").write_text(BOX)
+@pytest.mark.parametrize("kinematics", ["linear", "corotational"])
+def test_two_ranks_give_the_answer_of_one_and_say_so(verify, job, kinematics):
+    (verify.folder / "box.toml").write_text(f'{BOX}[analysis]\nkinematics = "{kinematics}"\n')
     done = verify("run", "box.toml", "--solver=reference", "--no-cache", "--ranks", "2",
                   "--out", "out")  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -105,6 +106,16 @@ def test_two_ranks_give_the_answer_of_one_and_say_so(verify, job):
     order = [np.lexsort(row.T[::-1]) for row in rows]
     difference = one.displacement[-1][order[0]] - two.displacement[-1][order[1]]
     assert np.abs(difference).max() <= 1e-10 * np.abs(one.displacement).max()
+
+
+def test_a_motion_takes_one_process_and_says_why(verify):
+    motion = '[analysis]\nkind = "dynamic"\nduration = 0.1\ntime_step = 0.1\noutputs = 2\n'
+    text = BOX.replace("poisson = 0.3", "poisson = 0.3\ndensity = 1.0")
+    (verify.folder / "box.toml").write_text(text + motion)
+    done = verify("run", "box.toml", "--solver=reference", "--no-cache", "--ranks", "2",
+                  "--out", "out")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "a motion is not distributed" in verify.records()["reference", 0]["notes"]["ranks"]
 
 
 def test_a_time_limit_ends_all_ranks(job):

@@ -10,7 +10,7 @@ from verify.result import Verdict
 from verify.scene import load_scene
 from verify.study.budget import Candidate, cheapest_adequate, error_budget, on_realised_cut
 from verify.study.budget.budget import Answer
-from verify.study.budget.scenes import polylines_of
+from verify.study.budget.realised_cut import polylines_of, triangles_of
 
 
 class Affine:
@@ -133,7 +133,7 @@ def test_segments_in_any_order_and_direction_become_the_polylines_they_are():
     for _ in range(20):
         order = rng.permutation(len(segments))
         flipped = [segments[i][:: rng.choice([-1, 1])] for i in order]
-        lines = polylines_of(np.array(flipped), 1e-12)
+        lines = polylines_of(np.array(flipped))
         sizes = sorted(len(line) for line in lines)
         assert sizes == [2, 2, 3]  # the middle of the straight part is no corner
         total = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines)
@@ -147,3 +147,17 @@ def test_the_scene_of_the_realised_cut_has_that_cut_and_one_level(scene):
     (cut,) = derived.cuts
     np.testing.assert_allclose(cut.points, [[0.0, 0.4], [1.0, 0.6]])
     assert derived.supports == scene.supports
+
+
+def test_triangles_of_a_cut_close_to_nodes_are_those_with_an_area():
+    """A square of two triangles, beside which a cut that misses a node by 1e-9 has a sliver."""
+    a, b, c, d = np.array([[0.0, 0, 0], [1, 0, 0.3], [1, 1, 0.3], [0, 1, 0]])
+    near = b + np.array([0.0, 0.0, 1e-9])
+    needle = np.array([a, d, a + 0.5 * (d - a) + np.array([1e-9, 0.0, 0.0])])
+    found = triangles_of(np.array([[a, near, c], [c, d, a], [b, near, c], needle]))
+    assert found.shape == (2, 3, 3)
+    areas = np.linalg.norm(np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]), axis=1)
+    np.testing.assert_allclose(areas, np.linalg.norm([-0.3, 0.0, 1.0]), rtol=1e-8)
+    corners = {tuple(corner) for corner in found.reshape(-1, 3)}
+    assert len(corners) == 4  # they still meet along a whole edge
+    assert triangles_of(np.zeros((0, 3, 3))).shape == (0, 3, 3)

@@ -87,6 +87,93 @@ def test_tips_on_edges_are_realised_and_the_method_differs_less_than_the_mesh():
     assert 1.0 <= found["total"] / found[MESH] <= 1.5
 
 
+BURIED = {
+    "title": "A tilted crack in a block whose surface moves as in infinite space",
+    "requirement": "It shall open.",
+    "geometry": {"kind": "box", "lower": [-1.0, -1.0, -1.0], "upper": [1.0, 1.0, 1.0]},
+    "mesh": {"cells": [[4, 4, 4]]},
+    "material": {"young": 1.0, "poisson": 0.3},
+    "exact": {"solution": "penny", "parameters": {"a": 0.52, "tension": 1.0,
+              "centre": [0.03, 0.02, 0.05], "normal": [0.1, 0.2, 1.0]}},
+    "supports": [{"where": side, "displacement": "exact"}
+                 for side in ("bottom", "top", "left", "right", "front", "back")],
+    "cuts": [{"kind": "disc", "centre": [0.03, 0.02, 0.05], "normal": [0.1, 0.2, 1.0],
+              "radius": 0.52}],
+    "reference": {"degree": 1},
+    "quantities": [{"kind": "strain_energy"}],
+}  # fmt: skip
+
+
+def test_in_space_a_front_inside_elements_is_an_error_of_the_cut_and_not_of_the_method():
+    """The elements of the front are not split: the crack that XFEM makes is much smaller, which
+    conforming elements with the same crack show as well."""
+    study = budget_of(Scene.model_validate(BURIED))
+    assert study.missing == []
+    found = parts(study, "displacement_l2")
+    assert found.keys() == {CUT, MESH, METHOD, "total"}
+    assert found[CUT] > 10 * found[MESH] > 50 * found[METHOD]
+    energy = parts(study, "strain_energy")
+    total = energy.pop("total")
+    assert sum(energy.values()) == pytest.approx(total, rel=1e-10)
+    assert energy[CUT] > 0.9 * total  # relative to what is released by the larger crack
+
+
+@pytest.mark.heavy
+def test_a_round_cut_in_space_is_taken_apart_and_nothing_is_left_out():
+    """A cylinder through a block, realised as 168 plane triangles that both methods share."""
+    block = {
+        **SETTLING,
+        "geometry": {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]},
+        "mesh": {"cells": [[3, 3, 3]]},
+        "material": {"young": 1e4, "poisson": 0.3, "density": 1.0},
+        "analysis": {"kind": "static"},
+        "supports": [{"where": "bottom", "displacement": [0.0, 0.0, 0.0]}],
+        "loads": [{"kind": "gravity", "acceleration": [3.0, 2.0, -10.0]}],
+        "cuts": [{"kind": "cylinder", "base": [0.5, 0.48, -0.2], "axis": [0.0, 0.0, 1.0],
+                  "radius": 0.33, "height": 1.5}],
+        "reference": {"size": 0.5, "degree": 1},
+        "quantities": [{"kind": "strain_energy"}],
+    }  # fmt: skip
+    study = budget_of(Scene.model_validate(block))
+    assert study.missing == []
+    found = parts(study, "strain_energy")
+    total = found.pop("total")
+    assert list(found) == [CUT, "finite rotations → linear", MESH, METHOD]
+    assert sum(found.values()) == pytest.approx(total, rel=1e-10)
+    assert abs(found[METHOD]) < 0.5 * abs(found[MESH])
+    assert abs(found["finite rotations → linear"]) < 0.05 * abs(total)
+
+
+UNCUT = {
+    "title": "A block without any cut, pulled and bent",
+    "requirement": "It shall stretch.",
+    "material": {"young": 1e4, "poisson": 0.3},
+    "quantities": [{"kind": "strain_energy"}],
+}
+PLANE = {
+    "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 0.5]},
+    "mesh": {"cells": [[4, 2]]},
+    "material": {**UNCUT["material"], "plane": "strain"},
+    "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
+    "loads": [{"kind": "traction", "where": "right", "traction": [10.0, 3.0]}],
+    "reference": {"size": 0.25},
+}
+SOLID = {
+    "geometry": {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 0.5, 0.5]},
+    "mesh": {"cells": [[4, 2, 2]]},
+    "supports": [{"where": "left", "displacement": [0.0, 0.0, 0.0]}],
+    "loads": [{"kind": "traction", "where": "right", "traction": [10.0, 3.0, 0.0]}],
+    "reference": {"size": 0.5, "degree": 1},
+}
+
+
+@pytest.mark.parametrize("body", [PLANE, SOLID], ids=["plane", "solid"])
+def test_without_a_cut_xfem_is_the_conforming_elements_and_all_is_the_mesh(body):
+    found = parts(budget_of(Scene.model_validate(UNCUT | body)), "displacement_l2")
+    assert CUT not in found
+    assert found[METHOD] < 1e-10 < 1e-2 < found[MESH]
+
+
 SETTLING = {
     "title": "A block, cut halfway, is loaded and comes to rest",
     "requirement": "It shall come to rest.",

@@ -1,29 +1,26 @@
 """Scenes that differ from a given one in one thing: its kinematics, cut, mesh, step, or motion."""
 
-from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
+from verify.study.budget.realised_cut import polylines_of, triangles_of
 
 __all__ = [
     "at_rest",
     "coarsest",
     "on_one_level",
     "on_realised_cut",
-    "polylines_of",
     "with_kinematics",
     "with_time_step",
 ]
 
 Array = NDArray[np.float64]
-
-_SAME = 1e-10  # of the body's size: two corners this close are one
-_STRAIGHT = 1e-9
 
 
 def with_kinematics(scene: Scene, kinematics: str) -> Scene:
@@ -72,9 +69,9 @@ def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) ->
     Parameters
     ----------
     scene : Scene
-        Plane.
-    facets : (f, 2, 2) array
-        ``Solution.cut_facets``, m.
+    facets : (f, d, d) array
+        ``Solution.cut_facets``, m: segments, joined to polylines; in space triangles, of which
+        each becomes a cut.
     level : int
         The mesh level that becomes the only one.
     kinematics : str
@@ -82,25 +79,28 @@ def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) ->
     Raises
     ------
     UnsupportedSceneError
-        If the scene is not plane, or its cuts open at different times.
+        If its cuts open at different times, or a part of the realised cut can be none of a scene.
     """
-    if scene.dimension != 2:
-        raise UnsupportedSceneError("the realised cut is taken as geometry in the plane only")
     opens = {float(getattr(cut, "opens_at", 0.0)) for cut in scene.cuts}
     if len(opens) > 1:
         raise UnsupportedSceneError(
             "its cuts open at different times, and the realised cut does not say which is which"
         )
-    size = float(np.ptp(facets.reshape(-1, 2), axis=0).max()) if len(facets) else 0.0
+    plane = scene.dimension == 2
+    kind, parts = ("polyline", polylines_of(facets)) if plane else ("polygon", triangles_of(facets))
     cuts = [
-        {"kind": "polyline", "name": f"realised{i}", "points": line.tolist(), "opens_at": when}
+        {"kind": kind, "name": f"realised{i}", "points": part.tolist(), "opens_at": when}
         for when in opens
-        for i, line in enumerate(polylines_of(facets, _SAME * size))
+        for i, part in enumerate(parts)
     ]
     energy = [{"kind": "strain_energy"}]  # the others may speak of a cut by its old name
     changes = {"cuts": cuts, "quantities": energy, "mesh": _levels(scene, slice(level, level + 1))}
     changes["analysis"] = {"kinematics": kinematics}
-    return _changed(scene, f"realised-{kinematics}", changes)
+    try:
+        return _changed(scene, f"realised-{kinematics}", changes)
+    except ValidationError as fault:
+        what = fault.errors()[0]["msg"].removeprefix("Value error, ")
+        raise UnsupportedSceneError(f"the realised cut is no geometry: {what}") from None
 
 
 def _levels(scene: Scene, chosen: slice) -> dict[str, Any]:
@@ -136,59 +136,3 @@ def _changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
     changed._file = scene.file or Path(f"{scene.name}.toml")
     changed._name = f"{scene.name}@{name}" if name else scene.name
     return changed
-
-
-def polylines_of(facets: Array, tolerance: float) -> list[Array]:
-    """Join segments (f, 2, 2) to polylines, split where more than two of them meet.
-
-    Corners within `tolerance` are one; those on a straight line are left out. A closed line
-    begins and ends in the same corner.
-    """
-    corners, ends = _numbered(facets, tolerance)
-    beside: dict[int, set[int]] = defaultdict(set)
-    for a, b in ends:
-        if a != b:
-            beside[a].add(b)
-            beside[b].add(a)
-    unused = {frozenset((a, b)) for a, b in ends if a != b}
-    starts = [node for node in beside if len(beside[node]) != 2] + list(beside)
-    lines = []
-    for start in starts:
-        for step in sorted(beside[start]):
-            if frozenset((start, step)) not in unused:
-                continue
-            line = [start, step]
-            unused.discard(frozenset(line))
-            while len(beside[line[-1]]) == 2 and line[-1] != start:
-                onwards = next(iter(beside[line[-1]] - {line[-2]}))
-                edge = frozenset((line[-1], onwards))
-                if edge not in unused:
-                    break
-                unused.discard(edge)
-                line.append(onwards)
-            lines.append(_without_straight(corners[line]))
-    return lines
-
-
-def _numbered(facets: Array, tolerance: float) -> tuple[Array, list[tuple[int, int]]]:
-    points = facets.reshape(-1, 2)
-    number = np.full(len(points), -1)
-    kept: list[Array] = []
-    for i, point in enumerate(points):
-        for j, other in enumerate(kept):
-            if np.abs(point - other).max() <= tolerance:
-                number[i] = j
-                break
-        else:
-            number[i] = len(kept)
-            kept.append(point)
-    pairs = [(int(a), int(b)) for a, b in number.reshape(-1, 2)]
-    return np.array(kept).reshape(-1, 2), pairs
-
-
-def _without_straight(line: Array) -> Array:
-    step = np.diff(line, axis=0)
-    step /= np.linalg.norm(step, axis=1)[:, None]
-    turn = np.abs(step[:-1, 0] * step[1:, 1] - step[:-1, 1] * step[1:, 0])
-    keep = np.concatenate([[True], turn > _STRAIGHT, [True]])
-    return np.asarray(line[keep])
