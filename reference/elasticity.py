@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from reference.boundary_values import constrained_values
 from reference.linear_solvers import (
     Answer,
+    IllConditionedError,
     direct_solver,
     near_null_space,
     solve_by_multigrid,
     solve_directly,
 )
 from reference.space import ConformingSpace
+from reference.weak_place import weak_place
 from verify.errors import InputError
 from verify.scene import BodyForce, Gravity, Material, Scene, Traction
 from verify.scene.parts import on_part
@@ -78,7 +80,8 @@ def solve_linear(
     Raises
     ------
     InputError
-        If a support or load acts nowhere, or a piece of the body is not held.
+        If a support or load acts nowhere, or a piece of the body is not held, or part of it so
+        weakly that round-off is all there is.
     RuntimeError
         If PETSc did not solve the system; the message says why.
     """
@@ -113,8 +116,12 @@ def solve_linear(
     if method == "direct":
         solver = direct_solver(matrix)
         timings["factorisation"] = perf_counter() - assembled
-        answer = solve_directly(solver, matrix, x, vector)
-        solver.destroy()
+        try:
+            answer = solve_directly(solver, matrix, x, vector)
+        except IllConditionedError as error:
+            raise weak_place(scene, space, error, space.everywhere(error.correction)) from error
+        finally:
+            solver.destroy()
     else:
         matrix.setNearNullSpace(near_null_space(matrix, space))
         answer = solve_by_multigrid(matrix, x, vector, tolerance)

@@ -9,6 +9,7 @@ from reference.space import ConformingSpace
 
 __all__ = [
     "Answer",
+    "IllConditionedError",
     "direct_solver",
     "near_null_space",
     "rigid_motions",
@@ -54,6 +55,24 @@ class Answer(NamedTuple):
     iterations: int
 
 
+class IllConditionedError(RuntimeError):
+    """A system was factorised, but its solution is lost in round-off.
+
+    Attributes
+    ----------
+    correction : (l,) array
+        Last correction of the unknowns of this rank: largest where the system is weak.
+    size : float
+        Its norm over that of the solution.
+    """
+
+    def __init__(self, correction: NDArray[np.float64], size: float) -> None:
+        super().__init__(
+            f"MUMPS did not solve the system (a refined solution differs by {size:.1e})"
+        )
+        self.correction, self.size = correction, size
+
+
 def direct_solver(matrix: Any) -> Any:
     """Factorise a symmetric positive definite matrix by MUMPS; gives a PETSc KSP."""
     from petsc4py import PETSc
@@ -84,7 +103,9 @@ def solve_directly(solver: Any, matrix: Any, x: Any, vector: Any) -> Answer:
     Raises
     ------
     RuntimeError
-        If MUMPS failed, or the last correction is not small.
+        If MUMPS failed.
+    IllConditionedError
+        If the last correction is not small.
     """
     residual, correction = vector.duplicate(), x.duplicate()
     loads = _residual(matrix, x, vector, residual)  # x holds the supports' values so far
@@ -97,13 +118,13 @@ def solve_directly(solver: Any, matrix: Any, x: Any, vector: Any) -> Answer:
         size = float(correction.norm() / (x.norm() or 1.0))
         x.axpy(1.0, correction)
     left = _residual(matrix, x, vector, residual) / (loads or 1.0)
+    last = np.array(correction.array, dtype=float)
     residual.destroy()
     correction.destroy()
-    if reason < 0 or not size <= _LARGEST_CORRECTION:
-        raise RuntimeError(
-            f"MUMPS did not solve the system (PETSc reason {reason}, a refined solution differs "
-            f"by {size:.1e})"
-        )
+    if reason < 0:
+        raise RuntimeError(f"MUMPS did not solve the system (PETSc reason {reason})")
+    if not size <= _LARGEST_CORRECTION:
+        raise IllConditionedError(last, size)
     return Answer("PETSc, MUMPS Cholesky", size, left, 0)
 
 

@@ -12,10 +12,11 @@ import numpy as np
 
 from reference.boundary_values import constrained_values
 from reference.elasticity import LinearSolve, lame, load_form, mean_stiffness
-from reference.linear_solvers import solve_directly, symmetric_solver
+from reference.linear_solvers import IllConditionedError, solve_directly, symmetric_solver
 from reference.mixed_solver import solve_saddle
 from reference.mixed_space import MixedSpace, mixed_space
 from reference.space import ConformingSpace
+from reference.weak_place import weak_place
 from verify.errors import InputError
 from verify.scene import Material, Scene
 
@@ -101,8 +102,14 @@ def solve_mixed(
         method = "direct" if small else "multigrid"
     if method == "direct":
         solver = symmetric_solver(matrix)
-        answer = solve_directly(solver, matrix, x, vector)
-        solver.destroy()
+        try:
+            answer = solve_directly(solver, matrix, x, vector)
+        except IllConditionedError as error:
+            ghosted = np.zeros(len(solution.x.array))  # what other ranks own is not read
+            ghosted[: len(error.correction)] = error.correction
+            raise weak_place(scene, space, error, mixed.displacement(ghosted)) from error
+        finally:
+            solver.destroy()
     else:
         weight = _pressure_mass(scene.material, mixed)
         answer = solve_saddle(matrix, weight, mixed, x, vector, tolerance)

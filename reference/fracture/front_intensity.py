@@ -76,35 +76,41 @@ def front_intensity(
     Raises
     ------
     InputError
-        If the field is plane, or a radius does not fit the mesh.
+        If the field is plane, or a radius or the number of stations does not fit the mesh.
     """
     if solution.dimension != 3:
         raise InputError("stress intensities along a front of a plane field; expected one in space")
     corners = np.unique(solution.cells[:, :4])
     place = np.full(len(solution.points), -1, dtype=np.int64)
     place[corners] = np.arange(len(corners))
+    radii = np.atleast_1d(np.asarray(radii, dtype=float))
     at = front.coordinates(solution.points[corners])
     away = np.hypot(at.ahead, at.across)
     centres, width = _stations(front, stations)
     on = away <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
-    values = []
-    for radius in np.atleast_1d(np.asarray(radii, dtype=float)):
-        fall = np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0)
+    for radius in radii:
         _check_fit(solution, place, away, radius)
-        row = []
-        for centre in centres:
-            weight = fall * _hat(front, at.along, centre, width)
-            cells = np.flatnonzero((weight[place[solution.cells[:, :4]]] > 0).any(axis=1))
-            q = weight[:, None] * at.axes[:, 0]
-            total = np.zeros(3)
-            for start in range(0, len(cells), _CHUNK):
-                part = cells[start : start + _CHUNK]
-                total += _interaction(solution, material, front, part, q, place, body_force)
-            extent = _mean_length(front, at.along[on], weight[on])
-            modulus = 0.5 * material.young / (1 - material.poisson**2)
-            row.append(total * [modulus, modulus, hooke(material).shear] / extent)
-        values.append(row)
-    domains = np.array(values)
+    within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
+    ahead = at.axes[:, 0]
+    nodal = np.zeros((len(corners), 3))  # M of each mode is linear in the extension of each node
+    for start in range(0, len(within), _CHUNK):
+        part = within[start : start + _CHUNK]
+        found = _interaction(solution, material, front, part, ahead, place, body_force)
+        nodes = place[solution.cells[part, :4]].ravel()
+        for mode in range(3):
+            values = found[:, :, mode].ravel()
+            nodal[:, mode] += np.bincount(nodes, values, minlength=len(corners))
+    hats = np.array([_hat(front, at.along, centre, width) for centre in centres])
+    falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
+    modulus = 0.5 * material.young / (1 - material.poisson**2)
+    extents = np.array([_mean_length(front, at.along[on], hat[on]) for hat in hats])
+    if not extents.all():
+        raise InputError(
+            f"{stations} stations along a front of {np.count_nonzero(on)} nodes: one of them has no "
+            "node of the mesh; ask for fewer, or refine"
+        )
+    scale = np.array([modulus, modulus, hooke(material).shear]) / extents[:, None]
+    domains = np.array([(hats * fall) @ nodal * scale for fall in falls])
     mean = domains.mean(axis=0)
     return FrontIntensity(centres, mean, np.abs(domains - mean).max(axis=0), domains)
 
@@ -156,34 +162,35 @@ def _interaction(
     material: Material,
     front: Front,
     cells: NDArray[np.int64],
-    q: Array,
+    ahead: Array,
     place: NDArray[np.int64],
     body_force: Array | None,
 ) -> Array:
-    """Sum up M of the three modes over some cells."""
+    """M (m, 4, 3) of the three modes in some cells, if a corner alone moves by one ahead."""
     at = cell_gradients(solution, cells)
     local = front.coordinates(at.points.reshape(-1, 3))
     axes = local.axes
-    nodal = q[place[solution.cells[cells, :4]]]  # (m, 4, 3)
-    share = at.corner_shares
-    q_here = np.einsum("qk,mki->mqi", share, nodal).reshape(-1, 3)
-    q_slope = np.einsum("mqkj,mki->mqij", at.hats, nodal).reshape(-1, 3, 3)
+    # a corner's direction and slopes in the axes of each point: (points, 4, 3)
+    unit = np.repeat(ahead[place[solution.cells[cells, :4]]], at.points.shape[1], axis=0)
+    unit = unit @ axes.swapaxes(1, 2)
+    slope = at.hats.reshape(-1, 4, 3) @ axes.swapaxes(1, 2)
     gradient = axes @ at.gradient.reshape(-1, 3, 3) @ axes.swapaxes(1, 2)
-    q_slope = axes @ q_slope @ axes.swapaxes(1, 2)
-    q_here = np.einsum("nij,nj->ni", axes, q_here)
     stress = hooke(material).stress(gradient)
-    weights = at.weights.ravel()
-    found = []
+    turned = gradient.swapaxes(1, 2)
+    share = np.tile(at.corner_shares, (len(cells), 1))
+    weights = at.weights.reshape(-1, 1)
+    found = np.empty((len(cells), 4, 3))
     for mode in (1, 2, 3):
         field = mode_field(mode, material, local.ahead, local.across, front.curvature)
         work = np.sum(field.stress * gradient, axis=(1, 2))  # σ̂ : ε = σ : ε̂
-        flux = np.einsum("nij,nik->nkj", stress, field.gradient)
-        flux += np.einsum("nij,nik->nkj", field.stress, gradient)
-        density = np.sum(flux * q_slope, axis=(1, 2)) - work * np.trace(q_slope, axis1=1, axis2=2)
-        density += np.sum(stress * field.misfit, axis=(1, 2)) * q_here[:, 0]
-        density += np.einsum("ni,nik,nk->n", field.divergence, gradient, q_here)
+        flux = field.gradient.swapaxes(1, 2) @ stress + turned @ field.stress
+        flux[:, [0, 1, 2], [0, 1, 2]] -= work[:, None]
+        source = (turned @ field.divergence[:, :, None])[:, :, 0]
+        source[:, 0] += np.sum(stress * field.misfit, axis=(1, 2))
         if body_force is not None:
             force = axes @ np.asarray(body_force, dtype=float)
-            density -= np.einsum("ni,nik,nk->n", force, field.gradient, q_here)
-        found.append(float(density @ weights))
-    return np.array(found)
+            source -= (field.gradient.swapaxes(1, 2) @ force[:, :, None])[:, :, 0]
+        density = np.sum((unit @ flux) * slope, axis=2)
+        density += share * (unit @ source[:, :, None])[:, :, 0]
+        found[:, :, mode - 1] = (weights * density).reshape(len(cells), -1, 4).sum(axis=1)
+    return found

@@ -188,3 +188,14 @@ def test_a_cut_that_ends_in_a_support_opens_there_and_its_levels_approach_each_o
     assert abs(values[2] - values[1]) < 0.2 * abs(values[1] - values[0]) < 1e-3 * values[2]
     # an uncut body is stiffer: the mouth on the support is not closed
     assert values[2] > 1.02 * energy_of(square(supports=held, loads=push), level=1)
+
+
+@pytest.mark.parametrize(("poisson", "angle"), [(0.3, 1.2e-3), (0.3, 2e-3), (0.47, 1.2e-3)])
+def test_a_needle_too_slender_for_round_off_is_named_by_its_place(poisson, angle):
+    """Its bending stiffness falls with the cube of its width; with 0.47 it has a pressure too."""
+    from verify.solvers import find_solver
+
+    hairpin = polyline("a", (0.2, 0.5), (0.8, 0.5), (0.2, 0.5 + 0.6 * np.tan(angle)))
+    material = {"young": 1.0, "poisson": poisson, "plane": "strain", "density": 1.0}
+    with pytest.raises(InputError, match=r"around \(0\.\d+, 0\.5\d*\).*slender"):
+        find_solver("reference").solve(square([hairpin], material=material), 0, 0)

@@ -118,3 +118,61 @@ def test_a_freed_half_falls_by_g_while_the_other_sags():
 def test_the_account_of_every_other_scheme_closes(scheme):
     ledger = solved(moving([MIDDLE], 0.1, initial=SPIN), scheme=scheme).ledger
     assert np.ptp(ledger["total"]) < 1e-10 * ledger["kinetic"].max()
+
+
+def test_cuts_that_open_one_after_the_other_set_one_piece_after_the_other_free():
+    """What hangs below the lower cut falls from 0, what is between both from 0.2 s on."""
+    lower = polygon("lower", (-1, -1, 0.25), (2, -1, 0.25), (2, 2, 0.25), (-1, 2, 0.25))
+    upper = {**MIDDLE, "points": [[x, y, 0.75] for x, y, _ in MIDDLE["points"]], "opens_at": 0.2}
+    scene = moving(
+        [upper, lower],
+        supports=[{"where": "top", "displacement": [0, 0, 0]}],
+        loads=[{"kind": "gravity", "acceleration": [0, 0, -0.98]}],
+        initial={"kind": "equilibrium", "cuts": "closed"},
+    )
+    found = solved(scene, scheme="energy_momentum")
+    height = found.points[found.cells, 2].mean(axis=1)
+    cells = {"lowest": height < 0.25, "middle": (height > 0.25) & (height < 0.75)}
+    fallen = {}
+    for name, mine in cells.items():
+        # a moving linear element's mean is that of its nodes
+        corners = found.points[found.cells[mine]]
+        volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+        means = found.displacement[:, found.cells[mine], 2].mean(axis=2)
+        fallen[name] = means @ volume / volume.sum()
+    assert found.times[2] == pytest.approx(0.2)
+    t = found.times
+    # a centre of mass that nothing holds falls by ½ g t², whatever the piece does around it
+    free = fallen["lowest"] - fallen["lowest"][0]
+    assert free == pytest.approx(-0.49 * t**2, abs=1e-9)
+    # the second cut opens when the middle moves already: from there on with constant acceleration
+    later = fallen["middle"][2:]
+    assert np.diff(later, 2) == pytest.approx(np.full(2, -0.98 * 0.01), abs=1e-9)
+    assert np.abs(np.diff(fallen["middle"][:3], 2) + 0.98 * 0.01).max() > 1e-4
+    assert np.ptp(found.ledger["total"]) < 1e-10 * found.ledger["kinetic"].max()
+
+
+def test_every_facet_of_a_curved_cut_is_known_to_be_its_own():
+    """A tube crossed by a plane: each opens alone to the faces that it has."""
+    from reference.dynamics_cuts import partly_opened
+    from reference.meshing import Grading, conforming_mesh
+
+    tube = {
+        "kind": "cylinder",
+        "name": "tube",
+        "base": [0.5, 0.5, -0.5],
+        "axis": [0.0, 0.0, 1.0],
+        "radius": 0.3,
+        "height": 2.0,
+    }
+    scene = moving([tube, MIDDLE])
+    mesh = conforming_mesh(scene, Grading(0.2, np.zeros((0, 3))))
+    areas, pieces = [], []
+    for opened in [(True, False), (False, True), (False, False)]:
+        part = partly_opened(scene, mesh, opened)
+        a, b, c = part.realised_cut.swapaxes(0, 1)
+        areas.append(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        pieces.append(part.pieces.max() + 1)
+    assert areas[0] == pytest.approx(2 * np.pi * 0.3, rel=0.02)  # facets: h²/24R²
+    assert areas[1] == pytest.approx(1.0, rel=1e-6)
+    assert pieces == [2, 2, 1]
