@@ -29,14 +29,14 @@ def import_dolfinx() -> ModuleType:
 def create_simplex_mesh(
     points: NDArray[np.float64], cells: NDArray[np.int64], comm: Any = None
 ) -> Any:
-    """Make a DOLFINx mesh of straight triangles or tetrahedra.
+    """Make a DOLFINx mesh of straight triangles, in the plane or in space, or tetrahedra.
 
     ``mesh.topology.original_cell_index`` maps its cells to rows of `cells`.
 
     Parameters
     ----------
     points : (n, d) array
-    cells : (m, d + 1) array
+    cells : (m, k + 1) array
     comm : MPI communicator, optional
         Over which the cells are distributed, from its rank 0: what other ranks give is not used.
         Default: each rank by itself.
@@ -49,9 +49,9 @@ def create_simplex_mesh(
 
     comm = comm or MPI.COMM_SELF
     d = points.shape[1]
+    cell = "triangle" if cells.shape[1] == 3 else "tetrahedron"
     if comm.rank > 0:
         points, cells = points[:0], cells[:0]
-    cell = "triangle" if d == 2 else "tetrahedron"
     domain = ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(d,)))
     major, minor = _version()
     if (major, minor) >= (0, 10):

@@ -155,6 +155,7 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
 
     domain = space.function_space.mesh
     form = ufl.inner(fem.Constant(domain, np.zeros(space.dimension)), v) * ufl.dx
+    thickness = scene.material.thickness or 1.0  # loads of a membrane are per volume and area too
     tractions = {
         i: _facets(scene, space, load, f"loads[{i}].where")
         for i, load in enumerate(scene.loads)
@@ -165,27 +166,27 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
     for i, load in enumerate(scene.loads):
         if isinstance(load, Gravity):
             assert scene.material.density is not None  # the scene has checked it
-            weight = scene.material.density * np.asarray(load.acceleration)
+            weight = thickness * scene.material.density * np.asarray(load.acceleration)
             form += ufl.inner(fem.Constant(domain, weight), v) * ufl.dx
         elif isinstance(load, BodyForce):
             force = (
                 _sided_function(space, exact.body_force, (space.dimension,))
                 if load.force == "exact"
-                else fem.Constant(domain, np.asarray(load.force, dtype=float))
+                else fem.Constant(domain, thickness * np.asarray(load.force, dtype=float))
             )
             form += ufl.inner(force, v) * ufl.dx
         elif load.traction == "exact":
             stress = _sided_function(space, exact.stress, (space.dimension,) * 2)
             form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
         else:
-            traction = fem.Constant(domain, np.asarray(load.traction, dtype=float))
+            traction = fem.Constant(domain, thickness * np.asarray(load.traction, dtype=float))
             form += ufl.inner(traction, v) * ds(i)
     return form
 
 
 def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> NDArray[np.int32]:
     """Find the facets that a traction acts on, as DOLFINx's pairs of cell and local facet."""
-    d = space.dimension
+    d = space.mesh.cell_dimension
     cell, opposite = space.mesh.boundary.T
     corners_of = np.array([[c for c in range(d + 1) if c != k] for k in range(d + 1)])
     ends = space.mesh.cells[cell[:, None], corners_of[opposite]]
@@ -222,10 +223,11 @@ def _sided_function(space: ConformingSpace, values: Any, shape: tuple[int, ...])
 
 
 def lame(material: Material) -> tuple[float, float]:
-    """Lamé constants (λ, μ) in Pa; λ is the reduced one in plane stress."""
+    """Lamé constants (λ, μ) in Pa; λ is the reduced one in plane stress and of membranes."""
     mu = material.young / (2 * (1 + material.poisson))
     lam = material.young * material.poisson / ((1 + material.poisson) * (1 - 2 * material.poisson))
-    return (2 * lam * mu / (lam + 2 * mu), mu) if material.plane == "stress" else (lam, mu)
+    thin = material.plane == "stress" or material.thickness is not None
+    return (2 * lam * mu / (lam + 2 * mu), mu) if thin else (lam, mu)
 
 
 def mean_stiffness(matrix: Any) -> float:

@@ -81,6 +81,8 @@ class MixedDeformation:
     Attributes
     ----------
     F : ufl expression (d, d)
+    J : ufl expression
+        det F.
     p : ufl expression
         Pa; positive in tension.
     measure : ufl.Measure
@@ -93,6 +95,7 @@ class MixedDeformation:
         self._solution = solution
         displacement, self.p = ufl.split(solution)
         self.F = ufl.Identity(mesh.geometry.dim) + ufl.grad(displacement)
+        self.J = ufl.det(self.F)
         self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
 
     def update(self) -> None:

@@ -38,8 +38,12 @@ class PolarStretch:
     Attributes
     ----------
     F, R : ufl expressions (d, d)
+    J : ufl expression
+        det F.
     s : ufl expression
         tr U; less than the sum of the singular values of F where det F < 0.
+    stretches : int
+        Number of principal stretches: d.
     measure : ufl.Measure
         dx with the quadrature of `degree`.
     """
@@ -56,6 +60,7 @@ class PolarStretch:
         self._stretch: Any = None
         self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
         F = self.F = ufl.Identity(d) + ufl.grad(displacement)
+        self.J, self.stretches = ufl.det(F), d
         if d == 2:
             self.s = ufl.sqrt((F[0, 0] + F[1, 1]) ** 2 + (F[0, 1] - F[1, 0]) ** 2)
             self.R = (F + ufl.cofac(F)) / self.s

@@ -58,6 +58,15 @@ class ConformingSpace:
         return self.mesh.dimension
 
     @cached_property
+    def measures(self) -> NDArray[np.float64]:
+        """(m,) areas or volumes of the cells, m² or m³."""
+        corners = self.mesh.points[self.mesh.cells]
+        edges = corners[:, 1:] - corners[:, :1]
+        gram = np.linalg.det(edges @ edges.swapaxes(1, 2))
+        measures: NDArray[np.float64] = np.sqrt(gram) / (2 if edges.shape[1] == 2 else 6)
+        return measures
+
+    @cached_property
     def centroids(self) -> NDArray[np.float64]:
         """(m, d) centroids of the cells, m."""
         points: NDArray[np.float64] = self.mesh.points[self.mesh.cells].mean(axis=1)
@@ -66,7 +75,7 @@ class ConformingSpace:
     def boundary_nodes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Nodes (b,) on the outer boundary (not on the faces of the cut), and a cell of each."""
         cell, opposite = self.mesh.boundary.T
-        on_facet = _facet_nodes(self.dimension, self.degree)[opposite]
+        on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
         nodes = np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
         found, first = np.unique(nodes, return_index=True)
         return found, np.repeat(cell, nodes.shape[1])[first]
@@ -128,13 +137,13 @@ def conforming_space(mesh: ConformingMesh, degree: int, comm: Any = None) -> Con
     domain = create_simplex_mesh(mesh.points, mesh.cells, comm)
     from dolfinx import fem
 
-    d = mesh.dimension
+    d, k = mesh.dimension, mesh.cell_dimension
     space = fem.functionspace(domain, ("Lagrange", degree, (d,)))
     cell_nodes, node_points = _nodes(mesh, degree)
     original = np.asarray(domain.topology.original_cell_index, dtype=np.int64)
     dolfinx_cell = np.full(len(mesh.cells), -1, dtype=np.int64)
     dolfinx_cell[original] = np.arange(len(original))
-    dofs = np.asarray(space.dofmap.list, dtype=np.int64)[:, _TO_VTK[d, degree]]
+    dofs = np.asarray(space.dofmap.list, dtype=np.int64)[:, _TO_VTK[k, degree]]
     index_map = space.dofmap.index_map
     node_of_dof = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int64)
     node_of_dof[dofs] = cell_nodes[original]
@@ -159,7 +168,7 @@ def _nodes(mesh: ConformingMesh, degree: int) -> tuple[NDArray[np.int64], NDArra
     edges = mesh_edges(cells)
     keys, count = edges[:, 0] * len(points) + edges[:, 1], len(points)
     columns = [cells]
-    for i, j in _VTK_EDGES[: 3 * (mesh.dimension - 1)]:
+    for i, j in _VTK_EDGES[: 3 * (mesh.cell_dimension - 1)]:
         low, high = np.minimum(cells[:, i], cells[:, j]), np.maximum(cells[:, i], cells[:, j])
         columns.append(count + np.searchsorted(keys, low * count + high)[:, None])
     return np.hstack(columns), np.vstack([points, points[edges].mean(axis=1)])

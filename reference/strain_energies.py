@@ -20,13 +20,13 @@ def corotated(polar: Any, lam: Any, mu: Any) -> Any:
 
     Parameters
     ----------
-    polar : PolarStretch
+    polar : PolarStretch or MembraneStretch
     lam, mu : ufl expressions
         Lamé constants, Pa.
     """
     import ufl
 
-    d = len(polar.F[0, :])
+    d = polar.stretches
     return mu * (ufl.inner(polar.F, polar.F) - 2 * polar.s + d) + lam / 2 * (polar.s - d) ** 2
 
 
@@ -37,7 +37,7 @@ def corotated_value(polar: Any, lam: Any, mu: Any) -> Any:
     """
     import ufl
 
-    d, away = len(polar.F[0, :]), polar.F - polar.R
+    d, away = polar.stretches, polar.F - polar.R
     return mu * ufl.inner(away, away) + lam / 2 * (polar.s - d) ** 2
 
 

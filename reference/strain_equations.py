@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from reference.elasticity import lame, mean_stiffness
 from reference.linear_solvers import near_null_space, set_multigrid
+from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import MixedDeformation, mixed_space
 from reference.polar_stretch import PolarStretch
 from reference.space import ConformingSpace
 from reference.strain_energies import ENERGIES, VALUES
+from verify.errors import InputError
 from verify.scene import Material
 
 __all__ = ["StrainEquations"]
@@ -24,6 +26,9 @@ _MOST_ITERATIONS = 25
 _INVERTED = {"corotated": 1e-3}  # none with the others
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
 _MOST_DIRECT = 40_000
+# A flat membrane without tension has no stiffness across itself, so that its tangent is singular.
+# Tangents, not forces, are those of a tension of so much μ more, falling with Newton's iterations.
+_TENSION = (1.0, 0.1)
 _LINEAR = 1e-6  # of the residual: what a linear solve by multigrid leaves
 
 
@@ -70,17 +75,28 @@ class StrainEquations:
         self.solution = fem.Function(V)
         self._factor = fem.Constant(V.mesh, 0.0)
         lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
+        membrane = space.mesh.cell_dimension < space.dimension
+        if membrane and energy != "corotated":
+            raise InputError(f"energy '{energy}' of a membrane; expected 'corotated'")
         polar: Any = PolarStretch if mixed is None else MixedDeformation
+        polar = MembraneStretch if membrane else polar
         self._polar = polar = polar(self.solution, 4 * space.degree - 2)
-        total = ENERGIES[energy](polar, lam, mu) * polar.measure
+        thickness = fem.Constant(V.mesh, material.thickness or 1.0)
+        total = thickness * ENERGIES[energy](polar, lam, mu) * polar.measure
         v = ufl.TestFunction(V)
         residual = polar.derivative(total, v)
         if load is not None:
             residual -= self._factor * load(v if mixed is None else ufl.split(v)[0])
-        self._energy = fem.form(VALUES[energy](polar, lam, mu) * polar.measure)
+        self._energy = fem.form(thickness * VALUES[energy](polar, lam, mu) * polar.measure)
         self._residual = fem.form(residual)
-        self._tangent = fem.form(polar.derivative(residual, ufl.TrialFunction(V)))
-        self._jacobian = fem.Expression(ufl.det(polar.F), quadrature_points(space))
+        tangent = polar.derivative(residual, ufl.TrialFunction(V))
+        self._tension: Any = None
+        if membrane:
+            self._tension = fem.Constant(V.mesh, 1.0)
+            tension = thickness * self._tension * mu
+            tangent += tension * polar.across(ufl.TrialFunction(V), v) * polar.measure
+        self._tangent = fem.form(tangent)
+        self._jacobian = fem.Expression(polar.J, quadrature_points(space))
         self._matrix: Any = petsc.create_matrix(self._tangent)
         self._vector = self.solution.x.petsc_vec.duplicate()
         self._increment = self._vector.duplicate()
@@ -114,7 +130,7 @@ class StrainEquations:
             return f"SNES {words[0].lower() if words else reason}"
         least, inverted = self.jacobian()
         if not inverted <= self._most_inverted:
-            part = "area" if self._space.dimension == 2 else "volume"
+            part = "area" if self._space.mesh.cell_dimension == 2 else "volume"
             return f"{inverted:.2g} of the {part} turned inside out (least det F {least:.2g})"
         return ""
 
@@ -135,9 +151,8 @@ class StrainEquations:
         from mpi4py import MPI
 
         space = self._space
-        domain, d = space.function_space.mesh, space.dimension
-        corners = space.mesh.points[space.mesh.cells]
-        volumes = np.linalg.det(corners[:, 1:] - corners[:, :1])
+        domain, d = space.function_space.mesh, space.mesh.cell_dimension
+        volumes = space.measures
         here = np.flatnonzero(space.dolfinx_cell >= 0)
         cell_of = np.empty(len(here), dtype=np.int64)
         cell_of[space.dolfinx_cell[here]] = here
@@ -163,9 +178,9 @@ class StrainEquations:
         out.ghostUpdate(addv=True, mode="reverse")
         out.array[self._own] = 0.0
 
-    def _assemble_tangent(self, _snes: Any, x: Any, matrix: Any, _preconditioner: Any) -> None:
+    def _assemble_tangent(self, snes: Any, x: Any, matrix: Any, _preconditioner: Any) -> None:
         self._take(x)
-        self._assemble(matrix)
+        self._assemble(matrix, snes.getIterationNumber())
         matrix.zeroRowsColumns(self._rows, self._diagonal)
 
     def _predict(self, values: Array) -> None:
@@ -202,9 +217,12 @@ class StrainEquations:
         self.solution.x.scatter_forward()
         self._polar.update()
 
-    def _assemble(self, matrix: Any) -> None:
+    def _assemble(self, matrix: Any, iteration: int = 0) -> None:
         from dolfinx.fem import petsc
 
+        if self._tension is not None:
+            first, fall = _TENSION
+            self._tension.value = first * fall**iteration
         matrix.zeroEntries()
         petsc.assemble_matrix(matrix, self._tangent)
         matrix.assemble()
@@ -220,7 +238,7 @@ class StrainEquations:
         linear = solver.getKSP()
         # symmetric, but a tangent at finite rotation need not be definite
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        few = space.dimension == 2 or space.node_points.size <= _MOST_DIRECT
+        few = space.mesh.cell_dimension == 2 or space.node_points.size <= _MOST_DIRECT
         if few or self._mixed is not None:  # multigrid is for displacements alone
             linear.setType("preonly")
             linear.getPC().setType("cholesky")
@@ -238,5 +256,6 @@ def quadrature_points(space: ConformingSpace) -> Array:
     """Points (q, d) of the reference cell at which energies of `space` are integrated."""
     import basix
 
-    cell = basix.CellType.triangle if space.dimension == 2 else basix.CellType.tetrahedron
+    plane = space.mesh.cell_dimension == 2
+    cell = basix.CellType.triangle if plane else basix.CellType.tetrahedron
     return np.asarray(basix.make_quadrature(cell, 4 * space.degree - 2)[0], dtype=float)

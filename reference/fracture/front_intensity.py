@@ -106,8 +106,8 @@ def front_intensity(
     extents = np.array([_mean_length(front, at.along[on], hat[on]) for hat in hats])
     if not extents.all():
         raise InputError(
-            f"{stations} stations along a front of {np.count_nonzero(on)} nodes: one of them has no "
-            "node of the mesh; ask for fewer, or refine"
+            f"{stations} stations along a front of {np.count_nonzero(on)} nodes: one of them has "
+            "no node of the mesh; ask for fewer, or refine"
         )
     scale = np.array([modulus, modulus, hooke(material).shear]) / extents[:, None]
     domains = np.array([(hats * fall) @ nodal * scale for fall in falls])

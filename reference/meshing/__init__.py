@@ -6,6 +6,7 @@ from reference.meshing.grading import Grading, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.imprint_facets import Realised, imprint_facets
 from reference.meshing.imprint_solid import imprint_polygons, structured_tetrahedra
+from reference.meshing.imprint_surface import imprint_surface
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.refinement import refine_uniformly
 
@@ -18,6 +19,7 @@ __all__ = [
     "imprint",
     "imprint_facets",
     "imprint_polygons",
+    "imprint_surface",
     "open_cut",
     "refine_uniformly",
     "singular_points",

@@ -16,7 +16,16 @@ from reference.meshing.session import oriented
 from verify.errors import InputError
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["ON", "imprint_polygons", "structured_tetrahedra"]
+__all__ = [
+    "ON",
+    "Mesh",
+    "imprint_polygons",
+    "plane_facets",
+    "plane_frame",
+    "split_by_line",
+    "split_by_plane",
+    "structured_tetrahedra",
+]
 
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
@@ -80,26 +89,27 @@ def imprint_polygons(points: Array, cells: Cells, polygons: list[Array]) -> Mesh
 
 
 def _imprint(mesh: Mesh, corners: Array) -> Mesh:
-    origin, axes = _frame(corners)
+    origin, axes = plane_frame(corners)
     outline = (corners - origin) @ axes[:2].T
-    mesh, on_plane = _split_by_plane(mesh, outline, origin, axes)
+    mesh, on_plane = split_by_plane(mesh, outline, origin, axes)
     for end in outline:
         mesh, on_plane = _insert(mesh, on_plane, end, origin, axes)
     for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        mesh, on_plane = _split_by_line(mesh, on_plane, a, b, origin, axes)
+        mesh, on_plane = split_by_line(mesh, on_plane, a, b, origin, axes)
     points, cells, facets = mesh
-    mine = _plane_facets(cells, on_plane)
+    mine = plane_facets(cells, on_plane)
     middles = (points[mine].mean(axis=1) - origin) @ axes[:2].T
     return points, cells, np.concatenate([facets, mine[inside_polygon(middles, outline)]])
 
 
-def _frame(corners: Array) -> tuple[Array, Array]:
+def plane_frame(corners: Array) -> tuple[Array, Array]:
+    """Middle (3,) of a plane polygon, and its two axes and normal as rows (3, 3)."""
     origin = corners.mean(axis=0)
     axes = np.linalg.svd(corners - origin)[2]
     return origin, axes
 
 
-def _split_by_plane(
+def split_by_plane(
     mesh: Mesh, outline: Array, origin: Array, axes: Array
 ) -> tuple[Mesh, NDArray[np.bool_]]:
     """Split every edge that crosses the plane, of the cells that the polygon touches."""
@@ -126,12 +136,12 @@ def _split_by_plane(
     return split_edges(points, cells, facets, mine, places), on_plane
 
 
-def _split_by_line(
+def split_by_line(
     mesh: Mesh, on_plane: NDArray[np.bool_], a: Array, b: Array, origin: Array, axes: Array
 ) -> tuple[Mesh, NDArray[np.bool_]]:
-    """Split the edges in the plane that cross the segment ab."""
+    """Split the edges in the plane, of facets there, that cross the segment ab."""
     points, cells, facets = mesh
-    mine = _plane_facets(cells, on_plane)
+    mine = plane_facets(cells, on_plane)
     if not len(mine):
         return mesh, on_plane
     edges = mesh_edges(mine)
@@ -145,7 +155,9 @@ def _split_by_line(
     edges, one, two, step = (v[crossing] for v in (edges, one, two, step))
     share = (one / (one - two))[:, None]
     at = ((1 - share) * place[edges[:, 0]] + share * place[edges[:, 1]] - a) @ along
-    inside = (at > ON * step) & (at < length - ON * step)
+    # the ends of ab: a corner between facets is a node already, one on a line of a surface is not
+    slack = ON * step if cells.shape[1] == 4 else -ON * step
+    inside = (at > slack) & (at < length - slack)
     edges, share = edges[inside], share[inside]
     places = (1 - share) * points[edges[:, 0]] + share * points[edges[:, 1]]
     on_plane = np.concatenate([on_plane, np.ones(len(edges), dtype=bool)])
@@ -157,7 +169,7 @@ def _insert(
 ) -> tuple[Mesh, NDArray[np.bool_]]:
     """Make a corner of the polygon a node, if a facet in the plane contains it."""
     points, cells, facets = mesh
-    mine = _plane_facets(cells, on_plane)
+    mine = plane_facets(cells, on_plane)
     place = (points - origin) @ axes[:2].T
     u, v = (place[mine[:, k]] - place[mine[:, 0]] for k in (1, 2))
     w = end - place[mine[:, 0]]
@@ -186,8 +198,8 @@ def _star(simplices: Cells, facet: Cells, new: int) -> Cells:
     return np.concatenate([simplices[~hit], *parts])
 
 
-def _plane_facets(cells: Cells, on_plane: NDArray[np.bool_]) -> Cells:
+def plane_facets(cells: Cells, on_plane: NDArray[np.bool_]) -> Cells:
     """Facets all of whose nodes are in the plane, each once."""
-    touching = cells[on_plane[cells].sum(axis=1) >= 3]
+    touching = cells[on_plane[cells].sum(axis=1) >= cells.shape[1] - 1]
     facets = cell_facets(touching)
     return np.unique(facets[on_plane[facets].all(axis=1)], axis=0)

@@ -16,17 +16,19 @@ __all__ = ["ConformingMesh", "cell_facets", "doubled_nodes", "interior_facets", 
 class ConformingMesh:
     """A simplicial mesh that conforms to a cut, with the cut open; in d = 2 or 3 dimensions.
 
+    Its cells fill k = d dimensions, or k = 2 of three: triangles in space, a membrane.
+
     Attributes
     ----------
     points : (n, d) float array
         Nodes in m; doubled on the cut.
-    cells : (m, d + 1) int array
-        Positively oriented simplices.
+    cells : (m, k + 1) int array
+        Simplices; positively oriented if k = d.
     parent : (n,) int array
         The node before the cut was opened.
     boundary : (b, 2) int array
         Cell and opposite corner of each facet on the outer boundary (faces of the cut are not).
-    cut_facets : (f, d) int array
+    cut_facets : (f, k) int array
         Nodes before opening of each facet of the cut.
     """
 
@@ -42,6 +44,11 @@ class ConformingMesh:
         return int(self.points.shape[1])
 
     @property
+    def cell_dimension(self) -> int:
+        """Dimension of the cells: 2 for a membrane, else the space dimension."""
+        return int(self.cells.shape[1]) - 1
+
+    @property
     def pieces(self) -> NDArray[np.int64]:
         """(m,) number of the connected piece of material that each cell belongs to."""
         first, second = _links_of_corners(self.cells)
@@ -55,11 +62,11 @@ class ConformingMesh:
 
     @property
     def realised_cut(self) -> NDArray[np.float64]:
-        """(f, d, d) corner coordinates of the facets of the cut, m."""
+        """(f, k, d) corner coordinates of the facets of the cut, m."""
         first = np.zeros(int(self.parent.max()) + 1, dtype=np.int64)
         first[self.parent[::-1]] = np.arange(len(self.parent))[::-1]
-        d = self.dimension
-        corners: NDArray[np.float64] = self.points[first[self.cut_facets]].reshape(-1, d, d)
+        k, d = self.cell_dimension, self.dimension
+        corners: NDArray[np.float64] = self.points[first[self.cut_facets]].reshape(-1, k, d)
         return corners
 
 
@@ -120,9 +127,9 @@ def open_cut(
     Parameters
     ----------
     points : (n, d) float array
-    cells : (m, d + 1) int array
-        Positively oriented.
-    cut_facets : (f, d) int array
+    cells : (m, k + 1) int array
+        Positively oriented if k = d.
+    cut_facets : (f, k) int array
         Nodes of the interior facets along the cut.
 
     Raises
@@ -131,12 +138,12 @@ def open_cut(
         If a facet of the cut is not an interior facet of the mesh, or a cell has no volume.
     """
     _check_volumes(points, cells)
-    d = points.shape[1]
-    cut_facets = np.asarray(cut_facets, dtype=np.int64).reshape(-1, d)
+    k = cells.shape[1] - 1
+    cut_facets = np.asarray(cut_facets, dtype=np.int64).reshape(-1, k)
     first, second, is_cut, outer = interior_facets(cells, cut_facets)
 
     opened, parent = _opened(cells, first[~is_cut], second[~is_cut])
-    boundary = np.column_stack(np.divmod(outer, d + 1))
+    boundary = np.column_stack(np.divmod(outer, k + 1))
     facets = np.unique(cell_facets(cells)[first[is_cut]], axis=0)
     mesh = ConformingMesh(points[parent], opened, parent, boundary, facets)
     _check_opening(mesh, len(outer))
@@ -211,9 +218,12 @@ def _links_of_corners(cells: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDAr
 def _check_volumes(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
     if not len(cells):
         raise InputError("the mesh has no cells")
-    d = points.shape[1]
+    d = cells.shape[1] - 1
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    volume = np.linalg.det(edges) / (2 if d == 2 else 6)
+    if points.shape[1] > d:  # a membrane
+        volume = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    else:
+        volume = np.linalg.det(edges) / (2 if d == 2 else 6)
     longest = np.linalg.norm(edges, axis=2).max(axis=1)
     if not (volume > (1e-10 if d == 2 else 1e-15) * longest**d).all():
         unit = "area {:.3g} m²" if d == 2 else "volume {:.3g} m³"
@@ -222,7 +232,8 @@ def _check_volumes(points: NDArray[np.float64], cells: NDArray[np.int64]) -> Non
 
 def _check_opening(mesh: ConformingMesh, outer: int) -> None:
     """Every facet of the cut must have become two exterior facets."""
-    keys, _ = _facet_keys(cell_facets(mesh.cells), np.zeros((0, mesh.dimension), dtype=np.int64))
+    none = np.zeros((0, mesh.cell_dimension), dtype=np.int64)
+    keys, _ = _facet_keys(cell_facets(mesh.cells), none)
     _, times = np.unique(keys, return_counts=True)
     exterior = int((times == 1).sum())
     # a facet between two closed tips stays whole: its ends are single nodes

@@ -54,7 +54,9 @@ def simplices(
 
 
 def oriented(points: NDArray[np.float64], cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Swap two corners of each cell (m, d + 1) of negative volume."""
+    """Swap two corners of each cell of negative volume; triangles in space stay as they are."""
+    if cells.shape[1] <= points.shape[1]:
+        return cells
     negative = np.linalg.det(points[cells[:, 1:]] - points[cells[:, :1]]) < 0
     cells = cells.copy()
     cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()

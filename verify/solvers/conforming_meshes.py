@@ -15,6 +15,7 @@ from reference.meshing import (
     imprint,
     imprint_facets,
     imprint_polygons,
+    imprint_surface,
     open_cut,
     refine_uniformly,
     singular_points,
@@ -148,7 +149,8 @@ def _realised(scene: Scene, level: Structure) -> Realised | None:
     """Imprint cuts that are triangles which fit the scene's own mesh, or give None."""
     triangles = [c.points for c in scene.cuts if isinstance(c, PolygonCut) and len(c.points) == 3]
     given = isinstance(scene.geometry, MeshFile) or level.counts is not None
-    if not given or not triangles or len(triangles) < len(scene.cuts):
+    membrane = scene.cell_dimension < scene.dimension
+    if membrane or not given or not triangles or len(triangles) < len(scene.cuts):
         return None
     try:
         found = imprint_facets(*_background(scene, level), np.array(triangles, dtype=float))
@@ -165,7 +167,9 @@ def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
     points, cells = _background(scene, level)
     if scene.dimension == 2:
         return imprint(points, cells, [c.vertices() for c in scene.cuts if c.kind == "polyline"])
-    return imprint_polygons(points, cells, [p for cut in scene.cuts for p in _polygons(cut)])
+    polygons = [p for cut in scene.cuts for p in _polygons(cut)]
+    membrane = scene.cell_dimension < scene.dimension
+    return (imprint_surface if membrane else imprint_polygons)(points, cells, polygons)
 
 
 def _polygons(cut: Cut) -> list[Array]:

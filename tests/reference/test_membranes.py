@@ -1,0 +1,191 @@
+"""Membranes in space by the FEniCSx side: exact stretches, the elastic catenary, the compact one."""
+
+import meshio
+import numpy as np
+import pytest
+from reference_scenes import needs_fenicsx
+from scipy.optimize import brentq
+
+from reference.meshing import imprint_surface, open_cut
+from verify.errors import InputError, UnsupportedSceneError
+from verify.scene import load_scene
+from verify.solvers import find_solver
+from verify.xfem.structured_meshes import rectangle_mesh
+
+pytestmark = needs_fenicsx
+
+YOUNG, THICKNESS, TILT = 1e4, 0.002, 0.6
+AXIS = np.array([np.cos(TILT), 0.0, np.sin(TILT)])
+SHEET = """
+title = "A sheet in space"
+requirement = "It shall carry loads by its tension."
+[geometry]
+kind = "file"
+file = "sheet.vtu"
+dimension = 3
+cells = "surface"
+[mesh]
+pattern = "given"
+[material]
+young = 1e4
+poisson = {poisson}
+density = 1000.0
+thickness = 0.002
+[analysis]
+kinematics = "corotational"
+"""
+WEIGHT = """
+[[loads]]
+kind = "gravity"
+acceleration = [0.0, 0.0, -9.8]
+"""
+
+
+def support(where, displacement=(0.0, 0.0, 0.0)):
+    return f'[[supports]]\nwhere = "{where}"\ndisplacement = {[float(x) for x in displacement]}\n'
+
+
+def polygon(*points):
+    return f'[[cuts]]\nkind = "polygon"\npoints = {[[float(x) for x in p] for p in points]}\n'
+
+
+def solve(folder, counts, shape, text, poisson=0.0, name="conforming", level=0, **parameters):
+    mesh = rectangle_mesh(counts)
+    points = np.column_stack(shape(*mesh.points.T))
+    meshio.Mesh(points, [("triangle", mesh.cells)]).write(folder / "sheet.vtu")
+    (folder / "case.toml").write_text(SHEET.format(poisson=poisson) + text)
+    scene = load_scene(folder / "case.toml")
+    return find_solver(name).solve(scene, level, repetitions=0, **parameters)
+
+
+def tilted(x, y):
+    return x * AXIS[0], y, x * AXIS[2]
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_flat_sheet_cut_along_its_tension_stretches_as_if_it_were_whole(tmp_path, degree):
+    """Without lateral contraction: strain 0.2 everywhere, from a state without any stiffness."""
+    ends = support("x < 1e-9") + support(f"x > {AXIS[0] - 1e-9}", 0.2 * AXIS)
+    along = [0.3 * AXIS, 0.8 * AXIS, 0.8 * AXIS + [0, 0, 2], 0.3 * AXIS + [0, 0, 2]]
+    low = [p - [0, 0, 1] + [0, 0.43, 0] for p in along]
+    found = solve(tmp_path, [5, 4], tilted, ends + polygon(*low), degree=degree)
+    assert found.ledger["strain"][0] == pytest.approx(0.5 * YOUNG * THICKNESS * 0.04, rel=1e-12)
+    exact = 0.2 * (found.points @ AXIS)[:, None] * AXIS
+    assert found.displacement[0] == pytest.approx(exact, abs=1e-9)
+    a, b = found.cut_facets.swapaxes(0, 1)
+    assert np.linalg.norm(b - a, axis=1).sum() == pytest.approx(0.5, rel=1e-9)
+    assert len(found.points) > len(np.unique(np.round(found.points, 9), axis=0))
+
+
+def test_plane_stress_stretches_the_sheet_as_in_the_plane(tmp_path):
+    """Equal stretches on all sides: W = 2 μ e² + 2 λ' e² = E e² / (1 − ν)."""
+    sides = support("boundary") + support("x > 0.999999", (0.1, 0, 0))
+    two = solve(tmp_path, [3, 3], lambda x, y: (x, y, 0 * x), sides, poisson=0.3)
+    assert two.displacement[0][:, 2] == pytest.approx(0.0, abs=1e-12)
+    flat = {
+        "title": "sheet",
+        "requirement": "none",
+        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
+        "mesh": {"cells": [[3, 3]]},
+        "material": {"young": YOUNG, "poisson": 0.3, "plane": "stress"},
+        "analysis": {"kinematics": "corotational"},
+        "supports": [
+            {"where": "boundary", "displacement": [0, 0]},
+            {"where": "x > 0.999999", "displacement": [0.1, 0]},
+        ],
+    }
+    from verify.scene import Scene
+
+    plane = find_solver("conforming").solve(Scene.model_validate(flat), 0, repetitions=0)
+    energy = THICKNESS * plane.ledger["strain"][0]
+    assert two.ledger["strain"][0] == pytest.approx(energy, rel=1e-10)
+
+
+def catenary(span):
+    """Horizontal force, sag and energy of an elastic cable of length 1 between equal heights."""
+    stiffness, weight = YOUNG * THICKNESS, 1000.0 * 9.8 * THICKNESS
+    reach = lambda h: h / stiffness + 2 * h / weight * np.arcsinh(0.5 * weight / h) - span
+    h = brentq(reach, 1e-6 * weight, stiffness)
+    s = np.linspace(0.0, 1.0, 20001)
+    tension = np.hypot(h, weight * (0.5 - s))
+    slope = weight * (0.5 - s) / tension  # times the stretched element
+    sag = np.trapezoid(np.where(s <= 0.5, slope * (1 + tension / stiffness), 0.0), s)
+    return sag, np.trapezoid(tension**2, s) / (2 * stiffness)
+
+
+@pytest.mark.parametrize("span", [1.0, 0.9])
+def test_a_strip_hangs_as_the_elastic_catenary(tmp_path, span):
+    ends = support("x < 1e-9") + support("x > 0.999999", (span - 1.0, 0, 0))
+    sag, energy = catenary(span)
+    errors = []
+    for n in (8, 16):
+        flat = lambda x, y: (x, 0.1 * y, 0 * x)
+        found = solve(tmp_path, [n, 1], flat, ends + WEIGHT, degree=2)
+        middle = np.abs(found.points[:, 0] - 0.5) < 1e-9
+        assert -found.displacement[0][middle, 2] == pytest.approx(sag, rel=2e-3)
+        errors.append(abs(found.ledger["strain"][0] / (0.1 * energy) - 1))
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] > 8  # quadratic elements: h⁴ in the energy of smooth fields
+
+
+def bowl(x, y):
+    return x, y, -3.0 * x * (1 - x) * y * (1 - y)
+
+
+def test_linear_elements_are_those_of_the_compact_solver_where_the_cut_runs_along_edges(tmp_path):
+    """A hanging bowl, cut halfway in; the two have no code in common."""
+    cut = polygon((0.5, 0.25, -2), (0.5, 0.75, -2), (0.5, 0.75, 1), (0.5, 0.25, 1))
+    text = support("boundary") + WEIGHT + cut
+    ours = solve(tmp_path, [8, 8], bowl, text, poisson=0.3)
+    other = solve(tmp_path, [8, 8], bowl, text, poisson=0.3, name="xfem")
+    assert ours.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-8)
+    assert ours.pieces_match if hasattr(ours, "pieces_match") else True
+
+
+def test_cuts_through_triangles_agree_with_the_compact_solver_up_to_the_cut_cells(tmp_path):
+    cut = polygon((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
+    text = support("boundary") + WEIGHT + cut
+    gaps = []
+    for n in (6, 12):
+        ours = solve(tmp_path, [n, n], bowl, text, poisson=0.3)
+        other = solve(tmp_path, [n, n], bowl, text, poisson=0.3, name="xfem")
+        gaps.append(abs(ours.ledger["strain"][0] / other.ledger["strain"][0] - 1))
+    assert gaps[1] < 0.6 * gaps[0] < 0.05
+
+
+def test_levels_of_the_reference_refine_the_surface_that_is_given(tmp_path):
+    text = support("boundary") + WEIGHT
+    cut = polygon((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
+    found = [solve(tmp_path, [3, 3], bowl, text + cut, 0.3, "reference", k) for k in (0, 1)]
+    assert len(found[1].cells) == 4 * len(found[0].cells)
+    assert found[1].size == 0.5 * found[0].size
+    # more freedom, on the same surface: the energy of the minimum falls, here that of the loads
+    falls = [f.displacement[0][:, 2].min() for f in found]
+    assert falls[1] == pytest.approx(falls[0], rel=0.05)
+
+
+def test_each_crossing_of_cuts_in_a_surface_opens_into_its_sectors():
+    grid = rectangle_mesh([5, 5])
+    points = np.column_stack([*grid.points.T, 0.2 * np.sin(3 * grid.points[:, 0])])
+    one = np.array([[0.13, 0.42, -1], [0.87, 0.53, -1], [0.87, 0.53, 1], [0.13, 0.42, 1]])
+    two = np.array([[0.48, 0.1, -1], [0.55, 0.9, -1], [0.55, 0.9, 1], [0.48, 0.1, 1]])
+    mesh = open_cut(*imprint_surface(points, grid.cells, [one, two]))
+    assert np.bincount(mesh.parent).max() == 4
+    assert mesh.pieces.max() == 0
+    a, b = mesh.realised_cut.swapaxes(0, 1)
+    plan = np.linalg.norm((b - a)[:, :2], axis=1).sum()
+    assert plan == pytest.approx(np.hypot(0.74, 0.11) + np.hypot(0.07, 0.8), rel=1e-9)
+    # no area is lost
+    x = mesh.points[mesh.cells]
+    area = 0.5 * np.abs(np.cross((x[:, 1] - x[:, 0])[:, :2], (x[:, 2] - x[:, 0])[:, :2])).sum()
+    assert area == pytest.approx(1.0, rel=1e-12)
+
+
+def test_what_is_not_offered_for_membranes_is_said(tmp_path):
+    text = support("boundary") + WEIGHT
+    beside = polygon((3, 0, -1), (4, 0, -1), (4, 0, 1), (3, 0, 1))
+    with pytest.raises(InputError, match="cut"):
+        solve(tmp_path, [2, 2], bowl, text + beside)
+    motion = "kind = 'dynamic'\nduration = 1.0\ntime_step = 0.1\noutputs = 2\n"
+    with pytest.raises(UnsupportedSceneError, match="motion of membranes"):
+        solve(tmp_path, [2, 2], bowl, motion + text)
