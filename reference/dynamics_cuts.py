@@ -68,7 +68,9 @@ def _distance(cut: object, points: Array) -> Array:
                 np.stack([a, b, b + along, a + along])
                 for a, b in pairwise(np.array(cut.points, dtype=float))
             ]
-            return np.min([_from_polygon(points, quad) for quad in quads], axis=0)
+            return np.asarray(
+                np.min([_from_polygon(points, quad) for quad in quads], axis=0), dtype=float
+            )
         case DiscCut():
             *plane, height = cut.axes() @ (points - np.array(cut.centre)).T
             share = np.hypot(*(plane / np.array(cut.semi_axes)[:, None]))

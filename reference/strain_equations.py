@@ -233,6 +233,8 @@ class StrainEquations:
         space, matrix = self._space, self._matrix
         solver = PETSc.SNES().create(matrix.comm)
         solver.setType("newtonls")  # with backtracking, unless told otherwise
+        if self._tension is not None:  # what is slack is overshot at first, and comes back from it
+            solver.getLineSearch().setType("basic")
         solver.setFunction(self._assemble_residual, self._vector.duplicate())
         solver.setJacobian(self._assemble_tangent, matrix)
         linear = solver.getKSP()

@@ -151,7 +151,7 @@ def test_more_stations_than_nodes_along_the_front_are_refused():
 
 def test_each_station_sees_its_own_intensity_whichever_others_are_asked_for():
     """A field whose K_I rises along the front: nodal sums are shared out by hats."""
-    field = prism((1, 0, 0), 8)
+    field = prism((1, 0, 0), 16)
     rising = Solution(
         field.points, field.cells, field.displacement * (1 + field.points[:, 2:]), order=2,
         cut_facets=field.cut_facets,

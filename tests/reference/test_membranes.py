@@ -1,4 +1,4 @@
-"""Membranes in space by the FEniCSx side: exact stretches, the elastic catenary, the compact one."""
+"""Membranes in space by the FEniCSx side: exact stretches, a catenary, the compact solver."""
 
 import meshio
 import numpy as np
@@ -78,7 +78,7 @@ def test_a_flat_sheet_cut_along_its_tension_stretches_as_if_it_were_whole(tmp_pa
 
 
 def test_plane_stress_stretches_the_sheet_as_in_the_plane(tmp_path):
-    """Equal stretches on all sides: W = 2 μ e² + 2 λ' e² = E e² / (1 − ν)."""
+    """A clamped square, one side of which is drawn away, against plane elements."""
     sides = support("boundary") + support("x > 0.999999", (0.1, 0, 0))
     two = solve(tmp_path, [3, 3], lambda x, y: (x, y, 0 * x), sides, poisson=0.3)
     assert two.displacement[0][:, 2] == pytest.approx(0.0, abs=1e-12)
@@ -104,7 +104,10 @@ def test_plane_stress_stretches_the_sheet_as_in_the_plane(tmp_path):
 def catenary(span):
     """Horizontal force, sag and energy of an elastic cable of length 1 between equal heights."""
     stiffness, weight = YOUNG * THICKNESS, 1000.0 * 9.8 * THICKNESS
-    reach = lambda h: h / stiffness + 2 * h / weight * np.arcsinh(0.5 * weight / h) - span
+
+    def reach(h):
+        return h / stiffness + 2 * h / weight * np.arcsinh(0.5 * weight / h) - span
+
     h = brentq(reach, 1e-6 * weight, stiffness)
     s = np.linspace(0.0, 1.0, 20001)
     tension = np.hypot(h, weight * (0.5 - s))
@@ -119,13 +122,16 @@ def test_a_strip_hangs_as_the_elastic_catenary(tmp_path, span):
     sag, energy = catenary(span)
     errors = []
     for n in (8, 16):
-        flat = lambda x, y: (x, 0.1 * y, 0 * x)
-        found = solve(tmp_path, [n, 1], flat, ends + WEIGHT, degree=2)
+        found = solve(tmp_path, [n, 1], strip, ends + WEIGHT, degree=2)
         middle = np.abs(found.points[:, 0] - 0.5) < 1e-9
         assert -found.displacement[0][middle, 2] == pytest.approx(sag, rel=2e-3)
         errors.append(abs(found.ledger["strain"][0] / (0.1 * energy) - 1))
     assert errors[1] < 1e-4
     assert errors[0] / errors[1] > 8  # quadratic elements: h⁴ in the energy of smooth fields
+
+
+def strip(x, y):
+    return x, 0.1 * y, 0 * x
 
 
 def bowl(x, y):
@@ -139,7 +145,6 @@ def test_linear_elements_are_those_of_the_compact_solver_where_the_cut_runs_alon
     ours = solve(tmp_path, [8, 8], bowl, text, poisson=0.3)
     other = solve(tmp_path, [8, 8], bowl, text, poisson=0.3, name="xfem")
     assert ours.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-8)
-    assert ours.pieces_match if hasattr(ours, "pieces_match") else True
 
 
 def test_cuts_through_triangles_agree_with_the_compact_solver_up_to_the_cut_cells(tmp_path):
@@ -159,7 +164,6 @@ def test_levels_of_the_reference_refine_the_surface_that_is_given(tmp_path):
     found = [solve(tmp_path, [3, 3], bowl, text + cut, 0.3, "reference", k) for k in (0, 1)]
     assert len(found[1].cells) == 4 * len(found[0].cells)
     assert found[1].size == 0.5 * found[0].size
-    # more freedom, on the same surface: the energy of the minimum falls, here that of the loads
     falls = [f.displacement[0][:, 2].min() for f in found]
     assert falls[1] == pytest.approx(falls[0], rel=0.05)
 
@@ -177,7 +181,7 @@ def test_each_crossing_of_cuts_in_a_surface_opens_into_its_sectors():
     assert plan == pytest.approx(np.hypot(0.74, 0.11) + np.hypot(0.07, 0.8), rel=1e-9)
     # no area is lost
     x = mesh.points[mesh.cells]
-    area = 0.5 * np.abs(np.cross((x[:, 1] - x[:, 0])[:, :2], (x[:, 2] - x[:, 0])[:, :2])).sum()
+    area = 0.5 * np.abs(np.linalg.det((x[:, 1:] - x[:, :1])[:, :, :2])).sum()
     assert area == pytest.approx(1.0, rel=1e-12)
 
 
