@@ -110,12 +110,19 @@ PROBE = """<script>addEventListener('load', () => setTimeout(() => {
     i => getComputedStyle(i).display)};
   const key = k => document.querySelector('.turn canvas').dispatchEvent(
     new KeyboardEvent('keydown', {key: k, bubbles: true}));
+  // how soon a frame is drawn is the machine's affair: look until every canvas has changed
+  const changed = (than, then, tries = 80) => setTimeout(() => {
+    const now = shot();
+    if (tries && now.some((view, i) => view.sum === than[i].sum)) changed(than, then, tries - 1);
+    else then(now);
+  }, 100);
   key('ArrowRight'); key('ArrowRight');
-  setTimeout(() => { found.turned = shot(); key('0');
-    setTimeout(() => { found.back = shot(); document.querySelector('.see-through input').click();
-      setTimeout(() => { found.through = shot();
+  changed(found.before, turned => { found.turned = turned; key('0');
+    changed(turned, back => { found.back = back;
+      document.querySelector('.see-through input').click();
+      changed(back, through => { found.through = through;
         document.body.innerHTML = '<pre id=probe>FOUND' + encodeURIComponent(JSON.stringify(found))
-          + '</pre>'; }, 150); }, 150); }, 150);
+          + '</pre>'; }); }); });
 }, 300));</script>"""
 
 
@@ -130,7 +137,7 @@ def test_bodies_can_be_turned_in_a_browser_and_all_of_a_figure_turn_together(tmp
     page.write_text(text.replace("</body>", PROBE + "</body>"), encoding="utf-8")
     command = [browser, "--headless", "--no-sandbox", "--use-angle=swiftshader", "--dump-dom",
                "--enable-unsafe-swiftshader", "--enable-logging=stderr", "--v=0",
-               "--window-size=1200,2000", "--virtual-time-budget=20000",
+               "--window-size=1200,2000", "--virtual-time-budget=60000",
                f"--user-data-dir={tmp_path / 'profile'}", page.as_uri()]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=180)
     # the probe itself reads pixels back, which the browser remarks upon

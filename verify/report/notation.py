@@ -9,6 +9,7 @@ __all__ = [
     "SECONDARY",
     "bytes_text",
     "error_title",
+    "gap",
     "metric_title",
     "number",
     "number_text",
@@ -108,7 +109,12 @@ def with_interval(value: float | None, low: float | None, high: float | None) ->
     interval = tag(
         "span", "[", number(low, digits), ", ", number(high, digits), "]", class_="interval"
     )
-    return joined(number(value, digits), " ", interval)
+    return joined(number(value, digits), gap(), interval)
+
+
+def gap() -> Markup:
+    """Return a space at which a cell that holds its line otherwise may be broken."""
+    return tag("span", " ", class_="gap")
 
 
 def seconds_text(value: float | None, beside: float | None = None) -> str:

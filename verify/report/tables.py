@@ -9,6 +9,7 @@ from verify.report.markup import Markup, joined, tag
 from verify.report.notation import (
     bytes_text,
     error_title,
+    gap,
     metric_title,
     number,
     seconds_text,
@@ -65,7 +66,9 @@ def times_table(result: CaseResult) -> Markup | None:
     phases = list(dict.fromkeys(name for solve in result.solves for name in solve.timings))
     if not phases:
         return None
-    head = ["solver", "level", *phases, "total without meshing", "process", "memory", "iterations"]
+    iterative = any(solve.iterations for solve in result.solves)
+    head = ["solver", "level", *phases, "total without meshing", "process", "memory"]
+    head += ["iterations"] if iterative else []
     rows = []
     for solve in _ordered(result):
         if not solve.timings:
@@ -80,7 +83,7 @@ def times_table(result: CaseResult) -> Markup | None:
                 seconds_text(whole.median) if whole else "–",
                 seconds_text(solve.wall),
                 bytes_text(solve.peak_memory),
-                iterations or "–",
+                *([iterations or "–"] if iterative else []),
             ]
         )
     caption = "Wall times: median (smallest to largest repetition)"
@@ -158,8 +161,29 @@ def reference_record(reference: dict[str, Any]) -> Markup | None:
         ]
         parts.append(tag("dl", [joined(*entry) for entry in entries], class_="record"))
     for key, value in nested.items():
-        parts.append(_nested(key, value))
+        parts.append(_levels_table(value) if key == "time_to_accuracy" else _nested(key, value))
     return joined(*parts)
+
+
+def _levels_table(levels: dict[str, dict[str, Any]]) -> Markup:
+    """Return what each level of a reference cost and bounds of its errors, levels side by side."""
+    costs = {"unknowns": number, "seconds": seconds_text}
+    names = dict.fromkeys(name for entry in levels.values() for name in entry)
+    rows = [
+        [
+            "wall time" if name == "seconds" else name,
+            *(costs[name](entry.get(name)) for entry in levels.values()),
+        ]
+        for name in names
+        if name in costs
+    ]
+    rows += [
+        [error_title(name), *(number(entry.get(name), 2) for entry in levels.values())]
+        for name in names
+        if name not in costs
+    ]
+    caption = "Reference: time to accuracy; of errors, bounds that the finest level gives"
+    return table(["", *(_words(level) for level in levels)], rows, caption)
 
 
 def _nested(key: str, record: dict[str, Any]) -> Markup:
@@ -177,6 +201,8 @@ def _nested(key: str, record: dict[str, Any]) -> Markup:
 
 
 def _value(value: Any) -> Markup:
+    if isinstance(value, bool):
+        return joined("yes" if value else "no")
     if isinstance(value, list | tuple):
         return joined(*_separated([_value(entry) for entry in value])) if value else joined("–")
     if isinstance(value, dict):
@@ -227,17 +253,18 @@ def _measured(solve: SolveRecord, name: str, result: CaseResult) -> Any:
         return "–" if solve.status is Status.SOLVED else str(solve.status)
     value = number(metric.value, 5 if metric.reference is None else 8)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
-    plus = joined(" ± ", number(metric.uncertainty, 2)) if metric.uncertainty > 0 else None
+    plus = joined(gap(), "± ", number(metric.uncertainty, 2)) if metric.uncertainty > 0 else None
     own = None
     if metric.reference is not None and len(_references(result, name)) > 1:
         own = tag("div", "reference ", number(metric.reference, 8), unit, class_="quiet")
     return joined(value, plus, unit, own)
 
 
-def _spread(values: Sequence[float]) -> str:
+def _spread(values: Sequence[float]) -> Markup:
     if not values:
-        return "–"
+        return joined("–")
     middle, low, high = median(values), min(values), max(values)
     if len(values) == 1:
-        return f"{seconds_text(middle)} (once)"
-    return f"{seconds_text(middle)} ({seconds_text(low, middle)}–{seconds_text(high, middle)})"
+        return joined(seconds_text(middle), gap(), "(once)")
+    between = f"({seconds_text(low, middle)}–{seconds_text(high, middle)})"
+    return joined(seconds_text(middle), gap(), between)
