@@ -189,7 +189,7 @@ def test_the_energy_momentum_scheme_conserves_over_ten_thousand_steps(dim, share
 
 def test_energy_is_kept_while_pieces_turn_inside_out():
     body = _free(cut_cube(2, (0.5, 0.53, 0.47)))
-    state = _moving(body, 0.3, 3.0)
+    state = _moving(body, 0.5, 3.0)
     scheme = EnergyMomentum(body, 0.9 * _critical(body))
     inverted, first = 0, None
     for _ in range(8):

@@ -34,7 +34,8 @@ class NewtonIntegrator(ABC):
     step_size : float
         In seconds.
     tolerance : float
-        Of the residual force, over the largest of the forces that it balances.
+        Of the residual force, over the largest of the forces that it balances, each force over the
+        mass of its node: what hangs on a sliver is solved for like the rest.
     iterations : int
         Allowed per step; if they do not suffice the step fails rather than go on unsolved.
     solver : LinearSolver, optional
@@ -65,6 +66,8 @@ class NewtonIntegrator(ABC):
         self._blocks = np.zeros((len(body.pattern.columns), space, space))
         self._solver = self._default_solver() if solver is None else solver
         self._mass_places = body.mass.places(body.pattern)
+        self._inverse_mass = (1.0 / body.mass.matrix.diagonal())[:, None]
+        self._noise = self._round_off()
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
     def _default_solver(self) -> LinearSolver:
@@ -102,51 +105,73 @@ class NewtonIntegrator(ABC):
         turned = (self.rate / self.step_size) * (displacement - self._start.displacement)
         return turned - (self.rate - 1.0) * self._start.velocity
 
-    def _residual(self, displacement: _Floats) -> tuple[_Floats, StepForces, float]:
-        """Residual force (N, d), the forces, and the scale to which it compares."""
+    def _residual(self, displacement: _Floats) -> tuple[_Floats, float, StepForces, float]:
+        """Residual force (N, d), its norm, the forces, and the scale to which it compares.
+
+        Norms are of accelerations. The forces on a sliver of 1e-12, in space 1e-38 of those on its
+        neighbours, would not be seen among these: its unknowns would go anywhere, and step by step
+        they would grow until its energy is that of the body.
+        """
         velocity = self._velocity(displacement)
         forces = self._forces(displacement, velocity, self._start.time + self.step_size)
         inertia = self.body.mass.apply(velocity - self._start.velocity) / self.step_size
         residual = forces.external - forces.internal - forces.viscous - inertia
         residual[self.body.fixed] = 0.0
         parts = (forces.external, forces.internal, forces.viscous, inertia)
-        return residual, forces, max(float(np.linalg.norm(part)) for part in parts)
+        scale = max(self._size(part) for part in parts)
+        return residual, self._size(residual), forces, scale
+
+    def _size(self, force: _Floats) -> float:
+        return float(np.linalg.norm(self._inverse_mass * force))
 
     def _solve(self, displacement: _Floats) -> tuple[_Floats, _Floats, StepForces]:
         body = self.body
         prescribed, _ = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
-        residual, forces, scale = self._residual(displacement)
-        norm = np.linalg.norm(residual)
-        floor, leaps = 0.0, 0
+        residual, norm, forces, scale = self._residual(displacement)
+        leaps = 0
         for _ in range(self.iterations):
-            if norm <= max(self.tolerance * scale, floor):
+            # round-off of positions, seen through the stiffness
+            noise = np.abs(body.force.virtual.node_points + displacement).max() * self._noise
+            if self._excess(residual, noise) <= self.tolerance * scale:
                 return displacement, self._velocity(displacement), forces
             correction = self._correction(displacement, residual)
-            # round-off of positions, seen through the stiffness
-            reach = np.abs(body.force.virtual.node_points + displacement).max()
-            floor = _ROUND_OFF * np.abs(self._blocks).max() * reach
+            nearly = self._excess(residual, 100.0 * noise) <= 1e3 * self.tolerance * scale
             accepted = False
             for halving in range(_HALVINGS):
                 trial = displacement + 0.5**halving * correction
-                residual, forces, scale = self._residual(trial)
-                if np.linalg.norm(residual) < norm:
+                residual, size, forces, scale = self._residual(trial)
+                if size < norm:
                     accepted = True
                     break
-            if not accepted and norm <= max(1e3 * self.tolerance * scale, 1e2 * floor):
-                _, forces, _ = self._residual(displacement)
+            if not accepted and nearly:
+                _, _, forces, _ = self._residual(displacement)
                 return displacement, self._velocity(displacement), forces
             if not accepted:
                 # a dead end of the residual, not a root: leap over it
                 leaps += 1
                 trial = displacement + correction
-                residual, forces, scale = self._residual(trial)
-            displacement, norm = trial, np.linalg.norm(residual)
+                residual, size, forces, scale = self._residual(trial)
+            displacement, norm = trial, size
         raise StepFailedError(
             f"{type(self).__name__}: step from t = {self._start.time:.6g} s by "
-            f"{self.step_size:.6g} s not solved: residual {norm:.3g} N against forces of "
-            f"{scale:.3g} N; expected {self.tolerance:g} of them. {self._why(displacement, leaps)}"
+            f"{self.step_size:.6g} s not solved: residual {norm:.3g} m/s² against forces "
+            f"over masses of {scale:.3g} m/s²; expected {self.tolerance:g} of them. "
+            f"{self._why(displacement, leaps)}"
         )
+
+    def _round_off(self) -> _Floats:
+        """(N, 1) error of the acceleration of each node for positions of size one, rounded."""
+        body = self.body
+        self._blocks[:] = 0.0
+        body.force.add_stiffness(body.pattern, self._blocks, self.share)
+        stiffness = np.abs(self._blocks[body.pattern.diagonal]).max(axis=(1, 2))[:, None]
+        return _ROUND_OFF * (self._inverse_mass * stiffness + self.rate / self.step_size**2)
+
+    def _excess(self, residual: _Floats, noise: _Floats) -> float:
+        """Norm of the accelerations that are left, as far as they are more than round-off."""
+        left = np.abs(self._inverse_mass * residual) - noise
+        return float(np.linalg.norm(np.maximum(left, 0.0)))
 
     def _why(self, displacement: _Floats, leaps: int) -> str:
         """Say what stood in the way of Newton's method."""

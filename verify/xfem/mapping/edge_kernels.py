@@ -19,7 +19,7 @@ _NODES = 4
 _FACE = 3  # corners of a face
 LINE = _FACE + 1  # a line: the nodes of an edge or a face, and the cut that crosses it
 _NONE = np.iinfo(np.int64).max
-_SHORT = 1e-6  # of an edge: what has given a line its direction was too short to be trusted
+_SHORT = 1e-2  # of an edge: what has given a line its direction was too short to be trusted
 
 
 class EdgeRecord(NamedTuple):
@@ -43,6 +43,8 @@ class EdgeRecord(NamedTuple):
         Zero point, and the next entry of the same line or -1.
     directions : (l, s) float array
         Along which the points of a line are ordered; zero until it is first asked for.
+    turned : (1,) int array
+        How often a direction was replaced: what was bisected before must be bisected anew.
     met : tuple of arrays
         Mesh nodes through which cuts run, see `PointNumbers.nodes_on_cuts`.
     """
@@ -57,6 +59,7 @@ class EdgeRecord(NamedTuple):
     tally: _Ints
     entries: _Ints
     directions: _Floats
+    turned: _Ints
     met: tuple[_Ints, _Ints, NDArray[np.bool_]]
 
 
@@ -157,6 +160,7 @@ def _direct(x, y, line, record):
     along = 0.0
     for i in range(space):
         along += (_place(far, i, record) - _place(x, i, record)) * direction[i]
+    record.turned[0] += known > 0.0
     for i in range(space):
         step = _place(far, i, record) - _place(x, i, record)
         direction[i] = step if along >= 0.0 else -step

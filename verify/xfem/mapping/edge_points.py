@@ -103,13 +103,15 @@ class EdgePoints:
             self._tally.rows,
             self._entries.rows,
             self._directions.rows,
+            np.zeros(1, dtype=np.int64),
             self._points.nodes_on_cuts,
         )
         room = len(facets) + len(facets) // 4 + 64
         # each point bisects a few facets, those around its edge
         while room < 64 * (len(facets) + len(self._entries) + 64):
+            record.turned[0] = 0
             *parts, enough = bisect_facets(facets, at, record, room)
-            if enough:
+            if enough and record.turned[0] == 0:
                 return tuple(parts)
-            room *= 2
+            room *= 1 if enough else 2
         raise XfemError(f"points on the edges of {len(facets)} facets are in no order")
