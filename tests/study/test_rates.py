@@ -62,3 +62,13 @@ def test_slopes_that_jump_by_half_their_size_are_no_order():
     assert rate.order is None
     assert rate.reason.startswith("oscillating")
     assert len(rate.pairwise) == 3
+
+
+def test_steady_slopes_that_the_comparison_leaves_open_are_not_called_oscillating():
+    # 1.00, 1.00; each error is known to a fifth, the slope between two to .4 / log 2 = .58
+    errors = [0.4, 0.2, 0.1]
+    rate = observed_rate("xfem", "jump_l2", [4, 2, 1], errors, [0.2 * e for e in errors])
+    assert rate.order is None
+    assert rate.reason == (
+        "floor: slopes 1.00, 1.00, which the uncertainty of the comparison leaves open by 0.58"
+    )

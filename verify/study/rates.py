@@ -65,7 +65,13 @@ def observed_rate(
         return without(f"oscillating: slopes {shown}")
     span = log(sizes[-2] / sizes[-1])
     allowed = sum(w / e for e, w in zip(errors[-2:], uncertainties[-2:], strict=True)) / span
-    spread = SAFETY * abs(slopes[-1] - slopes[-2]) + allowed
+    change = SAFETY * abs(slopes[-1] - slopes[-2])
+    spread = change + allowed
+    if spread >= 0.5 * slopes[-1] > change:
+        return without(
+            f"floor: slopes {shown}, which the uncertainty of the comparison leaves open by "
+            f"{allowed:.2f}"
+        )
     if spread >= 0.5 * slopes[-1]:
         return without(f"oscillating: slopes {shown}, so that the last says little about the next")
     return Rate(solver, metric, slopes[-1], spread, "", slopes)
