@@ -176,3 +176,36 @@ def test_every_facet_of_a_curved_cut_is_known_to_be_its_own():
     assert areas[0] == pytest.approx(2 * np.pi * 0.3, rel=0.02)  # facets: h²/24R²
     assert areas[1] == pytest.approx(1.0, rel=1e-6)
     assert pieces == [2, 2, 1]
+
+
+@pytest.mark.parametrize("kinematics", ["linear", "corotational"])
+def test_a_prestressed_body_stays_where_statics_finds_it_until_its_cut_opens(kinematics):
+    """Half cut from the start, cut through at 0.2 s: at rest before, its lower half falls after."""
+    half = polygon("half", (-1, -1, 0.5), (0.5, -1, 0.5), (0.5, 2, 0.5), (-1, 2, 0.5))
+    rest = polygon("rest", (0.5, -1, 0.5), (2, -1, 0.5), (2, 2, 0.5), (0.5, 2, 0.5))
+    given = {
+        "supports": [{"where": "top", "displacement": [0, 0, 0]}],
+        "loads": [{"kind": "gravity", "acceleration": [0, 0, -0.98]}],
+    }
+    motion = {
+        "kind": "dynamic",
+        "kinematics": kinematics,
+        "duration": 0.3,
+        "time_step": 0.02,
+        "outputs": 4,
+    }
+    start = {"kind": "equilibrium", "cuts": "open"}
+    late = [half, {**rest, "opens_at": 0.2}]
+    found = solved(moving(late, analysis=motion, initial=start, **given))
+    static = solved(moving([half], analysis={"kinematics": kinematics}, **given))
+    assert found.times == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    sag = static.displacement[0][:, 2].min()
+    for at_rest in found.displacement[:3]:
+        assert at_rest[:, 2].min() == pytest.approx(sag, rel=1e-7)
+        assert at_rest == pytest.approx(found.displacement[0], abs=1e-7 * abs(sag))
+    assert found.ledger["strain"][:3] == pytest.approx(static.ledger["strain"][0], rel=1e-7)
+    cells = found.cells[found.points[found.cells, 2].mean(axis=1) < 0.5]
+    corners = found.points[cells]
+    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    means = found.displacement[:, cells, 2].mean(axis=2) @ volume / volume.sum()
+    assert means[3] - means[2] == pytest.approx(-0.49 * 0.1**2, rel=1e-6)
