@@ -119,6 +119,16 @@ def test_time_at_equal_error_is_that_of_the_power_laws():
     assert not found["left_out"]
 
 
+@pytest.mark.parametrize(("repetitions", "said"), [(1, 1), (2, 0)])
+def test_times_without_repetition_are_not_called_certain(repetitions, said):
+    once = {"meshing": [1.0], "solve": [2.0] * repetitions}
+    solves = [solve("a", "x", 0, 0.1), solve("a", "y", 0, 0.1)]
+    for one in solves:
+        one.timings.update(once)
+    notes = rank_solvers([case_of("a", solves)])["contended"]
+    assert sum("timed once" in note for note in notes) == said
+
+
 def test_a_solver_without_an_error_in_common_is_not_timed_against_the_others():
     solves = [solve("a", n, level, 0.1 * 0.5**level, 0.0, 4.0**level)
               for n in ("x", "y") for level in range(3)]  # fmt: skip

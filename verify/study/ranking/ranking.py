@@ -55,10 +55,16 @@ def rank_solvers(
         "energy": [asdict(one) for one in energy_comparisons(results, solvers)],
         "cost": [asdict(one) for one in cost_comparisons(results, solvers)],
         "left_out": [asdict(one) for one in _left_out(results)],
-        "contended": sorted(
-            {s.notes["timing"] for r in results for s in r.solves if "timing" in s.notes}
-        ),
+        "contended": _why_times_may_be_off(results, solvers),
     }
+
+
+def _why_times_may_be_off(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[str]:
+    said = {s.notes["timing"] for r in results for s in r.solves if "timing" in s.notes}
+    timed = [s.timings for r in results for s in r.solves if s.solver in solvers and s.timings]
+    if any(max(map(len, each.values())) == 1 for each in timed):
+        said.add("solves that were timed once have no interval, so that no rank by it is certain")
+    return sorted(said)
 
 
 def _left_out(results: Sequence[CaseResult]) -> list[LeftOut]:
