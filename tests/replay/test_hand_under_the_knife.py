@@ -150,18 +150,22 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
     """
     for spread in (False, True):
         Session(slashed(hand), account=False, spread=spread).run()  # compiles
-    found = {}
+    found, runs = {}, []
     for name, clock, spread in (
         ("processor time", thread_time, False),
         ("wall time", perf_counter, False),
-        ("processor time, cuts spread", thread_time, True),
         ("wall time, cuts spread", perf_counter, True),
+        *[("processor time, cuts spread", thread_time, True)] * 3,
     ):
         session = Session(slashed(hand), account=False, spread=spread, clock=clock)
         found[name] = timings_of(session.run())
+        runs.append(np.array([record.total_seconds for record in session.records]))
     kernel = float(np.median(kernel_seconds(clock=thread_time)))
     last = session.records[-1]
     assert 170 <= last.split <= 260
+    # every replay is the same, so the median over three of a step is that of the same work
+    step, busy = np.median(runs[-3:], axis=0), np.array([r.busy for r in session.records])
+    ratio = float(step[busy].max() / np.median(step[~busy]))
     longer = THESIS_STEP / found["processor time"].resting.median
     with capsys.disabled():
         print(f"\nhand, {len(session.stage.mesh.cells)} tetrahedra, {last.split} cut; kernel "
@@ -169,11 +173,16 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
               f"{longer:.0f} times as long")  # fmt: skip
         for name, timings in found.items():
             print(f"{name}\n{timings.table}")
+        longest = 1e3 * step[busy].max()
+        print(f"cuts spread, medians of three runs: at most {longest:.2f} ms, "
+              f"{ratio:.2f} resting steps; {np.mean(step <= 2e-3):.0%} within 2 ms")  # fmt: skip
     timings, spread_timings = found["processor time"], found["processor time, cuts spread"]
     assert timings.resting.median < 0.35 * kernel
     assert timings.resting.most < 0.7 * kernel
     assert timings.cutting.median < 2.0 * kernel
-    # seen: 4 to 4.5 and 2.2 to 2.6 times a resting step, on a machine with other things to do
+    # seen: 4 to 4.5 and 1.8 to 2.1 times a resting step, the longest of all 2.2 to 2.7 times,
+    # on a machine with other things to do
     assert timings.cutting.median < 6.5 * timings.resting.median
-    assert spread_timings.cutting.median < 3.6 * timings.resting.median
-    assert spread_timings.cutting.most < 0.8 * timings.cutting.most
+    assert spread_timings.cutting.median < 2.6 * timings.resting.median
+    assert ratio < 3.3
+    assert spread_timings.cutting.most < 0.7 * timings.cutting.most
