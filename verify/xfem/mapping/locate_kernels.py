@@ -146,19 +146,33 @@ def cut_at(
 
 
 @njit(cache=True)
-def _among(x, reach, some, floor, ceiling, cells, points, gradients, room):
+def _depth(x, cell, least, cells, points, gradients):
+    """Give the smallest barycentric coordinate of x, or one that is at most `least`."""
+    smallest, origin, a = np.inf, cells[cell, 0], 0
+    while a < cells.shape[1] and smallest > least:
+        value = 1.0 if a == 0 else 0.0
+        for i in range(len(x)):
+            value += gradients[cell, a, i] * (x[i] - points[origin, i])
+        smallest = min(smallest, value)
+        a += 1
+    return smallest
+
+
+@njit(cache=True)
+def _among(x, reach, some, floor, ceiling, cells, points, gradients):
     """Give the cell of x of some cells, as `locate` does of all; -1 if x is in the box of none."""
     best, at = -np.inf, np.int64(-1)
     for cell in some:
-        apart = False
-        for i in range(len(x)):
-            apart = apart or x[i] < floor[cell, i] - reach or x[i] > ceiling[cell, i] + reach
-        if not apart:
-            smallest = barycentric(x, cell, cells, points, gradients, room)
-            if smallest > _TIE:  # inside of it, so in no other
-                return cell
-            if smallest > best:
-                best, at = smallest, cell
+        i = 0
+        while i < len(x) and floor[cell, i] - reach <= x[i] <= ceiling[cell, i] + reach:
+            i += 1
+        if i < len(x):
+            continue
+        smallest = _depth(x, cell, best, cells, points, gradients)
+        if smallest > _TIE:  # inside of it, so in no other
+            return cell
+        if smallest > best:
+            best, at = smallest, cell
     return at
 
 
@@ -187,17 +201,19 @@ def corner_cells(
                 for j in range(size):
                     inside[i] += _INWARDS / size * corners[q, j, i]
             cell = np.int64(-1)
+            tried = cell
             for trial in likely[q]:
-                if barycentric(inside, trial, cells, points, gradients, at[q, k]) > _TIE:
+                if trial == tried:
+                    continue
+                tried = trial
+                if _depth(inside, trial, _TIE, cells, points, gradients) > _TIE:
                     cell = trial
                     break
             if cell < 0:
-                cell = _among(
-                    inside, reach, some, floor, ceiling, cells, points, gradients, at[q, k]
-                )
-                if cell < 0:
-                    cell = locate(inside, reach, low, high, order, cells, points, gradients)
-                barycentric(inside, cell, cells, points, gradients, at[q, k])
+                cell = _among(inside, reach, some, floor, ceiling, cells, points, gradients)
+            if cell < 0:
+                cell = locate(inside, reach, low, high, order, cells, points, gradients)
+            barycentric(inside, cell, cells, points, gradients, at[q, k])
             found[q, k] = cell
             barycentric(corners[q, k], cell, cells, points, gradients, weights[q, k])
             total = 0.0
