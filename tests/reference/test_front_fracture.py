@@ -142,6 +142,8 @@ def test_a_front_where_no_cell_is_or_of_a_plane_field_is_refused():
     away = StraightFront([0.03, 0.03, 0], [0.03, 0.03, 1], [1, 0, 0])
     with pytest.raises(InputError, match="no cell of the mesh touches"):
         front_intensity(prism((1, 0, 0), 8), SOLID, away, [0.5])
+    with pytest.raises(InputError, match="not across"):
+        StraightFront([0, 0, 0], [0, 0, 1], [0, 0, 1])
 
 
 def test_more_stations_than_nodes_along_the_front_are_refused():
@@ -160,8 +162,6 @@ def test_each_station_sees_its_own_intensity_whichever_others_are_asked_for():
     flat = front_intensity(field, SOLID, FRONT, [0.5], stations=3).modes[:, 0]
     # linear along the front: a hat's mean is the value at its middle
     assert three / flat == pytest.approx(1 + np.array([0.25, 0.5, 0.75]), rel=0.02)
-    with pytest.raises(InputError, match="not across"):
-        StraightFront([0, 0, 0], [0, 0, 1], [0, 0, 1])
 
 
 class TestThePenny:
