@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from cut_bodies import boundary_nodes, cut_cube, cut_square, material, rotation
 
+from verify.xfem import corotational_static
 from verify.xfem.cholesky import SingularStiffnessError
+from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.corotational import InternalForce
 from verify.xfem.corotational_static import NotInEquilibriumError, static_equilibrium
 from verify.xfem.cuts import Plane
@@ -136,3 +138,27 @@ def test_what_cannot_be_found_is_said():
         static_equilibrium(force, ~free, load_steps=0)
     with pytest.raises(XfemError, match="supports of shape"):
         static_equilibrium(force, free[:3])
+
+
+@pytest.mark.parametrize("limit", [10_000, 3])
+def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(monkeypatch, limit):
+    """Also where the tangent is indefinite on the way, and where iterations run out."""
+    v = cut_cube(3)
+    X = v.node_points
+    ends = (X[:, 0] < 1e-9) | (X[:, 0] > 1.0 - 1e-9)
+
+    def twisted(s):
+        turned = (X - 0.5) @ rotation(3, 1.5 * s, (1.0, 0.0, 0.0)).T - (X - 0.5)
+        return np.where((X[:, 0] > 0.5)[:, None], turned, 0.0)
+
+    fixed = np.repeat(ends[:, None], 3, axis=1)
+    force = InternalForce(v, material(3))
+    direct = static_equilibrium(force, fixed, twisted, load_steps=2)
+    monkeypatch.setattr(corotational_static, "ITERATE_FROM", 0)
+    monkeypatch.setattr(
+        corotational_static, "ConjugateGradients", lambda *of: ConjugateGradients(*of, limit=limit)
+    )
+    iterated = static_equilibrium(force, fixed, twisted, load_steps=2)
+    # both to 1e-10 of the forces
+    np.testing.assert_allclose(iterated.displacement, direct.displacement, atol=1e-9)
+    assert iterated.energy == pytest.approx(direct.energy, rel=1e-9)

@@ -1,6 +1,7 @@
 """Static equilibrium at large rotations: Newton's method with load steps."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.typing import NDArray
 from verify.xfem.assembly_kernels import constrain
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.conjugate_gradients import ConjugateGradients, NotConvergedError
 from verify.xfem.corotational import InternalForce
 from verify.xfem.errors import XfemError
+from verify.xfem.static import ITERATE_FROM
 
 __all__ = ["NotInEquilibriumError", "StaticEquilibrium", "static_equilibrium"]
 
@@ -18,6 +21,7 @@ _Floats = NDArray[np.float64]
 
 _HALVINGS = 12
 _ROUND_OFF = 256.0 * np.finfo(float).eps
+_INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
 
 
 class NotInEquilibriumError(RuntimeError):
@@ -119,7 +123,12 @@ class _Newton:
         space = virtual.mesh.space
         self._pattern = block_pattern(virtual.cells, virtual.node_count)
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
-        self._solver = Cholesky(self._pattern, space)
+        large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
+        self._iterative = ConjugateGradients(self._pattern, space, _INEXACT) if large else None
+
+    @cached_property
+    def _direct(self) -> Cholesky:
+        return Cholesky(self._pattern, self._blocks.shape[1])
 
     def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took."""
@@ -173,6 +182,22 @@ class _Newton:
             load -= (pattern.matrix(blocks) @ change.ravel()).reshape(change.shape)
             load[self._fixed] = 0.0
         constrain(pattern.starts, pattern.columns, self._fixed, blocks)
-        self._solver.factorize(blocks)
-        correction = self._solver.solve(load)
+        correction = self._solved(load)
         return correction if change is None else correction + change
+
+    def _solved(self, load: _Floats) -> _Floats:
+        """Solve with the blocks; iterate if the body is large, factorise if that fails.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If the stiffness is found not to be positive definite, by either.
+        """
+        if self._iterative is not None:
+            self._iterative.factorize(self._blocks)
+            try:
+                return self._iterative.solve(load)
+            except NotConvergedError:
+                pass
+        self._direct.factorize(self._blocks)
+        return self._direct.solve(load)

@@ -18,11 +18,11 @@ from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["StaticSolution", "solve_static"]
+__all__ = ["ITERATE_FROM", "StaticSolution", "solve_static"]
 
 _Floats = NDArray[np.float64]
 
-_ITERATE_FROM = 2000  # nodes in space: docs/xfem-linear-solvers.md has the measurement
+ITERATE_FROM = 2000  # nodes in space: docs/xfem-linear-solvers.md has the measurement
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
 
 
@@ -105,7 +105,7 @@ def solve_static(
     if solver not in ("auto", "direct", "iterative"):
         raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
     if solver == "auto":
-        large = virtual.cells.shape[1] == 4 and virtual.node_count >= _ITERATE_FROM
+        large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
         solver = "iterative" if large and ghost is None else "direct"
     inverse: Cholesky | ConjugateGradients
     if solver == "iterative":
