@@ -38,10 +38,7 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
                 "--dimension", type=int, choices=(2, 3), help="only 2D or 3D (default: both)"
             )
         kind.add_argument("--quick", action="store_true", help="less of it, in under a minute")
-        kind.add_argument(
-            "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
-        )
-        kind.add_argument("--json", action="store_true", help="print the findings as JSON")
+        _add_output(kind)
     _add_cost(kinds.add_parser)
     _add_budget(kinds.add_parser)
 
@@ -62,14 +59,8 @@ def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
         "--metric", default="energy_norm", choices=("displacement_l2", "energy_norm", "jump_l2"),
         help="the error that is held equal (default: energy_norm)",
     )  # fmt: skip
-    kind.add_argument(
-        "--repetitions", metavar="N", type=count, default=5,
-        help="timed repetitions of each solve (default: 5)",
-    )  # fmt: skip
-    kind.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
-    )
-    kind.add_argument("--json", action="store_true", help="print the findings as JSON")
+    _add_repetitions(kind, 5, "5")
+    _add_output(kind)
 
 
 def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -88,13 +79,21 @@ def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
         help="displacement_l2, energy_norm (in motion their means, displacement_l2_mean, "
         "energy_norm_mean) or a quantity of the case (default: the first of these)",
     )  # fmt: skip
-    kind.add_argument(
-        "--repetitions", metavar="N", type=count,
-        help="timed repetitions of each solve (default: 5; with --quick 2)",
-    )  # fmt: skip
+    _add_repetitions(kind, None, "5; with --quick 2")
     kind.add_argument(
         "--quick", action="store_true", help="the two coarsest mesh levels, fewer models"
     )
+    _add_output(kind)
+
+
+def _add_repetitions(kind: argparse.ArgumentParser, default: int | None, said: str) -> None:
+    kind.add_argument(
+        "--repetitions", metavar="N", type=count, default=default,
+        help=f"timed repetitions of each solve (default: {said})",
+    )  # fmt: skip
+
+
+def _add_output(kind: argparse.ArgumentParser) -> None:
     kind.add_argument(
         "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
     )

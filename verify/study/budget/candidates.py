@@ -14,9 +14,9 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.result import SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.study.budget.chain import Chain
 from verify.study.budget.cheapest import Candidate
 from verify.study.budget.distances import Times, distances, norm_names
+from verify.study.budget.links import Chain
 from verify.study.budget.scenes import at_rest, with_kinematics
 from verify.study.budget.solved import JUDGED, Solve, Solved
 from verify.study.quantities import Measured

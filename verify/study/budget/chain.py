@@ -5,102 +5,34 @@ can be made, which says so, and the parts still add up to the total.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from verify.compare.body import AnyBody, Body, body_of
-from verify.compare.hooke import hooke, law_of
-from verify.compare.realised import cut_deviation
+from verify.compare.body import body_of
+from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.study.budget.budget import Answer
+from verify.study.budget.links import Chain, Missing, is_realised_as_asked, link
+from verify.study.budget.references import OUTSIDE, References
 from verify.study.budget.scenes import (
     on_one_level,
     on_realised_cut,
     with_kinematics,
     with_time_step,
 )
-from verify.study.budget.solved import CONFORMING, JUDGED, REFERENCE, Solve, Solved
-from verify.study.quantities import Measured
+from verify.study.budget.solved import CONFORMING, JUDGED, Solve
 from verify.study.reference import (
     ExactField,
     Reference,
-    conforming_reference,
     exact_reference,
     size_of,
 )
 
-__all__ = ["Chain", "Missing", "is_realised_as_asked", "make_chain"]
+__all__ = ["make_chain"]
 
-_SAME = 1e-9  # of the body's size
-_OUTSIDE = "not part of the total"
 _FINER = 4  # an exact solution has no time step: the own one over this
-
-
-@dataclass(frozen=True)
-class Missing:
-    """A link that could not be made.
-
-    Parameters
-    ----------
-    source : str
-        What would have been changed.
-    reason : str
-    where : str
-        Which part it is in instead.
-    """
-
-    source: str
-    reason: str
-    where: str
-
-
-@dataclass
-class Chain:
-    """The links, and what they were made of.
-
-    Attributes
-    ----------
-    scene : Scene
-    answers : list of Answer
-    missing : list of Missing
-    notes : list of str
-    known : Reference
-        Of the user's problem.
-    body : Body or SolidBody
-    size : float
-        Element size of the judged solution, m.
-    asked : dict of str to Solved
-        The scene as asked by the judged solver on all levels, by kinematics.
-    fine : list of (str, Solved)
-        Motions of one level at the fine time step, with what they are in words.
-    """
-
-    scene: Scene
-    known: Reference
-    body: AnyBody
-    size: float
-    asked: dict[str, Solved]
-    answers: list[Answer] = field(default_factory=list)
-    missing: list[Missing] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    fine: list[tuple[str, Solved]] = field(default_factory=list)
-
-
-def is_realised_as_asked(scene: Scene, solution: Solution) -> bool:
-    """Say whether the cut of `solution` is that of `scene`, tips and all, to round-off."""
-    body = body_of(scene)
-    if cut_deviation(solution, body) > _SAME * body.size:
-        return False
-    if not isinstance(body, Body):  # where a front ends inside elements, it is moved
-        return not len(body.front)
-    asked = float(sum(part.piece.length * (part.end - part.start) for part in body.parts))
-    edges = np.diff(solution.cut_facets, axis=1)[:, 0]
-    made = float(np.linalg.norm(edges, axis=1).sum())
-    return bool(abs(made - asked) <= _SAME * body.size)
 
 
 def make_chain(
@@ -138,7 +70,7 @@ class _Maker:
         if exact is not None:
             kinds = ["linear"]
         elif quick and self._own == "linear" and scene.analysis.kind == "dynamic":
-            missing.append(Missing("finite rotations → linear", "left out by --quick", _OUTSIDE))
+            missing.append(Missing("finite rotations → linear", "left out by --quick", OUTSIDE))
             kinds = ["linear"]
         scenes = [with_kinematics(scene, kind) for kind in kinds]
         asked = dict(zip(kinds, solve(scenes, "asked", (JUDGED,), timed=True), strict=True))
@@ -146,16 +78,18 @@ class _Maker:
         singular = None if exact is None else np.asarray(exact.singular_points)
         body, size = body_of(scene, singular), size_of(self._judged)
         self._first = kinds[0]
+        self._references = References(scene, body, size, solve)
         if exact is not None:
-            known, title = self._exact(exact, body), "the problem: exact solution"
+            known = exact_reference(scene, exact, body, hooke(scene.material))
+            title = "the problem: exact solution"
         else:
-            known, title = self._problem(body, size, missing)
+            known, title, self._first = self._references.problem(kinds[0], self._own, missing)
         self.chain = Chain(scene, known, body, size, asked, missing=missing)
         if exact is not None:
             text = "the exact solution is one of linear elasticity: nothing is said of rotations"
             self.chain.notes.append(text)
         self._take(title, "", known)
-        self._place = self._realise(exact is not None)
+        self._place = self._realise()
         if self._own != self._first:
             self._reference_link("linear kinematics", "finite rotations → linear", self._place)
         if scene.analysis.kind == "dynamic":
@@ -163,50 +97,9 @@ class _Maker:
         else:
             self._rest()
 
-    # -- the user's problem
-
-    def _exact(self, exact: ExactField, body: AnyBody) -> Reference:
-        return exact_reference(self._scene, exact, body, hooke(self._scene.material))
-
-    def _problem(self, body: AnyBody, size: float, missing: list[Missing]) -> tuple[Reference, str]:
-        """Make the first reference: at finite rotation if there is one, else linear."""
-        titles = {
-            "corotational": "the problem: finite rotations, cut as asked",
-            "linear": "the problem: linear kinematics, cut as asked",
-        }
-        try:
-            return self._reference(self._first, body, size), titles[self._first]
-        except InputError as problem:
-            if self._first == self._own:
-                raise
-            text = "finite rotations → linear"
-            missing.append(Missing(text, str(problem), _OUTSIDE))
-        self._first = self._own
-        return self._reference(self._own, body, size), titles[self._own]
-
-    def _reference(self, kinematics: str, body: AnyBody, size: float) -> Reference:
-        (solved,) = self._solve(
-            [with_kinematics(self._scene, kinematics)], f"reference-{kinematics}", (REFERENCE,)
-        )
-        found = self._of(solved, body, size)
-        self._finest = max(solved.solutions[REFERENCE])
-        self._steps = solved.solutions[REFERENCE][self._finest].iterations.get("steps", 0)
-        return found
-
-    def _of(self, solved: Solved, body: AnyBody, size: float) -> Reference:
-        levels = solved.solutions.get(REFERENCE, {})
-        law = law_of(solved.scene)
-        try:
-            return conforming_reference(self._scene, levels, body, law, size)
-        except InputError as problem:
-            reason = solved.reason(REFERENCE)
-            kind = solved.scene.analysis.kinematics
-            text = f"the {kind} reference of '{solved.scene.name}': {problem}"
-            raise InputError(f"{text} ({reason})" if reason else text) from None
-
     # -- one change after the other
 
-    def _realise(self, with_exact: bool) -> list[Scene]:
+    def _realise(self) -> list[Scene]:
         """Change the cut; give the scene on the level of the answer in both kinematics."""
         kinds = list(dict.fromkeys([self._first, self._own]))
         as_asked = [with_kinematics(self._scene, kind) for kind in kinds]
@@ -218,8 +111,7 @@ class _Maker:
         try:
             facets = self._judged.cut_facets
             realised = [on_realised_cut(self._scene, facets, self._level, k) for k in kinds]
-            found = self._solve(realised[:1], f"realised-{self._level}", (REFERENCE,))[0]
-            known = self._of(found, self.chain.body, self.chain.size)
+            known = self._references.of(realised[0], f"realised-{self._level}")
         except (InputError, UnsupportedSceneError) as problem:
             self._cut = text
             where = "in the part of the method: the links before it have the cut as asked"
@@ -236,12 +128,7 @@ class _Maker:
         asked = "level-" in own.name  # not realised: the scene of all levels has the reference
         scene = with_kinematics(self._scene, self._own) if asked else own
         where = f"reference-{self._own}" if asked else f"realised-{self._level}-{self._own}"
-
-        def known() -> Reference:
-            (solved,) = self._solve([scene], where, (REFERENCE,))
-            return self._of(solved, self.chain.body, self.chain.size)
-
-        self._try(name, change, known)
+        self._try(name, change, lambda: self._references.of(scene, where))
 
     def _rest(self) -> None:
         """Change the mesh and the method."""
@@ -299,11 +186,11 @@ class _Maker:
         """Time step of the finest reference, s: changing the mesh does not change it."""
         analysis = self._scene.analysis
         assert analysis.duration is not None
-        finest = getattr(self, "_finest", None)
+        finest, steps = self._references.finest, self._references.steps
         if analysis.time_step is not None:
             return analysis.time_step / (_FINER if finest is None else 2**finest)
-        if finest is not None and self._steps:
-            return analysis.duration / self._steps
+        if finest is not None and steps:
+            return analysis.duration / steps
         own = self._judged.iterations.get("steps", 0)
         return analysis.duration / (_FINER * max(own, 1))
 
@@ -324,16 +211,4 @@ class _Maker:
         """Append a link, with the changes that waited for it."""
         change = "; ".join([*self._waiting, change])
         self._waiting.clear()
-        if isinstance(what, Reference):
-            link = Answer(name, change, what.motion, what.quantities, what.norms)
-        else:
-            scene = self._scene
-            one = Measured(what, self.chain.body, law_of(scene), scene)
-            quantities = {}
-            for asked in scene.quantities:
-                try:
-                    quantities[asked.name] = one.quantity(asked), 0.0
-                except UnsupportedSceneError:
-                    continue
-            link = Answer(name, change, one.motion, quantities, {})
-        self.chain.answers.append(link)
+        self.chain.answers.append(link(self.chain, name, change, what))

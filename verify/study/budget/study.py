@@ -11,9 +11,10 @@ from verify.result import Verdict
 from verify.scene import Scene
 from verify.study.budget.budget import Budget, error_budget
 from verify.study.budget.candidates import find_candidates
-from verify.study.budget.chain import Chain, Missing, make_chain
+from verify.study.budget.chain import make_chain
 from verify.study.budget.cheapest import Candidate, cheapest_adequate
 from verify.study.budget.distances import Times, norm_names
+from verify.study.budget.links import Chain, Missing
 from verify.study.budget.scenes import coarsest
 from verify.study.budget.solved import Solve
 from verify.study.finding import Finding
