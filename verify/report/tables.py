@@ -195,7 +195,8 @@ def _nested(key: str, record: dict[str, Any]) -> Markup:
             [metric_title(name), *(_value(entry.get(column)) for column in columns)]
             for name, entry in record.items()
         ]
-        return table(["", *(_words(column) for column in columns)], rows, caption)
+        head = ["", *(_words(column) for column in columns)]
+        return table(head, rows, caption, class_="prose")
     rows = [[_words(name), _value(value)] for name, value in record.items()]
     return table(["", "value"], rows, caption)
 
