@@ -239,6 +239,22 @@ def test_an_explicit_scheme_takes_no_more_than_its_share_of_the_critical_step(tm
     assert half.iterations["steps"] == 5 * 11
 
 
+@pytest.mark.parametrize("scheme", ["central_differences", "symplectic_euler"])
+def test_an_explicit_scheme_stays_below_the_resonances_of_a_turning_body(tmp_path, scheme):
+    """No four modes resonate below 1/√2 of the critical step, which strain does not lower."""
+    coarse = ("time_step = 0.01\n", "")
+    turning = ("[analysis]", '[analysis]\nkinematics = "corotational"')
+    text = SQUARE + HELD + WEIGHT
+    linear = solve(tmp_path, text, coarse, scheme=scheme, step_factor=0.01)
+    turned = solve(tmp_path, text, coarse, turning, scheme=scheme, step_factor=0.01)
+    ratio = turned.iterations["steps"] / linear.iterations["steps"]
+    # five intervals in whole steps
+    assert ratio == pytest.approx(np.sqrt(2.0), rel=5.0 / linear.iterations["steps"])
+    # an implicit scheme is not concerned
+    implicit = [solve(tmp_path, text, coarse, *way).iterations["steps"] for way in ([], [turning])]
+    assert implicit[0] == implicit[1]
+
+
 def test_what_compiles_is_not_timed_and_every_phase_is(tmp_path):
     (tmp_path / "motion.toml").write_text(SQUARE + HELD + WEIGHT + CUT)
     found = XfemSolver().solve(load_scene(tmp_path / "motion.toml"), 0, 2)

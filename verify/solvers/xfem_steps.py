@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from verify.errors import InputError
-from verify.xfem.critical_step import critical_step, element_critical_steps
+from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -40,6 +40,7 @@ MASSES: dict[str, Callable[[VirtualMesh, float], Mass]] = {
     "hrz": lambda virtual, density: shifted_mass(virtual, density, "weighted diagonal"),
     "thesis": lambda virtual, density: shifted_mass(virtual, density, "enrichment"),
 }
+_REACH = 1.0  # strain up to which the step of a turning body is a bound
 _EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
 
 
@@ -54,8 +55,10 @@ def largest_step(
     """Return the largest time step, s, and where it comes from.
 
     An explicit scheme takes `factor` times its critical step, or the step asked for if that is
-    smaller. An implicit one takes the step asked for, or else `factor` times the critical step of
-    the uncut elements: what an explicit scheme could follow.
+    smaller. Where pieces turn, the critical step is that of strains up to 1, and `RESONANCE_FREE`
+    of it, so that the time grid makes no modes resonate (docs/xfem-dynamics.md). An implicit one
+    takes the step asked for, or else `factor` times the critical step of the uncut elements: what
+    an explicit scheme could follow.
 
     Parameters
     ----------
@@ -72,8 +75,9 @@ def largest_step(
     if not explicit and asked is not None:
         return asked, "analysis.time_step"
     critical = _critical(body, material, density, explicit)
-    found = factor * critical
-    said = f"{factor:g} of the critical step {critical:.4g} s"
+    turning = explicit and body.force.turning
+    found = factor * critical * (RESONANCE_FREE if turning else 1.0)
+    said = f"{factor:g} of {'√½ of ' if turning else ''}the critical step {critical:.4g} s"
     if not np.isfinite(found) or found <= 0.0:
         raise InputError(f"the critical step is {critical:g} s; give analysis.time_step")
     if asked is not None and asked < found:
@@ -85,7 +89,8 @@ def _critical(body: DynamicBody, material: Material, density: float, explicit: b
     virtual = body.force.virtual
     if not explicit or body.mass.diagonal is not None:
         # side-wise mass: no cut makes it smaller than that of the smallest uncut element
-        step = float(element_critical_steps(virtual.mesh, material, density).min())
+        strain = _REACH if body.force.turning else 0.0
+        step = float(element_critical_steps(virtual.mesh, material, density, strain).min())
     else:
         force: Any = body.force
         blocks = force.stiffness(body.pattern, np.zeros(body.shape), "frozen")
