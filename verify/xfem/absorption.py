@@ -86,9 +86,11 @@ def _renumber(virtual: VirtualMesh, stays: NDArray[np.bool_]) -> tuple[_Ints, _I
     Each mesh node keeps at least one unknown, because every cell keeps a piece; the first of them
     takes the node's number.
     """
-    used = np.unique(virtual.cells[stays])
+    is_used = np.zeros(virtual.node_count, dtype=bool)
+    is_used[virtual.cells[stays]] = True
+    used = np.flatnonzero(is_used)
     parent = virtual.node_parent[used]
-    order = np.lexsort([used, parent])
+    order = np.argsort(parent, kind="stable")
     used, parent = used[order], parent[order]
     first = np.diff(parent, prepend=-1) != 0
     nodes = len(virtual.mesh.points)
@@ -128,7 +130,10 @@ def _sub_cells(virtual: VirtualMesh, into: _Ints, number: _Ints) -> SubCells:
     cell = before if sub.cell is None else sub.cell
     in_cell = sub.barycentric if sub.in_cell is None else sub.in_cell
     # a whole cell that absorbs is from now on described by sub-simplices: itself is one
-    whole = np.setdiff1d(target[out], sub.piece)
+    is_whole = np.zeros(len(into), dtype=bool)
+    is_whole[target[out]] = True
+    is_whole[sub.piece] = False
+    whole = np.flatnonzero(is_whole)
     itself = np.broadcast_to(np.eye(mesh.dim + 1), (len(whole), mesh.dim + 1, mesh.dim + 1))
     return SubCells(
         piece=number[np.concatenate([target, whole])],

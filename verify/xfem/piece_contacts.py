@@ -32,8 +32,8 @@ def face_contacts(virtual: VirtualMesh, near: bool = False) -> tuple[_Ints, _Int
     across = mesh.neighbours[cells]
     row, local = np.nonzero((across > cells[:, None]) & chosen[across])
     cell, across = cells[row], across[row, local]
-    start = np.searchsorted(virtual.parent, np.arange(len(mesh.cells) + 1))
-    count = np.diff(start)
+    count = np.bincount(virtual.parent, minlength=len(mesh.cells))
+    start = np.cumsum(count) - count
     pairs = count[cell] * count[across]
     face = np.repeat(np.arange(len(cell)), pairs)
     within = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)

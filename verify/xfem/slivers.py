@@ -133,9 +133,10 @@ def _bridges(
 
 def _largest_siblings(virtual: VirtualMesh) -> _Ints:
     """Return the largest piece of each cell."""
-    order = np.lexsort([virtual.fraction, virtual.parent])
-    last = np.diff(virtual.parent[order], append=-1) != 0
-    largest: _Ints = order[last]
+    parent, fraction = virtual.parent, virtual.fraction
+    most = np.maximum.reduceat(fraction, np.flatnonzero(np.diff(parent, prepend=-1)))
+    candidates = np.flatnonzero(fraction == most[parent])
+    largest: _Ints = candidates[np.diff(parent[candidates], append=-1) != 0]
     return largest
 
 
