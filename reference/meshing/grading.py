@@ -87,7 +87,7 @@ def singular_points(scene: Scene) -> Array:
     if not any(support.displacement == "exact" for support in scene.supports):
         found.append(_corners(scene))
         found.append(_held_mouths(scene, cuts))
-    points = np.concatenate([f.reshape(-1, 2) for f in found])
+    points = np.concatenate([np.zeros((0, 2)), *(f.reshape(-1, 2) for f in found)])
     scale = float(np.ptp(outline, axis=0).max())
     _, first = np.unique(np.round(points / scale, 9), axis=0, return_index=True)
     return points[first]
