@@ -14,6 +14,7 @@ IMPORTED_AS = {
         "dolfinx", "dolfinx_solver", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py",
     },
     "pillow": {"PIL"},
+    "pyvista": {"pyvista", "vtkmodules"},  # VTK is what it is an interface of
     "scikit-fem": {"skfem"},
     "import-linter": {"importlinter"},
 }  # fmt: skip
