@@ -27,9 +27,9 @@ __all__ = ["MOST", "Session"]
 
 _Floats = NDArray[np.float64]
 
-_NONE, _DONE = np.empty(0, dtype=np.int64), object()
+_DONE = object()
 
-MOST = 24  # elements that a cut whose work is spread may split, but for ties
+MOST = 20  # elements that a cut whose work is spread may split, but for ties
 
 
 class Session:
@@ -90,7 +90,6 @@ class Session:
         self._spent = np.zeros(2)  # work and dissipation until the body was last made anew
         self._seconds = dict.fromkeys(PHASES, 0.0)
         self._held = [held_facets(stage.mesh, hold.nodes) for hold in stage.holds]
-        self._solver: Cholesky | None = None
         self.virtual: VirtualMesh
         self._assemble()
         self.state = self.body.rest()
@@ -228,14 +227,20 @@ class Session:
             body = self._body_of(parts)
         yield
         with self._timed("assembly"):
-            self._inherit(increment)
-            self._follow(body, parts.grips, increment.source)
-        self._begin_account()
-        if self._solver is not None and self._solver.is_worn:
-            if self._spread:
+            solver = self._solver.extended(body.pattern, increment.source)
+        if solver.is_worn:
+            if self._spread:  # no step is made with it: the body as it was is still solved for
+                with self._timed("assembly"):
+                    body.force.prepare(body.pattern)
                 yield
             with self._timed("assembly"):
-                self._order_anew()
+                solver = solver.renewed(body.pattern)
+            if self._spread:
+                yield
+        with self._timed("assembly"):
+            self._inherit(increment)
+            self._follow(body, parts.grips, solver)
+        self._begin_account()
 
     def _begin_account(self) -> None:
         if self._account:
@@ -256,15 +261,20 @@ class Session:
         for number in hooks:
             self._start[number] = self.state.displacement.copy()
         with self._timed("assembly"):
-            self._assemble()
+            grips = self._grips_of(self.virtual, self.body.mass, self._start)
+            self._follow(self.body.held_by(grips.supports), grips, self._solver)
         self._begin_account()
 
     def _parts_now(self, start: dict[int, _Floats]) -> "_Parts":
         """Make what the body is made of, as the cutter has it: mass, forces, what holds it."""
         stage, virtual = self.stage, self.cutter.virtual_mesh()
         mass = side_wise_mass(virtual, stage.density)
-        grips = Grips(virtual, stage.holds, stage.hooks, mass.weights, start, self._held)
+        grips = self._grips_of(virtual, mass, start)
         return _Parts(InternalForce(virtual, stage.material), mass, grips)
+
+    def _grips_of(self, virtual: VirtualMesh, mass: Mass, start: dict[int, _Floats]) -> Grips:
+        stage = self.stage
+        return Grips(virtual, stage.holds, stage.hooks, mass.weights, start, self._held)
 
     def _body_of(self, parts: "_Parts") -> DynamicBody:
         """Make the body and its sparsity."""
@@ -280,25 +290,15 @@ class Session:
     def _assemble(self) -> None:
         """Make the body anew that is there already, with what holds it from now on."""
         parts = self._parts_now(self._start)
-        self._follow(self._body_of(parts), parts.grips, _NONE)
+        body = self._body_of(parts)
+        self._follow(body, parts.grips, Cholesky(body.pattern, self.stage.mesh.space))
 
-    def _follow(self, body: DynamicBody, grips: Grips, source: NDArray[np.int64]) -> None:
-        """Move with another body from now on; its solver keeps the order of elimination.
-
-        `source` (k,) are the unknowns from which those come that are new.
-        """
+    def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
+        """Move with another body from now on."""
         self.body, self._grips, self.virtual = body, grips, body.force.virtual
         self._tool_load, self._ahead = None, None
-        if self._solver is None:
-            self._solver = Cholesky(self.body.pattern, self.stage.mesh.space)
-        else:
-            self._solver = self._solver.extended(self.body.pattern, source)
-        self.integrator = RealTimeEuler(self.body, self.stage.time_step, self._solver)
-
-    def _order_anew(self) -> None:
-        """Find another order of elimination."""
-        self._solver = Cholesky(self.body.pattern, self.stage.mesh.space)
-        self.integrator.solver = self._solver
+        self._solver = solver
+        self.integrator = RealTimeEuler(body, self.stage.time_step, solver)
 
     def _load(self, time: float) -> _Floats:
         force = self._grips.force(time)

@@ -59,14 +59,17 @@ class Cholesky:
     """
 
     def __init__(self, pattern: BlockPattern, block: int) -> None:
-        graph = (pattern.starts, pattern.columns)
-        order, bounds = minimum_degree(*graph)
-        row_start, _, parent = front_rows(*graph, order, bounds, _ANYWHERE)
-        order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
         self._block = block
         self._factor = self._stack = self._update = np.empty(0)
         self._diagonal = self._gathered = np.empty(0)
         self._place = np.empty(0, dtype=np.int64)
+        self._find_order(pattern)
+
+    def _find_order(self, pattern: BlockPattern) -> None:
+        graph = (pattern.starts, pattern.columns)
+        order, bounds = minimum_degree(*graph)
+        row_start, _, parent = front_rows(*graph, order, bounds, _ANYWHERE)
+        order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
         self._plan(pattern, order, bounds, _ANYWHERE)
         self._ordered = (self._work, len(order))
 
@@ -74,7 +77,7 @@ class Cholesky:
         """Solver for this body cut further, in the order of this one: no search for another.
 
         A new unknown has some of the neighbours of the one from which it comes, and is eliminated
-        with it. Takes the memory of this solver, which is of no use any more.
+        with it. Takes the memory of this solver, whose factors are lost with those of the other.
 
         Parameters
         ----------
@@ -88,6 +91,13 @@ class Cholesky:
         other.__dict__.update(self.__dict__)
         order, bounds = _insert(self._order, self._bounds, source)
         other._plan(pattern, order, bounds, self._parent)
+        return other
+
+    def renewed(self, pattern: BlockPattern) -> "Cholesky":
+        """Solver for any pattern, in an order found anew, with the memory of this solver."""
+        other = object.__new__(Cholesky)
+        other.__dict__.update(self.__dict__)
+        other._find_order(pattern)
         return other
 
     @property

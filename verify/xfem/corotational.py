@@ -147,6 +147,16 @@ class InternalForce:
             )
         return force, float(energy)
 
+    def prepare(self, pattern: BlockPattern) -> None:
+        """Do what `linearise` does otherwise when it is first called with a sparsity."""
+        if self.virtual.mesh.dim == 3:
+            self._sweep = self._sweep_over(pattern)
+
+    def _sweep_over(self, pattern: BlockPattern) -> Linearisation:
+        if self._sweep is not None and self._sweep.pattern is pattern:
+            return self._sweep
+        return Linearisation(self.virtual, self.lam, self.mu, pattern, self.turning)
+
     def linearise(
         self,
         pattern: BlockPattern,
@@ -184,8 +194,7 @@ class InternalForce:
             blocks[:] = 0.0
             self.add_stiffness(pattern, blocks, scale)
             return
-        if self._sweep is None or self._sweep.pattern is not pattern:
-            self._sweep = Linearisation(self.virtual, self.lam, self.mu, pattern, self.turning)
+        self._sweep = self._sweep_over(pattern)
         np.multiply(velocity, implicit, out=self._moved)
         self._moved += displacement
         self._sweep(displacement, self._moved, scale, force, blocks, whole)

@@ -129,7 +129,7 @@ def _real_time(hand: RealTime, contended: str) -> Iterator[Finding]:
         yield Finding(
             f"real time: every step within {name}",
             f"{hand.within_spread[name]:.1%} of {hand.steps} steps in processor time of one "
-            f"thread with the work of a cut spread over steps, slowest "
+            f"thread with the work of a cut spread over steps (medians of replays), slowest "
             f"{1e3 * hand.slowest_spread:.2f} ms; {hand.within[name]:.1%} with cuts done at once "
             f"({hand.within_wall[name]:.1%} in wall time), median {1e3 * hand.resting['step']:.2f} "
             f"ms, {1e3 * hand.cutting['step']:.2f} ms of the {hand.cutting_steps} that cut, "

@@ -1,6 +1,7 @@
 """What moves: elasticity, mass, damping, supports and loads of a cut body, and its state."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -138,16 +139,31 @@ class DynamicBody:
             raise XfemError(f"weight of shape {np.shape(self.weight)}; expected {self.shape}")
         if self.supports is None:
             self.supports = Supports.none(virtual)
-        if self.supports.fixed.shape != self.shape or self.supports.fixed.dtype != bool:
-            raise XfemError(
-                f"supports: {self.supports.fixed.dtype} array of shape "
-                f"{self.supports.fixed.shape}; expected bool and {self.shape}"
-            )
         penalised = self.force if isinstance(self.force, PenalisedForce) else None
         couplings = penalised.ghost.couplings if penalised else None
         self.pattern = self.mass.pattern(virtual, couplings)
-        self.fixed = self.supports.fixed
-        self.moving = isinstance(self.supports, MovingSupports)
+        self._hold(self.supports)
+
+    def held_by(self, supports: Supports | MovingSupports) -> "DynamicBody":
+        """Return this body with other supports; the rest, sparsity included, is shared.
+
+        Raises
+        ------
+        XfemError
+            If they are not of the shape of the body.
+        """
+        other = copy(self)
+        other._hold(supports)
+        return other
+
+    def _hold(self, supports: Supports | MovingSupports) -> None:
+        if supports.fixed.shape != self.shape or supports.fixed.dtype != bool:
+            raise XfemError(
+                f"supports: {supports.fixed.dtype} array of shape {supports.fixed.shape}; "
+                f"expected bool and {self.shape}"
+            )
+        self.supports, self.fixed = supports, supports.fixed
+        self.moving = isinstance(supports, MovingSupports)
 
     def rest(self) -> MotionState:
         """Undeformed and at rest at time 0, apart from what the supports prescribe."""
