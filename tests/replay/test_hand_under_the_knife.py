@@ -150,38 +150,40 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
     """
     for spread in (False, True):
         Session(slashed(hand), account=False, spread=spread).run()  # compiles
-    found, runs = {}, []
-    for name, clock, spread in (
-        ("processor time", thread_time, False),
-        ("wall time", perf_counter, False),
-        ("wall time, cuts spread", perf_counter, True),
-        *[("processor time, cuts spread", thread_time, True)] * 3,
-    ):
-        session = Session(slashed(hand), account=False, spread=spread, clock=clock)
-        found[name] = timings_of(session.run())
-        runs.append(np.array([record.total_seconds for record in session.records]))
+    found, runs = {}, {}
+    for _ in range(5):  # in turn, because the speed of a machine may change from second to second
+        for name, clock, spread in (
+            ("wall time", perf_counter, False),
+            ("processor time", thread_time, False),
+            ("wall time, cuts spread", perf_counter, True),
+            ("processor time, cuts spread", thread_time, True),
+        ):
+            session = Session(slashed(hand), account=False, spread=spread, clock=clock)
+            found[name] = timings_of(session.run())
+            runs.setdefault(name, []).append([record.total_seconds for record in session.records])
+            last = session.records
+            runs[name, "busy"] = np.array([record.busy for record in last])
     kernel = float(np.median(kernel_seconds(clock=thread_time)))
-    last = session.records[-1]
-    assert 170 <= last.split <= 260
-    # every replay is the same, so the median over three of a step is that of the same work
-    step, busy = np.median(runs[-3:], axis=0), np.array([r.busy for r in session.records])
-    ratio = float(step[busy].max() / np.median(step[~busy]))
+    assert 170 <= last[-1].split <= 260
+    # every replay is the same, so the median over five of a step is that of the same work
+    name = "processor time, cuts spread"
+    step, busy = np.median(runs[name], axis=0), runs[name, "busy"]
+    resting = float(np.median(step[~busy]))
+    ratio = float(step[busy].max() / resting)
     longer = THESIS_STEP / found["processor time"].resting.median
     with capsys.disabled():
-        print(f"\nhand, {len(session.stage.mesh.cells)} tetrahedra, {last.split} cut; kernel "
+        print(f"\nhand, {len(session.stage.mesh.cells)} tetrahedra, {last[-1].split} cut; kernel "
               f"{1e3 * kernel:.2f} ms; the step of Table 4.4 takes "
               f"{longer:.0f} times as long")  # fmt: skip
-        for name, timings in found.items():
-            print(f"{name}\n{timings.table}")
+        for title, timings in found.items():
+            print(f"{title}\n{timings.table}")
         longest = 1e3 * step[busy].max()
-        print(f"cuts spread, medians of three runs: at most {longest:.2f} ms, "
-              f"{ratio:.2f} resting steps; {np.mean(step <= 2e-3):.0%} within 2 ms")  # fmt: skip
-    timings, spread_timings = found["processor time"], found["processor time, cuts spread"]
-    assert timings.resting.median < 0.35 * kernel
-    assert timings.resting.most < 0.7 * kernel
-    assert timings.cutting.median < 2.0 * kernel
-    # seen: 4 to 4.5 and 1.8 to 2.1 times a resting step, the longest of all 2.2 to 2.3 times
-    assert timings.cutting.median < 6.5 * timings.resting.median
-    assert spread_timings.cutting.median < 2.6 * timings.resting.median
-    assert ratio < 2.8
-    assert spread_timings.cutting.most < 0.7 * timings.cutting.most
+        print(f"cuts spread, medians of five runs: at most {longest:.2f} ms, "
+              f"{ratio:.2f} resting steps; {np.mean(step <= 2e-3):.1%} within 2 ms")  # fmt: skip
+    at_once, cuts = np.median(runs["processor time"], axis=0), runs["processor time", "busy"]
+    assert np.median(at_once[~cuts]) < 0.35 * kernel
+    # seen: 4 to 5 and 1.8 to 2.1 times a resting step, the longest of all 2.0 to 2.4 times
+    assert np.median(at_once[cuts]) < 6.5 * np.median(at_once[~cuts])
+    assert np.median(step[busy]) < 2.8 * resting
+    assert ratio < 3.3
+    assert step[busy].max() < 0.7 * at_once[cuts].max()
