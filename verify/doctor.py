@@ -15,7 +15,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from verify.provenance import THREAD_VARIABLES, provenance
+from verify.provenance import provenance
+from verify.threads import ONE_THREAD
 
 __all__ = ["DEBIAN_PACKAGES", "Finding", "examine"]
 
@@ -146,7 +147,7 @@ def _probe(name: str) -> list[str]:
 def _tried(name: str, arguments: list[str], cure: str, needed: bool = True) -> Finding:
     root = str(Path(__file__).resolve().parent.parent)  # `reference` of a checkout
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1"), "PYTHONPATH": paths}
+    environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": paths}
     try:
         with tempfile.TemporaryDirectory(prefix="verify-doctor-") as folder:
             done = subprocess.run(

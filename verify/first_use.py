@@ -28,9 +28,9 @@ from verify.compare.cell_tree import build_cell_tree
 from verify.compare.facet_kernels import crossings, distance_to_segments
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
 from verify.compare.simplices import simplices
-from verify.provenance import THREAD_VARIABLES
 from verify.replay.session import Session
 from verify.replay.stage import Stage
+from verify.threads import ONE_THREAD
 from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.corotational import InternalForce
 from verify.xfem.corotational_static import static_equilibrium
@@ -263,7 +263,7 @@ def compile_all() -> FirstUse:
         If a process fails, with its last line.
     """
     begun = perf_counter()
-    environment = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
+    environment = {**os.environ, **ONE_THREAD}
     root = str(Path(__file__).resolve().parent.parent)
     paths = filter(None, [root, os.environ.get("PYTHONPATH")])
     environment["PYTHONPATH"] = os.pathsep.join(paths)

@@ -15,17 +15,7 @@ from typing import Any
 
 import verify
 
-__all__ = ["THREAD_VARIABLES", "provenance"]
-
-# pinned to one thread in every solving process
-THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-)
+__all__ = ["provenance"]
 
 # what is reported -> the distributions that may carry it, the likelier first
 _DISTRIBUTIONS = {

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 
 from verify.cli.parser import build_parser
 from verify.errors import InputError, UnsupportedSceneError
+from verify.threads import pin_to_one_thread
 
 __all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line `argv` (default: that of the process) and return its exit code."""
+    pin_to_one_thread()
     arguments = build_parser().parse_args(argv)
     try:
         code: int = arguments.command(arguments)

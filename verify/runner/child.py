@@ -15,7 +15,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from verify.provenance import THREAD_VARIABLES
+from verify.threads import ONE_THREAD
 
 __all__ = ["PARENT_VARIABLE", "POLL_SECONDS", "Child", "Ending"]
 
@@ -53,7 +53,7 @@ class Child:
         memory: float,
         ranks: int = 1,
     ) -> None:
-        environment = {**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")}
+        environment = {**os.environ, **ONE_THREAD}
         environment[PARENT_VARIABLE] = str(os.getpid())
         self.log, self.timeout, self.memory = log, timeout, memory
         self.peak, self.killed_for = 0.0, ""
