@@ -61,6 +61,39 @@ def test_a_solver_extended_at_every_cut_still_solves_its_system() -> None:
     assert anew.factor_entries < solver.factor_entries
 
 
+@pytest.mark.parametrize("new_are_held", [True, False])
+def test_held_nodes_are_left_out_and_what_couples_them_is_not_read(new_are_held) -> None:
+    """Blocks that are not numbers there, at every cut, also where the strokes cut held nodes."""
+    cutter, rng = under_the_knife(), np.random.default_rng(6)
+    at_end = cutter.mesh.points[:, 1] < 0.2
+    pattern, _ = system(cutter, rng)
+    solver = Cholesky(pattern, 3, at_end)
+    cuts, from_held = 0, 0
+    for time in np.linspace(0.1, 3.0, 24):
+        increment = cutter.advance(time)
+        if increment is None:
+            continue
+        pattern, blocks = system(cutter, rng)
+        held = at_end[cutter.virtual_mesh().node_parent]
+        if not new_are_held:
+            held[len(at_end) :] = False
+        solver = solver.extended(pattern, increment.source, held)
+        rows = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
+        unread = (rows != pattern.columns) & (held[rows] | held[pattern.columns])
+        blocks[unread] = np.nan
+        solver.factorize(blocks)
+        load = rng.standard_normal((pattern.node_count, 3))
+        blocks[unread] = 0.0
+        error = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
+        assert np.linalg.norm(error) < ROUND_OFF * np.linalg.norm(load)
+        cuts += 1
+        from_held += at_end[cutter.virtual_mesh().node_parent[increment.nodes_before :]].sum()
+    assert cuts > 12
+    assert from_held > 4
+    anew = [Cholesky(pattern, 3, some).factor_entries for some in (held, None)]
+    assert anew[0] < anew[1]
+
+
 @pytest.mark.parametrize("tip", ["inside", "through"])
 def test_a_cut_alone_is_split_as_it_is_beside_one_that_meets_nothing(tip) -> None:
     """The path for one cut against that for several: cells, pieces, points, shares."""

@@ -227,14 +227,14 @@ class Session:
             body = self._body_of(parts)
         yield
         with self._timed("assembly"):
-            solver = self._solver.extended(body.pattern, increment.source)
+            solver = self._solver.extended(body.pattern, increment.source, _held(body))
         if solver.is_worn:
             if self._spread:  # no step is made with it: the body as it was is still solved for
                 with self._timed("assembly"):
                     body.force.prepare(body.pattern)
                 yield
             with self._timed("assembly"):
-                solver = solver.renewed(body.pattern)
+                solver = solver.renewed(body.pattern, _held(body))
             if self._spread:
                 yield
         with self._timed("assembly"):
@@ -291,7 +291,8 @@ class Session:
         """Make the body anew that is there already, with what holds it from now on."""
         parts = self._parts_now(self._start)
         body = self._body_of(parts)
-        self._follow(body, parts.grips, Cholesky(body.pattern, self.stage.mesh.space))
+        solver = Cholesky(body.pattern, self.stage.mesh.space, _held(body))
+        self._follow(body, parts.grips, solver)
 
     def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
         """Move with another body from now on."""
@@ -385,6 +386,11 @@ class _Parts(NamedTuple):
     force: InternalForce
     mass: Mass
     grips: Grips
+
+
+def _held(body: DynamicBody) -> NDArray[np.bool_]:
+    """(N,) unknown nodes that are held altogether, which need not be solved for."""
+    return body.fixed.all(axis=1)
 
 
 def _blade_at(path: ToolPath, time: float) -> tuple[_Floats, _Floats]:

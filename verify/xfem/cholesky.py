@@ -56,28 +56,41 @@ class Cholesky:
     pattern : BlockPattern
     block : int
         Size of the blocks.
+    held : (N,) bool array, optional
+        Nodes of which every component is held: the matrix couples them to no other, and whatever
+        stands in these blocks is not read.
     """
 
-    def __init__(self, pattern: BlockPattern, block: int) -> None:
+    def __init__(
+        self, pattern: BlockPattern, block: int, held: NDArray[np.bool_] | None = None
+    ) -> None:
         self._block = block
+        self._held = np.zeros(pattern.node_count, dtype=bool) if held is None else held
         self._factor = self._stack = self._update = np.empty(0)
         self._diagonal = self._gathered = np.empty(0)
         self._place = np.empty(0, dtype=np.int64)
         self._find_order(pattern)
 
-    def _find_order(self, pattern: BlockPattern) -> None:
-        graph = (pattern.starts, pattern.columns)
-        order, bounds = minimum_degree(*graph)
-        row_start, _, parent = front_rows(*graph, order, bounds, _ANYWHERE)
-        order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
-        self._plan(pattern, order, bounds, _ANYWHERE)
-        self._ordered = (self._work, len(order))
+    @property
+    def _free(self) -> int:
+        return max(1, int(np.count_nonzero(~self._held)))
 
-    def extended(self, pattern: BlockPattern, source: _Ints) -> "Cholesky":
+    def _find_order(self, pattern: BlockPattern) -> None:
+        starts, columns, _ = coupled = _coupled(pattern.starts, pattern.columns, self._held)
+        order, bounds = minimum_degree(starts, columns)
+        row_start, _, parent = front_rows(starts, columns, order, bounds, _ANYWHERE)
+        order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
+        self._plan(coupled, order, bounds, _ANYWHERE)
+        self._ordered = (self._work, self._free)
+
+    def extended(
+        self, pattern: BlockPattern, source: _Ints, held: NDArray[np.bool_] | None = None
+    ) -> "Cholesky":
         """Solver for this body cut further, in the order of this one: no search for another.
 
         A new unknown has some of the neighbours of the one from which it comes, and is eliminated
         with it. Takes the memory of this solver, whose factors are lost with those of the other.
+        Only if one that is not held comes from one that is, there is nothing to go by.
 
         Parameters
         ----------
@@ -86,34 +99,48 @@ class Cholesky:
             through what has come from them, to none that were not coupled before.
         source : (k,) int array
             Unknown before from which each new one comes.
+        held : (N,) bool array, optional
+            As for a new solver. What was held before still is.
         """
-        other = object.__new__(Cholesky)
-        other.__dict__.update(self.__dict__)
+        other = self._with_held(pattern, held)
+        if (self._held[source] & ~other._held[len(self._held) :]).any():
+            other._find_order(pattern)
+            return other
         order, bounds = _insert(self._order, self._bounds, source)
-        other._plan(pattern, order, bounds, self._parent)
+        coupled = _coupled(pattern.starts, pattern.columns, other._held)
+        other._plan(coupled, order, bounds, self._parent)
         return other
 
-    def renewed(self, pattern: BlockPattern) -> "Cholesky":
+    def renewed(self, pattern: BlockPattern, held: NDArray[np.bool_] | None = None) -> "Cholesky":
         """Solver for any pattern, in an order found anew, with the memory of this solver."""
+        other = self._with_held(pattern, held)
+        other._find_order(pattern)
+        return other
+
+    def _with_held(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> "Cholesky":
+        """Copy that has the memory of this solver."""
         other = object.__new__(Cholesky)
         other.__dict__.update(self.__dict__)
-        other._find_order(pattern)
+        other._held = np.zeros(pattern.node_count, dtype=bool) if held is None else held
         return other
 
     @property
     def is_worn(self) -> bool:
         """Whether extensions have made the order so bad that a new one would pay."""
         work, nodes = self._ordered
-        return self._work > _WORN * work * (len(self._order) / nodes)
+        return self._work > _WORN * work * (self._free / nodes)
 
-    def _plan(self, pattern: BlockPattern, order: _Ints, bounds: _Ints, nearest: _Ints) -> None:
+    def _plan(
+        self, coupled: tuple[_Ints, _Ints, _Ints], order: _Ints, bounds: _Ints, nearest: _Ints
+    ) -> None:
         """Find fronts and room for an order, and where each block goes."""
-        graph = (pattern.starts, pattern.columns)
-        row_start, rows, parent = front_rows(*graph, order, bounds, nearest)
-        lists = assembly_lists(*graph, order, bounds, row_start, rows, parent)
+        starts, columns, blocks = coupled
+        row_start, rows, parent = front_rows(starts, columns, order, bounds, nearest)
+        lists = assembly_lists(starts, columns, order, bounds, row_start, rows, parent)
         self._order, self._bounds = order, bounds
         self._row_start, self._rows, self._parent = row_start, rows, parent
         self._relative, self._entry_start, self._entry_block, self._entry_row = lists
+        self._entry_block = blocks.take(self._entry_block)
         width = np.diff(bounds) * self._block
         below = np.diff(row_start) * self._block
         self._offset = np.concatenate([[0], np.cumsum(width * (width + below))])
@@ -183,6 +210,22 @@ class Cholesky:
 def _room[T: np.generic](store: NDArray[T], size: int) -> NDArray[T]:
     """Array of at least that size: the given one, or a larger one with room to grow."""
     return store if len(store) >= size else np.empty(size + size // 4, dtype=store.dtype)
+
+
+@njit(cache=True)
+def _coupled(starts, columns, held):
+    """Rows without what couples held nodes: starts, columns, and which blocks are left."""
+    fewer = np.empty_like(starts)
+    left, blocks = np.empty_like(columns), np.empty(len(columns), dtype=np.int64)
+    count = 0
+    fewer[0] = 0
+    for i in range(len(starts) - 1):
+        for k in range(starts[i], starts[i + 1]):
+            if columns[k] == i or not (held[i] or held[columns[k]]):
+                left[count], blocks[count] = columns[k], k
+                count += 1
+        fewer[i + 1] = count
+    return fewer, left[:count], blocks[:count]
 
 
 @njit(cache=True)
