@@ -3,33 +3,28 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.replay.body_parts import BodyParts, held_nodes
 from verify.replay.grips import Grips, held_facets
 from verify.replay.stage import Stage
+from verify.replay.staged_cut import MOST, Followed, Pieces, StagedCut
 from verify.replay.step_record import PHASES, StepRecord
 from verify.replay.surfaces import Picture, Surfaces
 from verify.xfem.cholesky import Cholesky
 from verify.xfem.collision.surface_collider import Contacts, SurfaceCollider
-from verify.xfem.corotational import InternalForce
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.energy_ledger import EnergyLedger
-from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["MOST", "Session"]
+__all__ = ["Session"]
 
 _Floats = NDArray[np.float64]
-
-_DONE = object()
-
-MOST = 20  # elements that a cut whose work is spread may split, but for ties
 
 
 class Session:
@@ -42,11 +37,10 @@ class Session:
         Whether to keep the account of the energies. Without it the hot path is that of a
         simulator: that is what is timed.
     spread : bool
-        Whether what a cut asks for is spread over steps, in the pieces of `_cut`, of which each
-        takes about as long as a step at rest, and of which a step does one. At most `MOST`
-        elements are split by a cut; the others wait for the next one. A replay is the same on any
-        machine. Until the mechanics follow, new unknowns move as those from which they come, so
-        that nothing jumps.
+        Whether what a cut asks for is spread over steps, of which each does one of the pieces of
+        `StagedCut`. At most `MOST` elements are split by a cut; the others wait for the next one. A
+        replay is the same on any machine. Until the mechanics follow, new unknowns move as those
+        from which they come, so that nothing jumps.
     clock : callable
         What phases are timed by: wall time in s, or `time.thread_time` where other work on the
         machine shall not be counted.
@@ -76,7 +70,7 @@ class Session:
     ) -> None:
         self.stage, self._account, self._clock = stage, account, clock
         self._spread, self._led = spread, float("-inf")  # time up to which the blades have been led
-        self._work: Iterator[None] | None = None  # what is left to be done of a cut
+        self._work: Pieces | None = None  # what is left to be done of a cut
         self._ahead: Increment | None = None  # of which the mechanics do not know yet
         self.cutter = SemiProgressiveCutter(stage.mesh)
         for path in stage.strokes:
@@ -90,6 +84,10 @@ class Session:
         self._spent = np.zeros(2)  # work and dissipation until the body was last made anew
         self._seconds = dict.fromkeys(PHASES, 0.0)
         self._held = [held_facets(stage.mesh, hold.nodes) for hold in stage.holds]
+        self._staged = StagedCut(
+            self.cutter, self.surfaces, self._parts_after, self._body_of, self._end_of_step,
+            self._timed,
+        )  # fmt: skip
         self.virtual: VirtualMesh
         self._assemble()
         self.state = self.body.rest()
@@ -119,10 +117,10 @@ class Session:
         self._assemble()
 
     def settle(self) -> None:
-        """Finish what is left of cuts whose work is spread."""
+        """Finish what is left of cuts whose work is spread: the blades are where they are now."""
         self._finish()
-        while self.cutter.waits:
-            self._work = self._cut(self._led)
+        while self.cutter.waits or self._led < self.time:
+            self._work = self._cut(self._next_stroke(self.time))
             self._finish()
 
     def step(self) -> StepRecord:
@@ -134,7 +132,7 @@ class Session:
             If the solver fails or the motion is not finite.
         """
         self._seconds = dict.fromkeys(PHASES, 0.0)
-        end = self.state.time + self.stage.time_step
+        end = self._end_of_step()
         hooks = self._hooks_to_begin(end)
         if hooks:
             self._finish()
@@ -191,56 +189,28 @@ class Session:
         """Do the next piece of the work of a cut; whether there are more."""
         if self._work is None:
             return False
-        for _ in self._work:
-            return True
-        self._work = None
-        return False
+        try:
+            self._ahead = next(self._work)
+        except StopIteration as done:
+            self._work = None
+            if done.value is not None:
+                self._follow_cut(done.value)
+            return False
+        return True
+
+    def _follow_cut(self, followed: Followed) -> None:
+        increment, body, grips, solver = followed
+        with self._timed("assembly"):
+            self._inherit(increment)
+            self._follow(body, grips, solver)
+        self._begin_account()
+
+    def _cut(self, until: float) -> Pieces:
+        return self._staged.pieces(until, MOST if self._spread else None, self._solver)
 
     def _finish(self) -> None:
         while self._advance():
             pass
-
-    def _cut(self, until: float) -> Iterator[None]:
-        """Lead the blades to a time, and do piece by piece what that asks for."""
-        with self._timed("cutting"):
-            division = self.cutter.look(until, MOST if self._spread else None)
-        if division is None:
-            return
-        yield
-        with self._timed("cutting"):
-            self._ahead = increment = self.cutter.divide(
-                division, self.state.time + self.stage.time_step
-            )
-        with self._timed("assembly"):
-            start = {hook: increment.inherit(values) for hook, values in self._start.items()}
-            parts = self._parts_now(start)
-        yield
-        goes: Iterator[object] = self.surfaces.following(increment)
-        going = True
-        while going:
-            with self._timed("cutting"):
-                going = next(goes, _DONE) is not _DONE
-            yield
-        with self._timed("cutting"):
-            self.surfaces.material.update(increment)
-        with self._timed("assembly"):
-            body = self._body_of(parts)
-        yield
-        with self._timed("assembly"):
-            solver = self._solver.extended(body.pattern, increment.source, _held(body))
-        if solver.is_worn:
-            if self._spread:  # no step is made with it: the body as it was is still solved for
-                with self._timed("assembly"):
-                    body.force.prepare(body.pattern)
-                yield
-            with self._timed("assembly"):
-                solver = solver.renewed(body.pattern, _held(body))
-            if self._spread:
-                yield
-        with self._timed("assembly"):
-            self._inherit(increment)
-            self._follow(body, parts.grips, solver)
-        self._begin_account()
 
     def _begin_account(self) -> None:
         if self._account:
@@ -261,37 +231,28 @@ class Session:
         for number in hooks:
             self._start[number] = self.state.displacement.copy()
         with self._timed("assembly"):
-            grips = self._grips_of(self.virtual, self.body.mass, self._start)
+            stage, weights = self.stage, self.body.mass.weights
+            grips = Grips(self.virtual, stage.holds, stage.hooks, weights, self._start, self._held)
             self._follow(self.body.held_by(grips.supports), grips, self._solver)
         self._begin_account()
 
-    def _parts_now(self, start: dict[int, _Floats]) -> "_Parts":
-        """Make what the body is made of, as the cutter has it: mass, forces, what holds it."""
-        stage, virtual = self.stage, self.cutter.virtual_mesh()
-        mass = side_wise_mass(virtual, stage.density)
-        grips = self._grips_of(virtual, mass, start)
-        return _Parts(InternalForce(virtual, stage.material), mass, grips)
+    def _parts(self, start: dict[int, _Floats]) -> BodyParts:
+        return BodyParts.of(self.stage, self.cutter.virtual_mesh(), start, self._held)
 
-    def _grips_of(self, virtual: VirtualMesh, mass: Mass, start: dict[int, _Floats]) -> Grips:
-        stage = self.stage
-        return Grips(virtual, stage.holds, stage.hooks, mass.weights, start, self._held)
+    def _parts_after(self, increment: Increment) -> BodyParts:
+        return self._parts({hook: increment.inherit(at) for hook, at in self._start.items()})
 
-    def _body_of(self, parts: "_Parts") -> DynamicBody:
-        """Make the body and its sparsity."""
-        return DynamicBody(
-            parts.force,
-            parts.mass,
-            weight=parts.mass.weight(self.stage.gravity),
-            load=self._load,
-            supports=parts.grips.supports,
-            damping=self.stage.damping,
-        )
+    def _body_of(self, parts: BodyParts) -> DynamicBody:
+        return parts.body(self._load)
+
+    def _end_of_step(self) -> float:
+        return self.state.time + self.stage.time_step
 
     def _assemble(self) -> None:
         """Make the body anew that is there already, with what holds it from now on."""
-        parts = self._parts_now(self._start)
+        parts = self._parts(self._start)
         body = self._body_of(parts)
-        solver = Cholesky(body.pattern, self.stage.mesh.space, _held(body))
+        solver = Cholesky(body.pattern, self.stage.mesh.space, held_nodes(body))
         self._follow(body, parts.grips, solver)
 
     def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
@@ -378,19 +339,6 @@ class Session:
         start = self._clock()
         yield
         self._seconds[phase] += self._clock() - start
-
-
-class _Parts(NamedTuple):
-    """What a body is made of."""
-
-    force: InternalForce
-    mass: Mass
-    grips: Grips
-
-
-def _held(body: DynamicBody) -> NDArray[np.bool_]:
-    """(N,) unknown nodes that are held altogether, which need not be solved for."""
-    return body.fixed.all(axis=1)
 
 
 def _blade_at(path: ToolPath, time: float) -> tuple[_Floats, _Floats]:

@@ -1,0 +1,114 @@
+"""The work of a cut in pieces of about equal length, so that a step can do one of them.
+
+What is cut, the body that moves, and the surfaces follow one after the other; until the last piece
+is done the mechanics go on with the body as it was. Pieces are bounded by what they do and by how
+many elements a cut may split, never by a clock: a replay is the same on any machine.
+"""
+
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from verify.replay.body_parts import BodyParts, held_nodes
+from verify.replay.grips import Grips
+from verify.replay.surfaces import Surfaces
+from verify.xfem.cholesky import Cholesky
+from verify.xfem.cutting.growing_body import Increment
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.dynamics import DynamicBody
+
+__all__ = ["MOST", "Followed", "Pieces", "StagedCut"]
+
+MOST = 20  # elements that a cut whose work is spread may split, but for ties
+
+_DONE = object()
+
+Pieces = Generator[Increment | None, None, "Followed | None"]
+
+
+class Followed(NamedTuple):
+    """What moves from now on, and how it comes from what has moved until now."""
+
+    increment: Increment
+    body: DynamicBody
+    grips: Grips
+    solver: Cholesky
+
+
+@dataclass(frozen=True)
+class StagedCut:
+    """How cuts are made.
+
+    Attributes
+    ----------
+    cutter : SemiProgressiveCutter
+    surfaces : Surfaces
+    parts_after : callable
+        What the body is made of after an increment.
+    body_of : callable
+        The body of these parts.
+    end_of_step : callable
+        Time at the end of the step under way, s.
+    timed : callable
+        Measures what a phase takes.
+    """
+
+    cutter: SemiProgressiveCutter
+    surfaces: Surfaces
+    parts_after: Callable[[Increment], BodyParts]
+    body_of: Callable[[BodyParts], DynamicBody]
+    end_of_step: Callable[[], float]
+    timed: Callable[[str], AbstractContextManager[None]]
+
+    def pieces(self, until: float, most: int | None, solver: Cholesky) -> Pieces:
+        """Lead the blades to a time, and do piece by piece what that asks for.
+
+        Parameters
+        ----------
+        until : float
+            s.
+        most : int or None
+            How many elements may be split, see `SemiProgressiveCutter.look`.
+        solver : Cholesky
+            Of the body as it is. Until the last piece is done it may be used, but only to
+            factorise and solve in one go: its memory is shared with that of the body to come.
+
+        Yields
+        ------
+        Increment or None
+            What has been cut of which the mechanics do not know.
+
+        Returns
+        -------
+        Followed or None
+            None if nothing was cut.
+        """
+        with self.timed("cutting"):
+            division = self.cutter.look(until, most)
+        if division is None:
+            return None
+        yield None
+        with self.timed("cutting"):
+            increment = self.cutter.divide(division, self.end_of_step())
+        yield increment
+        with self.timed("assembly"):
+            parts = self.parts_after(increment)
+            body = self.body_of(parts)
+            other = solver.extended(body.pattern, increment.source, held_nodes(body))
+        yield increment
+        if other.is_worn:
+            with self.timed("assembly"):
+                other = other.renewed(body.pattern, held_nodes(body))
+            yield increment
+        goes, going = self.surfaces.following(increment), True
+        while going:
+            with self.timed("cutting"):
+                going = next(goes, _DONE) is not _DONE
+            yield increment
+        with self.timed("cutting"):
+            self.surfaces.material.update(increment)
+        yield increment
+        with self.timed("assembly"):
+            body.force.prepare(body.pattern)
+        return Followed(increment, body, parts.grips, other)
