@@ -5,13 +5,13 @@ or timed-out solve is a record like any other, with its reason.
 """
 
 import json
-import os
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.whole_files import write_whole
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -187,9 +187,7 @@ class CaseResult:
 def write_result(result: CaseResult, path: Path) -> None:
     """Write `result` as JSON, in one step (a reader never sees half a file)."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(path.suffix + ".partial")
-    partial.write_text(json.dumps(asdict(result), indent=1), encoding="utf-8")
-    os.replace(partial, path)
+    write_whole(path, json.dumps(asdict(result), indent=1))
 
 
 def read_result(path: Path) -> CaseResult:

@@ -12,7 +12,6 @@ the file exchange for programs that are not written in Python.
 import contextlib
 import io
 import json
-import os
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.whole_files import whole_file, write_whole
 
 __all__ = ["SCHEMA_VERSION", "Regularisation", "Solution", "read_solution", "write_solution"]
 
@@ -179,8 +179,7 @@ class Solution:
 def write_solution(solution: Solution, path: Path) -> None:
     """Write `solution` as ``path.vtu`` (or one VTU per output time) and ``path.json``.
 
-    The JSON file is written last and in one step, so that its presence means that the
-    solution is whole.
+    Each in one step, the JSON file last, so that its presence means that the solution is whole.
 
     Parameters
     ----------
@@ -205,7 +204,8 @@ def write_solution(solution: Solution, path: Path) -> None:
             point_data=fields,
             cell_data={} if sides is None else {"side": [sides.astype(np.int32)]},
         )
-        mesh.write(path.parent / name, file_format="vtu")
+        with whole_file(path.parent / name) as partial:
+            mesh.write(partial, file_format="vtu")
     record = {
         "schema": SCHEMA_VERSION,
         "files": names,
@@ -223,10 +223,7 @@ def write_solution(solution: Solution, path: Path) -> None:
         "regularisations": [vars(entry) for entry in solution.regularisations],
         "notes": solution.notes,
     }
-    target = path.with_suffix(".json")
-    partial = target.with_suffix(".json.partial")
-    partial.write_text(json.dumps(record, indent=1), encoding="utf-8")
-    os.replace(partial, target)
+    write_whole(path.with_suffix(".json"), json.dumps(record, indent=1))
 
 
 def read_solution(path: Path) -> Solution:

@@ -6,8 +6,8 @@ import pytest
 from test_resume import SLOW, wait_for
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.runner.directory import RunDirectory, claimed
-from verify.runner.storage import read_json, write_json
 
 IDENTITY = {"cases": ["a"], "options_of_result": {"repetitions": 1}}
 

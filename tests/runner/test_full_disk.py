@@ -5,10 +5,10 @@ import json
 import pytest
 from small_disk import small_disk
 
+from verify.json_files import read_json, write_json
 from verify.result import Status
 from verify.runner.job import Job
 from verify.runner.reference_cache import ReferenceCache
-from verify.runner.storage import read_json, write_json
 from verify.scene import load_scene
 from verify.solution import write_solution
 from verify.study.record import write_study

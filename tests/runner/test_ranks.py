@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.runner import ranks
 from verify.runner.child import POLL_SECONDS, Child
-from verify.runner.storage import read_json, write_json
 from verify.scene import load_scene, scene_content
 from verify.solution import read_solution
 

@@ -20,6 +20,7 @@ from verify.anatomy.patch import Patch
 from verify.anatomy.store import patch_file, stored_patch, write_patch
 from verify.anatomy.thicken import thicken
 from verify.errors import InputError
+from verify.whole_files import whole_file, write_whole
 
 __all__ = ["PACKAGE", "VERSION", "WHEEL_SHA256", "fetch_anatomy"]
 
@@ -122,10 +123,11 @@ def _write(folder: Path, crops: dict[str, Crop], licence: bytes) -> list[Path]:
         write_patch(path, *crop)
         patch = stored_patch(shape, folder)
         mesh = folder / f"{shape}.vtu"
-        meshio.write(mesh, meshio.Mesh(*_mesh(shape, patch)))
+        with whole_file(mesh) as partial:
+            meshio.Mesh(*_mesh(shape, patch)).write(partial, file_format="vtu")
         made += [path, mesh]
     own = folder / "LICENSE.md"
-    own.write_bytes(licence)
+    write_whole(own, licence)
     return [*made, own]
 
 

@@ -1,5 +1,6 @@
 """Where real anatomy is kept between runs: patches in the user's data directory."""
 
+import io
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from verify.anatomy.patch import Patch
 from verify.errors import InputError
+from verify.whole_files import write_whole
 
 __all__ = ["patch_file", "store_folder", "stored_patch", "write_patch"]
 
@@ -31,11 +33,11 @@ def patch_file(shape: str, folder: Path | None = None) -> Path:
 
 def write_patch(path: Path, outline: _Floats, holes: list[_Floats], samples: _Floats) -> None:
     """Write a patch: borders (k, 2) and samples (n, 3) of its surface, m; in one step."""
-    partial = path.with_name(path.name + ".partial")
-    with partial.open("wb") as file:
-        arrays = {"outline": outline, "samples": samples}
-        np.savez_compressed(file, **arrays, **{f"hole{k}": h for k, h in enumerate(holes)})  # type: ignore[arg-type]
-    os.replace(partial, path)
+    arrays = {"outline": outline, "samples": samples}
+    arrays |= {f"hole{k}": hole for k, hole in enumerate(holes)}
+    packed = io.BytesIO()
+    np.savez_compressed(packed, **arrays)  # type: ignore[arg-type]
+    write_whole(path, packed.getvalue())
 
 
 def stored_patch(shape: str, folder: Path | None = None) -> Patch:

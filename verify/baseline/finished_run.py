@@ -7,9 +7,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from verify.errors import InputError
+from verify.json_files import read_json
 from verify.result import CaseResult, read_result
 from verify.runner.fingerprint import digest_of
-from verify.runner.storage import read_json
 from verify.scene import Scene
 
 __all__ = ["FinishedRun", "physics_of", "read_run"]

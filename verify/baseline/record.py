@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from verify.errors import InputError
-from verify.runner.storage import write_json
+from verify.json_files import write_json
 from verify.scene.messages import first_fault
 from verify.scene.strict import Finite, NonNegative, Positive, Strict
 

@@ -2,6 +2,7 @@
 
 import argparse
 import csv
+import io
 import json
 import os
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
+from verify.whole_files import write_whole
 
 if TYPE_CHECKING:
-    from verify.replay import Stage
+    from verify.replay import Stage, StepRecord
 
 __all__ = ["execute"]
 
@@ -47,7 +49,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
 
 def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
-    from verify.replay import PHASES, Session, quality_of
+    from verify.replay import Session, quality_of
     from verify.replay.animation import Frame, view_of, write_animation, write_picture
     from verify.replay.timings import timings_of
 
@@ -68,18 +70,7 @@ def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
             # as fast as it happened, but no faster than a screen shows
             write_animation(frames, view, arguments.out, min(50.0, len(frames) / stage.duration))
     if arguments.records is not None:
-        with arguments.records.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file)
-            table.writerow(
-                ["step", "time", *PHASES, "split", "unknowns", "mean_delay", "kinetic", "strain",
-                 "potential", "work", "dissipated", "contacts"]
-            )  # fmt: skip
-            for r in records:
-                delay = r.delay.mean() if len(r.delay) else ""
-                table.writerow(
-                    [r.step, r.time, *r.seconds.values(), r.split, r.unknowns, delay, r.kinetic,
-                     r.strain, r.potential, r.work, r.dissipated, r.contacts]
-                )  # fmt: skip
+        write_whole(arguments.records, _table(records))
     summary = {
         "case": name,
         "steps": len(records),
@@ -105,6 +96,25 @@ def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
     }
     print(json.dumps(summary, indent=2) if arguments.json else _words(summary))
     return 0
+
+
+def _table(records: "list[StepRecord]") -> str:
+    """Return what every step cost and did as CSV."""
+    from verify.replay import PHASES
+
+    text = io.StringIO()
+    table = csv.writer(text)
+    table.writerow(
+        ["step", "time", *PHASES, "split", "unknowns", "mean_delay", "kinetic", "strain",
+         "potential", "work", "dissipated", "contacts"]
+    )  # fmt: skip
+    for r in records:
+        delay = r.delay.mean() if len(r.delay) else ""
+        table.writerow(
+            [r.step, r.time, *r.seconds.values(), r.split, r.unknowns, delay, r.kinetic, r.strain,
+             r.potential, r.work, r.dissipated, r.contacts]
+        )  # fmt: skip
+    return text.getvalue()
 
 
 def _words(summary: dict[str, Any]) -> str:

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.runner.childhood import die_with_parent
 from verify.runner.solve import solve_job
-from verify.runner.storage import read_json, write_json
 from verify.solvers import find_solver
 
 __all__ = ["main"]

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from verify.errors import InputError
 from verify.exchange.export import level_folder
+from verify.json_files import read_json
 from verify.result import Status
 from verify.runner.fingerprint import physics_digest
-from verify.runner.storage import read_json
 from verify.scene import Scene
 from verify.solution import Solution, read_solution
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.exchange.answers import Answers
+from verify.json_files import read_json, write_json
 from verify.provenance import provenance
 from verify.result import CaseResult, SolveRecord, Status, read_result
 from verify.runner import Options, Progress, run_cases
@@ -23,7 +24,6 @@ from verify.runner.directory import RunDirectory, claimed, write_run
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.runner.job import Job, solution_files, store_record
 from verify.runner.log import telling_line
-from verify.runner.storage import read_json, write_json
 from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, write_solution

@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from verify.compare.hooke import hooke
 from verify.errors import InputError
 from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
+from verify.json_files import write_json
 from verify.runner.fingerprint import physics_digest
-from verify.runner.storage import write_json
 from verify.scene import Scene, SpatialCut
+from verify.whole_files import whole_file
 
 __all__ = ["EXPORT_SCHEMA", "export_case", "level_folder"]
 
@@ -156,7 +157,8 @@ def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
     points = np.zeros((len(problem.points), 3))
     points[:, :d] = problem.points
     cell_type = {2: "triangle", 3: "tetra"}[problem.scene.cell_dimension]
-    meshio.Mesh(points, [(cell_type, problem.cells)]).write(mesh, file_format="vtu")
+    with whole_file(mesh) as partial:
+        meshio.Mesh(points, [(cell_type, problem.cells)]).write(partial, file_format="vtu")
     content = {
         "schema": EXPORT_SCHEMA,
         "mesh": mesh.name,
@@ -215,4 +217,6 @@ def _write_cuts(scene: Scene, path: Path) -> None:
         index.append(np.full(len(facets), i, dtype=np.int32))
         points.append(np.pad(vertices, ((0, 0), (0, 3 - vertices.shape[1]))))
         first += len(vertices)
-    meshio.Mesh(np.vstack(points), blocks, cell_data={"cut": index}).write(path, file_format="vtu")
+    mesh = meshio.Mesh(np.vstack(points), blocks, cell_data={"cut": index})
+    with whole_file(path) as partial:
+        mesh.write(partial, file_format="vtu")

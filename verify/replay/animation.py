@@ -1,5 +1,6 @@
 """Frames of a played scene, drawn off-screen, and the animation that they make."""
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from verify.replay.surfaces import Picture
+from verify.whole_files import write_whole
 
 __all__ = ["Frame", "View", "view_of", "write_animation", "write_picture"]
 
@@ -72,7 +74,9 @@ def view_of(frames: Sequence[Frame], towards: Sequence[float] | None = None) -> 
 
 def write_picture(frame: Frame, view: View, path: Path) -> None:
     """Draw one frame into a PNG file."""
-    Image.fromarray(_draw([frame], view)[0]).save(path)
+    made = io.BytesIO()
+    Image.fromarray(_draw([frame], view)[0]).save(made, format="PNG")
+    write_whole(path, made.getvalue())
 
 
 def write_animation(frames: Sequence[Frame], view: View, path: Path, per_second: float) -> None:
@@ -89,16 +93,16 @@ def write_animation(frames: Sequence[Frame], view: View, path: Path, per_second:
     images = [Image.fromarray(image) for image in _draw(frames, view)]
     palette = images[-1].quantize(128)
     first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
-    partial = path.with_name(path.name + ".partial")
+    made = io.BytesIO()  # written by itself, Pillow does not say that the disk is full
     first.save(
-        partial,
+        made,
         format="GIF",
         save_all=True,
         append_images=rest,
         duration=max(20, round(1000.0 / per_second)),
         loop=0,
     )
-    partial.replace(path)
+    write_whole(path, made.getvalue())
 
 
 def _draw(frames: Sequence[Frame], view: View) -> list[NDArray[np.uint8]]:

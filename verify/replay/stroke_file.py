@@ -1,8 +1,8 @@
 """A stroke of the mouse, written down as a cut that can be pasted into a case file."""
 
-import os
 from pathlib import Path
 
+from verify.whole_files import write_whole
 from verify.xfem.tool_path import ToolPath
 
 __all__ = ["stroke_text", "write_stroke"]
@@ -24,9 +24,7 @@ def stroke_text(path: ToolPath, name: str = "stroke") -> str:
 
 def write_stroke(path: ToolPath, file: Path, name: str = "stroke") -> None:
     """Write it into a file, in one step."""
-    partial = file.with_name(file.name + ".partial")
-    partial.write_text(stroke_text(path, name), encoding="utf-8")
-    os.replace(partial, file)
+    write_whole(file, stroke_text(path, name))
 
 
 def _row(values) -> str:  # type: ignore[no-untyped-def]

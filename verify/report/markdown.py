@@ -15,6 +15,8 @@ from pathlib import Path
 
 from PIL import Image
 
+from verify.whole_files import write_whole
+
 __all__ = ["PICTURES", "markdown"]
 
 PICTURES = "report-pictures"
@@ -99,7 +101,7 @@ class _Pictures:
         styled = (
             f"{opened[:end]}<style>{html.escape(self.style, quote=False)}</style>{opened[end:]}"
         )
-        (self.folder / name).write_text(styled, encoding="utf-8")
+        write_whole(self.folder / name, styled)
         return f'<img src="{PICTURES}/{name}" alt="{label[1] if label else "drawing"}">'
 
     def image(self, address: str) -> str:
@@ -107,8 +109,10 @@ class _Pictures:
         if not address.startswith("data:"):
             return address
         name = self._name("png")
+        made = io.BytesIO()
         with Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))) as image:
-            image.save(self.folder / name, "PNG", optimize=True)
+            image.save(made, "PNG", optimize=True)
+        write_whole(self.folder / name, made.getvalue())
         return f"{PICTURES}/{name}"
 
     def _name(self, ending: str) -> str:

@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from verify.errors import InputError
+from verify.whole_files import whole_file
 
 __all__ = ["BROWSERS", "print_page"]
 
@@ -29,16 +30,17 @@ def print_page(page: Path, target: Path) -> None:
             "prints report.html"
         )
     with tempfile.TemporaryDirectory(prefix="verify-print-") as place:
-        partial = Path(place) / "report.pdf"
+        printed = Path(place) / "report.pdf"
         command = [
             browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer",
-            f"--user-data-dir={place}/profile", f"--print-to-pdf={partial}",
+            f"--user-data-dir={place}/profile", f"--print-to-pdf={printed}",
             page.resolve().as_uri(),
         ]  # fmt: skip
         try:
             subprocess.run(command, capture_output=True, timeout=_SECONDS)
         except subprocess.TimeoutExpired:
             raise InputError(f"{browser} did not print within {_SECONDS:g} s", str(page)) from None
-        if not partial.is_file():
+        if not printed.is_file():
             raise InputError(f"{browser} did not print", str(page))
-        shutil.copyfile(partial, target)
+        with whole_file(target) as partial:
+            shutil.copyfile(printed, partial)

@@ -1,6 +1,5 @@
 """Renders a run directory: ``report.html``, ``results.json``, ``results.csv``, ``junit.xml``."""
 
-import os
 from pathlib import Path
 
 from verify.report.exports import csv_rows, json_document, junit_document
@@ -9,6 +8,7 @@ from verify.report.page import page
 from verify.report.pictures import CasePictures, case_pictures, drawn
 from verify.report.printing import print_page
 from verify.report.run_directory import load_run
+from verify.whole_files import write_whole
 
 __all__ = ["render", "render_markdown", "render_pdf"]
 
@@ -42,11 +42,11 @@ def render(directory: Path) -> Path:
     excess = len(text.encode("utf-8")) - _PAGE_BYTES
     if excess > 0:
         text = page(run, pictures, [*notes, _left_out(pictures, excess)])
-    _write(directory / "results.json", json_document(run))
-    _write(directory / "results.csv", csv_rows(run))
-    _write(directory / "junit.xml", junit_document(run))
+    write_whole(directory / "results.json", json_document(run))
+    write_whole(directory / "results.csv", csv_rows(run))
+    write_whole(directory / "junit.xml", junit_document(run))
     target = directory / "report.html"
-    _write(target, text)
+    write_whole(target, text)
     return target
 
 
@@ -60,7 +60,7 @@ def render_markdown(directory: Path) -> Path:
     """
     text = render(directory).read_text(encoding="utf-8")
     target = directory / "report.md"
-    _write(target, markdown(text, directory))
+    write_whole(target, markdown(text, directory))
     return target
 
 
@@ -94,14 +94,3 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
     said = [f"{stills} bodies are shown as stills"] if stills else []
     said += [f"{dropped} of {total} pictures are left out"] if dropped else []
     return f"{', '.join(said)} to keep the page below {_PAGE_BYTES / 1e6:.3g} MB."
-
-
-def _write(path: Path, content: str) -> None:
-    partial = path.with_name(path.name + ".partial")
-    try:
-        partial.write_text(content, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        error.filename = error.filename or str(path)  # a full disk does not say where
-        partial.unlink(missing_ok=True)
-        raise

@@ -1,7 +1,6 @@
 """The page of a study: findings as sentences, then maps and curves, then where it comes from."""
 
 import json
-import os
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +18,7 @@ from verify.report.summary import badge
 from verify.report.thesis_figures import thesis_section
 from verify.report.time_panel import time_panel
 from verify.result import Verdict
+from verify.whole_files import write_whole
 
 __all__ = ["render_study"]
 
@@ -55,14 +55,7 @@ def render_study(directory: Path, kind: str) -> Path:
             found = record.get(key) if isinstance(record, dict) else type(record).__name__
             raise InputError(f"{key} is {found!r}; expected {value!r}", str(source))
     target = directory / f"{kind}.html"
-    partial = target.with_name(target.name + ".partial")
-    try:
-        partial.write_text(_page(record, kind), encoding="utf-8")
-        os.replace(partial, target)
-    except OSError as error:
-        error.filename = error.filename or str(target)  # a full disk does not say where
-        partial.unlink(missing_ok=True)
-        raise
+    write_whole(target, _page(record, kind))
     return target
 
 

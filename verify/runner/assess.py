@@ -14,11 +14,11 @@ from typing import Any
 from verify.compare.locate import Field, SolutionField
 from verify.compare.motion import ExactMotion
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.result import CaseResult, SolveRecord, Status, Verdict, write_result
 from verify.runner.childhood import die_with_parent
 from verify.runner.error_field import write_error_field
 from verify.runner.job import load_record
-from verify.runner.storage import read_json, write_json
 from verify.runner.unjudged import unjudged_check
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution

@@ -14,6 +14,7 @@ from verify.runner.child import Ending
 from verify.runner.fingerprint import code_of_solver
 from verify.runner.remote import solve_remotely
 from verify.scene import MeshFile, mesh_path, restore_scene
+from verify.whole_files import write_whole
 
 __all__ = ["ClusterEngine"]
 
@@ -102,7 +103,7 @@ class RemoteSolve:
         files: dict[str, bytes] = answer["files"]
         # the outcome last: its presence means that the rest is there
         for name in sorted(files, key=lambda name: name == "outcome.json"):
-            (self._folder / Path(name).name).write_bytes(files[name])
+            write_whole(self._folder / Path(name).name, files[name])
         self._future.release()
         return Ending(**answer["ending"])
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.runner.storage import read_json, write_json
+from verify.json_files import read_json, write_json
 
 __all__ = ["RUN_SCHEMA", "RunDirectory", "claimed"]
 

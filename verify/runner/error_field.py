@@ -1,6 +1,5 @@
 """The error of a solution at its own nodes, as a file for pictures."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ from numpy.typing import NDArray
 
 from verify.compare.locate import Field, SolutionField
 from verify.solution import Solution
+from verify.whole_files import whole_file
 
 __all__ = ["nodal_error", "write_error_field"]
 
@@ -62,6 +62,5 @@ def write_error_field(solution: Solution, truth: Field, path: Path) -> None:
         [(solution.cell_type, solution.cells)],
         point_data={"error": nodal_error(solution, truth), "displacement": displacement},
     )
-    partial = path.with_suffix(".partial")
-    mesh.write(partial, file_format="vtu")
-    os.replace(partial, path)
+    with whole_file(path) as partial:
+        mesh.write(partial, file_format="vtu")

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.result import Metric, SolveRecord, Status
 from verify.runner.fingerprint import file_digest
-from verify.runner.storage import read_json, write_json
 
 __all__ = ["Job", "load_record", "record_of", "solution_files", "store_record", "stored_record"]
 

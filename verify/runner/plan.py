@@ -8,6 +8,7 @@ from time import sleep
 from typing import Any
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.result import SolveRecord, Status
 from verify.runner.child import POLL_SECONDS, Child
 from verify.runner.directory import RunDirectory
@@ -18,7 +19,6 @@ from verify.runner.log import telling_line
 from verify.runner.options import Options
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
-from verify.runner.storage import read_json, write_json
 from verify.scene import Scene, scene_content
 
 __all__ = ["CasePlan", "Survey", "plan_case", "solvers_of", "survey_solvers"]

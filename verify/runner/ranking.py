@@ -11,9 +11,9 @@ from typing import Any
 
 from verify.conformance import conform, exit_code_of
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.result import CaseResult, Status
 from verify.runner.fingerprint import code_of_solver, digest_of
-from verify.runner.storage import read_json, write_json
 from verify.solvers import solver_names
 from verify.study.ranking import rank_solvers, ranked_solvers
 

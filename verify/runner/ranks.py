@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from verify.errors import InputError
+from verify.json_files import write_json
 from verify.runner.childhood import die_with_parent, under_a_launcher
-from verify.runner.storage import write_json
 
 __all__ = ["RANKS_VARIABLE", "give_up", "main", "mpiexec", "world"]
 

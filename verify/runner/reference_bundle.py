@@ -8,7 +8,6 @@ physics changed is not found, which is an error and not a reason to compute some
 """
 
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -20,6 +19,7 @@ from verify.runner.fingerprint import bytes_digest, digest_of, file_digest, phys
 from verify.runner.job import Job
 from verify.runner.reference_cache import Entry, ReferenceCache, read_entry
 from verify.scene import Scene
+from verify.whole_files import whole_file, write_whole
 
 __all__ = ["ReferenceBundle", "write_bundle"]
 
@@ -49,9 +49,11 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
                 f"({cache.root}); `verify run` of the case puts it there"
             )
         entries += own
-    partial = path.with_name(f"{path.name}.partial")
     try:
-        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        with (
+            whole_file(path) as partial,
+            zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
+        ):
             contents = {
                 "schema": BUNDLE_SCHEMA,
                 "entries": [entry.as_json() for entry in entries],
@@ -62,11 +64,8 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
                 for name in sorted(entry.files):
                     data = (cache.root / entry.key / name).read_bytes()
                     archive.writestr(_member(f"{entry.key}/{name}"), data, zipfile.ZIP_DEFLATED)
-        os.replace(partial, path)
-    except OSError as error:
+    except (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError) as error:
         raise InputError(f"cannot be written ({error.strerror})", str(path)) from None
-    finally:
-        partial.unlink(missing_ok=True)
     return entries
 
 
@@ -133,7 +132,7 @@ class ReferenceBundle:
         """
         entry = self._of(scene)[job.level]
         for name in entry.files:
-            (job.folder / Path(name).name).write_bytes(self._read(entry, name))
+            write_whole(job.folder / Path(name).name, self._read(entry, name))
         return entry.taken_by(job, f"from the bundle {self.path.name}")
 
     def _read(self, entry: Entry, name: str) -> bytes:

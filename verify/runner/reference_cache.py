@@ -22,12 +22,13 @@ from time import time
 from typing import Any
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.provenance import provenance
 from verify.result import SolveRecord, Status
 from verify.runner.fingerprint import code_of_solver, digest_of, file_digest, physics_digest
 from verify.runner.job import Job, record_of, solution_files
-from verify.runner.storage import read_json, write_json
 from verify.scene import Scene
+from verify.whole_files import whole_file
 
 __all__ = ["REFERENCE", "Entry", "ReferenceCache", "cache_folder", "current_key", "read_entry"]
 
@@ -135,7 +136,8 @@ class ReferenceCache:
         try:
             entry = self._entry(folder)
             for name, digest in entry.files.items():
-                shutil.copyfile(folder / name, job.folder / name)
+                with whole_file(job.folder / name) as copied:
+                    shutil.copyfile(folder / name, copied)
                 if file_digest(job.folder / name) != digest:
                     raise InputError("differs from what was stored", str(folder / name))
         except (FileNotFoundError, InputError):  # damaged, or removed while we looked

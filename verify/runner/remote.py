@@ -9,10 +9,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+from verify.json_files import read_json, write_json
 from verify.provenance import provenance
 from verify.runner.child import POLL_SECONDS, Child
 from verify.runner.fingerprint import code_of_solver
-from verify.runner.storage import read_json, write_json
 
 __all__ = ["solve_remotely"]
 

@@ -9,6 +9,7 @@ from time import sleep
 from typing import Any, Protocol
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.provenance import provenance
 from verify.result import CaseResult, SolveRecord, Status, read_result
 from verify.runner.checking import check_scene
@@ -26,7 +27,6 @@ from verify.runner.plan import CasePlan, plan_case, survey_solvers
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
-from verify.runner.storage import read_json, write_json
 from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene, scene_content
 

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError, UnsupportedSceneError
+from verify.json_files import read_json, write_json
 from verify.result import Status
 from verify.runner.childhood import die_with_parent, peak_memory
 from verify.runner.ranks import give_up, world
-from verify.runner.storage import read_json, write_json
 
 __all__ = ["main", "solve_job"]
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.json_files import read_json, write_json
 from verify.runner.childhood import die_with_parent
 from verify.runner.fingerprint import file_digest
-from verify.runner.storage import read_json, write_json
 
 __all__ = ["main", "survey"]
 

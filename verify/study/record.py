@@ -2,15 +2,14 @@
 
 import csv
 import io
-import json
-import math
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.json_files import write_json
 from verify.provenance import provenance
+from verify.whole_files import write_whole
 
 __all__ = ["SCHEMA", "make_directory", "write_study"]
 
@@ -58,13 +57,13 @@ def write_study(
         **record,
     }
     target = directory / f"{kind}.json"
-    _replace(target, json.dumps(_finite(document), indent=1, allow_nan=False) + "\n")
+    write_json(document, target)
     buffer = io.StringIO()
     listed = list(rows)
     writer = csv.DictWriter(buffer, list(listed[0]) if listed else [], lineterminator="\n")
     writer.writeheader()
     writer.writerows(listed)
-    _replace(directory / f"{kind}.csv", buffer.getvalue())
+    write_whole(directory / f"{kind}.csv", buffer.getvalue())
     return target
 
 
@@ -82,22 +81,3 @@ def make_directory(directory: Path) -> None:
         raise InputError("is a file; expected a directory to write into", str(directory)) from None
     except PermissionError:
         raise InputError("may not be written", str(directory)) from None
-
-
-def _replace(path: Path, text: str) -> None:
-    partial = path.with_name(path.name + ".partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        error.filename = error.filename or str(path)  # a full disk does not say where
-        partial.unlink(missing_ok=True)
-        raise
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    return [_finite(entry) for entry in value] if isinstance(value, list | tuple) else value

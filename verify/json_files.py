@@ -2,32 +2,25 @@
 
 import json
 import math
-import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.whole_files import write_whole
 
 __all__ = ["read_json", "write_json"]
 
 
 def write_json(content: Any, path: Path) -> None:
-    """Write `content` in one step: a reader, or a kill at any time, never sees half a file.
+    """Write `content` in one step. Numbers that are not finite become null.
 
     Raises
     ------
     OSError
         With the name of the file; what was there before stays.
     """
-    partial = path.with_name(path.name + ".partial")
-    text = json.dumps(_plain(content), indent=1, allow_nan=False)
-    try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        error.filename = error.filename or str(path)  # a full disk does not say where
-        partial.unlink(missing_ok=True)
-        raise
+    write_whole(path, json.dumps(_plain(content), indent=1, allow_nan=False) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -54,7 +47,7 @@ def _plain(value: Any) -> Any:
     match value:
         case float():
             return float(value) if math.isfinite(value) else None
-        case dict():
+        case Mapping():
             return {str(key): _plain(entry) for key, entry in value.items()}
         case list() | tuple():
             return [_plain(entry) for entry in value]

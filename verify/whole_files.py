@@ -1,0 +1,49 @@
+"""Files that are whole or not there: a reader, or a kill at any time, never sees half of one."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+__all__ = ["whole_file", "write_whole"]
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give the name of a file to write, which takes the place of `path` at the end.
+
+    If writing fails or is interrupted, the half is removed and what was at `path` stays. A link
+    is followed; a device or a pipe, which has no half, is written as it is.
+
+    Raises
+    ------
+    OSError
+        As writing raised it, with the name `path`: a full disk does not say where.
+    """
+    direct = path.exists() and not path.is_file()
+    target = path if direct else path.resolve()
+    partial = path if direct else target.with_name(f"{target.name}.partial")
+    try:
+        yield partial
+        if not direct:
+            os.replace(partial, target)
+    except BaseException as error:
+        if not direct:
+            with suppress(OSError):  # it was never made
+                partial.unlink()
+        if isinstance(error, OSError) and _is_of(error, partial):
+            # a new one: the second name that replacing and copying give cannot be taken away
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        raise
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write text (UTF-8) or bytes by `whole_file`."""
+    with whole_file(path) as partial:
+        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def _is_of(error: OSError, partial: Path) -> bool:
+    if error.errno is None:  # no error of the system's
+        return False
+    return error.filename is None or str(partial) in (str(error.filename), str(error.filename2))
