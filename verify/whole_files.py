@@ -1,11 +1,16 @@
 """Files that are whole or not there: a reader, or a kill at any time, never sees half of one."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["whole_file", "write_whole"]
+from verify.errors import InputError
+
+__all__ = ["DISK_FAILURES", "asked_place", "whole_file", "write_whole"]
+
+DISK_FAILURES = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 
 
 @contextmanager
@@ -21,7 +26,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         As writing raised it, with the name `path`: a full disk does not say where.
     """
     direct = path.exists() and not path.is_file()
-    target = path if direct else path.resolve()
+    target = path if direct else Path(os.path.realpath(path))
     partial = path if direct else target.with_name(f"{target.name}.partial")
     try:
         yield partial
@@ -41,6 +46,25 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Write text (UTF-8) or bytes by `whole_file`."""
     with whole_file(path) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextmanager
+def asked_place(path: Path) -> Iterator[None]:
+    """Write inside it what the user asked to have at `path`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written there and can be elsewhere.
+    OSError
+        If the disk fails, or is full (`DISK_FAILURES`).
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno in DISK_FAILURES:
+            raise
+        raise InputError(f"cannot be written ({error.strerror})", str(path)) from None
 
 
 def _is_of(error: OSError, partial: Path) -> bool:

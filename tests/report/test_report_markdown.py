@@ -6,6 +6,7 @@ import shutil
 import pytest
 from page_parser import parsed
 from PIL import Image
+from small_disk import by_command, named_until_it_fits, small_disk
 from synthetic_run import make_run
 
 from verify.cli import main
@@ -77,6 +78,15 @@ def test_without_a_browser_pdf_is_refused_in_one_line(tmp_path, monkeypatch, cap
     monkeypatch.setattr("sys.argv", ["verify", "report", str(root), "--format", "pdf"])
     assert main() == 2
     assert "--format markdown needs nothing" in capsys.readouterr().err
+
+
+def test_a_report_in_markdown_that_does_not_fit_exits_with_3(tmp_path, capsys):
+    with small_disk(tmp_path / "disk", "2m") as disk:
+        run = make_run(disk.root / "run", pictures=False)
+        command = ("report", run, "--format", "markdown")
+        named = named_until_it_fits(disk, by_command(capsys, *command))
+    assert "run/results.json" in named
+    assert any(name.startswith(f"run/{PICTURES}") for name in named)
 
 
 @pytest.mark.browser

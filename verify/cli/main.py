@@ -1,6 +1,5 @@
 """Entry point: parse, run the command, turn errors into one line and an exit code."""
 
-import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -8,6 +7,7 @@ from collections.abc import Sequence
 from verify.cli.parser import build_parser
 from verify.errors import InputError, UnsupportedSceneError
 from verify.threads import pin_to_one_thread
+from verify.whole_files import DISK_FAILURES
 
 __all__ = ["main"]
 
@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO):
+        if error.errno not in DISK_FAILURES:
             raise
         where = f" ({error.filename})" if error.filename else ""
         return _fail(

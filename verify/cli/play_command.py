@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
-from verify.whole_files import write_whole
+from verify.whole_files import asked_place, write_whole
 
 if TYPE_CHECKING:
     from verify.replay import Stage, StepRecord
@@ -64,13 +64,16 @@ def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
     records, quality, timings = session.records, quality_of(session), timings_of(session.records)
     if arguments.out is not None:
         view = view_of(frames)
-        if arguments.out.suffix == ".png":
-            write_picture(frames[-1], view, arguments.out)
-        else:
-            # as fast as it happened, but no faster than a screen shows
-            write_animation(frames, view, arguments.out, min(50.0, len(frames) / stage.duration))
+        with asked_place(arguments.out):
+            if arguments.out.suffix == ".png":
+                write_picture(frames[-1], view, arguments.out)
+            else:
+                # as fast as it happened, but no faster than a screen shows
+                rate = min(50.0, len(frames) / stage.duration)
+                write_animation(frames, view, arguments.out, rate)
     if arguments.records is not None:
-        write_whole(arguments.records, _table(records))
+        with asked_place(arguments.records):
+            write_whole(arguments.records, _table(records))
     summary = {
         "case": name,
         "steps": len(records),

@@ -13,6 +13,7 @@
 Every field of the JSON files is described in ``docs/extending.md``.
 """
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -47,8 +48,8 @@ def export_case(
     ----------
     scene : Scene
     out : Path
-        A directory that does not exist, is empty, or holds an export of the same case; answers
-        in it stay.
+        A directory that does not exist, is empty, or holds an export, whole or not; answers in it
+        stay.
     levels : sequence of int, optional
         Mesh levels; default all.
     conforming : bool
@@ -100,9 +101,14 @@ def export_case(
 def _check_place(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise InputError("is a file; expected a directory for the export", str(out))
-    if out.is_dir() and any(out.iterdir()) and not (out / "case.json").is_file():
+    if out.is_dir() and not (out / "case.json").is_file() and any(map(_is_foreign, out.iterdir())):
         raise InputError("not empty and not an export; give --out a new directory", str(out))
     (out / "case.json").unlink(missing_ok=True)
+
+
+def _is_foreign(path: Path) -> bool:
+    """Whether it is none of an export's own, which lie alone where one has ended early."""
+    return re.fullmatch(r"level-\d+|cuts\.vtu(\.partial)?", path.name) is None
 
 
 def _case(scene: Scene, levels: list[dict[str, Any]]) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
+from verify.whole_files import asked_place
 
 __all__ = ["RUN_SCHEMA", "RunDirectory", "claimed"]
 
@@ -68,12 +69,10 @@ def claimed(root: Path, identity: dict[str, Any]) -> Iterator[RunDirectory]:
     found = _contents(root)
     if found - {".lock", "run.json.partial"} and "run.json" not in found:
         raise InputError("not empty and not a run; give --out a new directory", str(root))
-    try:
+    with asked_place(root):
         root.mkdir(parents=True, exist_ok=True)
         # inheritable would let an orphaned solver keep the lock; Python's default is not to
         lock = os.open(root / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", str(root)) from None
     try:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

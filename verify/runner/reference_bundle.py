@@ -19,7 +19,7 @@ from verify.runner.fingerprint import bytes_digest, digest_of, file_digest, phys
 from verify.runner.job import Job
 from verify.runner.reference_cache import Entry, ReferenceCache, read_entry
 from verify.scene import Scene
-from verify.whole_files import whole_file, write_whole
+from verify.whole_files import asked_place, whole_file, write_whole
 
 __all__ = ["ReferenceBundle", "write_bundle"]
 
@@ -34,7 +34,10 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
     Raises
     ------
     InputError
-        If a level of a scene's reference is not in the cache, or the scene has none.
+        If a level of a scene's reference is not in the cache, the scene has none, or the file
+        cannot be written where it is asked for.
+    OSError
+        If the disk is full.
     """
     entries: list[Entry] = []
     for scene in scenes:
@@ -49,23 +52,21 @@ def write_bundle(path: Path, scenes: Sequence[Scene], cache: ReferenceCache) -> 
                 f"({cache.root}); `verify run` of the case puts it there"
             )
         entries += own
-    try:
-        with (
-            whole_file(path) as partial,
-            zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
-        ):
-            contents = {
-                "schema": BUNDLE_SCHEMA,
-                "entries": [entry.as_json() for entry in entries],
-            }
-            text = json.dumps(contents, indent=1, sort_keys=True)
-            archive.writestr(_member(_CONTENTS), text, zipfile.ZIP_DEFLATED)
-            for entry in entries:
-                for name in sorted(entry.files):
-                    data = (cache.root / entry.key / name).read_bytes()
-                    archive.writestr(_member(f"{entry.key}/{name}"), data, zipfile.ZIP_DEFLATED)
-    except (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError) as error:
-        raise InputError(f"cannot be written ({error.strerror})", str(path)) from None
+    with (
+        asked_place(path),
+        whole_file(path) as partial,
+        zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
+    ):
+        contents = {
+            "schema": BUNDLE_SCHEMA,
+            "entries": [entry.as_json() for entry in entries],
+        }
+        text = json.dumps(contents, indent=1, sort_keys=True)
+        archive.writestr(_member(_CONTENTS), text, zipfile.ZIP_DEFLATED)
+        for entry in entries:
+            for name in sorted(entry.files):
+                data = (cache.root / entry.key / name).read_bytes()
+                archive.writestr(_member(f"{entry.key}/{name}"), data, zipfile.ZIP_DEFLATED)
     return entries
 
 
