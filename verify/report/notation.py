@@ -10,6 +10,7 @@ __all__ = [
     "bytes_text",
     "error_title",
     "gap",
+    "is_error",
     "metric_title",
     "number",
     "number_text",
@@ -56,9 +57,14 @@ def metric_title(name: str) -> str:
     return _METRICS.get(name, name.replace("_", " "))
 
 
+def is_error(name: str) -> bool:
+    """Whether the metric is an error by itself, not a quantity that has one."""
+    return name in _ERRORS
+
+
 def error_title(name: str) -> str:
     """Return what is judged of a metric: an error, or the relative error of a quantity."""
-    return metric_title(name) if name in _ERRORS else f"relative error of the {metric_title(name)}"
+    return metric_title(name) if is_error(name) else f"relative error of the {metric_title(name)}"
 
 
 def solver_title(name: str) -> str:

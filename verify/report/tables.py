@@ -5,6 +5,7 @@ from statistics import median
 from typing import Any
 
 from verify.report.curves import duration, metric_names
+from verify.report.figures_reference import accuracy_figure
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import (
     bytes_text,
@@ -161,7 +162,10 @@ def reference_record(reference: dict[str, Any]) -> Markup | None:
         ]
         parts.append(tag("dl", [joined(*entry) for entry in entries], class_="record"))
     for key, value in nested.items():
-        parts.append(_levels_table(value) if key == "time_to_accuracy" else _nested(key, value))
+        if key == "time_to_accuracy":
+            parts.append(joined(accuracy_figure(value), _levels_table(value)))
+        else:
+            parts.append(_nested(key, value))
     return joined(*parts)
 
 

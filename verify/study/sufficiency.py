@@ -64,8 +64,10 @@ def sufficiency(
 
 def _row(metric: Metric) -> dict[str, float | None]:
     scale = 1.0 if metric.reference is None else abs(metric.reference)
-    error = abs(metric.value - (metric.reference or 0.0))
+    # measured values may be numpy's, whose comparisons JSON cannot hold
+    error = float(abs(metric.value - (metric.reference or 0.0)))
+    uncertainty = float(metric.uncertainty)
     ratio: float | None = None
-    if max(error, metric.uncertainty) > _ROUND_OFF * scale:
-        ratio = metric.uncertainty / error if error > 0.0 else float("inf")
-    return {"error": error, "uncertainty": metric.uncertainty, "ratio": ratio}
+    if max(error, uncertainty) > _ROUND_OFF * scale:
+        ratio = uncertainty / error if error > 0.0 else float("inf")
+    return {"error": error, "uncertainty": uncertainty, "ratio": ratio}
