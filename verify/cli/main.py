@@ -32,6 +32,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # `verify list | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except ChildProcessError as error:
+        return _fail(str(error), 3)
     except OSError as error:
         if error.errno not in DISK_FAILURES:
             raise

@@ -29,7 +29,7 @@ def execute(arguments: argparse.Namespace) -> int:
         from verify.study.slivers import sliver_study
 
         dimensions = (arguments.dimension,) if arguments.dimension else (2, 3)
-        slivers = sliver_study(dimensions, arguments.quick, announce)
+        slivers = sliver_study(dimensions, arguments.quick, announce, arguments.processes)
         findings, record = slivers.findings, slivers.as_record()
         rows = [asdict(m) for m in slivers.measurements]
     elif arguments.study == "calibration":

@@ -1,6 +1,7 @@
 """Arguments of ``verify study``."""
 
 import argparse
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -37,6 +38,11 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
             kind.add_argument(
                 "--dimension", type=int, choices=(2, 3), help="only 2D or 3D (default: both)"
             )
+            cores = len(os.sched_getaffinity(0))
+            kind.add_argument(
+                "-j", metavar="N", type=count, default=cores, dest="processes",
+                help="processes side by side (default: all cores; nothing measured is a time)",
+            )  # fmt: skip
         kind.add_argument("--quick", action="store_true", help="less of it, in under a minute")
         _add_output(kind)
     _add_cost(kinds.add_parser)

@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from time import perf_counter
-from typing import Any
+from typing import Any, Literal
 
+from verify.study.in_processes import in_processes
 from verify.study.slivers.accuracy import displacement_error
 from verify.study.slivers.bodies import (
     DENSITY,
@@ -38,6 +39,7 @@ _QUICK_TREATMENTS = {  # of other placements than along faces, by whether the cu
     False: ("keep", "conforming", "snapped"),
     True: ("keep", "merge", "ghost penalty", "conforming", "snapped"),
 }
+_Part = Placement | Literal["uncut", "runs"]
 _FITTED = ("condition number", "CG iterations", "compliance", "displacement error", "critical step")
 
 
@@ -73,6 +75,7 @@ def sliver_study(
     dimensions: Sequence[int] = (2, 3),
     quick: bool = False,
     announce: Callable[[str], None] = lambda text: None,
+    processes: int = 1,
 ) -> SliverStudy:
     """Run the sweep.
 
@@ -82,30 +85,45 @@ def sliver_study(
     quick : bool
         Fewer sizes and shorter runs.
     announce : callable, optional
-        Told what is being done.
+        Told what is done.
+    processes : int
+        Side by side; nothing that is measured is a time, so they disturb nothing.
 
     Raises
     ------
     ValueError
         If a dimension is neither 2 nor 3, or there is none.
+    ChildProcessError
+        If a process is killed.
     """
     if not dimensions or any(d not in (2, 3) for d in dimensions):
         raise ValueError(f"dimensions {list(dimensions)}; expected 2, 3 or both")
     start = perf_counter()
-    found: list[Measurement] = []
+    parts: list[tuple[int, _Part]] = []
     for dimension in dimensions:
-        mesh = background(dimension, quick)
-        found += _uncut(mesh)
-        for placement in PLACEMENTS[dimension]:
-            announce(f"{dimension}D, {placement}: conditioning, steps, errors, compliance")
-            found += _swept(mesh, placement, quick)
-        announce(f"{dimension}D: runs at and around the critical step, motion at large strain")
-        found += run_measurements(mesh, quick)
-    growths = _growths(found)
+        parts += [(dimension, "uncut"), *((dimension, p) for p in PLACEMENTS[dimension])]
+        parts.append((dimension, "runs"))
+    measured = in_processes(_measured, [(*part, quick) for part in parts], processes)
+    found: dict[tuple[int, _Part], list[Measurement]] = {}
+    for index, measurements in measured:
+        found[parts[index]] = measurements
+        announce("{}D, {}: {} of {} parts".format(*parts[index], len(found), len(parts)))
+    ordered = [measurement for part in parts for measurement in found[part]]
+    growths = _growths(ordered)
     seconds = perf_counter() - start
     return SliverStudy(
-        quick, tuple(dimensions), found, growths, findings(found, growths, dimensions), seconds
+        quick, tuple(dimensions), ordered, growths, findings(ordered, growths, dimensions), seconds
     )
+
+
+def _measured(dimension: int, part: _Part, quick: bool) -> list[Measurement]:
+    """Measure one part: the uncut body, a placement of the cut, or the bodies that run."""
+    mesh = background(dimension, quick)
+    if part == "uncut":
+        return _uncut(mesh)
+    if part == "runs":  # at and around the critical step, and at large strain
+        return list(run_measurements(mesh, quick))
+    return list(_swept(mesh, part, quick))
 
 
 def _uncut(mesh: SimplexMesh) -> list[Measurement]:
