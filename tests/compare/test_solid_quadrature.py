@@ -7,7 +7,6 @@ from verify.compare.simplex_rule import points_in, simplex_rule
 from verify.compare.splitting import bisect, measures, split_at_level
 from verify.compare.surface_rule import nearest_on_cut, surface_rule
 from verify.compare.volume_rule import volume_rule
-from verify.errors import UnsupportedSceneError
 from verify.scene import load_scene
 
 DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 1.0, 1.0], "radius": 0.3}
@@ -215,26 +214,3 @@ def test_a_place_on_a_cut_is_the_nearest_point_with_its_normal():
     at = nearest_on_cut(body, "cut", np.array([0.9, 0.5, 0.4]))
     assert np.allclose(at.points, [[0.8, 0.5, 0.4]], atol=1e-15)
     assert np.allclose(at.normals, [[-1.0, 0, 0]], atol=1e-9)
-
-
-def test_a_membrane_is_refused_by_name(tmp_path):
-    import meshio
-
-    triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.2]])
-    meshio.Mesh(triangle, [("triangle", np.array([[0, 1, 2]]))]).write(tmp_path / "skin.vtu")
-    geometry = {
-        "kind": "file",
-        "file": str(tmp_path / "skin.vtu"),
-        "dimension": 3,
-        "cells": "surface",
-    }
-    asked = solid_scene(
-        [],
-        geometry=geometry,
-        mesh={"pattern": "given"},
-        material={"young": 1.0, "poisson": 0.3, "thickness": 0.01},
-        supports=[{"where": "z > -1", "displacement": [0.0, 0.0, 0.0]}],
-        analysis={"kinematics": "corotational"},
-    )
-    with pytest.raises(UnsupportedSceneError, match="membrane"):
-        body_of(asked)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from verify.compare.curves import Piece, closed_pieces, cut_pieces, meeting_parameters
 from verify.compare.facet_kernels import distance_to_segments
+from verify.compare.membrane_body import MembraneBody, membrane_of
 from verify.compare.solid import SolidBody, solid_of
 from verify.errors import UnsupportedSceneError
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
@@ -100,7 +101,7 @@ class Body:
         return foot, self.tip_distance(foot) <= 1e-10 * self.size
 
 
-AnyBody = Body | SolidBody
+AnyBody = Body | SolidBody | MembraneBody
 
 
 def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
@@ -111,9 +112,11 @@ def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
     Raises
     ------
     UnsupportedSceneError
-        If the scene is neither a rectangle, a polygon, a box nor a mesh of tetrahedra, or a
-        cut is no curve or surface of a known kind.
+        If the scene is neither a rectangle, a polygon, a box nor a mesh of tetrahedra or of
+        triangles in space, or a cut is no curve or surface of a known kind.
     """
+    if scene.cell_dimension < scene.dimension:
+        return membrane_of(scene)
     if scene.dimension == 3:
         return solid_of(scene)
     if not isinstance(scene.geometry, Rectangle | Polygon):

@@ -19,8 +19,8 @@ def energy_error(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorN
     With the corotated energy: of twice its `error_density`, and twice the reference's energy.
     A reference that moves rigidly but for round-off has the norm 0.
     """
-    expected = reference.gradient(rule.points, rule.points)
-    difference = field.gradient(rule.points, rule.points) - expected
+    expected = rule.gradient(reference)
+    difference = rule.gradient(field) - expected
     scale = float(np.sqrt(2 * rule.weights @ law.energy_density(expected)))
     whole = float(np.sqrt(2 * law.shear * rule.weights @ np.sum(expected**2, axis=(1, 2))))
     return ErrorNorm(

@@ -1,7 +1,8 @@
 """Isotropic elasticity as the comparison needs it: energy densities of a gradient.
 
 Linear: ½ σ:ε. Corotated: μ‖U − I‖² + ½ λ tr²(U − I), the energy whose gradient the corotational
-formulation with polar rotations is; U is the stretch of F = I + ∇u = R U.
+formulation with polar rotations is; U is the stretch of F = I + ∇u = R U. A membrane has the same
+of the two stretches in its tangent plane, times its thickness, with the λ of plane stress.
 """
 
 from dataclasses import dataclass
@@ -11,14 +12,14 @@ from numpy.typing import NDArray
 
 from verify.scene import Material, Scene
 
-__all__ = ["Corotated", "Hooke", "Law", "corotated", "hooke", "law_of"]
+__all__ = ["Corotated", "Hooke", "Law", "MembraneLaw", "corotated", "hooke", "law_of"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Hooke:
-    """Lamé constants (Pa), those of the plane problem in plane stress."""
+    """Lamé constants (Pa), those of the plane problem in plane stress; of a membrane in N/m."""
 
     lame: float
     shear: float
@@ -42,7 +43,10 @@ class Corotated(Hooke):
 
     def energy_density(self, gradient: Array) -> Array:
         """μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m³ of displacement gradients (n, d, d)."""
-        stretch = _principal_stretches(gradient) - 1.0
+        return self._density(_principal_stretches(gradient) - 1.0)
+
+    def _density(self, stretch: Array) -> Array:
+        """Energy density (n,) of principal stretches less one (n, k)."""
         density: Array = self.shear * np.sum(stretch**2, axis=1)
         density += 0.5 * self.lame * np.sum(stretch, axis=1) ** 2
         return density
@@ -57,7 +61,27 @@ class Corotated(Hooke):
         return super().energy_density(turned)
 
 
-Law = Hooke | Corotated
+@dataclass(frozen=True)
+class MembraneLaw(Corotated):
+    """The corotated energy of a membrane, J/m².
+
+    Gradients are (n, 3, 2): along two orthonormal tangents, with components along these and
+    across the surface, as `verify.compare.simplices.triangle_frames` has them.
+    """
+
+    def energy_density(self, gradient: Array) -> Array:
+        """μ‖U − I‖² + ½ λ tr²(U − I) (n,) in J/m² of displacement gradients (n, 3, 2)."""
+        along = gradient[:, :2]
+        strain = along + np.swapaxes(along, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
+        return self._density(_less_one(np.maximum(np.linalg.eigvalsh(strain), -1.0)))
+
+    def error_density(self, difference: Array, expected: Array) -> Array:
+        """Energy density (n,) of sym(Rᵀ δ), R (n, 3, 2) the turn of the tangent plane."""
+        left, _, right = np.linalg.svd(np.eye(3)[:, :2] + expected, full_matrices=False)
+        return Hooke.energy_density(self, np.swapaxes(left @ right, 1, 2) @ difference)
+
+
+Law = Hooke | Corotated | MembraneLaw
 
 
 def hooke(material: Material) -> Hooke:
@@ -72,6 +96,8 @@ def corotated(material: Material) -> Corotated:
 
 def law_of(scene: Scene) -> Law:
     """Elasticity that a scene asks for."""
+    if scene.cell_dimension < scene.dimension:
+        return MembraneLaw(*_constants(scene.material))
     make = corotated if scene.analysis.kinematics == "corotational" else hooke
     return make(scene.material)
 
@@ -83,9 +109,10 @@ def _constants(material: Material) -> tuple[float, float]:
     """
     shear = material.young / (2 * (1 + material.poisson))
     lame = 2 * shear * material.poisson / (1 - 2 * material.poisson)
-    if material.plane == "stress":
+    if material.plane == "stress" or material.thickness is not None:
         lame = 2 * lame * shear / (lame + 2 * shear)
-    return lame, shear
+    thickness = material.thickness or 1.0
+    return thickness * lame, thickness * shear
 
 
 def _principal_stretches(gradient: Array) -> Array:
@@ -104,9 +131,14 @@ def _principal_stretches(gradient: Array) -> Array:
         return 1.0 + 0.5 * np.column_stack([total - apart, total + apart])
     strain = gradient + np.swapaxes(gradient, 1, 2) + np.swapaxes(gradient, 1, 2) @ gradient
     excess = np.maximum(np.linalg.eigvalsh(strain), -1.0)
-    stretch = 1.0 + excess / (1.0 + np.sqrt(1.0 + excess))
+    stretch = 1.0 + _less_one(excess)
     stretch[:, 0] *= np.where(np.linalg.det(np.eye(d) + gradient) < 0.0, -1.0, 1.0)
     return np.asarray(stretch)
+
+
+def _less_one(excess: Array) -> Array:
+    """Stretches less one of eigenvalues of C − I."""
+    return np.asarray(excess / (1.0 + np.sqrt(1.0 + excess)))
 
 
 def _rotations(gradient: Array) -> Array:

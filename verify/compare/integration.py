@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from verify.compare.body import AnyBody, Body
 from verify.compare.cut_line import CutRule, cut_rule
 from verify.compare.error_norm import ErrorNorm
+from verify.compare.membrane_body import MembraneBody
+from verify.compare.membrane_rule import membrane_cut_rule, membrane_rule
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.surface_rule import surface_rule
 from verify.compare.volume_rule import volume_rule
@@ -43,6 +45,12 @@ def rules(body: AnyBody, size: float, count: int = 3) -> list[Rule]:
             area_rule(body, factor * size / 3, angle, grading=_GRADING)
             for factor, angle in list(zip(_FAMILY, slab_angles(body), strict=True))[:count]
         ]
+    if isinstance(body, MembraneBody):
+        spacing = max(size / 3, (2 * body.measure / _MOST) ** 0.5)
+        return [
+            membrane_rule(body, factor * spacing, seed, grading=_GRADING)
+            for seed, factor in enumerate(_FAMILY[:count])
+        ]
     spacing = max(size / 3, (6 * body.measure / _MOST) ** (1 / 3))
     return [
         volume_rule(body, factor * spacing, seed) for seed, factor in enumerate(_FAMILY[:count])
@@ -53,6 +61,8 @@ def cut_rules(body: AnyBody, size: float, count: int = 3) -> list[CutRule]:
     """Rules on the cuts for fields on elements of size `size` m, the finest first."""
     if isinstance(body, Body):
         return [cut_rule(body, factor * size / 8) for factor in _FAMILY[:count]]
+    if isinstance(body, MembraneBody):
+        return [membrane_cut_rule(body, factor * size / 8) for factor in _FAMILY[:count]]
     return [surface_rule(body, factor * size / 3) for factor in _FAMILY[:count]]
 
 

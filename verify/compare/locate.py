@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
-from verify.compare.simplices import simplices, straight_or_raise
+from verify.compare.membrane_kernels import nearest_triangles
+from verify.compare.simplices import simplices, straight_or_raise, triangle_frames
 from verify.errors import InputError
 from verify.solution import Solution
 
@@ -43,7 +44,7 @@ class SolutionField:
     Parameters
     ----------
     solution : Solution
-        Linear, or quadratic with straight edges.
+        Linear, or quadratic with straight edges. Of a membrane the gradients are tangential.
     step : int
         Output time that is evaluated; default the last.
 
@@ -76,6 +77,10 @@ class SolutionField:
         self._centres = shape.corners.mean(axis=1)
         self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
         self._origin = np.ascontiguousarray(shape.corners[:, 0])
+        self._across = self._sides = None
+        if solution.cell_dimension < solution.dimension:
+            self._across = np.ascontiguousarray(triangle_frames(shape.corners)[:, 2])
+            self._sides = np.zeros((len(self._cells), 0), dtype=np.int8)
         self._set_nodal(solution.displacement[step])
 
     def _set_nodal(self, displacement: Array) -> None:
@@ -100,6 +105,8 @@ class SolutionField:
         centroid lies in the direction of `near` (n, d); without `near`, the one that it lies
         deepest in. A point outside of all cells is given to the nearest.
         """
+        if self._across is not None:
+            return self._on_surface(points, near)[0]
         points = np.ascontiguousarray(points, dtype=float)
         directions = np.zeros((0, points.shape[1])) if near is None else near - points
         found: NDArray[np.int64] = find_cells(
@@ -114,6 +121,24 @@ class SolutionField:
             ROUND_OFF * self.scale,
         )
         return found
+
+    def _on_surface(
+        self, points: Array, near: Array | None = None
+    ) -> tuple[NDArray[np.int64], Array]:
+        """Find the triangle (n,) nearest to each of `points` (n, 3), and its distance (n,)."""
+        points = np.ascontiguousarray(points, dtype=float)
+        directions = np.zeros((0, 3)) if near is None else near - points
+        found: tuple[NDArray[np.int64], Array] = nearest_triangles(
+            points, np.ascontiguousarray(directions), self._wanted(points, near),
+            self._tree.lower, self._tree.upper, self._tree.cells, self.shape.corners,
+            self.shape.normals, self._across, self._centres, self._sides,
+            ROUND_OFF * self.scale,
+        )  # fmt: skip
+        return found
+
+    def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
+        """Sides (n, 0) of cuts that are wanted on a membrane: no cut is known here."""
+        return np.zeros((len(points), 0), dtype=np.int8)
 
     def in_cells(self, points: Array, cells: NDArray[np.int64]) -> tuple[Array, Array]:
         """Displacement (n, d) and gradient (n, d, d) of the polynomial of each given cell."""

@@ -4,7 +4,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["evaluate_linear", "evaluate_quadratic", "find_cells"]
+__all__ = [
+    "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells", "segment_distance2",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -25,7 +27,7 @@ def _depth(x, normals, corners):
 
 
 @njit(cache=True)
-def _segment_distance2(x, a, b):
+def segment_distance2(x, a, b):
     """Squared distance of `x` to the segment ab, in any dimension."""
     along, length2 = 0.0, 0.0
     for c in range(x.shape[0]):
@@ -45,7 +47,7 @@ def _outside_distance2(x, normals, corners):
     best = np.inf
     for i in range(d + 1):
         for j in range(i):
-            best = min(best, _segment_distance2(x, corners[i], corners[j]))
+            best = min(best, segment_distance2(x, corners[i], corners[j]))
     if d == 2:
         return best
     for facet in range(4):  # the foot inside a face beats its edges
@@ -135,12 +137,12 @@ def _nearest(x, lower, upper, cells, corners, normals):
     while top > 0:
         top -= 1
         node = stack[top]
-        if _box_distance2(x, lower[node], upper[node]) >= best2:
+        if box_distance2(x, lower[node], upper[node]) >= best2:
             continue
         if node < leaves:
             left, right = 2 * node, 2 * node + 1
-            left2 = _box_distance2(x, lower[left], upper[left])
-            if left2 < _box_distance2(x, lower[right], upper[right]):
+            left2 = box_distance2(x, lower[left], upper[left])
+            if left2 < box_distance2(x, lower[right], upper[right]):
                 left, right = right, left
             stack[top], stack[top + 1] = left, right  # the nearer child is taken first
             top += 2
@@ -159,7 +161,8 @@ def _nearest(x, lower, upper, cells, corners, normals):
 
 
 @njit(cache=True)
-def _box_distance2(x, lower, upper):
+def box_distance2(x, lower, upper):
+    """Squared distance of `x` to a box, 0 inside."""
     distance2 = 0.0
     for a in range(x.shape[0]):
         gap = max(lower[a] - x[a], x[a] - upper[a])
@@ -208,27 +211,28 @@ def evaluate_linear(points, found, origins, values, slopes):
 def evaluate_quadratic(points, found, nodes, values, corners, gradients):
     """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
     n, d = points.shape
+    count = corners.shape[1]
     u, grad = np.zeros((n, d)), np.zeros((n, d, d))
-    weight = np.empty(d + 1)
+    weight = np.empty(count)
     for i in range(n):
         cell = found[i]
         g = gradients[cell]
-        for k in range(d + 1):
+        for k in range(count):
             weight[k] = 0.0
             for a in range(d):
-                weight[k] += g[k, a] * (points[i, a] - corners[cell, (k + 1) % (d + 1), a])
-        for k in range(d + 1):
+                weight[k] += g[k, a] * (points[i, a] - corners[cell, (k + 1) % count, a])
+        for k in range(count):
             node = nodes[cell, k]
             shape, slope = weight[k] * (2.0 * weight[k] - 1.0), 4.0 * weight[k] - 1.0
             for c in range(d):
                 u[i, c] += shape * values[node, c]
                 for a in range(d):
                     grad[i, c, a] += slope * g[k, a] * values[node, c]
-        for edge in range(d * (d + 1) // 2):
-            # VTK: edges 01 12 20, and in 3D then 03 13 23
+        for edge in range(count * (count - 1) // 2):
+            # VTK: edges 01 12 20, and of tetrahedra then 03 13 23
             p = edge if edge < 3 else edge - 3
             q = (edge + 1) % 3 if edge < 3 else 3
-            node = nodes[cell, d + 1 + edge]
+            node = nodes[cell, count + edge]
             shape = 4.0 * weight[p] * weight[q]
             for c in range(d):
                 u[i, c] += shape * values[node, c]

@@ -54,6 +54,11 @@ class SolutionMotion:
         self._found: _Found = {}
         self._last: tuple[float, Sampled] | None = None
 
+    @property
+    def off_surface(self) -> float:
+        """Distance of the surface of a membrane from that of its body, m; 0 of other bodies."""
+        return getattr(self._field, "off_surface", 0.0)
+
     def afresh(self) -> "SolutionMotion":
         """Return the same motion, without what it remembers of points."""
         other = object.__new__(SolutionMotion)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody, Body
+from verify.compare.membrane_body import MembraneBody
 from verify.compare.surface_rule import surface_rule
 
 __all__ = ["NEAR", "near_radius", "near_tip"]
@@ -15,7 +16,7 @@ NEAR = 0.1
 def near_radius(body: AnyBody) -> float:
     """Distance from a tip or front that is called near, m; 0 if there is none.
 
-    A tenth of the length of the shortest cut inside the body that has a tip; in space of the
+    A tenth of the length of the shortest cut inside the body that has a tip; in a solid of the
     root of the area of the cuts inside the body.
     """
     if isinstance(body, Body):
@@ -29,6 +30,8 @@ def near_radius(body: AnyBody) -> float:
             if (body.tip_distance(ends) <= 1e-10 * body.size).any():
                 tipped.add(part.cut)
         return NEAR * min(lengths[cut] for cut in tipped)
+    if isinstance(body, MembraneBody):
+        return NEAR * min(_lengths_with_tip(body), default=0.0)
     if not len(body.front):
         return 0.0
     area = float(surface_rule(body, body.size / 20, depth=1.0).weights.sum())
@@ -38,3 +41,12 @@ def near_radius(body: AnyBody) -> float:
 def near_tip(body: AnyBody, points: NDArray[np.float64], radius: float) -> NDArray[np.bool_]:
     """Whether points (n, d) are nearer to a tip or front than `radius` m."""
     return np.asarray(body.tip_distance(points) < radius)
+
+
+def _lengths_with_tip(body: MembraneBody) -> list[float]:
+    """Lengths of the cuts of a membrane that end inside it, m."""
+    return [
+        float(lines.lengths.sum())
+        for lines in body.cuts.values()
+        if (body.tip_distance(lines.ends.reshape(-1, 3)) <= 1e-9 * body.size).any()
+    ]

@@ -8,6 +8,8 @@ from verify.compare.body import AnyBody, Body
 from verify.compare.cut_line import CutRule, place_on_cut
 from verify.compare.jump_error import displacement_jump
 from verify.compare.locate import Field
+from verify.compare.membrane_body import MembraneBody
+from verify.compare.membrane_rule import nearest_on_membrane_cut
 from verify.compare.surface_rule import nearest_on_cut
 
 __all__ = ["cut_place", "opening"]
@@ -21,7 +23,7 @@ def opening(
     In the plane the place is a fraction of the cut's length, and the tangent goes along the
     cut's direction; in space the place is a point, of which the nearest on the cut is taken,
     and the tangential jump is the length of what is left of the jump without its normal part.
-    The normal points into the positive side.
+    The normal points into the positive side; of a membrane it lies in the surface.
     """
     at = cut_place(body, cut, place)
     normal, jump = at.normals[0], displacement_jump(field, at)[0]
@@ -37,4 +39,7 @@ def cut_place(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRul
     if isinstance(body, Body):
         assert isinstance(place, float)
         return place_on_cut(body, cut, place)
-    return nearest_on_cut(body, cut, np.array(place, dtype=float))
+    point = np.array(place, dtype=float)
+    if isinstance(body, MembraneBody):
+        return nearest_on_membrane_cut(body, cut, point)
+    return nearest_on_cut(body, cut, point)

@@ -16,6 +16,8 @@ from verify.compare.body import AnyBody
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.facet_kernels import crossings
 from verify.compare.locate import ROUND_OFF, SolutionField
+from verify.compare.membrane_body import MembraneBody
+from verify.compare.membrane_field import MembraneField
 from verify.solution import Solution
 
 __all__ = ["SidedField", "cut_deviation", "field_of"]
@@ -27,6 +29,8 @@ _ROWS = 2000  # points per block of the distance tables, to bound memory
 
 def field_of(solution: Solution, body: AnyBody) -> "SolutionField | SidedField":
     """Make the field of a solution, with the sides of the cuts of `body` as asked."""
+    if isinstance(body, MembraneBody):
+        return MembraneField(solution, body)
     field = SolutionField(solution)
     deviation = cut_deviation(solution, body)
     if deviation <= ROUND_OFF * body.size:

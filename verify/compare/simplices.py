@@ -1,4 +1,7 @@
-"""Geometry of simplices: gradients of barycentric coordinates, facet normals, volumes."""
+"""Geometry of simplices: gradients of barycentric coordinates, facet normals, volumes.
+
+Of triangles in space all of it is tangential: what lies across them has no gradient there.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -9,26 +12,27 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["EDGES", "Simplices", "simplices", "straight_or_raise"]
+__all__ = ["EDGES", "Simplices", "in_frames", "simplices", "straight_or_raise", "triangle_frames"]
 
 Array = NDArray[np.float64]
 
-# corners at the ends of each mid-edge node, in VTK's order
+_CORNERS = {3: 3, 6: 3, 4: 4, 10: 4}  # by the nodes of a cell
+# corners at the ends of each mid-edge node, in VTK's order; by the dimension of the cells
 EDGES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))}
 
 
 @dataclass(frozen=True)
 class Simplices:
-    """Simplices with what evaluation needs.
+    """Simplices of k dimensions with what evaluation needs.
 
     Parameters
     ----------
-    corners : (m, d+1, d) float array
+    corners : (m, k+1, d) float array
     volume : (m,) float array
-        Areas in 2D; never negative.
-    gradients : (m, d+1, d) float array
+        Areas of triangles; never negative.
+    gradients : (m, k+1, d) float array
         Gradients of the barycentric coordinates; zero in degenerate cells.
-    normals : (m, d+1, d) float array
+    normals : (m, k+1, d) float array
         Unit inward normals of the facets opposite to each corner.
     degenerate : (m,) bool array
         Cells whose height is not resolved by double precision; they hold no material.
@@ -42,21 +46,22 @@ class Simplices:
 
 
 def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
-    """Geometry of the simplices with corners ``points[cells[:, :d + 1]]``."""
-    d = points.shape[1]
-    corners = points[cells[:, : d + 1]]
-    areas = np.empty_like(corners)  # facet normals times d! volume, all over one determinant
-    for i in range(d + 1):
-        others = [k for k in range(d + 1) if k != i]
+    """Geometry of the simplices with corners ``points[cells[:, :k + 1]]``."""
+    count = _CORNERS[cells.shape[1]]
+    corners = points[cells[:, :count]]
+    across = triangle_frames(corners)[:, 2] if count == points.shape[1] == 3 else None
+    areas = np.empty_like(corners)  # facet normals times k! volume, all over one determinant
+    for i in range(count):
+        others = [k for k in range(count) if k != i]
         edges = [corners[:, b] - corners[:, a] for a, b in pairwise(others)]
-        areas[:, i] = _perpendicular(edges)
+        areas[:, i] = _perpendicular(edges if across is None else [across, *edges])
         inward = np.sum(areas[:, i] * (corners[:, i] - corners[:, others[0]]), axis=1)
         areas[:, i] *= np.where(inward < 0, -1.0, 1.0)[:, None]
     # the determinant from the largest facet: the smallest height, hence the least cancellation
     sizes = np.linalg.norm(areas, axis=2)
     largest = np.argmax(sizes, axis=1)
     rows = np.arange(len(corners))
-    apex, foot = corners[rows, largest], corners[rows, (largest + 1) % (d + 1)]
+    apex, foot = corners[rows, largest], corners[rows, (largest + 1) % count]
     determinant = np.sum(areas[rows, largest] * (apex - foot), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         height = determinant / sizes[rows, largest]
@@ -65,8 +70,38 @@ def simplices(points: Array, cells: NDArray[np.int64]) -> Simplices:
         gradients = areas / determinant[:, None, None]
         normals = areas / sizes[..., None]
     gradients[degenerate], normals[degenerate] = 0.0, 0.0
-    volume = np.maximum(determinant, 0.0) / factorial(d)
+    volume = np.maximum(determinant, 0.0) / factorial(count - 1)
     return Simplices(corners, volume, gradients, normals, degenerate)
+
+
+def triangle_frames(corners: Array) -> Array:
+    """Orthonormal frames (m, 3, 3) of triangles (m, 3, 3) in space, as rows: two along, one across.
+
+    The first is along the longest edge and the others are square to it to the last digit, so that
+    of a sliver only the turn about its length is not resolved. Of a triangle without area the frame
+    is some frame.
+    """
+    edges = np.roll(corners, -1, axis=1) - corners
+    longest = np.argmax(np.linalg.norm(edges, axis=2), axis=1)
+    rows = np.arange(len(corners))
+    first, second = edges[rows, longest], edges[rows, (longest + 1) % 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = first / np.linalg.norm(first, axis=1)[:, None]
+        for _ in range(2):
+            second = second - np.sum(second * first, axis=1)[:, None] * first
+            second = second / np.linalg.norm(second, axis=1)[:, None]
+    flat = ~np.isfinite(first + second).all(axis=1)
+    first[flat], second[flat] = np.eye(3)[0], np.eye(3)[1]
+    return np.stack([first, second, np.cross(first, second)], axis=1)
+
+
+def in_frames(gradient: Array, frames: Array) -> Array:
+    """Take derivatives (m, 3, 2) along the tangents of `frames` (m, 3, 3), components along rows.
+
+    `gradient` (m, 3, 3) may be tangential to another triangulation of the surface: then this is
+    the gradient of what it becomes by way of the nearest points.
+    """
+    return np.asarray(frames @ gradient @ np.swapaxes(frames[:, :2], 1, 2))
 
 
 def straight_or_raise(points: Array, cells: NDArray[np.int64]) -> None:
@@ -77,10 +112,10 @@ def straight_or_raise(points: Array, cells: NDArray[np.int64]) -> None:
     InputError
         With the worst cell, if a mid-edge node is off by more than 1e-8 of its edge.
     """
-    d = points.shape[1]
-    for k, (a, b) in enumerate(EDGES[d]):
+    count = _CORNERS[cells.shape[1]]
+    for k, (a, b) in enumerate(EDGES[count - 1]):
         ends = points[cells[:, a]], points[cells[:, b]]
-        off = np.linalg.norm(points[cells[:, d + 1 + k]] - 0.5 * (ends[0] + ends[1]), axis=1)
+        off = np.linalg.norm(points[cells[:, count + k]] - 0.5 * (ends[0] + ends[1]), axis=1)
         length = np.linalg.norm(ends[1] - ends[0], axis=1)
         round_off = 16 * np.finfo(float).eps * np.abs(points).max()
         worst = int(np.argmax(off - 1e-8 * length))

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from verify.compare.body import Body
 from verify.compare.curves import Arc, Piece, Segment, closed_pieces
+from verify.compare.locate import Field
+from verify.compare.simplices import in_frames
 
 __all__ = ["Rule", "area_rule", "graded_breaks", "slab_angles"]
 
@@ -25,10 +27,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rule:
-    """Points (n, d) and weights (n,) of a quadrature rule; points lie inside, on no cut."""
+    """A quadrature rule of a body.
+
+    Parameters
+    ----------
+    points : (n, d) array
+        Inside, on no cut.
+    weights : (n,) array
+    frames : (n, 3, 3) array, optional
+        Of a membrane: two tangents and the normal at each point, as rows.
+    """
 
     points: Array
     weights: Array
+    frames: Array | None = None
+
+    def gradient(self, field: Field) -> Array:
+        """Gradient (n, d, d) of a field at the points; of a membrane (n, 3, 2), see `in_frames`."""
+        gradient = field.gradient(self.points, self.points)
+        return gradient if self.frames is None else in_frames(gradient, self.frames)
 
 
 @dataclass(frozen=True)

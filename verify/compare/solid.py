@@ -98,7 +98,7 @@ def solid_of(scene: Scene) -> SolidBody:
     Raises
     ------
     UnsupportedSceneError
-        If it is a membrane, or a cut is no surface of a known kind.
+        If a cut is no surface of a known kind, or the body is none.
     """
     corners, box, inside = _material(scene)
     size = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
@@ -122,8 +122,6 @@ def _material(scene: Scene) -> tuple[Array, Array | None, Inside]:
             return np.asarray(within.all(axis=1))
 
         return _box_tetrahedra(box), box, in_box
-    if isinstance(geometry, MeshFile) and geometry.cells == "surface":
-        raise UnsupportedSceneError("comparison on membranes is not possible yet")
     if not isinstance(geometry, MeshFile):
         raise UnsupportedSceneError(
             f"comparison on a body of kind '{geometry.kind}' is not possible yet; boxes and mesh "

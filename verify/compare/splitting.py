@@ -25,6 +25,8 @@ def measures(corners: Array) -> Array:
     edges = corners[:, 1:] - corners[:, :1]
     if edges.shape[1] == edges.shape[2]:
         size: Array = np.abs(np.linalg.det(edges))
+    elif edges.shape[1:] == (2, 3):  # Gram's determinant is a square: it loses thin triangles
+        size = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     else:
         size = np.sqrt(np.maximum(np.linalg.det(edges @ np.swapaxes(edges, 1, 2)), 0.0))
     return size / factorial(edges.shape[1])

@@ -5,6 +5,7 @@ import numpy as np
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field, SolutionField
 from verify.compare.simplex_rule import simplex_rule
+from verify.compare.simplices import in_frames, triangle_frames
 from verify.compare.slabs import Rule
 from verify.solution import Solution
 
@@ -29,12 +30,17 @@ def nodal_strain_energy(field: SolutionField, law: Law) -> float:
     order = 1 if solution.order == 1 else _FINE if isinstance(law, Corotated) else 2
     every = np.arange(len(solution.cells))
     total = 0.0
-    for weights, share in zip(*simplex_rule(solution.dimension, order), strict=True):
+    membrane = solution.cell_dimension < solution.dimension
+    frames = triangle_frames(shape.corners) if membrane else None
+    for weights, share in zip(*simplex_rule(solution.cell_dimension, order), strict=True):
         points = np.einsum("k,mka->ma", weights, shape.corners)
-        total += share * float(shape.volume @ law.energy_density(field.in_cells(points, every)[1]))
+        gradient = field.in_cells(points, every)[1]
+        if frames is not None:
+            gradient = in_frames(gradient, frames)
+        total += share * float(shape.volume @ law.energy_density(gradient))
     return total
 
 
 def field_strain_energy(field: Field, rule: Rule, law: Law) -> float:
     """Energy of the body by quadrature, J (2D: per metre); for exact fields."""
-    return float(rule.weights @ law.energy_density(field.gradient(rule.points, rule.points)))
+    return float(rule.weights @ law.energy_density(rule.gradient(field)))

@@ -1,7 +1,7 @@
 """Quadrature of a cut body in space: neutral tetrahedra, split by the cuts, graded to fronts.
 
 A box is divided by a grid of its own, whose planes are shifted at random (with a fixed seed), so
-that its points do not fall in step with a structured mesh; the tetrahedra of a mesh file are
+that its points do not fall in step with a structured mesh; the simplices of a mesh file are
 divided at random points. Plane cuts split them exactly; a cylinder splits them along its linear
 interpolant in tetrahedra so small that the sagitta is a thirtieth of the spacing. The side of a
 point is then a matter of the field that is asked; the rest is in the integration error.
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import morton_order
+from verify.compare.membrane_body import MembraneBody
 from verify.compare.patches import Patch
 from verify.compare.simplex_rule import points_in
 from verify.compare.slabs import Rule
@@ -58,9 +59,13 @@ def volume_rule(
 
 
 def volume_cells(
-    body: SolidBody, spacing: float, seed: int = 0, depth: float = 0.25, grading: float = 1.0
+    body: SolidBody | MembraneBody,
+    spacing: float,
+    seed: int = 0,
+    depth: float = 0.25,
+    grading: float = 1.0,
 ) -> Array:
-    """Tetrahedra (m, 4, 3) of the quadrature."""
+    """Tetrahedra (m, 4, 3) of the quadrature, or triangles (m, 3, 3)."""
     random = np.random.default_rng(seed)
     if body.box is not None:
         cells = _shaken_grid(body.box, spacing, random)
@@ -125,11 +130,12 @@ def _shaken_grid(box: Array, spacing: float, random: np.random.Generator) -> Arr
 
 
 def _divided(corners: Array, random: np.random.Generator) -> Array:
-    """Four tetrahedra (4 m, 4, 3) around a random point inside each."""
-    weight = random.dirichlet(np.full(4, 8.0), len(corners))
+    """Simplices (k m, k, 3) around a random point inside each of (m, k, 3)."""
+    count = corners.shape[1]
+    weight = random.dirichlet(np.full(count, 8.0), len(corners))
     inner = np.einsum("mk,mka->ma", weight, corners)
     parts = []
-    for k in range(4):
+    for k in range(count):
         part = corners.copy()
         part[:, k] = inner
         parts.append(part)

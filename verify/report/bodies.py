@@ -92,8 +92,10 @@ def error_body(path: Path) -> Body:
     else:
         raise InputError("the error field has no triangles or tetrahedra", str(path))
     cells = np.asarray(mesh.cells_dict[kind], dtype=np.int64)
-    dimension = 3 if kind.startswith("tetra") else 2
-    points = np.asarray(mesh.points, dtype=float)[:, :dimension]
+    points = np.asarray(mesh.points, dtype=float)
+    # triangles off z = 0 are a membrane
+    dimension = 3 if kind.startswith("tetra") or np.ptp(points[:, 2]) > 0.0 else 2
+    points = points[:, :dimension]
     if "error" in mesh.point_data:
         values = np.asarray(mesh.point_data["error"], dtype=float)
         values = values if values.ndim == 1 else np.linalg.norm(values, axis=1)
@@ -131,6 +133,10 @@ def _body(
     if flat:
         triangles = cells
         edges = _single(cells, ((0, 1), (1, 2), (2, 0)))
+        inner = _all_edges(elements[:, :3], ((0, 1), (1, 2), (2, 0)))
+    elif cells.shape[1] == 3:  # a membrane
+        triangles = cells
+        edges = _creases(drawn, triangles)
         inner = _all_edges(elements[:, :3], ((0, 1), (1, 2), (2, 0)))
     else:
         triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.locate import Field, SolutionField
+from verify.compare.simplices import simplices
 from verify.solution import Solution
 from verify.whole_files import whole_file
 
@@ -35,13 +36,12 @@ def nodal_error(solution: Solution, truth: Field) -> NDArray[np.float64]:
         0 at nodes that no cell uses.
     """
     points, cells = solution.points, solution.cells
-    corners = points[cells[:, : solution.dimension + 1]]
-    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    shape = simplices(points, cells)
     owner = np.full(len(points), -1)
-    order = np.argsort(volume, kind="stable")  # of what is assigned twice, the last stays
+    order = np.argsort(shape.volume, kind="stable")  # of what is assigned twice, the last stays
     owner[cells[order].ravel()] = np.repeat(order, cells.shape[1])
     used = owner >= 0
-    centre = corners.mean(axis=1)[owner[used]]
+    centre = shape.corners.mean(axis=1)[owner[used]]
     inside = points[used] + _INTO_CELL * (centre - points[used])
     own, _ = SolutionField(solution).in_cells(inside, owner[used])
     error = np.zeros(len(points))

@@ -12,6 +12,7 @@ from verify.compare.body import AnyBody, body_of
 from verify.compare.errors import Rules
 from verify.compare.hooke import Law, law_of
 from verify.compare.integration import spread_of
+from verify.compare.locate import ROUND_OFF
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 from verify.scene import Scene, scene_hash
@@ -38,6 +39,7 @@ REFERENCE = "reference"
 
 # A solver may drop slivers; a mesh that misses more of the body than this is another body.
 _COVERED = 0.01
+_ON_SURFACE = 0.01  # of the size of a membrane: so far apart two triangulations of it may be
 _SAME_TIME = 1e-6  # of the duration
 
 
@@ -162,6 +164,8 @@ def _measure(
     covered = one.coverage
     if abs(covered - 1) > 1e-9:
         record = _noted(record, {"coverage": f"cells cover the body times {covered:.9f}"})
+    if (off := one.motion.off_surface) > ROUND_OFF * one.body.size:
+        record = _noted(record, {"surface": f"up to {off:.3g} m off the surface of the scene"})
     # the reference does not judge itself: its finest level would have no error
     own = record.solver == REFERENCE and not scene.judged_by_exact
     metrics, notes = _quantities(scene, one, None if own else reference)
@@ -184,6 +188,8 @@ def _defect(scene: Scene, one: Measured) -> str:
     covered, times = one.coverage, one.solution.times
     if abs(covered - 1) > _COVERED:
         return f"the cells of the solution cover {covered:.4g} of the body"
+    if one.motion.off_surface > _ON_SURFACE * one.body.size:
+        return f"the solution lies up to {one.motion.off_surface:.3g} m off the surface of the body"
     duration = scene.analysis.duration
     if duration is not None and abs(times[-1] - duration) > _SAME_TIME * duration:
         return f"the solution ends at {times[-1]:.6g} s; the scene at {duration:.6g} s"

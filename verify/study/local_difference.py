@@ -69,8 +69,7 @@ def _made_of(
 
 def _around(side: _Side, coarse: Measured) -> tuple[Array, Array, Array]:
     """Points (n, d) in the cells around one, weights (n,) that sum to 1, and points near each."""
-    d = side.point.shape[1]
-    corners = coarse.solution.cells[:, : d + 1]
+    corners = coarse.solution.cells[:, : coarse.solution.cell_dimension + 1]
     held = corners[coarse.motion.cells_at(*side)[0]]
     cells = coarse.solution.points[corners[np.isin(corners, held).any(axis=1)]]
     points, weights = points_in(cells, 2)

@@ -12,6 +12,8 @@ from verify.compare.body import AnyBody, Body
 from verify.compare.errors import ERRORS, Rules
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
+from verify.compare.membrane_body import MembraneBody
+from verify.compare.membrane_rule import membrane_rule
 from verify.compare.motion import ExactMotion, Motion
 from verify.compare.near_tip import NEAR, near_radius
 from verify.compare.simplices import simplices
@@ -91,7 +93,7 @@ def size_of(solution: Solution) -> float:
     """Element size of a solution, m; from the mean cell volume where it says none."""
     if np.isfinite(solution.size) and solution.size > 0:
         return float(solution.size)
-    d = solution.dimension
+    d = solution.cell_dimension
     volume = simplices(solution.points, solution.cells).volume
     return float((factorial(d) * volume.sum() / len(volume)) ** (1 / d))
 
@@ -147,6 +149,10 @@ def _exact_rules(body: AnyBody) -> Sequence[Rule]:
         return [
             area_rule(body, body.size / n, angle, 7, 1e-8)
             for n, angle in zip((14, 10), slab_angles(body)[:2], strict=True)
+        ]
+    if isinstance(body, MembraneBody):
+        return [
+            membrane_rule(body, body.size / n, seed, 5, 1e-6) for seed, n in enumerate((14, 10))
         ]
     order = 3 if len(body.front) else 5
     return [
