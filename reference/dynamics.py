@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.elasticity import stiffness_form
-from reference.linear_solvers import direct_solver
+from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Material
@@ -114,23 +114,24 @@ class LinearMotion:
     ) -> None:
         import ufl
         from dolfinx import fem
-        from dolfinx.fem import petsc
 
         if material.density is None:
             raise InputError("material.density is missing: motion needs it")
         V = space.function_space
         u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
         density = fem.Constant(V.mesh, np.asarray(material.density))
-        self._stiffness = _matrix(stiffness_form(material, u, v))
-        self._mass = _matrix(density * ufl.inner(u, v) * ufl.dx)
-        self._damping, self._unknowns, self._time = damping, unknowns, start
-        self._u = _vector(self._stiffness, displacement)
-        self._v = _vector(self._stiffness, velocity)
-        self._v.array[unknowns] = 0.0
-        self._dimension = space.dimension
+        stiffness = assembled_matrix(stiffness_form(material, u, v))
+        self._stiffness = NodalMatrix(stiffness, space)
+        mass = assembled_matrix(density * ufl.inner(u, v) * ufl.dx)
+        self._mass = NodalMatrix(mass, space)
+        self._damping, self._held, self._time = damping, unknowns, start
+        self._space = space
+        self._u = np.array(displacement, dtype=float).ravel()
+        self._v = np.array(velocity, dtype=float).ravel()
+        self._v[unknowns] = 0.0
         zero = fem.Constant(V.mesh, np.zeros(space.dimension))
         form = ufl.inner(zero, v) * ufl.dx if load is None else load(v)
-        self._force: Any = petsc.assemble_vector(fem.form(form))
+        self._force = nodal_forces(form, space)
         self._a = self._initial_acceleration()
 
     def run(self, scheme: Scheme, step: float, steps: int, every: int = 1) -> Iterator[Moment]:
@@ -143,86 +144,63 @@ class LinearMotion:
             Δt, s.
         steps, every : int
         """
-        mass, stiffness = self._damping
         solver = self._effective(scheme, step)
-        start_total = self._total()
+        start_total = sum(self._energies())
         work = 0.0
         yield self._moment(work, start_total)
-        right, part = self._u.duplicate(), self._u.duplicate()
         for n in range(1, steps + 1):
             # predictors with a₊ = 0, then one solve for a₊
-            u_p, v_p = self._u.copy(), self._v.copy()
-            u_p.axpy(step, self._v)
-            u_p.axpy(step**2 * scheme.beta_old, self._a)
-            v_p.axpy(step * scheme.gamma_old, self._a)
-            u_mid = _between(u_p, self._u, scheme.alpha_f)
-            v_mid = _between(v_p, self._v, scheme.alpha_f)
-            u_mid.axpy(stiffness, v_mid)
-            self._stiffness.mult(u_mid, right)
-            v_mid.scale(mass)
-            v_mid.axpy(scheme.alpha_m, self._a)
-            self._mass.mult(v_mid, part)
-            right.axpy(1.0, part)
-            right.aypx(-1.0, self._force)
-            right.array[self._unknowns] = 0.0
-            before = self._u.copy()
-            solver.solve(right, self._a)
-            u_p.axpy(step**2 * scheme.beta, self._a)
-            v_p.axpy(step * scheme.gamma, self._a)
-            self._u, self._v = u_p, v_p
-            before.aypx(-1.0, self._u)
-            work += float(self._force.dot(before))
+            before, old = self._u, scheme.alpha_f
+            u = before + step * self._v + step**2 * scheme.beta_old * self._a
+            v = self._v + step * scheme.gamma_old * self._a
+            right = self._remaining(
+                (1 - old) * u + old * before,
+                (1 - old) * v + old * self._v,
+                scheme.alpha_m * self._a,
+            )
+            self._a = solver.solve(right)
+            self._u = u + step**2 * scheme.beta * self._a
+            self._v = v + step * scheme.gamma * self._a
+            work += float(self._force @ (self._u - before))
             self._time += step
             if n % every == 0 or n == steps:
                 yield self._moment(work, start_total)
         solver.destroy()
 
-    def _effective(self, scheme: Scheme, step: float) -> Any:
+    def _remaining(self, u: Array, v: Array, a: Array) -> Array:
+        """Return the forces f − K u − C v − M a that are left, none where held."""
+        mass, stiffness = self._damping
+        right = self._force - self._stiffness @ (u + stiffness * v) - self._mass @ (mass * v + a)
+        right[self._held] = 0.0
+        return right
+
+    def _effective(self, scheme: Scheme, step: float) -> NodalSolver:
         mass, stiffness = self._damping
         keep = 1 - scheme.alpha_f
-        matrix = self._mass.copy()
+        matrix = self._mass.petsc.copy()
         matrix.scale(1 - scheme.alpha_m + keep * scheme.gamma * step * mass)
-        matrix.axpy(
-            keep * (scheme.beta * step**2 + scheme.gamma * step * stiffness), self._stiffness
-        )
-        matrix.zeroRowsColumns(self._unknowns, 1.0)
-        return direct_solver(matrix)
+        share = keep * (scheme.beta * step**2 + scheme.gamma * step * stiffness)
+        matrix.axpy(share, self._stiffness.petsc)
+        return NodalSolver(matrix, self._space, self._held)
 
-    def _initial_acceleration(self) -> Any:
+    def _initial_acceleration(self) -> Array:
         """M a = f − C v − K u with a = 0 where held."""
-        right, part, mixed = (self._u.duplicate() for _ in range(3))
-        mass, stiffness = self._damping
-        self._u.copy(mixed)
-        mixed.axpy(stiffness, self._v)
-        self._stiffness.mult(mixed, right)
-        self._mass.mult(self._v, part)
-        right.axpy(mass, part)
-        right.aypx(-1.0, self._force)
-        right.array[self._unknowns] = 0.0
-        matrix = self._mass.copy()
-        matrix.zeroRowsColumns(self._unknowns, 1.0)
-        solver = direct_solver(matrix)
-        acceleration = self._u.duplicate()
-        solver.solve(right, acceleration)
+        solver = NodalSolver(self._mass.petsc.copy(), self._space, self._held)
+        acceleration = solver.solve(self._remaining(self._u, self._v, 0.0 * self._u))
         solver.destroy()
         return acceleration
 
     def _energies(self) -> tuple[float, float]:
-        product = self._u.duplicate()
-        self._mass.mult(self._v, product)
-        kinetic = 0.5 * float(self._v.dot(product))
-        self._stiffness.mult(self._u, product)
-        return kinetic, 0.5 * float(self._u.dot(product))
-
-    def _total(self) -> float:
-        return sum(self._energies())
+        kinetic = 0.5 * float(self._v @ (self._mass @ self._v))
+        return kinetic, 0.5 * float(self._u @ (self._stiffness @ self._u))
 
     def _moment(self, work: float, start_total: float) -> Moment:
         kinetic, strain = self._energies()
+        d = self._space.dimension
         return Moment(
             self._time,
-            np.array(self._u.array, dtype=float).reshape(-1, self._dimension),
-            np.array(self._v.array, dtype=float).reshape(-1, self._dimension),
+            self._u.reshape(-1, d).copy(),
+            self._v.reshape(-1, d).copy(),
             kinetic,
             strain,
             work,
@@ -252,26 +230,3 @@ def inherit(closed: ConformingSpace, opened: ConformingSpace, field: Array) -> A
     values = np.empty((len(opened.node_points), field.shape[1]))
     values[opened.cell_nodes] = field[closed.cell_nodes]
     return values
-
-
-def _matrix(form: Any) -> Any:
-    from dolfinx import fem
-    from dolfinx.fem import petsc
-
-    matrix = petsc.assemble_matrix(fem.form(form))
-    matrix.assemble()
-    return matrix
-
-
-def _vector(matrix: Any, values: Array) -> Any:
-    vector = matrix.createVecRight()
-    vector.array[:] = values.ravel()
-    return vector
-
-
-def _between(later: Any, earlier: Any, alpha: float) -> Any:
-    """Mix (1 − α) later + α earlier."""
-    mixed = later.copy()
-    mixed.scale(1 - alpha)
-    mixed.axpy(alpha, earlier)
-    return mixed

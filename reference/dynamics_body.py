@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_values import constrained_values
-from reference.dynamics_law import Matrix, law_of
+from reference.dynamics_law import law_of
 from reference.elasticity import load_form
 from reference.large_strain import solve_large_strain
-from reference.linear_solvers import direct_solver
+from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Gravity, Scene, Support
@@ -41,20 +41,19 @@ class _Held:
 
 
 class MovingBody:
-    """A body of a dynamic scene on one mesh. Arrays (k,) hold nodes × components.
+    """A body of a dynamic scene on one mesh. Arrays (k,), of nodes × components, are on all ranks.
 
     Parameters
     ----------
     scene : Scene
     space : ConformingSpace
-        Serial.
     exact : ExactSolution or None
         For supports and loads that are said to be exact.
 
     Attributes
     ----------
     law : Law
-    mass : Matrix
+    mass : NodalMatrix
         Consistent.
     weight : (k,) array
         Dead load of gravity, N.
@@ -70,7 +69,6 @@ class MovingBody:
     def __init__(self, scene: Scene, space: ConformingSpace, exact: Any) -> None:
         import ufl
         from dolfinx import fem
-        from dolfinx.fem import petsc
 
         density = scene.material.density
         if density is None:
@@ -79,15 +77,12 @@ class MovingBody:
         V = space.function_space
         inertia = fem.Constant(V.mesh, np.asarray(density))
         inertia = inertia * ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V)) * ufl.dx
-        mass = petsc.assemble_matrix(fem.form(inertia))
-        mass.assemble()
-        self.mass = Matrix(mass)
+        self.mass = NodalMatrix(assembled_matrix(inertia), space)
         self.law = law_of(scene.material, space, scene.analysis.kinematics)
         self.weight = np.zeros(space.node_points.size)
         self._driven: list[tuple[Array, Any]] = []
         for load in scene.loads:
-            form = self._load_form(load, ufl.TestFunction(V))
-            forces = np.array(fem.assemble_vector(fem.form(form)).array, dtype=float)
+            forces = nodal_forces(self._load_form(load, ufl.TestFunction(V)), space)
             if isinstance(load, Gravity):
                 self.weight += forces
             else:
@@ -140,11 +135,7 @@ class MovingBody:
 
     def accelerations(self, forces: Array) -> Array:
         """Solve M a = forces, with a = 0 where held."""
-        matrix = self.mass.petsc.copy()
-        matrix.zeroRowsColumns(self.held, 1.0)
-        right = forces.copy()
-        right[self.held] = 0.0
-        return _solved(matrix, right)
+        return self._solved(self.mass.petsc.copy(), forces)
 
     def _linear_equilibrium(self, factors: list[float]) -> Array:
         load = self.weight.copy()
@@ -153,11 +144,16 @@ class MovingBody:
         u = np.zeros_like(load)
         pairs = zip(self._supports, factors, strict=True)
         u[self.held] = self._filled([one.values(factor) for one, factor in pairs])
-        free_load = load - self.law.force(u)
-        free_load[self.held] = 0.0
-        matrix = self.law.tangent(u)
-        matrix.zeroRowsColumns(self.held, float(matrix.getDiagonal().sum()) / len(u))
-        return u + _solved(matrix, free_load)
+        return u + self._solved(self.law.tangent(u), load - self.law.force(u))
+
+    def _solved(self, matrix: Any, forces: Array) -> Array:
+        """Solve a positive definite system, with zero where held, and destroy it."""
+        right = forces.copy()
+        right[self.held] = 0.0
+        solver = NodalSolver(matrix, self.space, self.held)
+        found = solver.solve(right)
+        solver.destroy()
+        return found
 
     def _first_loads(self, v: Any) -> Any:
         """Linear form of all loads with their first factors."""
@@ -194,15 +190,3 @@ class MovingBody:
         for one, value in zip(self._supports, values, strict=True):
             filled[one.place] = value
         return filled.ravel()[self.held]
-
-
-def _solved(matrix: Any, right: Array) -> Array:
-    """Solve a symmetric positive definite system and free it."""
-    x, b = matrix.createVecs()
-    b.array[:] = right
-    solver = direct_solver(matrix)
-    solver.solve(b, x)
-    found = np.array(x.array, dtype=float)
-    for entry in (solver, matrix, x, b):
-        entry.destroy()
-    return found

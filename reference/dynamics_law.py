@@ -21,28 +21,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.elasticity import lame, stiffness_form
+from reference.nodal_algebra import (
+    NodalMatrix,
+    assembled_matrix,
+    nodal_forces,
+    nodal_integral,
+)
 from reference.polar_stretch import PolarStretch
 from reference.space import ConformingSpace
 from reference.strain_energies import corotated, corotated_value
 from verify.scene import Material
 
-__all__ = ["CorotatedLaw", "Law", "LinearLaw", "Matrix", "law_of"]
+__all__ = ["CorotatedLaw", "Law", "LinearLaw", "law_of"]
 
 Array = NDArray[np.float64]
-
-
-class Matrix:
-    """A PETSc matrix that multiplies arrays."""
-
-    def __init__(self, petsc_matrix: Any) -> None:
-        self.petsc = petsc_matrix
-        self._in, self._out = petsc_matrix.createVecs()
-
-    def __matmul__(self, values: Array) -> Array:
-        """Multiply an array (k,)."""
-        self._in.array[:] = values
-        self.petsc.mult(self._in, self._out)
-        return np.array(self._out.array, dtype=float)
 
 
 class Law(Protocol):
@@ -95,7 +87,7 @@ class LinearLaw:
 
         V = space.function_space
         form = stiffness_form(material, ufl.TrialFunction(V), ufl.TestFunction(V))
-        self._stiffness = Matrix(_assembled(form))
+        self._stiffness = NodalMatrix(assembled_matrix(form), space)
 
     def energy(self, u: Array) -> float:
         """½ u·K u."""
@@ -143,6 +135,7 @@ class CorotatedLaw:
         import ufl
         from dolfinx import fem
 
+        self._space = space
         V = space.function_space
         lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
         self._before, self._after, self._velocity = (fem.Function(V) for _ in range(3))
@@ -166,54 +159,46 @@ class CorotatedLaw:
 
     def energy(self, u: Array) -> float:
         """Integral of the energy density."""
-        from dolfinx import fem
-
         self._put(u)
-        return float(np.real(fem.assemble_scalar(self._energy)))
+        return nodal_integral(self._energy, self._space)
 
     def force(self, u: Array) -> Array:
         """Return the gradient of the energy."""
         self._put(u)
-        return self._vector(self._force)
+        return nodal_forces(self._force, self._space)
 
     def averaged(self, u: Array, later: Array) -> Array:
         """Return the mean force of a step; see the module."""
         self._put(later, u)
-        return self._vector(self._averaged)
+        return nodal_forces(self._averaged, self._space)
 
     def viscous(self, u: Array, v: Array) -> Array:
         """Return the force of the rate of strain, seen in the turned frame."""
         self._put(u)
-        self._velocity.x.array[:] = v
-        return self._vector(self._viscous)
+        self._velocity.x.array[:] = self._space.local_part(v)
+        return nodal_forces(self._viscous, self._space)
 
     def tangent(self, u: Array) -> Any:
         """Return the exact tangent."""
         self._put(u)
-        return _matrix(self._tangent)
+        return assembled_matrix(self._tangent)
 
     def averaged_tangent(self, u: Array, later: Array) -> Any:
         """Return the exact tangent of the mean force."""
         self._put(later, u)
-        return _matrix(self._averaged_tangent)
+        return assembled_matrix(self._averaged_tangent)
 
     def viscous_tangent(self, u: Array) -> Any:
         """Return the stiffness with the rotations of u."""
         self._put(u)
-        return _matrix(self._viscous_tangent)
+        return assembled_matrix(self._viscous_tangent)
 
     def _put(self, after: Array, before: Array | None = None) -> None:
-        self._after.x.array[:] = after
+        self._after.x.array[:] = self._space.local_part(after)
         self._last.update()
         if before is not None:
-            self._before.x.array[:] = before
+            self._before.x.array[:] = self._space.local_part(before)
             self._first.update()
-
-    @staticmethod
-    def _vector(form: Any) -> Array:
-        from dolfinx import fem
-
-        return np.array(fem.assemble_vector(form).array, dtype=float)
 
 
 def law_of(material: Material, space: ConformingSpace, kinematics: str) -> Law:
@@ -238,17 +223,3 @@ def _turned_work(turn: Any, rate: Any, test: Any, lam: Any, mu: Any) -> Any:
 
     one, other = (ufl.sym(turn.T * gradient) for gradient in (rate, test))
     return 2 * mu * ufl.inner(one, other) + lam * ufl.tr(one) * ufl.tr(other)
-
-
-def _assembled(form: Any) -> Any:
-    from dolfinx import fem
-
-    return _matrix(fem.form(form))
-
-
-def _matrix(form: Any) -> Any:
-    from dolfinx.fem import petsc
-
-    matrix = petsc.assemble_matrix(form)
-    matrix.assemble()
-    return matrix

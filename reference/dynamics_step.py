@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from reference.dynamics import Scheme
 from reference.dynamics_body import MovingBody
+from reference.nodal_algebra import NodalSolver
 
 __all__ = ["State", "StepForces", "Stepper"]
 
@@ -75,7 +76,7 @@ class Stepper:
     def __init__(self, body: MovingBody, scheme: Scheme, averaged: bool, size: float) -> None:
         self.body, self.scheme, self.averaged, self.size = body, scheme, averaged, size
         self.solves = 0
-        self._solver: Any = None
+        self._solver: NodalSolver | None = None
         self._before = np.zeros(0)  # internal and viscous force at the start of the step
         self._load = np.zeros(0)
 
@@ -120,7 +121,9 @@ class Stepper:
             fresh = self._solver is None or (norm > _SLOW * last and not self.body.law.linear)
             if fresh:
                 self._factorise(start.displacement, self._end(start, a)[0])
-            correction, last = self._correction(residual), norm
+            assert self._solver is not None
+            correction, last = self._solver.solve(residual), norm
+            self.solves += 1
             best = self._residual(start, a + correction)
             share = 1.0
             while fresh and not best[2] < last and share > _SHORTEST:
@@ -149,9 +152,7 @@ class Stepper:
     def close(self) -> None:
         """Free what PETSc holds."""
         if self._solver is not None:
-            matrix = self._solver.getOperators()[0]
-            for entry in (self._solver, matrix, self._right, self._answer):
-                entry.destroy()
+            self._solver.destroy()
             self._solver = None
 
     def _external(self, time: float) -> Array:
@@ -185,8 +186,6 @@ class Stepper:
 
     def _factorise(self, before: Array, u: Array) -> None:
         """Factorise the derivative of minus the residual by the new acceleration."""
-        from petsc4py import PETSc
-
         self.close()
         body, scheme, h = self.body, self.scheme, self.size
         mass, stiffness = body.scene.analysis.damping
@@ -202,23 +201,9 @@ class Stepper:
             matrix.axpy(keep * h * scheme.gamma * stiffness, damping)
             damping.destroy()
         matrix.axpy(1 - scheme.alpha_m + keep * h * scheme.gamma * mass, body.mass.petsc)
-        matrix.zeroRowsColumns(body.held, float(matrix.getDiagonal().sum()) / len(u))
         symmetric = body.law.linear or not self.averaged
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
-        solver = PETSc.KSP().create(matrix.comm)
-        solver.setOperators(matrix)
-        solver.setType("preonly")
-        solver.getPC().setType("cholesky" if symmetric else "lu")
-        solver.getPC().setFactorSolverType("mumps")
-        solver.setUp()
-        self._solver = solver
-        self._answer, self._right = matrix.createVecs()
-
-    def _correction(self, residual: Array) -> Array:
-        self._right.array[:] = residual
-        self._solver.solve(self._right, self._answer)
-        self.solves += 1
-        return np.array(self._answer.array, dtype=float)
+        kind: Any = "symmetric" if symmetric else "general"
+        self._solver = NodalSolver(matrix, body.space, body.held, kind)
 
 
 def _scale(forces: StepForces) -> float:

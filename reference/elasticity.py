@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 from reference.boundary_values import constrained_values
 from reference.linear_solvers import (
     Answer,
-    IllConditionedError,
     direct_solver,
     near_null_space,
     solve_by_multigrid,
     solve_directly,
 )
-from reference.space import ConformingSpace
-from reference.weak_place import weak_place
+from reference.space import ConformingSpace, SharedUnknowns
+from reference.weak_place import naming_weak_places
 from verify.errors import InputError
 from verify.scene import BodyForce, Gravity, Material, Scene, Traction
 from verify.scene.parts import on_part
 
 __all__ = [
     "LinearSolve",
+    "held_system",
     "lame",
     "load_form",
     "mean_stiffness",
@@ -87,13 +87,10 @@ def solve_linear(
     """
     import ufl
     from dolfinx import fem
-    from dolfinx.fem import petsc
-    from petsc4py import PETSc
 
     V, d = space.function_space, space.dimension
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    unknowns, values = constrained_values(scene, space, exact)
-    own, at = space.own_unknowns(unknowns)
+    held = constrained_values(scene, space, exact)
     a = fem.form(stiffness_form(scene.material, u, v))
     load = fem.form(load_form(scene, space, v, exact))
     if method is None:
@@ -101,27 +98,16 @@ def solve_linear(
         method = "direct" if small else "multigrid"
 
     start = perf_counter()
-    matrix = petsc.assemble_matrix(a)
-    matrix.assemble()
-    vector = petsc.assemble_vector(load)
-    vector.ghostUpdate(addv=True, mode="reverse")
-    solution = fem.Function(V)
+    matrix, vector, solution = held_system(a, load, space, *held)
     x = solution.x.petsc_vec
-    x.array[own] = values[at]
-    # symmetric elimination; the free rows keep their equilibrium, and any component can be held
-    rows = (own + d * V.dofmap.index_map.local_range[0]).astype(PETSc.IntType)
-    matrix.zeroRowsColumns(rows, mean_stiffness(matrix), x, vector)
     assembled = perf_counter()
     timings = {"assembly": assembled - start}
     if method == "direct":
         solver = direct_solver(matrix)
         timings["factorisation"] = perf_counter() - assembled
-        try:
+        with naming_weak_places(scene, space):
             answer = solve_directly(solver, matrix, x, vector)
-        except IllConditionedError as error:
-            raise weak_place(scene, space, error, space.everywhere(error.correction)) from error
-        finally:
-            solver.destroy()
+        solver.destroy()
     else:
         matrix.setNearNullSpace(near_null_space(matrix, space))
         answer = solve_by_multigrid(matrix, x, vector, tolerance)
@@ -133,6 +119,46 @@ def solve_linear(
     for entry in (matrix, vector):
         entry.destroy()
     return LinearSolve(displacement, stored, answer, timings)
+
+
+def held_system(
+    form: Any,
+    load: Any,
+    unknowns: SharedUnknowns,
+    held: NDArray[np.int32],
+    values: NDArray[np.float64],
+) -> tuple[Any, Any, Any]:
+    """Assemble a symmetric system of which some displacements are known.
+
+    Parameters
+    ----------
+    form, load : compiled forms
+    unknowns : SharedUnknowns
+    held : (h,) int array
+        Scalar displacements, by nodes.
+    values : (h,) array
+        m.
+
+    Returns
+    -------
+    matrix, vector : PETSc Mat and Vec
+    solution : dolfinx.fem.Function
+        The known values, and zeros.
+    """
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
+    matrix = petsc.assemble_matrix(form)
+    matrix.assemble()
+    vector = petsc.assemble_vector(load)
+    vector.ghostUpdate(addv=True, mode="reverse")
+    solution = fem.Function(unknowns.function_space)
+    x = solution.x.petsc_vec
+    own, at = unknowns.own_unknowns(held)
+    x.array[own] = values[at]
+    # symmetric elimination; the free rows keep their equilibrium, and any component can be held
+    matrix.zeroRowsColumns(unknowns.rows(held), mean_stiffness(matrix), x, vector)
+    return matrix, vector, solution
 
 
 def stiffness_form(material: Material, u: Any, v: Any) -> Any:

@@ -11,6 +11,7 @@ __all__ = [
     "Answer",
     "IllConditionedError",
     "direct_solver",
+    "general_solver",
     "near_null_space",
     "rigid_motions",
     "set_multigrid",
@@ -86,13 +87,12 @@ def symmetric_solver(matrix: Any) -> Any:
     from petsc4py import PETSc
 
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    solver = PETSc.KSP().create(matrix.comm)
-    solver.setOperators(matrix)
-    solver.setType("preonly")
-    solver.getPC().setType("cholesky")
-    solver.getPC().setFactorSolverType("mumps")
-    solver.setUp()
-    return solver
+    return _factorised(matrix, "cholesky")
+
+
+def general_solver(matrix: Any) -> Any:
+    """Factorise a matrix that need not be symmetric by MUMPS; gives a PETSc KSP."""
+    return _factorised(matrix, "lu")
 
 
 def solve_directly(solver: Any, matrix: Any, x: Any, vector: Any) -> Answer:
@@ -231,6 +231,18 @@ def _orthonormal(matrix: Any, motions: NDArray[np.float64]) -> list[Any]:
         vector.normalize()
         modes.append(vector)
     return modes
+
+
+def _factorised(matrix: Any, kind: str) -> Any:
+    from petsc4py import PETSc
+
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOperators(matrix)
+    solver.setType("preonly")
+    solver.getPC().setType(kind)
+    solver.getPC().setFactorSolverType("mumps")
+    solver.setUp()
+    return solver
 
 
 def _failed(solver: Any) -> bool:

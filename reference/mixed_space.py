@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.space import ConformingSpace
+from reference.space import ConformingSpace, SharedUnknowns
 
 __all__ = ["MixedDeformation", "MixedSpace", "mixed_space"]
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class MixedSpace:
+class MixedSpace(SharedUnknowns):
     """Quadratic displacements and continuous linear pressures on a conforming mesh.
 
     Both jump across the cut, whose nodes are doubled.
@@ -36,36 +36,26 @@ class MixedSpace:
     displacement_dofs: NDArray[np.int64]
     pressure_dofs: NDArray[np.int64]
 
-    @property
-    def owned(self) -> int:
-        """Number of unknowns that this rank owns."""
-        index_map = self.function_space.dofmap.index_map
-        return int(index_map.size_local * self.function_space.dofmap.index_map_bs)
-
-    @property
-    def first(self) -> int:
-        """Global number of the first unknown of this rank."""
-        index_map = self.function_space.dofmap.index_map
-        return int(index_map.local_range[0] * self.function_space.dofmap.index_map_bs)
-
     def own_unknowns(
         self, unknowns: NDArray[np.int32]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Find some scalar displacements, numbered by nodes, among the unknowns of this rank.
-
-        Returns
-        -------
-        own : (l,) array
-            Their numbers on this rank.
-        at : (l,) array
-            Their places in `unknowns`.
-        """
+        """Find which of some scalar displacements are this rank's own; see the base class."""
         own, at = self.space.own_unknowns(unknowns)
         return self.displacement_dofs.ravel()[own], at
 
-    def displacement(self, values: Array) -> Array:
-        """Gather nodal displacements (n, d) on all ranks from the unknowns of each, m."""
-        return self.space.everywhere(values[self.displacement_dofs.ravel()])
+    def own_part(self, values: Array) -> Array:
+        """Give the unknowns that this rank owns of displacements, with pressures of zero."""
+        own = np.zeros(self.own_size)
+        own[self._own_displacements] = self.space.own_part(values)
+        return own
+
+    def everywhere(self, local: Array) -> Array:
+        """Gather nodal displacements on all ranks; see the base class."""
+        return self.space.everywhere(local[self._own_displacements])
+
+    @property
+    def _own_displacements(self) -> NDArray[np.int64]:
+        return self.displacement_dofs[: self.space.owned].ravel()
 
 
 class MixedDeformation:
@@ -127,4 +117,4 @@ def mixed_space(space: ConformingSpace) -> MixedSpace:
         dofs[vectors, k] = both.sub(0).sub(k).dofmap.list
     pressures = np.unique(np.asarray(both.sub(1).dofmap.list, dtype=np.int64))
     found = MixedSpace(space, both, dofs, pressures)
-    return MixedSpace(space, both, dofs, pressures[pressures < found.owned])
+    return MixedSpace(space, both, dofs, pressures[pressures < found.own_size])

@@ -11,12 +11,12 @@ from typing import Any, Literal
 import numpy as np
 
 from reference.boundary_values import constrained_values
-from reference.elasticity import LinearSolve, lame, load_form, mean_stiffness
-from reference.linear_solvers import IllConditionedError, solve_directly, symmetric_solver
+from reference.elasticity import LinearSolve, held_system, lame, load_form
+from reference.linear_solvers import solve_directly, symmetric_solver
 from reference.mixed_solver import solve_saddle
 from reference.mixed_space import MixedSpace, mixed_space
 from reference.space import ConformingSpace
-from reference.weak_place import weak_place
+from reference.weak_place import naming_weak_places
 from verify.errors import InputError
 from verify.scene import Material, Scene
 
@@ -72,8 +72,6 @@ def solve_mixed(
     """
     import ufl
     from dolfinx import fem
-    from dolfinx.fem import petsc
-    from petsc4py import PETSc
 
     if not scene.material.poisson > 0:
         raise InputError(
@@ -83,33 +81,21 @@ def solve_mixed(
     start = perf_counter()
     mixed = mixed_space(space)
     W = mixed.function_space
-    unknowns, values = constrained_values(scene, space, exact)
-    own, at = mixed.own_unknowns(unknowns)
+    held = constrained_values(scene, space, exact)
     tests = ufl.TestFunctions(W)
     load = fem.form(load_form(scene, space, tests[0], exact))
-    matrix = petsc.assemble_matrix(fem.form(_saddle(scene.material, ufl.TrialFunctions(W), tests)))
-    matrix.assemble()
-    vector = petsc.assemble_vector(load)
-    vector.ghostUpdate(addv=True, mode="reverse")
-    solution = fem.Function(W)
+    form = fem.form(_saddle(scene.material, ufl.TrialFunctions(W), tests))
+    matrix, vector, solution = held_system(form, load, mixed, *held)
     x = solution.x.petsc_vec
-    x.array[own] = values[at]
-    rows = (own + mixed.first).astype(PETSc.IntType)
-    matrix.zeroRowsColumns(rows, mean_stiffness(matrix), x, vector)
     timings = {"assembly": perf_counter() - start}
     if method is None:
         small = space.dimension == 2 or W.dofmap.index_map.size_global <= _MOST_DIRECT
         method = "direct" if small else "multigrid"
     if method == "direct":
         solver = symmetric_solver(matrix)
-        try:
+        with naming_weak_places(scene, space, mixed):
             answer = solve_directly(solver, matrix, x, vector)
-        except IllConditionedError as error:
-            ghosted = np.zeros(len(solution.x.array))  # what other ranks own is not read
-            ghosted[: len(error.correction)] = error.correction
-            raise weak_place(scene, space, error, mixed.displacement(ghosted)) from error
-        finally:
-            solver.destroy()
+        solver.destroy()
     else:
         weight = _pressure_mass(scene.material, mixed)
         answer = solve_saddle(matrix, weight, mixed, x, vector, tolerance)
@@ -122,7 +108,7 @@ def solve_mixed(
     density = mu * ufl.inner(strain, strain) + p**2 / (2 * lam)
     stored = fem.assemble_scalar(fem.form(density * ufl.dx))
     energy = W.mesh.comm.allreduce(float(np.real(stored)))
-    displacement = mixed.displacement(np.asarray(solution.x.array, dtype=float))
+    displacement = mixed.everywhere(np.asarray(x.array, dtype=float))
     for entry in (matrix, vector):
         entry.destroy()
     return LinearSolve(displacement, energy, answer, timings)

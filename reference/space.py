@@ -1,5 +1,6 @@
 """The finite element space of a conforming mesh: nodes, cells and boundary as arrays."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,7 +12,7 @@ from reference.dolfinx_versions import create_simplex_mesh
 from reference.meshing import ConformingMesh
 from reference.meshing.edge_splitting import mesh_edges
 
-__all__ = ["ConformingSpace", "conforming_space"]
+__all__ = ["ConformingSpace", "SharedUnknowns", "conforming_space"]
 
 # basix numbers the mid-nodes by the opposite edge, VTK along the outline
 _TO_VTK = {
@@ -23,8 +24,59 @@ _TO_VTK = {
 _VTK_EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # the first three in the plane
 
 
+class SharedUnknowns(ABC):
+    """Scalar unknowns of a function space, of which every MPI rank owns some.
+
+    Attributes
+    ----------
+    function_space : dolfinx.fem.FunctionSpace
+    """
+
+    function_space: Any
+
+    @property
+    def first(self) -> int:
+        """Global number of the first unknown of this rank."""
+        dofmap = self.function_space.dofmap
+        return int(dofmap.index_map.local_range[0] * dofmap.index_map_bs)
+
+    @property
+    def own_size(self) -> int:
+        """Number of unknowns that this rank owns."""
+        dofmap = self.function_space.dofmap
+        return int(dofmap.index_map.size_local * dofmap.index_map_bs)
+
+    @abstractmethod
+    def own_unknowns(
+        self, unknowns: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Find which of some scalar displacements, numbered by nodes, are this rank's own.
+
+        Returns
+        -------
+        own : (l,) array
+            Their numbers on this rank.
+        at : (l,) array
+            Their places in `unknowns`.
+        """
+
+    @abstractmethod
+    def own_part(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give the unknowns that this rank owns of nodal vectors (n, d), equal on all ranks."""
+
+    @abstractmethod
+    def everywhere(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gather nodal vectors (n, d) on all ranks from the unknowns of each, its own first."""
+
+    def rows(self, unknowns: NDArray[np.int32]) -> Any:
+        """Give those of some scalar displacements that this rank owns as PETSc numbers them."""
+        from petsc4py import PETSc
+
+        return (self.own_unknowns(unknowns)[0] + self.first).astype(PETSc.IntType)
+
+
 @dataclass(frozen=True)
-class ConformingSpace:
+class ConformingSpace(SharedUnknowns):
     """Vector Lagrange elements on a conforming mesh.
 
     Every rank of a parallel run knows the whole mesh and all its nodes; DOLFINx holds a part.
@@ -88,15 +140,7 @@ class ConformingSpace:
     def own_unknowns(
         self, unknowns: NDArray[np.int32]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Find which of some scalar unknowns, numbered by nodes, are this rank's own.
-
-        Returns
-        -------
-        own : (l,) array
-            Their numbers on this rank.
-        at : (l,) array
-            Their places in `unknowns`.
-        """
+        """Find which of some scalar unknowns are this rank's own; see the base class."""
         d = self.dimension
         place = np.full(self.node_points.size, -1, dtype=np.int64)
         place[unknowns] = np.arange(len(unknowns))
@@ -104,17 +148,26 @@ class ConformingSpace:
         own = np.flatnonzero(at >= 0)
         return own, at[own]
 
-    def displacement(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gather nodal displacements (n, d) on all ranks from the unknowns of each, m."""
-        return self.everywhere(values)
+    def own_part(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give the unknowns that this rank owns of nodal vectors; see the base class."""
+        own = self.node_of_dof[: self.owned]
+        return np.asarray(values.reshape(-1, self.dimension)[own].ravel(), dtype=float)
+
+    def local_part(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give all unknowns of this rank, those of others last, of nodal vectors (n, d)."""
+        return np.asarray(values.reshape(-1, self.dimension)[self.node_of_dof].ravel(), dtype=float)
 
     def everywhere(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gather nodal values (n, d) on all ranks from the unknowns of each, its own first."""
+        """Gather nodal vectors on all ranks; see the base class."""
         d = self.dimension
         values = np.zeros((len(self.node_points), d))
         values[self.node_of_dof[: self.owned]] = local[: self.owned * d].reshape(-1, d)
         comm = self.function_space.mesh.comm
-        return values if comm.size == 1 else np.asarray(comm.allreduce(values))
+        if comm.size > 1:
+            from mpi4py import MPI
+
+            comm.Allreduce(MPI.IN_PLACE, values)  # a sum with zeros: exact, the same everywhere
+        return values
 
 
 def conforming_space(mesh: ConformingMesh, degree: int, comm: Any = None) -> ConformingSpace:

@@ -10,7 +10,7 @@ from reference.linear_solvers import near_null_space, set_multigrid
 from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import MixedDeformation, mixed_space
 from reference.polar_stretch import PolarStretch
-from reference.space import ConformingSpace
+from reference.space import ConformingSpace, SharedUnknowns
 from reference.strain_energies import ENERGIES, VALUES
 from verify.errors import InputError
 from verify.scene import Material
@@ -69,9 +69,9 @@ class StrainEquations:
         V = space.function_space if mixed is None else mixed.function_space
         self._mixed = mixed
         self._space, self.iterations, self._most_inverted = space, 0, _INVERTED.get(energy, 0.0)
-        self._own, self._at = (mixed or space).own_unknowns(unknowns)
-        first = V.dofmap.index_map_bs * V.dofmap.index_map.local_range[0]
-        self._rows = (self._own + first).astype(np.int32)
+        self._unknowns: SharedUnknowns = mixed or space
+        self._own, self._at = self._unknowns.own_unknowns(unknowns)
+        self._rows = self._unknowns.rows(unknowns)
         self.solution = fem.Function(V)
         self._factor = fem.Constant(V.mesh, 0.0)
         lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
@@ -136,8 +136,7 @@ class StrainEquations:
 
     def displacement(self) -> Array:
         """Nodal displacements (n, d) on every rank, m."""
-        values = np.asarray(self.solution.x.array, dtype=float)
-        return (self._mixed or self._space).displacement(values)
+        return self._unknowns.everywhere(np.asarray(self.solution.x.array, dtype=float))
 
     def energy(self) -> float:
         """Return the stored energy, J (in the plane per metre)."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.elasticity import stiffness_form
+from reference.nodal_algebra import assembled_matrix
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Material
@@ -73,27 +74,24 @@ def _matrices(
     """Stiffness and mass; the unknowns held are out of both, but for ones on the diagonal of K."""
     import ufl
     from dolfinx import fem
-    from dolfinx.fem import petsc
 
     if material.density is None:
         raise InputError("material.density is missing: vibration needs it")
     V = space.function_space
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     density = fem.Constant(V.mesh, np.asarray(material.density))
-    pair = []
-    for form in (stiffness_form(material, u, v), density * ufl.inner(u, v) * ufl.dx):
-        matrix = petsc.assemble_matrix(fem.form(form))
-        matrix.assemble()
-        pair.append(matrix)
-    stiffness, mass = pair
-    stiffness.zeroRowsColumns(unknowns, 1.0)
-    mass.zeroRowsColumns(unknowns, 0.0)
+    stiffness = assembled_matrix(stiffness_form(material, u, v))
+    mass = assembled_matrix(density * ufl.inner(u, v) * ufl.dx)
+    rows = space.rows(unknowns)
+    stiffness.zeroRowsColumns(rows, 1.0)
+    mass.zeroRowsColumns(rows, 0.0)
     return stiffness, mass
 
 
 def _mean_ratio(stiffness: Any, mass: Any) -> float:
-    k, m = stiffness.getDiagonal().array, mass.getDiagonal().array
-    return float(k[m > 0].sum() / m.sum())
+    k, m = stiffness.getDiagonal(), mass.getDiagonal()
+    k.array[m.array == 0.0] = 0.0  # held
+    return float(k.sum() / m.sum())
 
 
 def _solve(
@@ -117,8 +115,8 @@ def _solve(
     if shift is None:
         # M must be inverted: ones in place of the unknowns held give eigenvalues 1/1 at most,
         # and K's are scaled out of the way
-        mass.zeroRowsColumns(unknowns, 1.0)
-        stiffness.zeroRowsColumns(unknowns, 0.0)
+        mass.zeroRowsColumns(space.rows(unknowns), 1.0)
+        stiffness.zeroRowsColumns(space.rows(unknowns), 0.0)
         solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
     else:
         transform.setType("sinvert")
@@ -138,7 +136,7 @@ def _solve(
         value = float(np.real(solver.getEigenpair(i, vector)))
         stiffness.mult(vector, k_v)
         mass.mult(vector, m_v)
-        modes.append(np.array(vector.array, dtype=float).reshape(-1, space.dimension))
+        modes.append(space.everywhere(vector.array))
         modes[-1] /= np.sqrt(vector.dot(m_v))
         k_v.axpy(-value, m_v)
         residuals.append(float(k_v.norm() / (abs(value) * m_v.norm() or 1.0)))

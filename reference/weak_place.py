@@ -1,32 +1,52 @@
 """Where a body is held so weakly that its displacement is lost in round-off."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import NDArray
 
 from reference.linear_solvers import IllConditionedError
-from reference.space import ConformingSpace
+from reference.space import ConformingSpace, SharedUnknowns
 from verify.errors import InputError
 from verify.scene import Scene
 
-__all__ = ["weak_place"]
+__all__ = ["naming_weak_places"]
 
 
-def weak_place(
-    scene: Scene,
-    space: ConformingSpace,
-    error: IllConditionedError,
-    correction: NDArray[np.float64],
-) -> InputError:
-    """Say in terms of the geometry why a system could not be solved.
+@contextmanager
+def naming_weak_places(
+    scene: Scene, space: ConformingSpace, unknowns: SharedUnknowns | None = None
+) -> Iterator[None]:
+    """Say of a system that is lost in round-off where the body is held too weakly.
 
     Parameters
     ----------
     scene : Scene
     space : ConformingSpace
-    error : IllConditionedError
-    correction : (n, d) array
-        Of the nodes of the space.
+        Of the displacements.
+    unknowns : SharedUnknowns, optional
+        Of the system, if it has others beside.
+
+    Raises
+    ------
+    InputError
+        In place of an `IllConditionedError`.
     """
+    try:
+        yield
+    except IllConditionedError as error:
+        correction = (unknowns or space).everywhere(error.correction)
+        raise _weak_place(scene, space, error, correction) from error
+
+
+def _weak_place(
+    scene: Scene,
+    space: ConformingSpace,
+    error: IllConditionedError,
+    correction: NDArray[np.float64],
+) -> InputError:
+    """Say in terms of the geometry why a system could not be solved."""
     size = np.linalg.norm(np.nan_to_num(correction, nan=np.inf), axis=1)
     node = int(np.argmax(size))
     around = (space.cell_nodes == node).any(axis=1)

@@ -1,12 +1,8 @@
 """Locking: what an element loses as Poisson's ratio goes to 1/2, and a pressure gains."""
 
-import subprocess
-import sys
-from pathlib import Path
-from shutil import which
-
 import numpy as np
 import pytest
+from ranks_of_tests import on_ranks
 from reference_scenes import energy_of, needs_fenicsx, polyline, square
 from solid_scenes import cube, polygon
 
@@ -209,12 +205,6 @@ def test_a_thick_strip_of_neo_hookean_material_bends_to_rivlins_sector(poisson, 
 
 
 _PARALLEL = """
-import sys
-sys.path.insert(0, {tests!r})
-from mpi4py import MPI
-from reference.dolfinx_versions import import_dolfinx
-import_dolfinx()
-import numpy as np
 from test_near_incompressible import waving
 from reference.exact import exact_solution
 from reference.nearly_incompressible import solve_mixed
@@ -223,34 +213,14 @@ from verify.solvers.conforming_meshes import peer_mesh
 
 scene = waving(0.49, 2, 3)
 exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
-space = conforming_space(peer_mesh(scene, 0, "imprinted"), 2, MPI.COMM_WORLD)
-values = []
+space = conforming_space(peer_mesh(scene, 0, "imprinted"), 2, world)
+answer = []
 for method in ("direct", "multigrid"):
     found = solve_mixed(scene, space, exact, method, 1e-12)
-    values += [found.strain_energy, float(np.linalg.norm(found.displacement))]
-if MPI.COMM_WORLD.rank == 0:
-    print(MPI.COMM_WORLD.size, *map(repr, values))
+    answer += [found.strain_energy, float(np.linalg.norm(found.displacement))]
 """
 
 
-def on_ranks(count):
-    beside = Path(sys.executable).with_name("mpiexec")
-    mpiexec = str(beside) if beside.exists() else which("mpiexec")
-    if mpiexec is None:
-        pytest.skip("needs mpiexec")
-    script = _PARALLEL.format(tests=str(Path(__file__).parent))
-    done = subprocess.run(
-        [mpiexec, "-n", str(count), sys.executable, "-c", script],
-        capture_output=True,
-        text=True,
-        cwd=Path(__file__).parents[2],
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    ranks, *values = done.stdout.split()
-    assert int(ranks) == count
-    return [float(value) for value in values]
-
-
-def test_two_ranks_give_the_answer_of_one():
-    assert on_ranks(2) == pytest.approx(on_ranks(1), rel=1e-10)
+def test_two_ranks_give_the_answer_of_one(tmp_path):
+    one, two = (on_ranks(count, _PARALLEL, tmp_path) for count in (1, 2))
+    assert two == pytest.approx(one, rel=1e-10)

@@ -1,12 +1,8 @@
 """Linear elasticity in space against closed forms; directly, by multigrid, on several ranks."""
 
-import subprocess
-import sys
-from pathlib import Path
-from shutil import which
-
 import numpy as np
 import pytest
+from ranks_of_tests import on_ranks
 from reference_scenes import energy_of, needs_fenicsx
 from solid_scenes import EXACT, SHAPES, cube, disc
 
@@ -173,18 +169,12 @@ def test_a_piece_left_a_rigid_motion_is_named_with_the_motion(supports, words):
 
 
 _PARALLEL = """
-import sys
-sys.path.insert(0, {tests!r})
-from mpi4py import MPI
-from reference.dolfinx_versions import import_dolfinx
-import_dolfinx()
-import numpy as np
+import resource
 from solid_scenes import cube, disc
 from reference.elasticity import solve_linear
 from reference.meshing import Grading, conforming_mesh
 from reference.space import conforming_space
 
-world = MPI.COMM_WORLD
 loads = [dict(kind="gravity", acceleration=[0, 0, -1]),
          dict(kind="traction", where="top", traction=[0.1, 0, 1.0])]
 scene = cube([disc()], loads=loads)
@@ -194,45 +184,23 @@ if world.rank == 0:
 mesh = world.bcast(mesh)
 space = conforming_space(mesh, {degree}, world)
 found = solve_linear(scene, space, None, {method!r})
-import resource
 memory = world.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-if world.rank == 0:
-    print(world.size, found.displacement.size, repr(found.strain_energy),
-          repr(float(np.linalg.norm(found.displacement))), memory / 1e6,
-          sum(found.timings.values()))
+answer = [found.displacement.size, found.strain_energy, float(np.linalg.norm(found.displacement)),
+          memory / 1e6, sum(found.timings.values())]
 """
 
 
-def on_ranks(count, size, degree, method):
-    """Size, energy, norm of the displacement, GB and seconds of a solve on some ranks."""
-    beside = Path(sys.executable).with_name("mpiexec")
-    mpiexec = str(beside) if beside.exists() else which("mpiexec")
-    if mpiexec is None:
-        pytest.skip("needs mpiexec")
-    script = _PARALLEL.format(
-        tests=str(Path(__file__).parent), size=size, degree=degree, method=method
-    )
-    done = subprocess.run(
-        [mpiexec, "-n", str(count), sys.executable, "-c", script],
-        capture_output=True,
-        text=True,
-        cwd=Path(__file__).parents[2],
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    ranks, *values = done.stdout.split()
-    assert int(ranks) == count
-    return [float(value) for value in values]
-
-
 @pytest.mark.parametrize("degree, method", [(1, "direct"), (2, "multigrid")])
-def test_two_ranks_give_the_answer_of_one(degree, method):
-    one, two = (on_ranks(count, 0.3, degree, method)[:3] for count in (1, 2))
+def test_two_ranks_give_the_answer_of_one(degree, method, tmp_path):
+    script = _PARALLEL.format(size=0.3, degree=degree, method=method)
+    one, two = (on_ranks(count, script, tmp_path)[:3] for count in (1, 2))
     assert two == pytest.approx(one, rel=1e-10)
 
 
 @pytest.mark.heavy
-def test_a_million_unknowns_are_solved_on_two_ranks_within_five_gigabytes():
-    size, _, _, memory, _ = on_ranks(2, 0.0685, 2, "multigrid")
+def test_a_million_unknowns_are_solved_on_two_ranks_within_five_gigabytes(tmp_path):
+    script = _PARALLEL.format(size=0.0685, degree=2, method="multigrid")
+    size, _, _, memory, seconds = on_ranks(2, script, tmp_path)
+    print(f"{size} unknowns, {memory:.2f} GB, {seconds:.0f} s")
     assert size > 0.85e6
     assert memory < 5.0

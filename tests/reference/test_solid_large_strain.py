@@ -1,12 +1,8 @@
 """Finite rotation and strain in space: turns, patches, tangents, and another code's equilibria."""
 
-import subprocess
-import sys
-from pathlib import Path
-from shutil import which
-
 import numpy as np
 import pytest
+from ranks_of_tests import on_ranks
 from reference_scenes import needs_fenicsx
 from solid_scenes import cube, polygon
 
@@ -209,12 +205,6 @@ def test_energies_agree_at_small_strain_and_part_at_large():
 
 
 _TURNED = """
-import sys
-sys.path.insert(0, {tests!r})
-from mpi4py import MPI
-from reference.dolfinx_versions import import_dolfinx
-import_dolfinx()
-import numpy as np
 import reference.strain_equations
 from test_solid_large_strain import hanging
 from reference.boundary_values import constrained_values
@@ -223,38 +213,18 @@ from reference.large_strain import solve_large_strain
 from reference.space import conforming_space
 from verify.solvers.conforming_meshes import peer_mesh
 
-reference.strain_equations._MOST_DIRECT = {most}
+reference.strain_equations._MOST_DIRECT = 1_000_000 if world.size == 1 else 0
 scene = hanging([])
-space = conforming_space(peer_mesh(scene, 0, "imprinted"), 1, MPI.COMM_WORLD)
+space = conforming_space(peer_mesh(scene, 0, "imprinted"), 1, world)
 found = solve_large_strain(
     scene.material, space, constrained_values(scene, space, None)[0],
     lambda factor: constrained_values(scene, space, None, factor)[1],
     lambda v: load_form(scene, space, v, None))
-if MPI.COMM_WORLD.rank == 0:
-    print(MPI.COMM_WORLD.size, repr(found.strain_energy), found.smallest_jacobian,
-          repr(float(np.linalg.norm(found.displacement))))
+answer = [found.strain_energy, found.smallest_jacobian, float(np.linalg.norm(found.displacement))]
 """
 
 
-def on_ranks(count, most):
-    beside = Path(sys.executable).with_name("mpiexec")
-    mpiexec = str(beside) if beside.exists() else which("mpiexec")
-    if mpiexec is None:
-        pytest.skip("needs mpiexec")
-    script = _TURNED.format(tests=str(Path(__file__).parent), most=most)
-    done = subprocess.run(
-        [mpiexec, "-n", str(count), sys.executable, "-c", script],
-        capture_output=True,
-        text=True,
-        cwd=Path(__file__).parents[2],
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    ranks, *values = done.stdout.split()
-    assert int(ranks) == count
-    return [float(value) for value in values]
-
-
-def test_two_ranks_and_multigrid_give_the_answer_of_one_rank_and_a_factorisation():
+def test_two_ranks_and_multigrid_give_the_answer_of_one_rank_and_a_factorisation(tmp_path):
+    one, two = (on_ranks(count, _TURNED, tmp_path) for count in (1, 2))
     # Newton's residual is 1e-11 of the forces
-    assert on_ranks(2, most=0) == pytest.approx(on_ranks(1, most=1_000_000), rel=1e-9)
+    assert two == pytest.approx(one, rel=1e-9)

@@ -95,7 +95,8 @@ class TestImprinted:
         polygons = [np.array(cut["points"]) for cut in cuts]
         check(open_cut(*imprint_polygons(*grid, polygons)), expected, pieces, 1e-4)
 
-    @pytest.mark.parametrize("seed", range(6))
+    # seeds whose polygons surround their centre
+    @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 7])
     def test_random_polygons_are_imprinted_exactly(self, seed):
         rng = np.random.default_rng(seed)
         normal = rng.normal(size=3)
@@ -108,8 +109,7 @@ class TestImprinted:
             np.outer(np.cos(angle), one) + np.outer(np.sin(angle), np.cross(normal, one))
         )
         fan = 0.5 * np.roll(radius, -1) * radius * np.sin(np.roll(angle, -1) - angle)
-        if (np.diff(angle, append=angle[0] + 2 * np.pi) > 3.0).any():
-            pytest.skip("the polygon does not surround its centre")
+        assert (np.diff(angle, append=angle[0] + 2 * np.pi) < 3.0).all()
         grid = structured_tetrahedra((0, 0, 0), (1, 1, 1), (4, 4, 4))
         check(open_cut(*imprint_polygons(*grid, [corners])), fan.sum(), 1, 1e-4)
 

@@ -204,7 +204,7 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     command.add_argument(
         "--ranks", metavar="N", type=count, default=1,
-        help="MPI ranks of each reference of statics, here or on its worker (default: 1)",
+        help="MPI ranks of each reference, here or on its worker (default: 1)",
     )  # fmt: skip
     command.add_argument(
         "--references", metavar="BUNDLE", type=Path,

@@ -37,7 +37,7 @@ class Options:
     cluster : str or None
         Scheduler of a Dask cluster whose workers solve; None: processes of this machine do.
     ranks : int
-        MPI ranks of each reference that can be distributed.
+        MPI ranks of each reference.
     judged : bool
         Whether the references that judge are solved with the rest; without them only `solvers` run.
     """

@@ -221,21 +221,14 @@ class _Work:
             "repetitions": job.repetitions,
             "parameters": job.parameters,
             "ranks": self._ranks(job),
-            "one_process": self._one_process(job),
         }
         write_json(content, job.folder / "job.json")
         self.running[self.engine.start(content, job.folder)] = job
         self.progress.started(job.label)
 
     def _ranks(self, job: Job) -> int:
-        """MPI ranks of a solve: several for references of statics, else one."""
-        static = self.plans[job.case].scene.analysis.kind == "static"
-        return self.options.ranks if job.solver == REFERENCE and static else 1
-
-    def _one_process(self, job: Job) -> str:
-        """Why a reference does not take the ranks that were asked for, if it does not."""
-        alone = job.solver == REFERENCE and self._ranks(job) < self.options.ranks
-        return "a motion is not distributed: one process" if alone else ""
+        """MPI ranks of a solve: several for references, else one."""
+        return self.options.ranks if job.solver == REFERENCE else 1
 
     def _known(self, job: Job) -> SolveRecord | None:
         """Take a reference from the bundle or the cache."""

@@ -37,8 +37,6 @@ def main(job_file: Path) -> None:
     outcome = solve_job(job, folder, first)
     if comm is not None:
         outcome.setdefault("notes", {})["ranks"] = str(comm.size)
-    elif reason := job.get("one_process"):
-        outcome.setdefault("notes", {})["ranks"] = reason
     if first:
         write_json({**outcome, "peak_memory": peak_memory()}, folder / "outcome.json")
     if comm is not None and outcome["status"] != Status.SOLVED:

@@ -183,13 +183,13 @@ def _solve(
     if scene.exact is not None:
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
-    comm = _comm(scene)
+    comm = _comm()
 
     def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
         if scene.analysis.kind == "static":
             return _equilibrium(scene, conforming_space(mesh, degree, comm), exact, pressure)
         largest = motion.largest(level, size)
-        return _moved(scene, mesh, degree, exact, motion.scheme, largest, trial)
+        return _moved(scene, mesh, degree, exact, motion.scheme, largest, comm, trial)
 
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
@@ -205,12 +205,12 @@ def _solve(
     return _solution(mesh, result, size, timings)
 
 
-def _comm(scene: Scene) -> Any:
-    """Communicator over which a scene is distributed: all ranks for statics, else none."""
+def _comm() -> Any:
+    """Communicator over which a scene is distributed, or None where there is one process only."""
     from reference.ranks import all_ranks
 
     ranks, _ = all_ranks()
-    return ranks if scene.analysis.kind == "static" and ranks.size > 1 else None
+    return ranks if ranks.size > 1 else None
 
 
 def _shared(
@@ -230,10 +230,11 @@ def _moved(
     exact: Any,
     scheme: str,
     largest: float,
+    comm: Any,
     trial: bool,
 ) -> _Answer:
     """Solve a dynamic scene."""
-    found = move(scene, mesh, degree, exact, scheme, largest, trial)
+    found = move(scene, mesh, degree, exact, scheme, largest, comm, trial)
     return _Answer(
         found.space,
         found.times,

@@ -73,6 +73,7 @@ def move(
     exact: Any,
     scheme: str,
     largest: float,
+    comm: Any = None,
     trial: bool = False,
 ) -> ConformingMotion:
     """Integrate the motion of a dynamic scene.
@@ -88,6 +89,8 @@ def move(
         One of `SCHEMES`.
     largest : float
         Largest time step, s.
+    comm : MPI communicator, optional
+        Of the ranks that share the work, each with the whole answer; default: each by itself.
     trial : bool
         Whether to stop after the first step: what compiles, compiles in it.
 
@@ -100,7 +103,7 @@ def move(
     RuntimeError
         If a step or the initial equilibrium is not found.
     """
-    return _Mover(scene, mesh, degree, exact, scheme, largest).run(trial)
+    return _Mover(scene, mesh, degree, exact, scheme, largest, comm).run(trial)
 
 
 class _Mover:
@@ -114,8 +117,10 @@ class _Mover:
         exact: Any,
         scheme: str,
         largest: float,
+        comm: Any,
     ) -> None:
         self.scene, self.mesh, self.degree, self.exact = scene, mesh, degree, exact
+        self.comm = comm
         self.scheme, self.largest = scheme, largest
         self.times = np.array(scene.analysis.output_times)
         self.opens = [self._snapped(float(getattr(cut, "opens_at", 0.0))) for cut in scene.cuts]
@@ -173,7 +178,7 @@ class _Mover:
         opened = tuple(opens <= time for opens in self.opens)
         if opened not in self.spaces:
             mesh = partly_opened(self.scene, self.mesh, opened)
-            self.spaces[opened] = conforming_space(mesh, self.degree)
+            self.spaces[opened] = conforming_space(mesh, self.degree, self.comm)
         return self.spaces[opened]
 
     def _initial(self, body: MovingBody) -> State:

@@ -1,0 +1,124 @@
+"""Matrices and forms that act on nodal arrays (k,), nodes × components, equal on all MPI ranks.
+
+Assembly, products and factorisations are distributed; what a motion does with vectors between them
+is not, so that every rank takes the same steps.
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.elasticity import mean_stiffness
+from reference.linear_solvers import (
+    direct_solver,
+    general_solver,
+    solve_directly,
+    symmetric_solver,
+)
+from reference.space import ConformingSpace, SharedUnknowns
+
+__all__ = ["NodalMatrix", "NodalSolver", "assembled_matrix", "nodal_forces", "nodal_integral"]
+
+Array = NDArray[np.float64]
+_SOLVERS = {"definite": direct_solver, "symmetric": symmetric_solver, "general": general_solver}
+
+
+class NodalMatrix:
+    """A PETSc matrix that multiplies nodal arrays.
+
+    Parameters
+    ----------
+    petsc_matrix : PETSc Mat
+    space : ConformingSpace
+    """
+
+    def __init__(self, petsc_matrix: Any, space: ConformingSpace) -> None:
+        self.petsc, self._space = petsc_matrix, space
+        self._in, self._out = petsc_matrix.createVecs()
+
+    def __matmul__(self, values: Array) -> Array:
+        """Multiply an array (k,)."""
+        self._in.array[:] = self._space.own_part(values)
+        self.petsc.mult(self._in, self._out)
+        return self._space.everywhere(self._out.array).ravel()
+
+
+class NodalSolver:
+    """A factorised matrix of which the rows and columns of held unknowns are taken out.
+
+    Parameters
+    ----------
+    matrix : PETSc Mat
+        Changed, and destroyed with the solver.
+    unknowns : ConformingSpace or MixedSpace
+        Of the matrix.
+    held : (h,) int array
+        Scalar displacements, by nodes.
+    kind : {"definite", "symmetric", "general"}
+    """
+
+    def __init__(
+        self,
+        matrix: Any,
+        unknowns: SharedUnknowns,
+        held: NDArray[np.int32],
+        kind: Literal["definite", "symmetric", "general"] = "definite",
+    ) -> None:
+        self._unknowns, self._matrix, self._proven = unknowns, matrix, False
+        matrix.zeroRowsColumns(unknowns.rows(held), mean_stiffness(matrix))
+        self._solver = _SOLVERS[kind](matrix)
+        self._x, self._b = matrix.createVecs()
+
+    def solve(self, right: Array) -> Array:
+        """Solve for an array (k,), zero where held if the right side is.
+
+        The first solve is refined, and shows whether the factorisation is any good.
+
+        Raises
+        ------
+        IllConditionedError
+            If the solution is lost in round-off.
+        RuntimeError
+            If MUMPS failed.
+        """
+        self._b.array[:] = self._unknowns.own_part(right)
+        if self._proven:
+            self._solver.solve(self._b, self._x)
+        else:
+            self._x.set(0.0)
+            solve_directly(self._solver, self._matrix, self._x, self._b)
+            self._proven = True
+        return self._unknowns.everywhere(self._x.array).ravel()
+
+    def destroy(self) -> None:
+        """Free what PETSc holds."""
+        for entry in (self._solver, self._matrix, self._x, self._b):
+            entry.destroy()
+
+
+def assembled_matrix(form: Any) -> Any:
+    """Assemble a bilinear form (of UFL, or compiled)."""
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
+    matrix = petsc.assemble_matrix(fem.form(form))
+    matrix.assemble()
+    return matrix
+
+
+def nodal_forces(form: Any, space: ConformingSpace) -> Array:
+    """Assemble a linear form (of UFL, or compiled); (k,)."""
+    from dolfinx import fem, la
+
+    vector = fem.assemble_vector(fem.form(form))
+    vector.scatter_reverse(la.InsertMode.add)
+    return space.everywhere(np.asarray(vector.array, dtype=float)).ravel()
+
+
+def nodal_integral(form: Any, space: ConformingSpace) -> float:
+    """Integrate a compiled form without arguments over the whole body."""
+    from dolfinx import fem
+
+    comm = space.function_space.mesh.comm
+    return float(comm.allreduce(float(np.real(fem.assemble_scalar(form)))))
