@@ -12,14 +12,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.cholesky_kernels import (
-    assembly_lists,
-    factorise_fronts,
-    front_rows,
-    solve_fronts,
-)
+from verify.xfem.cholesky_kernels import factorise_fronts, solve_fronts
+from verify.xfem.dense_tiles import COLUMNS, ROWS
 from verify.xfem.errors import XfemError
-from verify.xfem.front_tree import merge_and_order, stack_depth
+from verify.xfem.front_plan_kernels import assembly_lists, front_rows
+from verify.xfem.front_tree import levels, merge_and_order
 from verify.xfem.minimum_degree import minimum_degree
 
 __all__ = ["Cholesky", "SingularStiffnessError"]
@@ -66,9 +63,10 @@ class Cholesky:
     ) -> None:
         self._block = block
         self._held = np.zeros(pattern.node_count, dtype=bool) if held is None else held
-        self._factor = self._stack = self._update = np.empty(0)
-        self._diagonal = self._gathered = np.empty(0)
-        self._place = np.empty(0, dtype=np.int64)
+        self._factor = self._diagonal = self._gathered = np.empty(0)
+        self._stacks = (np.empty(0), np.empty(0))
+        self._runs = np.empty((3, 0), dtype=np.int64)
+        self._tile = np.empty(COLUMNS * (COLUMNS + 1) // 2)
         self._find_order(pattern)
 
     @property
@@ -90,7 +88,7 @@ class Cholesky:
 
         A new unknown has some of the neighbours of the one from which it comes, and is eliminated
         with it. Takes the memory of this solver, whose factors are lost with those of the other.
-        Only if one that is not held comes from one that is, there is nothing to go by.
+        Only where one that is free was held, or comes from one that was, is another order sought.
 
         Parameters
         ----------
@@ -100,10 +98,11 @@ class Cholesky:
         source : (k,) int array
             Unknown before from which each new one comes.
         held : (N,) bool array, optional
-            As for a new solver. What was held before still is.
+            As for a new solver.
         """
         other = self._with_held(pattern, held)
-        if (self._held[source] & ~other._held[len(self._held) :]).any():
+        was_held = np.concatenate([self._held, self._held[source]])
+        if (was_held & ~other._held).any():
             other._find_order(pattern)
             return other
         order, bounds = _insert(self._order, self._bounds, source)
@@ -143,22 +142,25 @@ class Cholesky:
         self._entry_block = blocks.take(self._entry_block)
         width = np.diff(bounds) * self._block
         below = np.diff(row_start) * self._block
-        self._offset = np.concatenate([[0], np.cumsum(width * (width + below))])
         self._work = float(width @ (width + below) ** 2)  # about the operations of a factorisation
-        most = int(below.max(initial=0))
+        self._entries = int((width * (width + below) - width * (width - 1) // 2).sum())
+        below = _full(below, ROWS)
+        height = _full(width, ROWS) + below
+        self._offset = np.concatenate([[0], np.cumsum(_full(width, COLUMNS) * height)])
+        self._level, depths = levels(parent, below**2)
         self._factor = _room(self._factor, int(self._offset[-1]))
-        self._stack = _room(self._stack, stack_depth(parent, below))
-        self._update = _room(self._update, most**2)
-        self._place = _room(self._place, most)
-        self._diagonal = _room(self._diagonal, int(width.max(initial=0)))
-        self._gathered = _room(self._gathered, most)
+        even, odd = self._stacks
+        self._stacks = (_room(even, depths[0]), _room(odd, depths[1]))
+        most = int(height.max(initial=0))
+        self._diagonal, self._gathered = _room(self._diagonal, most), _room(self._gathered, most)
+        if self._runs.shape[1] < most:
+            self._runs = np.empty((3, most), dtype=np.int64)
         self._permuted = np.empty((len(order), self._block))
 
     @property
     def factor_entries(self) -> int:
         """Stored entries of the factor."""
-        width = np.diff(self._bounds) * self._block
-        return int(self._offset[-1] - (width * (width - 1) // 2).sum())
+        return self._entries
 
     def factorize(self, blocks: NDArray[np.float64]) -> None:
         """Factorise the matrix with these blocks (B, block, block).
@@ -169,20 +171,21 @@ class Cholesky:
             If a pivot is not positive beyond round-off.
         """
         failed = factorise_fronts(
-            blocks,
+            np.ascontiguousarray(blocks),
             self._bounds,
             self._row_start,
             self._relative,
             self._parent,
+            self._level,
             self._entry_start,
             self._entry_block,
             self._entry_row,
             self._offset,
             self._factor,
-            self._stack,
-            self._update,
-            self._place,
+            self._stacks,
+            self._runs,
             self._diagonal,
+            self._tile,
         )
         if failed >= 0:
             raise SingularStiffnessError(int(self._order[failed // self._block]))
@@ -201,15 +204,28 @@ class Cholesky:
             self._factor,
             self._block,
             self._gathered,
+            self._tile,
             self._permuted.reshape(-1),
         )
         solution[self._order] = self._permuted
         return solution
 
 
-def _room[T: np.generic](store: NDArray[T], size: int) -> NDArray[T]:
-    """Array of at least that size: the given one, or a larger one with room to grow."""
-    return store if len(store) >= size else np.empty(size + size // 4, dtype=store.dtype)
+def _room(store: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Array of at least that size: the given one, or a larger one with room to grow.
+
+    It begins with a line of the cache, so that no vector in it spans two.
+    """
+    if len(store) >= size:
+        return store
+    size += size // 4
+    room = np.empty(size + ROWS)
+    skipped = -room.ctypes.data % (8 * ROWS) // 8
+    return room[skipped : skipped + size]
+
+
+def _full(lengths: _Ints, multiple: int) -> _Ints:
+    return -(-lengths // multiple) * multiple
 
 
 @njit(cache=True)

@@ -2,243 +2,177 @@
 
 A front has the columns of its supernode and, below them, the rows that these columns reach. Its
 factor columns are stored one after the other (column j of front s starts at
-``offset[s] + j·height``), so the innermost loops run over consecutive numbers. Its update matrix
-waits on a stack until the parent front adds it.
+``offset[s] + j·height``), in fours; the rows of the columns and those below them each fill
+vectors (`dense_tiles`), zeros after them. The update matrix of a front, as padded, waits on a stack
+until the parent front adds it.
 """
 
 import numpy as np
 from numba import njit
 
-from verify.xfem.short_sort import sort_short
+from verify.xfem.dense_tiles import (
+    COLUMNS,
+    ROWS,
+    add_run,
+    padded,
+    project_columns,
+    substitute,
+    subtract_columns,
+    subtract_product,
+)
+from verify.xfem.lane_shuffles import address
 
-__all__ = ["assembly_lists", "factorise_fronts", "front_rows", "solve_fronts"]
+__all__ = ["factorise_fronts", "solve_fronts"]
 
 # a pivot below this share of the diagonal entry that it came from is round-off
 _TINY = 1e-14
+_BAND = 96  # columns that a product takes at a time: more do not stay in the first cache
+_STRIP = 16  # rows: what they hold above the diagonal is for nothing
 
 
 @njit(cache=True)
-def front_rows(starts, columns, order, bounds, nearest):
-    """Rows of each front and the tree of fronts, from the sparsity and the order.
-
-    `nearest` (S,), or (0,), gives fronts beyond which the parents must not be: -1 where there is
-    none. A front then has the rows of its children even where it does not meet them itself.
-
-    Returns
-    -------
-    row_start : (S + 1,) int array
-        Rows of front s are entries row_start[s] to row_start[s + 1] of `rows`.
-    rows : (R,) int array
-        Places in the order, ascending, after the columns of the front.
-    parent : (S,) int array
-        Parent front, -1 at a root.
-    """
-    nodes = len(order)
-    fronts = len(bounds) - 1
-    rank = np.empty(nodes, dtype=np.int64)
-    front_of = np.empty(nodes, dtype=np.int64)
-    for k in range(nodes):
-        rank[order[k]] = k
-    for s in range(fronts):
-        for k in range(bounds[s], bounds[s + 1]):
-            front_of[k] = s
-    head = np.full(fronts, -1, dtype=np.int64)
-    following = np.full(fronts, -1, dtype=np.int64)
-    parent = np.full(fronts, -1, dtype=np.int64)
-    row_start = np.zeros(fronts + 1, dtype=np.int64)
-    rows = np.empty(4 * nodes + 16, dtype=np.int64)
-    mark = np.full(nodes, -1, dtype=np.int64)
-    used = 0
-    for s in range(fronts):
-        begin = used
-        if used + nodes > len(rows):
-            grown = np.empty(2 * len(rows) + nodes, dtype=np.int64)
-            for at in range(used):
-                grown[at] = rows[at]
-            rows = grown
-        for k in range(bounds[s], bounds[s + 1]):
-            for at in range(starts[order[k]], starts[order[k] + 1]):
-                row = rank[columns[at]]
-                if row >= bounds[s + 1] and mark[row] != s:
-                    mark[row] = s
-                    rows[used] = row
-                    used += 1
-        child = head[s]
-        while child >= 0:
-            for at in range(row_start[child], row_start[child + 1]):
-                row = rows[at]
-                if row >= bounds[s + 1] and mark[row] != s:
-                    mark[row] = s
-                    rows[used] = row
-                    used += 1
-            child = following[child]
-        sort_short(rows[begin:used])
-        row_start[s + 1] = used
-        if used > begin:
-            above = front_of[rows[begin]]
-            if len(nearest) > 0 and 0 <= nearest[s] < above:
-                above = nearest[s]
-            parent[s] = above
-            following[s] = head[above]
-            head[above] = s
-    return row_start, rows[:used].copy(), parent
+def _write_block(blocks, at, block, panel, into, height):
+    """Write the block whose first number is at `at`, transposed."""
+    if block == 3:  # written out: a third of the time
+        for _ in range(3):
+            panel[into], panel[into + 1] = blocks[at], blocks[at + 1]
+            panel[into + 2] = blocks[at + 2]
+            at, into = at + 3, into + height
+        return
+    for a in range(block):
+        for b in range(block):
+            panel[into + a * height + b] = blocks[at + a * block + b]
 
 
 @njit(cache=True)
-def assembly_lists(starts, columns, order, bounds, row_start, rows, parent):
-    """Where matrix blocks and update matrices of children go in each front.
+def _factorise_group(panel, at, step, width, diagonal, factor):
+    """Factorise the square of `COLUMNS` columns whose first number is at `at`.
 
-    Returns
-    -------
-    relative : (R,) int array
-        Place of each row among the columns and rows of the parent front.
-    entry_start : (N + 1,) int array
-        Matrix blocks of each column (in the order).
-    entry_block, entry_row : (E,) int array
-        Which block, transposed, adds to which local row of the column's front.
+    Only the first `width` are there. Writes the factor row by row, with the inverses of its
+    diagonal; returns the failing column or -1.
     """
-    nodes = len(order)
-    fronts = len(bounds) - 1
-    rank = np.empty(nodes, dtype=np.int64)
-    for k in range(nodes):
-        rank[order[k]] = k
-    relative = np.empty(len(rows), dtype=np.int64)
-    entry_start = np.zeros(nodes + 1, dtype=np.int64)
-    entry_block = np.empty((len(columns) + nodes) // 2, dtype=np.int64)
-    entry_row = np.empty_like(entry_block)
-    place = np.empty(nodes, dtype=np.int64)
-    entries = 0
-    for s in range(fronts):
-        width = bounds[s + 1] - bounds[s]
-        for at in range(row_start[s], row_start[s + 1]):
-            place[rows[at]] = width + at - row_start[s]
-        for k in range(bounds[s], bounds[s + 1]):
-            place[k] = k - bounds[s]
-        for k in range(bounds[s], bounds[s + 1]):
-            for at in range(starts[order[k]], starts[order[k] + 1]):
-                row = rank[columns[at]]
-                if row >= k:
-                    entry_block[entries] = at
-                    entry_row[entries] = place[row]
-                    entries += 1
-            entry_start[k + 1] = entries
-    # rows of a front are found among the columns or, in step, among the rows of its parent
-    for s in range(fronts):
-        above = parent[s]
-        if above < 0:
-            continue
-        at = row_start[above]
-        width = bounds[above + 1] - bounds[above]
-        for k in range(row_start[s], row_start[s + 1]):
-            row = rows[k]
-            if row < bounds[above + 1]:
-                relative[k] = row - bounds[above]
+    for i in range(COLUMNS):
+        for j in range(i + 1):
+            entry = i * (i + 1) // 2 + j
+            if i >= width:
+                factor[entry] = 1.0 if i == j else 0.0
+                continue
+            value = panel[at + j * step + i]
+            for k in range(j):
+                value -= factor[i * (i + 1) // 2 + k] * factor[j * (j + 1) // 2 + k]
+            if i > j:
+                factor[entry] = value * factor[j * (j + 1) // 2 + j]
+            elif value > _TINY * diagonal[i]:
+                factor[entry] = 1.0 / np.sqrt(value)
             else:
-                while rows[at] < row:
-                    at += 1
-                relative[k] = width + at - row_start[above]
-    return relative, entry_start, entry_block, entry_row
-
-
-@njit(cache=True, fastmath={"contract", "reassoc"})
-def _subtract(panel, low, high, j, first, second, begin):
-    """Subtract columns `low` to `high` times their rows j and j + 1 from two columns.
-
-    Column entries are counted from row `begin` of the panel on: first[0] is row j + begin of
-    the front if `begin` is measured from j.
-    """
-    length = len(first)
-    k = low
-    while k + 4 <= high:
-        a, b, c, d = panel[k], panel[k + 1], panel[k + 2], panel[k + 3]
-        a0, b0, c0, d0 = a[j], b[j], c[j], d[j]
-        a1, b1, c1, d1 = a[j + 1], b[j + 1], c[j + 1], d[j + 1]
-        a, b, c, d = a[begin:], b[begin:], c[begin:], d[begin:]
-        for i in range(length):
-            first[i] -= a[i] * a0 + b[i] * b0 + c[i] * c0 + d[i] * d0
-            second[i] -= a[i] * a1 + b[i] * b1 + c[i] * c1 + d[i] * d1
-        k += 4
-    while k < high:
-        a = panel[k]
-        a0, a1 = a[j], a[j + 1]
-        a = a[begin:]
-        for i in range(length):
-            first[i] -= a[i] * a0
-            second[i] -= a[i] * a1
-        k += 1
-
-
-@njit(cache=True, fastmath={"contract", "reassoc"})
-def _subtract_one(panel, low, high, j, first, begin):
-    length = len(first)
-    for k in range(low, high):
-        a = panel[k]
-        a0 = a[j]
-        a = a[begin:]
-        for i in range(length):
-            first[i] -= a[i] * a0
-
-
-@njit(cache=True)
-def _eliminate(panel, diagonal):
-    """Factorise the columns of a panel (w, height) in place; the failing column or -1."""
-    width, height = panel.shape
-    j = 0
-    while j < width:
-        pair = j + 1 < width
-        if pair:
-            _subtract(panel, 0, j, j, panel[j, j:], panel[j + 1, j:], j)
-        else:
-            _subtract_one(panel, 0, j, j, panel[j, j:], j)
-        pivot = panel[j, j]
-        if not pivot > _TINY * diagonal[j]:
-            return j
-        scale = 1.0 / np.sqrt(pivot)
-        for i in range(j, height):
-            panel[j, i] *= scale
-        if pair:
-            factor = panel[j, j + 1]
-            for i in range(j + 1, height):
-                panel[j + 1, i] -= panel[j, i] * factor
-            pivot = panel[j + 1, j + 1]
-            if not pivot > _TINY * diagonal[j + 1]:
-                return j + 1
-            scale = 1.0 / np.sqrt(pivot)
-            for i in range(j + 1, height):
-                panel[j + 1, i] *= scale
-        j += 2
+                return i
     return -1
 
 
 @njit(cache=True)
-def _complement(panel, update):
-    """Subtract L Lᵀ of the rows below the supernode from its update matrix (lower part)."""
-    width, height = panel.shape
-    below = height - width
-    j = 0
-    while j < below:
-        if j + 1 < below:
-            _subtract(panel, 0, width, width + j, update[j, j:], update[j + 1, j:], width + j)
-        else:
-            _subtract_one(panel, 0, width, width + j, update[j, j:], width + j)
-        j += 2
+def _eliminate(panel, at, width, height, diagonal, factor):
+    """Factorise the columns of a panel in place, `height` numbers each; the failing one or -1."""
+    numbers, coefficients = address(panel), address(factor)
+    begin = 0
+    while begin < width:
+        end = min(width, begin + _BAND)
+        for j in range(begin, end, COLUMNS):
+            row = j // ROWS * ROWS  # what is above the diagonal is never read
+            top = at + j * height
+            if j > begin:
+                subtract_product(
+                    numbers, top + row, height, numbers, at + begin * height + row,
+                    at + begin * height + j, height, height - row, COLUMNS, j - begin,
+                )  # fmt: skip
+            failed = _factorise_group(panel, top + j, height, width - j, diagonal[j:], factor)
+            if failed >= 0:
+                return j + failed
+            substitute(numbers, top + row, height, height - row, coefficients)
+            for k in range(COLUMNS):
+                column = top + k * height
+                for i in range(column + row, column + j + k):
+                    panel[i] = 0.0
+                panel[column + j + k] = factor[k * (k + 1) // 2 + k] if j + k < width else 0.0
+        for j in range(end, width, COLUMNS):
+            row = j // ROWS * ROWS
+            subtract_product(
+                numbers, at + j * height + row, height, numbers, at + begin * height + row,
+                at + begin * height + j, height, height - row, COLUMNS, end - begin,
+            )  # fmt: skip
+        begin = end
+    return -1
 
 
 @njit(cache=True)
-def _extend_add(waiting, place, count, panel, update):
-    """Add the update matrix of a child, whose row i is row place[i] of this front."""
-    width = panel.shape[0]
-    for j in range(count):
-        column = place[j]
-        source = waiting[j]
-        if column < width:
-            target = panel[column]
-            for i in range(j, count):
-                target[place[i]] += source[i]
-        else:
-            target = update[column - width]
-            for i in range(j, count):
-                target[place[i] - width] += source[i]
+def _complement(panel, at, width, height, update, into, below):
+    """Subtract L Lᵀ of the last `below` rows from an update matrix (lower part)."""
+    numbers, others = address(panel), address(update)
+    first = height - below
+    for begin in range(0, width, _BAND):
+        left, depth = at + begin * height + first, min(_BAND, width - begin)
+        for row in range(0, below, _STRIP):
+            rows = min(_STRIP, below - row)
+            subtract_product(
+                others, into + row, below, numbers, left + row, left, height, rows, row + rows,
+                depth,
+            )  # fmt: skip
+
+
+@njit(cache=True)
+def _extend_add(waiting, at, count, runs, first, length, row, panel, panel_at, width, height,
+                update, update_at, below):  # fmt: skip
+    """Add the update matrix of a child, in runs of rows that follow each other in this front too.
+
+    Row first[r] + i of the child is row row[r] + i of this front, i < length[r].
+    """
+    top = height - below
+    source, own, other = address(waiting), address(panel), address(update)
+    for r in range(runs):
+        for k in range(length[r]):
+            column = row[r] + k
+            j = first[r] + k
+            begin = at + j * count
+            if column < width:
+                into = panel_at + column * height
+                add_run(own, into + column, source, begin + j, length[r] - k)
+                for q in range(r + 1, runs):
+                    add_run(own, into + row[q], source, begin + first[q], length[q])
+            else:
+                into = update_at + (column - top) * below - top
+                add_run(other, into + column, source, begin + j, length[r] - k)
+                for q in range(r + 1, runs):
+                    add_run(other, into + row[q], source, begin + first[q], length[q])
+
+
+@njit(cache=True)
+def _find_runs(relative, columns, top, block, first, length, row):
+    """Write the runs of a child's rows, given its places among columns and rows; their number."""
+    runs, k = 0, 0
+    while k < len(relative):
+        begin = k
+        k += 1
+        while k < len(relative) and relative[k] == relative[k - 1] + 1 and relative[k] != columns:
+            k += 1
+        first[runs], length[runs] = begin * block, (k - begin) * block
+        place = relative[begin]
+        row[runs] = place * block if place < columns else top + (place - columns) * block
+        runs += 1
+    return runs
+
+
+@njit(cache=True)
+def _write_entries(blocks, block, begin, end, entry_start, entry_block, entry_row, panel, at,
+                   height):  # fmt: skip
+    """Write the blocks of the columns of a front, nodes `begin` to `end` in the order."""
+    columns = end - begin
+    shift = padded(columns * block) - columns * block  # of rows below the columns
+    for k in range(columns):
+        column = at + k * block * height
+        for entry in range(entry_start[begin + k], entry_start[begin + k + 1]):
+            into = column + entry_row[entry] * block
+            if entry_row[entry] >= columns:
+                into += shift
+            _write_block(blocks, entry_block[entry] * block * block, block, panel, into, height)
 
 
 @njit(cache=True)
@@ -248,104 +182,118 @@ def factorise_fronts(
     row_start,
     relative,
     parent,
+    level,
     entry_start,
     entry_block,
     entry_row,
     offset,
     factor,
-    stack,
-    update_space,
+    stacks,
     place,
     diagonal,
+    square,
 ):
-    """Factorise; return the scalar column (in the order) whose pivot failed, or -1."""
+    """Factorise; return the scalar column (in the order) whose pivot failed, or -1.
+
+    The update matrices of fronts wait on one of two stacks, by the parity of their level: fronts
+    are in postorder, so those of the children are the last ones on the other.
+    """
     block = blocks.shape[1]
     fronts = len(bounds) - 1
-    # children of a front are the last ones on the stack: fronts are in postorder
     waiting_front = np.empty(fronts, dtype=np.int64)
     waiting = 0
-    top = 0
+    tops = np.zeros(2, dtype=np.int64)
+    first, length, row = place[0], place[1], place[2]
+    numbers = blocks.reshape(-1)
     for s in range(fronts):
-        width = (bounds[s + 1] - bounds[s]) * block
-        below = (row_start[s + 1] - row_start[s]) * block
-        height = width + below
-        panel = factor[offset[s] : offset[s + 1]].reshape(width, height)
-        panel[:] = 0.0
-        update = update_space[: below * below].reshape(below, below)
-        update[:] = 0.0
-        for k in range(bounds[s], bounds[s + 1]):
-            column = (k - bounds[s]) * block
-            for at in range(entry_start[k], entry_start[k + 1]):
-                source = blocks[entry_block[at]]
-                row = entry_row[at] * block
-                for a in range(block):
-                    for b in range(block):
-                        panel[column + a, row + b] = source[a, b]
+        columns = bounds[s + 1] - bounds[s]
+        width = columns * block
+        below = padded((row_start[s + 1] - row_start[s]) * block)
+        height, at = padded(width) + below, offset[s]
+        for entry in range(at, offset[s + 1]):
+            factor[entry] = 0.0
+        mine = level[s] & 1
+        update, other, into = stacks[mine], stacks[1 - mine], tops[mine]
+        for j in range(below):
+            for i in range(into + j * below + j // ROWS * ROWS, into + (j + 1) * below):
+                update[i] = 0.0
+        _write_entries(
+            numbers, block, bounds[s], bounds[s + 1], entry_start, entry_block, entry_row, factor,
+            at, height,
+        )  # fmt: skip
         for j in range(width):
-            diagonal[j] = panel[j, j]
+            diagonal[j] = factor[at + j * height + j]
         while waiting > 0 and parent[waiting_front[waiting - 1]] == s:
             waiting -= 1
             child = waiting_front[waiting]
-            count = (row_start[child + 1] - row_start[child]) * block
-            top -= count * count
-            for k in range(row_start[child], row_start[child + 1]):
-                for a in range(block):
-                    place[(k - row_start[child]) * block + a] = relative[k] * block + a
-            matrix = stack[top : top + count * count].reshape(count, count)
-            _extend_add(matrix, place, count, panel, update)
-        failed = _eliminate(panel, diagonal)
+            mine_too = relative[row_start[child] : row_start[child + 1]]
+            count = padded(len(mine_too) * block)
+            tops[1 - mine] -= count * count
+            runs = _find_runs(mine_too, columns, padded(width), block, first, length, row)
+            _extend_add(
+                other, tops[1 - mine], count, runs, first, length, row, factor, at, width, height,
+                update, into, below,
+            )  # fmt: skip
+        failed = _eliminate(factor, at, width, height, diagonal, square)
         if failed >= 0:
             return bounds[s] * block + failed
         if below > 0:
-            _complement(panel, update)
-            matrix = stack[top : top + below * below].reshape(below, below)
-            for j in range(below):
-                for i in range(j, below):
-                    matrix[j, i] = update[j, i]
-            top += below * below
+            _complement(factor, at, width, height, update, into, below)
+            tops[mine] += below * below
             waiting_front[waiting] = s
             waiting += 1
     return -1
 
 
-@njit(cache=True, fastmath={"contract", "reassoc"})
-def solve_fronts(bounds, row_start, rows, offset, factor, block, gathered, x):
-    """Solve L Lᵀ x = b in place; x (N·block,) is in the order of elimination."""
+@njit(cache=True, fastmath={"contract"})
+def solve_fronts(bounds, row_start, rows, offset, factor, block, gathered, four, x):
+    """Solve L Lᵀ x = b in place; x (N·block,) is in the order of elimination.
+
+    Diagonals of the factor are inverted. `gathered` has room for the rows of any front, `four`
+    for `COLUMNS` numbers.
+    """
     fronts = len(bounds) - 1
+    panels, local, few = address(factor), address(gathered), address(four)
     for s in range(fronts):
-        width = (bounds[s + 1] - bounds[s]) * block
-        below = (row_start[s + 1] - row_start[s]) * block
-        panel = factor[offset[s] : offset[s + 1]].reshape(width, width + below)
-        own = x[bounds[s] * block : bounds[s] * block + width]
-        total = gathered[:below]
-        total[:] = 0.0
-        for j in range(width):
-            column = panel[j]
-            own[j] /= column[j]
-            value = own[j]
-            for i in range(j + 1, width):
-                own[i] -= column[i] * value
-            tail = column[width:]
-            for i in range(below):
-                total[i] += tail[i] * value
-        for k in range(row_start[s], row_start[s + 1]):
+        own, width = bounds[s] * block, (bounds[s + 1] - bounds[s]) * block
+        top, below = padded(width), padded((row_start[s + 1] - row_start[s]) * block)
+        height = top + below
+        for i in range(width):
+            gathered[i] = x[own + i]
+        for i in range(width, height):
+            gathered[i] = 0.0
+        for j in range(0, width, COLUMNS):
+            column = offset[s] + j * height
+            for k in range(COLUMNS):
+                value = gathered[j + k]
+                for l in range(k):
+                    value -= factor[column + l * height + j + k] * four[l]
+                four[k] = value * factor[column + k * height + j + k]
+            for k in range(min(COLUMNS, width - j)):
+                x[own + j + k] = four[k]
+            row = j // ROWS * ROWS
+            subtract_columns(local, row, panels, column + row, height, height - row, few)
+        for k in range(row_start[s + 1] - row_start[s]):
+            into, source = rows[row_start[s] + k] * block, top + k * block
             for a in range(block):
-                x[rows[k] * block + a] -= total[(k - row_start[s]) * block + a]
+                x[into + a] += gathered[source + a]
     for s in range(fronts - 1, -1, -1):
-        width = (bounds[s + 1] - bounds[s]) * block
-        below = (row_start[s + 1] - row_start[s]) * block
-        panel = factor[offset[s] : offset[s + 1]].reshape(width, width + below)
-        own = x[bounds[s] * block : bounds[s] * block + width]
-        other = gathered[:below]
-        for k in range(row_start[s], row_start[s + 1]):
+        own, width = bounds[s] * block, (bounds[s + 1] - bounds[s]) * block
+        top, below = padded(width), padded((row_start[s + 1] - row_start[s]) * block)
+        height = top + below
+        for i in range(height):
+            gathered[i] = 0.0
+        for k in range(row_start[s + 1] - row_start[s]):
+            source, into = rows[row_start[s] + k] * block, top + k * block
             for a in range(block):
-                other[(k - row_start[s]) * block + a] = x[rows[k] * block + a]
-        for j in range(width - 1, -1, -1):
-            column = panel[j]
-            value = own[j]
-            for i in range(j + 1, width):
-                value -= column[i] * own[i]
-            tail = column[width:]
-            for i in range(below):
-                value -= tail[i] * other[i]
-            own[j] = value / column[j]
+                gathered[into + a] = x[source + a]
+        for j in range((width - 1) // COLUMNS * COLUMNS, -1, -COLUMNS):
+            column, row = offset[s] + j * height, j // ROWS * ROWS
+            project_columns(local, row, panels, column + row, height, height - row, few)
+            for k in range(min(COLUMNS, width - j) - 1, -1, -1):
+                value = x[own + j + k] - four[k]
+                for l in range(k + 1, min(COLUMNS, width - j)):
+                    value -= factor[column + k * height + j + l] * x[own + j + l]
+                x[own + j + k] = value * factor[column + k * height + j + k]
+            for k in range(min(COLUMNS, width - j)):
+                gathered[j + k] = x[own + j + k]

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["merge_and_order", "stack_depth"]
+__all__ = ["levels", "merge_and_order"]
 
 _Ints = NDArray[np.int64]
 
@@ -41,9 +41,24 @@ def merge_and_order(
     return new, ends
 
 
-def stack_depth(parent: _Ints, below: _Ints) -> int:
-    """Most update entries that wait at one time when fronts are visited in postorder."""
-    return int(_stack_depth(parent, below))
+def levels(parent: _Ints, entries: _Ints) -> tuple[_Ints, tuple[int, int]]:
+    """Levels of fronts in postorder, and how deep two stacks of update matrices become.
+
+    Parameters
+    ----------
+    parent : (S,) int array
+    entries : (S,) int array
+        Of the update matrix of each front. It waits on the stack of even levels or on that of odd
+        ones, where its parent, which then takes it, does not write its own.
+
+    Returns
+    -------
+    level : (S,) int array
+        0 at a root.
+    depths : (int, int)
+    """
+    level, even, odd = _levels(parent, entries)
+    return level, (int(even), int(odd))
 
 
 @njit(cache=True)
@@ -112,13 +127,19 @@ def _postorder(width, parent, group):
 
 
 @njit(cache=True)
-def _stack_depth(parent, below):
-    freed = np.zeros(len(parent), dtype=np.int64)
-    waiting = 0
-    deepest = 0
-    for front in range(len(parent)):
-        waiting += below[front] ** 2 - freed[front]
-        deepest = max(deepest, waiting)
+def _levels(parent, entries):
+    count = len(parent)
+    level = np.zeros(count, dtype=np.int64)
+    for front in range(count - 1, -1, -1):
         if parent[front] >= 0:
-            freed[parent[front]] += below[front] ** 2
-    return deepest
+            level[front] = level[parent[front]] + 1
+    freed = np.zeros(count, dtype=np.int64)  # by each front, of the other stack
+    waiting, deepest = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
+    for front in range(count):
+        mine = level[front] & 1
+        waiting[mine] += entries[front]
+        deepest[mine] = max(deepest[mine], waiting[mine])
+        waiting[1 - mine] -= freed[front]
+        if parent[front] >= 0:
+            freed[parent[front]] += entries[front]
+    return level, deepest[0], deepest[1]
