@@ -128,7 +128,7 @@ class _Newton:
 
     @cached_property
     def _direct(self) -> Cholesky:
-        return Cholesky(self._pattern, self._blocks.shape[1])
+        return Cholesky(self._pattern, self._blocks.shape[1], self._fixed.all(axis=1))
 
     def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took."""

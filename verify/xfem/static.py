@@ -111,7 +111,7 @@ def solve_static(
     if solver == "iterative":
         inverse = ConjugateGradients(pattern, shape[1], _ROUNDING)
     else:
-        inverse = Cholesky(pattern, shape[1])
+        inverse = Cholesky(pattern, shape[1], supports.fixed.all(axis=1))
     clock.append(perf_counter())
     blocks = stiffness.assemble(pattern)
     internal, _ = stiffness.force(supports.values)

@@ -71,7 +71,7 @@ class NewtonIntegrator(ABC):
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
     def _default_solver(self) -> LinearSolver:
-        return Cholesky(self.body.pattern, self.body.shape[1])
+        return Cholesky(self.body.pattern, self.body.shape[1], self.body.fixed.all(axis=1))
 
     @abstractmethod
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:

@@ -48,7 +48,9 @@ class RealTimeEuler:
         space = body.shape[1]
         self.blocks = np.zeros((len(body.pattern.columns), space, space))
         self.load = np.empty(body.shape)
-        self.solver = Cholesky(body.pattern, space) if solver is None else solver
+        if solver is None:
+            solver = Cholesky(body.pattern, space, body.fixed.all(axis=1))
+        self.solver: LinearSolver = solver
         self._places = body.mass.places(body.pattern)
         self._values = body.mass.entries[2]
         self._internal = np.empty(body.shape)
