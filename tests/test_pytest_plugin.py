@@ -5,30 +5,15 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
+from case_texts import STRETCHED, body_text
 
 ROOT = Path(__file__).resolve().parents[1]
 pytest_plugins = ["pytester"]
 
-CASE = """
-title = "A strained square"
-requirement = "It shall be strained."
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 1.0]
-[mesh]
-cells = [[2, 2]]
-[material]
-young = 1.0
-poisson = 0.0
-plane = "strain"
-[[supports]]
-where = "boundary"
-displacement = "exact"
-[exact]
-solution = "linear"
-parameters = { matrix = [[0.1, 0.0], [0.0, 0.0]] }
-"""
+CASE = (
+    body_text("A strained square", "It shall be strained.", [1.0, 1.0], [[2, 2]], poisson="0.0")
+    + STRETCHED
+)
 
 
 def check(equals, solver="xfem"):

@@ -8,6 +8,7 @@ import sys
 import meshio
 import numpy as np
 import pytest
+from case_texts import body_text, support_text, weight_text
 
 from verify.cli import main
 from verify.errors import InputError, UnsupportedSceneError
@@ -75,45 +76,25 @@ def test_exporting_again_leaves_answers_alone(tmp_path):
     assert (tmp_path / "f1/level-0/solution.vtu").is_file()
 
 
-SPACE = """
-title = "A cube that falls apart"
-requirement = "It shall fall."
-[geometry]
-kind = "box"
-lower = [0.0, 0.0, 0.0]
-upper = [1.0, 1.0, 1.0]
-[mesh]
-cells = [[2, 2, 2]]
-[material]
-young = 1e4
-poisson = 0.3
-density = 1000.0
-[analysis]
-kind = "dynamic"
-duration = 0.4
-time_step = 0.1
-outputs = 3
-[initial]
-kind = "equilibrium"
-[[supports]]
-where = "top"
-displacement = [0.0, 0.0, 0.1]
-history = [[0.0, 0.0], [0.4, 1.0]]
-[[loads]]
-kind = "gravity"
-acceleration = [0.0, 0.0, -9.8]
-[[cuts]]
-kind = "disc"
-centre = [0.5, 0.5, 0.45]
-normal = [0.0, 0.0, 1.0]
-radius = 3.0
-opens_at = 0.2
-[[quantities]]
-kind = "displacement"
-name = "fall"
-point = [0.5, 0.5, 0.1]
-component = "z"
-"""
+SPACE = (
+    body_text(
+        "A cube that falls apart",
+        "It shall fall.",
+        [1.0, 1.0, 1.0],
+        [[2, 2, 2]],
+        young="1e4",
+        density="1000.0",
+    )
+    + '[analysis]\nkind = "dynamic"\nduration = 0.4\ntime_step = 0.1\noutputs = 3\n'
+    + '[initial]\nkind = "equilibrium"\n'
+    + support_text("top", [0, 0, 0.1])
+    + "history = [[0.0, 0.0], [0.4, 1.0]]\n"
+    + weight_text(3)
+    + '[[cuts]]\nkind = "disc"\ncentre = [0.5, 0.5, 0.45]\nnormal = [0.0, 0.0, 1.0]\nradius = 3.0\n'
+    + "opens_at = 0.2\n"
+    + '[[quantities]]\nkind = "displacement"\nname = "fall"\n'
+    + 'point = [0.5, 0.5, 0.1]\ncomponent = "z"\n'
+)
 
 
 def test_a_motion_in_space_goes_out_and_its_time_series_comes_back(tmp_path):

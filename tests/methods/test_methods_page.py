@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from verify.methods import METHODS
+from verify.solvers import find_solver
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "methods.md"
 
@@ -37,6 +38,10 @@ def test_the_example_of_the_page_prints_a_line_for_every_method(capsys):
     exec(compile(example, str(PAGE), "exec"), {})
     printed = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in printed] == list(METHODS)
+
+
+def test_every_method_is_a_solver_of_its_name():
+    assert all(find_solver(name).name == name for name in METHODS)
 
 
 def test_the_page_names_every_method():

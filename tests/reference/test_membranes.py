@@ -3,6 +3,7 @@
 import meshio
 import numpy as np
 import pytest
+from case_texts import cut_text, sheet_text, support_text, weight_text
 from reference_scenes import needs_fenicsx
 from scipy.optimize import brentq
 
@@ -16,44 +17,15 @@ pytestmark = needs_fenicsx
 
 YOUNG, THICKNESS, TILT = 1e4, 0.002, 0.6
 AXIS = np.array([np.cos(TILT), 0.0, np.sin(TILT)])
-SHEET = """
-title = "A sheet in space"
-requirement = "It shall carry loads by its tension."
-[geometry]
-kind = "file"
-file = "sheet.vtu"
-dimension = 3
-cells = "surface"
-[mesh]
-pattern = "given"
-[material]
-young = 1e4
-poisson = {poisson}
-density = 1000.0
-thickness = 0.002
-[analysis]
-kinematics = "corotational"
-"""
-WEIGHT = """
-[[loads]]
-kind = "gravity"
-acceleration = [0.0, 0.0, -9.8]
-"""
-
-
-def support(where, displacement=(0.0, 0.0, 0.0)):
-    return f'[[supports]]\nwhere = "{where}"\ndisplacement = {[float(x) for x in displacement]}\n'
-
-
-def polygon(*points):
-    return f'[[cuts]]\nkind = "polygon"\npoints = {[[float(x) for x in p] for p in points]}\n'
 
 
 def solve(folder, counts, shape, text, poisson=0.0, name="conforming", level=0, **parameters):
     mesh = rectangle_mesh(counts)
     points = np.column_stack(shape(*mesh.points.T))
     meshio.Mesh(points, [("triangle", mesh.cells)]).write(folder / "sheet.vtu")
-    (folder / "case.toml").write_text(SHEET.format(poisson=poisson) + text)
+    body = sheet_text("A sheet in space", "It shall carry loads by its tension.", poisson)
+    turning = '[analysis]\nkinematics = "corotational"\n'
+    (folder / "case.toml").write_text(body + turning + text)
     scene = load_scene(folder / "case.toml")
     return find_solver(name).solve(scene, level, repetitions=0, **parameters)
 
@@ -65,10 +37,10 @@ def tilted(x, y):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_flat_sheet_cut_along_its_tension_stretches_as_if_it_were_whole(tmp_path, degree):
     """Without lateral contraction: strain 0.2 everywhere, from a state without any stiffness."""
-    ends = support("x < 1e-9") + support(f"x > {AXIS[0] - 1e-9}", 0.2 * AXIS)
+    ends = support_text("x < 1e-9") + support_text(f"x > {AXIS[0] - 1e-9}", 0.2 * AXIS)
     along = [0.3 * AXIS, 0.8 * AXIS, 0.8 * AXIS + [0, 0, 2], 0.3 * AXIS + [0, 0, 2]]
     low = [p - [0, 0, 1] + [0, 0.43, 0] for p in along]
-    found = solve(tmp_path, [5, 4], tilted, ends + polygon(*low), degree=degree)
+    found = solve(tmp_path, [5, 4], tilted, ends + cut_text(*low), degree=degree)
     assert found.ledger["strain"][0] == pytest.approx(0.5 * YOUNG * THICKNESS * 0.04, rel=1e-12)
     exact = 0.2 * (found.points @ AXIS)[:, None] * AXIS
     assert found.displacement[0] == pytest.approx(exact, abs=1e-9)
@@ -79,7 +51,7 @@ def test_a_flat_sheet_cut_along_its_tension_stretches_as_if_it_were_whole(tmp_pa
 
 def test_plane_stress_stretches_the_sheet_as_in_the_plane(tmp_path):
     """A clamped square, one side of which is drawn away, against plane elements."""
-    sides = support("boundary") + support("x > 0.999999", (0.1, 0, 0))
+    sides = support_text("boundary") + support_text("x > 0.999999", (0.1, 0, 0))
     two = solve(tmp_path, [3, 3], lambda x, y: (x, y, 0 * x), sides, poisson=0.3)
     assert two.displacement[0][:, 2] == pytest.approx(0.0, abs=1e-12)
     flat = {
@@ -118,11 +90,11 @@ def catenary(span):
 
 @pytest.mark.parametrize("span", [1.0, 0.9])
 def test_a_strip_hangs_as_the_elastic_catenary(tmp_path, span):
-    ends = support("x < 1e-9") + support("x > 0.999999", (span - 1.0, 0, 0))
+    ends = support_text("x < 1e-9") + support_text("x > 0.999999", (span - 1.0, 0, 0))
     sag, energy = catenary(span)
     errors = []
     for n in (8, 16):
-        found = solve(tmp_path, [n, 1], strip, ends + WEIGHT, degree=2)
+        found = solve(tmp_path, [n, 1], strip, ends + weight_text(3), degree=2)
         middle = np.abs(found.points[:, 0] - 0.5) < 1e-9
         assert -found.displacement[0][middle, 2] == pytest.approx(sag, rel=2e-3)
         errors.append(abs(found.ledger["strain"][0] / (0.1 * energy) - 1))
@@ -140,16 +112,16 @@ def bowl(x, y):
 
 def test_linear_elements_are_those_of_the_compact_solver_where_the_cut_runs_along_edges(tmp_path):
     """A hanging bowl, cut halfway in; the two have no code in common."""
-    cut = polygon((0.5, 0.25, -2), (0.5, 0.75, -2), (0.5, 0.75, 1), (0.5, 0.25, 1))
-    text = support("boundary") + WEIGHT + cut
+    cut = cut_text((0.5, 0.25, -2), (0.5, 0.75, -2), (0.5, 0.75, 1), (0.5, 0.25, 1))
+    text = support_text("boundary") + weight_text(3) + cut
     ours = solve(tmp_path, [8, 8], bowl, text, poisson=0.3)
     other = solve(tmp_path, [8, 8], bowl, text, poisson=0.3, name="xfem")
     assert ours.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-8)
 
 
 def test_cuts_through_triangles_agree_with_the_compact_solver_up_to_the_cut_cells(tmp_path):
-    cut = polygon((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
-    text = support("boundary") + WEIGHT + cut
+    cut = cut_text((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
+    text = support_text("boundary") + weight_text(3) + cut
     gaps = []
     for n in (6, 12):
         ours = solve(tmp_path, [n, n], bowl, text, poisson=0.3)
@@ -159,8 +131,8 @@ def test_cuts_through_triangles_agree_with_the_compact_solver_up_to_the_cut_cell
 
 
 def test_levels_of_the_reference_refine_the_surface_that_is_given(tmp_path):
-    text = support("boundary") + WEIGHT
-    cut = polygon((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
+    text = support_text("boundary") + weight_text(3)
+    cut = cut_text((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
     found = [solve(tmp_path, [3, 3], bowl, text + cut, 0.3, "reference", k) for k in (0, 1)]
     assert len(found[1].cells) == 4 * len(found[0].cells)
     assert found[1].size == 0.5 * found[0].size
@@ -186,8 +158,8 @@ def test_each_crossing_of_cuts_in_a_surface_opens_into_its_sectors():
 
 
 def test_what_is_not_offered_for_membranes_is_said(tmp_path):
-    text = support("boundary") + WEIGHT
-    beside = polygon((3, 0, -1), (4, 0, -1), (4, 0, 1), (3, 0, 1))
+    text = support_text("boundary") + weight_text(3)
+    beside = cut_text((3, 0, -1), (4, 0, -1), (4, 0, 1), (3, 0, 1))
     with pytest.raises(InputError, match="cut"):
         solve(tmp_path, [2, 2], bowl, text + beside)
     motion = "kind = 'dynamic'\nduration = 1.0\ntime_step = 0.1\noutputs = 2\n"

@@ -9,30 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from case_texts import STRETCHED, body_text
 
 HERE = Path(__file__).parent
 
-CASE = """
-title = "A stretched square"
-requirement = "It shall be stretched."
-tags = ["stretched"]
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 1.0]
-[mesh]
-cells = [[2, 2], [4, 4]]
-[material]
-young = 1.0
-poisson = 0.0
-plane = "strain"
-[[supports]]
-where = "boundary"
-displacement = "exact"
-[exact]
-solution = "linear"
-parameters = { matrix = [[0.1, 0.0], [0.0, 0.0]] }
-"""
+CASE = (
+    'tags = ["stretched"]\n'
+    + body_text(
+        "A stretched square", "It shall be stretched.", [1.0, 1.0], [[2, 2], [4, 4]], poisson="0.0"
+    )
+    + STRETCHED
+)
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.errors import InputError
 from verify.result import CaseResult, Metric, SolveRecord, Status
@@ -18,39 +19,21 @@ from verify.study.sufficiency import sufficiency
 
 MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
 
-CASE = """
-title = "A slit under its weight"
-requirement = "It shall open."
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 1.0]
-[mesh]
-cells = [[48, 48]]
-[material]
-young = 1.0e4
-poisson = 0.3
-density = 1000.0
-plane = "strain"
-[[supports]]
-where = "top"
-displacement = [0.0, 0.0]
-[[loads]]
-kind = "gravity"
-acceleration = [0.0, -9.8]
-[[cuts]]
-kind = "polyline"
-points = [[0.3, 0.52], [0.7, 0.52]]
-[reference]
-size = 0.3
-degree = 1
-levels = 3
-max_levels = {most}
-[[quantities]]
-kind = "opening"
-name = "opening"
-at = 0.5
-"""
+CASE = (
+    body_text(
+        "A slit under its weight",
+        "It shall open.",
+        [1.0, 1.0],
+        [[48, 48]],
+        young="1.0e4",
+        density="1000.0",
+    )
+    + support_text("top", [0, 0])
+    + weight_text()
+    + cut_text([0.3, 0.52], [0.7, 0.52])
+    + "[reference]\nsize = 0.3\ndegree = 1\nlevels = 3\nmax_levels = {most}\n"
+    + '[[quantities]]\nkind = "opening"\nname = "opening"\nat = 0.5\n'
+)
 
 
 def solve(solver, level, value=1.1, uncertainty=0.001, status=Status.SOLVED):

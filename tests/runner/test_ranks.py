@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from case_texts import body_text, cut_text, support_text
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
@@ -23,32 +24,13 @@ try:
 except InputError:
     pytest.skip("needs mpiexec", allow_module_level=True)
 
-BOX = """
-title = "A box, cut halfway, pulled"
-requirement = "It shall be pulled."
-[geometry]
-kind = "box"
-lower = [0.0, 0.0, 0.0]
-upper = [1.0, 1.0, 1.0]
-[mesh]
-cells = [[2, 2, 2]]
-[material]
-young = 1.0
-poisson = 0.3
-[[supports]]
-where = "bottom"
-displacement = [0.0, 0.0, 0.0]
-[[loads]]
-kind = "traction"
-where = "top"
-traction = [0.0, 0.0, 0.1]
-[[cuts]]
-kind = "polygon"
-points = [[-0.1, -0.1, 0.52], [0.5, -0.1, 0.52], [0.5, 1.1, 0.52], [-0.1, 1.1, 0.52]]
-[reference]
-size = 1.0
-degree = 1
-"""
+BOX = (
+    body_text("A box, cut halfway, pulled", "It shall be pulled.", [1.0, 1.0, 1.0], [[2, 2, 2]])
+    + support_text("bottom", [0, 0, 0])
+    + '[[loads]]\nkind = "traction"\nwhere = "top"\ntraction = [0.0, 0.0, 0.1]\n'
+    + cut_text([-0.1, -0.1, 0.52], [0.5, -0.1, 0.52], [0.5, 1.1, 0.52], [-0.1, 1.1, 0.52])
+    + "[reference]\nsize = 1.0\ndegree = 1\n"
+)
 
 
 def gone(pid):

@@ -3,49 +3,22 @@
 from pathlib import Path
 
 import pytest
+from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.errors import InputError
 from verify.scene import load_scene
 
-WHOLE = """
-schema = 1
-title = "A strip"
-requirement = "It shall hang."
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 2.0]
-[mesh]
-cells = [[4, 8], [8, 16]]
-[material]
-young = 1e4
-poisson = 0.3
-density = 1000.0
-plane = "strain"
-[[supports]]
-where = "top"
-displacement = [0.0, 0.0]
-[[loads]]
-kind = "gravity"
-acceleration = [0.0, -9.8]
-[[cuts]]
-kind = "polyline"
-points = [[-0.1, 1.0], [0.5, 1.0]]
-expected = "edge"
-[[quantities]]
-kind = "displacement"
-name = "tip"
-point = [0.5, 0.0]
-component = "y"
-[[quantities]]
-kind = "opening"
-name = "mouth"
-at = 0.2
-[[acceptance]]
-check = "error"
-metric = "tip"
-at_most = 0.1
-"""
+WHOLE = (
+    "schema = 1\n"
+    + body_text("A strip", "It shall hang.", [1.0, 2.0], [[4, 8], [8, 16]], "1e4", density="1000.0")
+    + support_text("top", [0, 0])
+    + weight_text()
+    + cut_text([-0.1, 1.0], [0.5, 1.0])
+    + 'expected = "edge"\n'
+    + '[[quantities]]\nkind = "displacement"\nname = "tip"\npoint = [0.5, 0.0]\ncomponent = "y"\n'
+    + '[[quantities]]\nkind = "opening"\nname = "mouth"\nat = 0.2\n'
+    + '[[acceptance]]\ncheck = "error"\nmetric = "tip"\nat_most = 0.1\n'
+)
 
 FAULTS = {
     "unknown key": ("young = ", "yuong = ", "material.yuong: unknown key; did you mean 'young'?"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from case_texts import body_text, support_text
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -9,22 +10,9 @@ from verify.errors import InputError
 from verify.scene import CylinderCut, DiscCut, PolygonCut, SweptCut, load_scene
 from verify.scene.spatial import area_inside, distance_to_triangles, ear_clipping, overlap_area
 
-CUBE = """
-title = "A cube"
-requirement = "It shall be cut."
-[geometry]
-kind = "box"
-lower = [0.0, 0.0, 0.0]
-upper = [1.0, 1.0, 1.0]
-[mesh]
-cells = [[2, 2, 2]]
-[material]
-young = 1.0
-poisson = 0.3
-[[supports]]
-where = "boundary"
-displacement = [0.0, 0.0, 0.0]
-"""
+CUBE = body_text("A cube", "It shall be cut.", [1.0, 1.0, 1.0], [[2, 2, 2]]) + support_text(
+    "boundary", [0, 0, 0]
+)
 DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 0.0, 2.0], "radius": 0.3}
 PIPE = {
     "kind": "cylinder", "base": [0.5, 0.5, 0.2], "axis": [0.0, 0.0, 1.0], "radius": 0.3,

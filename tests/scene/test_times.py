@@ -2,31 +2,18 @@
 
 import numpy as np
 import pytest
+from case_texts import body_text, support_text
 
 from verify.errors import InputError
 from verify.scene import Rotation, Support, load_scene
 from verify.scene.history import factor_at, first_factor, jumps, slope_at
 
-MOVING = """
-title = "A square"
-requirement = "It shall move."
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 1.0]
-[mesh]
-cells = [[4, 4]]
-[material]
-young = 1.0
-poisson = 0.3
-density = 1.0
-plane = "strain"
-[analysis]
-kind = "dynamic"
-duration = 2.0
-"""
+MOVING = (
+    body_text("A square", "It shall move.", [1.0, 1.0], [[4, 4]], density="1.0")
+    + '[analysis]\nkind = "dynamic"\nduration = 2.0\n'
+)
 STATIC = MOVING.replace('[analysis]\nkind = "dynamic"\nduration = 2.0\n', "")
-HELD = '[[supports]]\nwhere = "left"\ndisplacement = [0.0, 0.0]\n'
+HELD = support_text("left", [0, 0])
 
 
 def load(folder, text):

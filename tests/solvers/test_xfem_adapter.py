@@ -3,36 +3,26 @@
 import meshio
 import numpy as np
 import pytest
+from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
 from verify.xfem.structured_meshes import rectangle_mesh
 
-STRIP = """
-title = "A hanging strip, cut halfway"
-requirement = "It shall hang."
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [0.02, 0.1]
-[mesh]
-cells = [[4, 21], [8, 41]]
-[material]
-young = 1e4
-poisson = 0.3
-density = 1000.0
-plane = "strain"
-[[supports]]
-where = "top"
-displacement = [0.0, 0.0]
-[[loads]]
-kind = "gravity"
-acceleration = [0.0, -9.8]
-[[cuts]]
-kind = "polyline"
-points = [[0.0, 0.05], [0.01, 0.05]]
-"""
+STRIP = (
+    body_text(
+        "A hanging strip, cut halfway",
+        "It shall hang.",
+        [0.02, 0.1],
+        [[4, 21], [8, 41]],
+        young="1e4",
+        density="1000.0",
+    )
+    + support_text("top", [0, 0])
+    + weight_text()
+    + cut_text([0.0, 0.05], [0.01, 0.05])
+)
 
 
 SLIDING = '"top"\ncomponents = ["y"]\ndisplacement = [0.0]'

@@ -2,47 +2,20 @@
 
 import numpy as np
 import pytest
+from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
 
 GRAVITY = 9.8
-SQUARE = """
-title = "A square in motion"
-requirement = "It shall move."
-[geometry]
-kind = "rectangle"
-lower = [0.0, 0.0]
-upper = [1.0, 1.0]
-[mesh]
-cells = [[8, 8]]
-[material]
-young = 1e4
-poisson = 0.3
-density = 1000.0
-plane = "strain"
-[analysis]
-kind = "dynamic"
-duration = 0.5
-time_step = 0.01
-outputs = 6
-"""
-HELD = """
-[[supports]]
-where = "top"
-displacement = [0.0, 0.0]
-"""
-WEIGHT = """
-[[loads]]
-kind = "gravity"
-acceleration = [0.0, -9.8]
-"""
-CUT = """
-[[cuts]]
-kind = "polyline"
-points = [[-0.1, 0.45], [1.1, 0.41]]
-"""
+SQUARE = (
+    body_text("A square in motion", "It shall move.", [1.0, 1.0], [[8, 8]], "1e4", density="1000.0")
+    + '[analysis]\nkind = "dynamic"\nduration = 0.5\ntime_step = 0.01\noutputs = 6\n'
+)
+HELD = support_text("top", [0, 0])
+WEIGHT = weight_text()
+CUT = cut_text([-0.1, 0.45], [1.1, 0.41])
 
 
 def solve(folder, text, *changes, **parameters):

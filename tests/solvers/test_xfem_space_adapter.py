@@ -3,38 +3,17 @@
 import meshio
 import numpy as np
 import pytest
+from case_texts import body_text, cut_text, sheet_text, support_text, weight_text
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
 
-CUBE = """
-title = "A cube"
-requirement = "It shall be cut."
-[geometry]
-kind = "box"
-lower = [0.0, 0.0, 0.0]
-upper = [1.0, 1.0, 1.0]
-[mesh]
-cells = [[4, 4, 4], [8, 8, 8]]
-[material]
-young = 1.0
-poisson = 0.3
-density = 1.0
-"""
-PULLED = """
-[[supports]]
-where = "bottom"
-displacement = [0.0, 0.0, 0.0]
-[[supports]]
-where = "top"
-displacement = [0.0, 0.0, 0.1]
-"""
-ENDS = """
-[[supports]]
-where = "boundary"
-displacement = [0.0, 0.0, 0.0]
-"""
+CUBE = body_text(
+    "A cube", "It shall be cut.", [1.0, 1.0, 1.0], [[4, 4, 4], [8, 8, 8]], density="1.0"
+)
+PULLED = support_text("bottom", [0, 0, 0]) + support_text("top", [0, 0, 0.1])
+ENDS = support_text("boundary", [0, 0, 0])
 
 
 def scene(folder, text):
@@ -174,39 +153,14 @@ def test_tetrahedra_of_a_file_give_what_the_box_gives(tmp_path):
     assert other.ledger["strain"][0] == pytest.approx(own.ledger["strain"][0], rel=1e-12)
 
 
-MEMBRANE = """
-title = "A sheet in space"
-requirement = "It shall be cut."
-[geometry]
-kind = "file"
-file = "sheet.vtu"
-dimension = 3
-cells = "surface"
-[mesh]
-pattern = "given"
-[material]
-young = 1e4
-poisson = 0.3
-density = 1000.0
-thickness = 0.002
-[analysis]
-kind = "dynamic"
-kinematics = "corotational"
-duration = 0.5
-time_step = 0.01
-outputs = 3
-[[supports]]
-where = "x < 1e-9"
-displacement = [0.0, 0.0, 0.0]
-[[loads]]
-kind = "gravity"
-acceleration = [0.0, 0.0, -9.8]
-"""
-ACROSS = """
-[[cuts]]
-kind = "polygon"
-points = [[0.47, -0.1, -1.0], [0.43, 1.1, -1.0], [0.43, 1.1, 1.0], [0.47, -0.1, 1.0]]
-"""
+MEMBRANE = (
+    sheet_text("A sheet in space", "It shall be cut.")
+    + '[analysis]\nkind = "dynamic"\nkinematics = "corotational"\n'
+    + "duration = 0.5\ntime_step = 0.01\noutputs = 3\n"
+    + support_text("x < 1e-9", [0, 0, 0])
+    + weight_text(3)
+)
+ACROSS = cut_text([0.47, -0.1, -1.0], [0.43, 1.1, -1.0], [0.43, 1.1, 1.0], [0.47, -0.1, 1.0])
 
 
 def sheet(folder, height):

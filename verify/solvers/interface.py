@@ -16,17 +16,15 @@ __all__ = ["Solver", "find_solver", "solver_names"]
 _BUILT_IN = {
     "xfem": "verify.solvers.xfem:XfemSolver",
     "conforming": "verify.solvers.conforming:ConformingSolver",
-    "subdivision": "verify.solvers.methods_adapter:SubdivisionSolver",
-    "snapping": "verify.solvers.methods_adapter:SnappingSolver",
-    "snapping_subdivision": "verify.solvers.methods_adapter:SnappingSubdivisionSolver",
-    "removal": "verify.solvers.methods_adapter:RemovalSolver",
-    "removal_refined": "verify.solvers.methods_adapter:RemovalRefinedSolver",
-    "virtual_node": "verify.solvers.methods_adapter:VirtualNodeSolver",
-    "virtual_node_arbitrary": "verify.solvers.methods_adapter:VirtualNodeArbitrarySolver",
     "mass_spring": "verify.solvers.methods_adapter:MassSpringSolver",
-    "uncut": "verify.solvers.methods_adapter:UncutSolver",
     "reference": "verify.solvers.conforming:ReferenceSolver",
 }
+# of the class `MethodSolver` each, which is told the name
+_METHODS = (
+    "subdivision", "snapping", "snapping_subdivision", "removal", "removal_refined",
+    "virtual_node", "virtual_node_arbitrary", "uncut",
+)  # fmt: skip
+_BUILT_IN |= dict.fromkeys(_METHODS, "verify.solvers.methods_adapter:MethodSolver")
 _GROUP = "verify.solvers"
 
 
@@ -95,5 +93,5 @@ def find_solver(name: str) -> Solver:
         if (error.name or "").partition(".")[0] in ("verify", "reference"):
             raise  # our own mistake, not a missing dependency
         raise InputError(f"solver '{name}' needs '{error.name}', which is not installed") from None
-    solver: Solver = found()
+    solver: Solver = found(name) if name in _METHODS else found()
     return solver

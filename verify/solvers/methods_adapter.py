@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import partial
 from inspect import signature
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +31,7 @@ from verify.xfem.static import solve_static
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = [
-    "MassSpringSolver",
-    "RemovalRefinedSolver",
-    "RemovalSolver",
-    "SnappingSolver",
-    "SnappingSubdivisionSolver",
-    "SubdivisionSolver",
-    "UncutSolver",
-    "VirtualNodeArbitrarySolver",
-    "VirtualNodeSolver",
-]
+__all__ = ["MassSpringSolver", "MethodSolver"]
 
 _Floats = NDArray[np.float64]
 
@@ -75,8 +65,13 @@ class _Run:
     clamped: int
 
 
-class _MethodSolver:
+class MethodSolver:
     """A method of `verify.methods` on P1 elements: statics and motion, linear and corotational.
+
+    Parameters
+    ----------
+    name : str
+        One of `verify.methods.METHODS`.
 
     Parameters of `solve`
     ---------------------
@@ -90,13 +85,11 @@ class _MethodSolver:
         Those of the method, in `verify.methods`.
     """
 
-    name: ClassVar[str]
     _force: Any = InternalForce
 
-    @property
-    def method(self) -> str:
-        """Name of the method that cuts."""
-        return self.name
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._method = name  # that cuts
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what ``xfem`` refuses, and what no changed mesh can do."""
@@ -162,7 +155,7 @@ class _MethodSolver:
         return _solution(self.name, runs[-1], size, {"meshing": [meshing], **timings})
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
-        known = list(signature(METHODS[self.method]).parameters)[2:]
+        known = list(signature(METHODS[self._method]).parameters)[2:]
         for name in parameters:
             if name not in known:
                 further = ", ".join([*known, "load_steps", "scheme", "step_factor"])
@@ -184,7 +177,7 @@ class _MethodSolver:
     ) -> _Run:
         """Cut, load, solve: all of it, nothing kept from the run before."""
         mesh = SimplexMesh(mesh.points, mesh.cells)
-        body = METHODS[self.method](mesh, cuts_of(scene, size), **parameters)
+        body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
         exact, material = _exact(scene), body.material(material_of(scene))
         kinematics = scene.analysis.kinematics
         if scene.analysis.kind == "dynamic":
@@ -224,55 +217,7 @@ class _MethodSolver:
         return _Run(body, np.zeros(1), u[None], None, ledger, timings, iterations, {}, clamped)
 
 
-class SubdivisionSolver(_MethodSolver):
-    """Cut cells split into conforming simplices."""
-
-    name = "subdivision"
-
-
-class SnappingSolver(_MethodSolver):
-    """Nodes moved onto the cut and doubled."""
-
-    name = "snapping"
-
-
-class SnappingSubdivisionSolver(_MethodSolver):
-    """Near nodes snapped, the rest subdivided."""
-
-    name = "snapping_subdivision"
-
-
-class RemovalSolver(_MethodSolver):
-    """Touched cells removed."""
-
-    name = "removal"
-
-
-class RemovalRefinedSolver(_MethodSolver):
-    """Touched cells refined, then removed."""
-
-    name = "removal_refined"
-
-
-class VirtualNodeSolver(_MethodSolver):
-    """Cut cells copied for each part with a node (Molino et al. 2004)."""
-
-    name = "virtual_node"
-
-
-class VirtualNodeArbitrarySolver(_MethodSolver):
-    """Cut cells copied for each part (Sifakis et al. 2007)."""
-
-    name = "virtual_node_arbitrary"
-
-
-class UncutSolver(_MethodSolver):
-    """Finite elements without the cut: the control."""
-
-    name = "uncut"
-
-
-class MassSpringSolver(_MethodSolver):
+class MassSpringSolver(MethodSolver):
     """Springs on the edges of a mesh cut by another method.
 
     Parameters of `solve`
@@ -283,15 +228,8 @@ class MassSpringSolver(_MethodSolver):
         See `verify.methods.spring_fit`.
     """
 
-    name = "mass_spring"
-
     def __init__(self) -> None:
-        self._cut = "snapping"
-
-    @property
-    def method(self) -> str:
-        """Name of the method that cuts."""
-        return self._cut
+        super().__init__("mass_spring")
 
     def solve(
         self,
@@ -310,7 +248,7 @@ class MassSpringSolver(_MethodSolver):
         for name, value, known in given:
             if value not in known:
                 raise InputError(f"{name} '{value}'; expected one of {', '.join(known)}")
-        self._cut = cut
+        self._method = cut
         self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
         return super().solve(
             scene, level, repetitions, load_steps, scheme, step_factor, **parameters
