@@ -111,6 +111,7 @@ class Stepper:
 
     def _solved(self, start: State, a: Array) -> tuple[Array, StepForces]:
         """Newton's method for the acceleration at the end, with factorisations kept while good."""
+        body = self.body
         forces, residual, norm = self._residual(start, a)
         last, leaps = np.inf, 0
         for _ in range(_MOST_ITERATIONS):
@@ -118,7 +119,7 @@ class Stepper:
             stuck = norm > 0.1 * last
             if norm <= _TOLERANCE * scale or (stuck and norm <= _GOOD_ENOUGH * scale):
                 return a, forces
-            fresh = self._solver is None or (norm > _SLOW * last and not self.body.law.linear)
+            fresh = self._solver is None or (norm > _SLOW * last and not body.law.linear)
             if fresh:
                 self._factorise(start.displacement, self._end(start, a)[0])
             assert self._solver is not None
@@ -136,10 +137,12 @@ class Stepper:
                 break
             a = a + share * correction
             forces, residual, norm = best
+        worst = int(np.argmax(np.abs(np.nan_to_num(residual, nan=np.inf))))
+        node = body.space.node_points[worst // body.space.dimension]
         raise RuntimeError(
             f"the step from {start.time:.6g} s by {self.size:.6g} s is not solved: residual "
-            f"{norm:.3g} N against forces of {_scale(forces):.3g} N; a smaller "
-            "analysis.time_step may help"
+            f"{norm:.3g} N against forces of {_scale(forces):.3g} N, most of it around "
+            f"({', '.join(f'{x:.4g}' for x in node)}); a smaller analysis.time_step may help"
         )
 
     def _residual(self, start: State, a: Array) -> tuple[StepForces, Array, float]:

@@ -87,6 +87,8 @@ def solve_large_strain(
 
     Raises
     ------
+    IllConditionedError
+        If the body is held so weakly somewhere that the tangent at rest is lost in round-off.
     RuntimeError
         If steps below 1e-4 do not converge; with the load factor reached and PETSc's reason.
     """

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.elasticity import lame, mean_stiffness
-from reference.linear_solvers import near_null_space, set_multigrid
+from reference.linear_solvers import near_null_space, set_multigrid, solve_directly
 from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import MixedDeformation, mixed_space
 from reference.polar_stretch import PolarStretch
@@ -102,6 +102,7 @@ class StrainEquations:
         self._increment = self._vector.duplicate()
         self._force = self._diagonal = 0.0
         self._solver = self._newton()
+        self._unproven = self._solver.getKSP().getType() == "preonly"
 
     def advance(self, target: float, values: Array) -> str:
         """Go to another load factor; say why not, or nothing.
@@ -111,6 +112,11 @@ class StrainEquations:
         target : float
         values : (k,) array
             Of the constrained unknowns there, m.
+
+        Raises
+        ------
+        IllConditionedError
+            If the first tangent was factorised, and its solution is lost in round-off.
         """
         self._factor.value = np.asarray(target)
         self._predict(values[self._at])
@@ -201,7 +207,11 @@ class StrainEquations:
         self._matrix.zeroRowsColumns(self._rows, self._diagonal, increment, vector)
         linear = self._solver.getKSP()
         linear.setOperators(self._matrix)
-        linear.solve(vector, increment)
+        if self._unproven:  # at rest: what is held too weakly shows as in linear statics
+            solve_directly(linear, self._matrix, increment, vector)
+            self._unproven = False
+        else:
+            linear.solve(vector, increment)
         self._assemble(self._matrix)
         self._matrix.mult(increment, vector)
         self._force = max(self._force, float(vector.norm()), 1e-300)

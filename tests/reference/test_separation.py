@@ -190,12 +190,48 @@ def test_a_cut_that_ends_in_a_support_opens_there_and_its_levels_approach_each_o
     assert values[2] > 1.02 * energy_of(square(supports=held, loads=push), level=1)
 
 
-@pytest.mark.parametrize(("poisson", "angle"), [(0.3, 1.2e-3), (0.3, 2e-3), (0.47, 1.2e-3)])
-def test_a_needle_too_slender_for_round_off_is_named_by_its_place(poisson, angle):
-    """Its bending stiffness falls with the cube of its width; with 0.47 it has a pressure too."""
-    from verify.solvers import find_solver
-
+def needle(angle, poisson=0.3, **changes):
+    """Give a square with a tongue of material between the legs of a hairpin."""
     hairpin = polyline("a", (0.2, 0.5), (0.8, 0.5), (0.2, 0.5 + 0.6 * np.tan(angle)))
     material = {"young": 1.0, "poisson": poisson, "plane": "strain", "density": 1.0}
+    return square([hairpin], material=material, **changes)
+
+
+TURNING = {"kinematics": "corotational"}
+MOVING = {"kind": "dynamic", "duration": 0.2, "time_step": 0.1, "outputs": 2}
+HUNG = {"analysis": MOVING, "initial": {"kind": "equilibrium", "cuts": "open"}}
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        needle(1.2e-3),
+        needle(2e-3),
+        pytest.param(needle(1.2e-3, 0.47), id="with a pressure"),
+        pytest.param(needle(1.2e-3, analysis=TURNING), id="finite rotation"),
+        pytest.param(needle(1.2e-3, **HUNG), id="start of a motion"),
+        pytest.param(
+            needle(1.2e-3, **{**HUNG, "analysis": MOVING | TURNING}),
+            id="start of a motion at finite rotation",
+        ),
+        pytest.param(
+            needle(1.2e-3, analysis=MOVING | {"duration": 4e5, "time_step": 2e5}),
+            id="a step so long that inertia holds nothing",
+        ),
+    ],
+)
+def test_a_needle_too_slender_for_round_off_is_named_by_its_place(scene):
+    """Its bending stiffness falls with the cube of its width."""
+    from verify.solvers import find_solver
+
     with pytest.raises(InputError, match=r"around \(0\.\d+, 0\.5\d*\).*slender"):
-        find_solver("reference").solve(square([hairpin], material=material), 0, 0)
+        find_solver("reference").solve(scene, 0, 0)
+
+
+def test_its_inertia_holds_a_needle_in_a_motion():
+    from verify.solvers import find_solver
+
+    scene = needle(1.2e-3, analysis=MOVING)
+    ledger = find_solver("reference").solve(scene, 0, 0).ledger
+    assert ledger["kinetic"][-1] > 0
+    assert np.ptp(ledger["total"]) < 1e-8 * ledger["kinetic"][-1]  # what a step leaves unsolved

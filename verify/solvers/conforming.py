@@ -15,6 +15,7 @@ from reference.large_strain import solve_large_strain
 from reference.meshing import ConformingMesh
 from reference.nearly_incompressible import solve_mixed, wants_pressure
 from reference.space import ConformingSpace, conforming_space
+from reference.weak_place import naming_weak_places
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Solution
@@ -267,13 +268,14 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             },
         )
     unknowns, _ = constrained_values(scene, space, exact)
-    finite = solve_large_strain(
-        scene.material,
-        space,
-        unknowns,
-        lambda factor: constrained_values(scene, space, exact, factor)[1],
-        lambda v: load_form(scene, space, v, exact),
-    )
+    with naming_weak_places(scene, space):
+        finite = solve_large_strain(
+            scene.material,
+            space,
+            unknowns,
+            lambda factor: constrained_values(scene, space, exact, factor)[1],
+            lambda v: load_form(scene, space, v, exact),
+        )
     return _Answer(
         space,
         np.zeros(1),

@@ -15,6 +15,7 @@ from reference.dynamics_ledger import Ledger
 from reference.dynamics_step import State, Stepper
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
+from reference.weak_place import naming_weak_places
 from verify.scene import Equilibrium, Moving, Scene
 
 __all__ = ["SCHEMES", "ConformingMotion", "move", "natural_step"]
@@ -97,9 +98,8 @@ def move(
     Raises
     ------
     InputError
-        If a support or load acts nowhere, or a piece that is to be in equilibrium is not held.
-    UnsupportedSceneError
-        If cuts in space do not open at the same time.
+        If a support or load acts nowhere, a piece that is to be in equilibrium is not held, or
+        part of one so weakly that round-off is all there is.
     RuntimeError
         If a step or the initial equilibrium is not found.
     """
@@ -137,7 +137,8 @@ class _Mover:
         open_before = isinstance(initial, Equilibrium) and initial.cuts == "open"
         space = self._space(0.0 if open_before else -1.0)
         clock = perf_counter()
-        state = self._initial(MovingBody(self.scene, space, self.exact))
+        with naming_weak_places(self.scene, space):
+            state = self._initial(MovingBody(self.scene, space, self.exact))
         self.timings["initial state"] += perf_counter() - clock
         starts = sorted({0.0, *self.opens})
         outputs: list[tuple[ConformingSpace, State]] = []
@@ -150,7 +151,8 @@ class _Mover:
             last = k == len(starts) - 1
             end = float(self.times[-1]) if last else starts[k + 1]
             wanted = self.times[(self.times >= start) & ((self.times < end) | last)]
-            stage = self._stage(body, state, start, end, wanted, trial)
+            with naming_weak_places(self.scene, space):
+                stage = self._stage(body, state, start, end, wanted, trial)
             outputs += [(space, output) for output in stage]
             if trial:
                 break
