@@ -32,6 +32,7 @@ def budget_section(record: Mapping[str, Any]) -> Markup:
             links,
             notes,
             _missing(record),
+            _ends(record),
             tag("div", figures, class_="panels"),
         ),
         tag(
@@ -64,6 +65,28 @@ def _missing(record: Mapping[str, Any]) -> Markup | None:
     return tag(
         "div", tag("table", tag("thead", head), tag("tbody", rows), class_="map"), class_="scroll"
     )
+
+
+def _ends(record: Mapping[str, Any]) -> Markup | None:
+    """Say where cuts end, and where the answer has their ends."""
+    if not record.get("ends"):
+        return None
+    titles = ("end of a cut, m", "realised at", "hindmost node there", "acts as an end at")
+    head = tag("tr", [tag("th", title, scope="col") for title in titles])
+    rows = [
+        tag("tr", tag("th", f"({one['place'][0]:.4g}, {one['place'][1]:.4g})", scope="row"),
+            tag("td", f"{one['moved']:+.2f} h"), tag("td", f"{one['nodes']:+.2f} h"),
+            tag("td", f"{one['acts']:+.2f} ± {one['uncertainty']:.2f} h"))
+        for one in record["ends"]
+    ]  # fmt: skip
+    said = (
+        "Along the cut from its end as asked, positive beyond it, in elements. Without tip "
+        "functions elements are too stiff at an end, and their answer is that of a shorter cut "
+        "than they realise: conforming ones by 0.38 ± 0.13 elements at every end, XFEM by as much "
+        "as the last column says less the second. The last column is expected, not measured."
+    )
+    table = tag("table", tag("thead", head), tag("tbody", rows), class_="map")
+    return joined(tag("p", said, class_="quiet"), tag("div", table, class_="scroll"))
 
 
 def _bars(budget: Mapping[str, Any]) -> Markup:

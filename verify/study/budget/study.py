@@ -5,18 +5,21 @@ from dataclasses import asdict, dataclass, field
 from time import perf_counter
 from typing import Any
 
+from verify.compare.body import Body
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Verdict
 from verify.scene import Scene
+from verify.solvers.xfem_scene import background_mesh
 from verify.study.budget.budget import Budget, error_budget
 from verify.study.budget.candidates import find_candidates
 from verify.study.budget.chain import make_chain
 from verify.study.budget.cheapest import Candidate, cheapest_adequate
+from verify.study.budget.cut_ends import CutEnd, cut_ends
 from verify.study.budget.distances import Times, norm_names
 from verify.study.budget.links import Chain, Missing
 from verify.study.budget.scenes import coarsest
-from verify.study.budget.solved import Solve
+from verify.study.budget.solved import JUDGED, Solve
 from verify.study.finding import Finding
 from verify.study.quantities import unit_of
 from verify.study.reference import ExactField
@@ -47,6 +50,8 @@ class BudgetStudy:
     missing : list of Missing
         Links that could not be made, with their reasons.
     notes : list of str
+    ends : list of CutEnd
+        Where the ends of cuts in the plane are realised, and where the answer has them.
     quick : bool
     seconds : float
     """
@@ -61,6 +66,7 @@ class BudgetStudy:
     findings: list[Finding]
     missing: list[Missing] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    ends: list[CutEnd] = field(default_factory=list)
     quick: bool = False
     seconds: float = 0.0
 
@@ -116,16 +122,9 @@ def budget_study(
         raise InputError(scene.played_only, str(scene.file or scene.name))
     if quick:
         scene = coarsest(scene, _QUICK_LEVELS)
-    count = scene.mesh.count
-    level = count - 1 if level is None else level
-    if not 0 <= level < count:
-        raise InputError(f"level {level}; expected 0..{count - 1}", "--level")
     dynamic = scene.analysis.kind == "dynamic"
     times: Times = scene.analysis.output_times if dynamic else (None,)
-    names = [*norm_names(times), *(quantity.name for quantity in scene.quantities)]
-    metric = metric or names[1 if dynamic else 0]
-    if metric not in names:
-        raise InputError(f"no budget of '{metric}'; there is one of {', '.join(names)}", "--metric")
+    level, metric = _asked_for(scene, level, metric, times)
     try:
         chain = make_chain(scene, level, exact, solve, quick)
     except UnsupportedSceneError as refusal:
@@ -148,9 +147,34 @@ def budget_study(
         findings=[choice, *(_finding(budget) for budget in budgets)],
         missing=chain.missing,
         notes=chain.notes,
+        ends=_ends(chain, level),
         quick=quick,
         seconds=perf_counter() - start,
     )
+
+
+def _asked_for(
+    scene: Scene, level: int | None, metric: str | None, times: Times
+) -> tuple[int, str]:
+    """Return level and metric, the default where none is given; refuse what there is not."""
+    count = scene.mesh.count
+    level = count - 1 if level is None else level
+    if not 0 <= level < count:
+        raise InputError(f"level {level}; expected 0..{count - 1}", "--level")
+    names = [*norm_names(times), *(quantity.name for quantity in scene.quantities)]
+    metric = metric or names[0 if len(times) == 1 else 1]
+    if metric not in names:
+        raise InputError(f"no budget of '{metric}'; there is one of {', '.join(names)}", "--metric")
+    return level, metric
+
+
+def _ends(chain: Chain, level: int) -> list[CutEnd]:
+    """Find the ends of cuts, in the plane."""
+    if not isinstance(chain.body, Body) or not len(chain.body.tips):
+        return []
+    mesh, _ = background_mesh(chain.scene, level)
+    facets = chain.asked[chain.scene.analysis.kinematics].solution(JUDGED, level).cut_facets
+    return cut_ends(chain.body, facets, mesh.points, mesh.cells, chain.size)
 
 
 def _contention(chain: Chain) -> str:

@@ -1,0 +1,177 @@
+"""What the end of a cut costs: the error is that of another end, wherever it falls in an element.
+
+Away from an end, and to first order, the error of linear elements without tip functions is what the
+displacement changes by when the end is moved. By how many elements follows from where the end is
+realised and from the nodes of the edge there. That is held here on cracks whose ends fall on twelve
+fractions of an element, in two directions, on two levels (the finer one: `make heavy`).
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from griffith_ends import Crack, crack_scene
+from tip_advance import tip_advances
+
+from reference.exact import exact_solution
+from verify.compare.body import body_of
+from verify.study.budget import cut_ends
+
+ANGLES, PLACES = (20.0, -35.0), range(6)
+RULES = ("inside", "through")
+levels = pytest.mark.parametrize("count", [16, pytest.param(32, marks=pytest.mark.heavy)])
+
+
+def ends_at(place, angle, size):
+    """Ends at fractions place/6 and place/6 + 1/12 of an element's width, at changing heights."""
+    shift = size * np.array([place / 6, place / 6 + 1 / 12])
+    slope = np.tan(np.deg2rad(angle))
+    x = np.array([-0.9375 - shift[1], 0.9375 + shift[0]])
+    height = size * (0.1 + 0.37 * place)
+    return np.stack([x, height + slope * x], axis=1)
+
+
+@cache
+def cracks(count):
+    """All cracks, each with its answers by the conforming elements and by XFEM's rules."""
+    found = []
+    for angle in ANGLES:
+        for place in PLACES:
+            ends = ends_at(place, angle, 4.0 / count)
+            crack = Crack(crack_scene(ends, angle, {"cells": [[count, count]]}))
+            answers = {rule: crack.solve("xfem", tip=rule) for rule in RULES}
+            found.append((crack, {"conforming": crack.solve("conforming"), **answers}))
+    return found
+
+
+def of(rule, count):
+    return [(crack, answers[rule]) for crack, answers in cracks(count)]
+
+
+def test_the_derivative_by_an_end_is_held_at_the_outline_and_singular_as_the_crack_says():
+    """Beside the end it is the derivative of the crack in an infinite plate, by differences."""
+    scene = crack_scene(ends_at(1, 20.0, 0.25), 20.0, {"cells": [[16, 16]]})
+    parameters = scene.exact.parameters
+    crack = exact_solution("griffith", parameters, scene.material)
+    outline = body_of(scene).outline
+    first, second = tip_advances(crack, outline)[:2]
+    share = np.linspace(0.0, 1.0, 57)[:, None]
+    next_corner = np.roll(outline, -1, axis=0)
+    sides = np.concatenate([p + share * (q - p) for p, q in zip(outline, next_corner, strict=True)])
+    inside = np.random.default_rng(2).uniform(-1.0, 1.0, (50, 2))
+    for one in (first, second):
+        held = np.abs(one.displacement(sides)).max()
+        assert held < 0.01 * np.abs(one.displacement(inside)).max()
+    tip, along = crack.singular_points[1], np.diff(crack.singular_points, axis=0)[0]
+    along /= np.linalg.norm(along)
+    turn = np.linspace(-3.0, 3.0, 13)
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=1) @ np.stack(
+        [along, [-along[1], along[0]]]
+    )
+    step = 1e-7
+
+    def advanced(by):
+        centre = np.array(parameters["centre"]) + 0.5 * by * along
+        moved = {**parameters, "a": parameters["a"] + 0.5 * by, "centre": centre.tolist()}
+        return exact_solution("griffith", moved, scene.material)
+
+    points = tip + 1e-4 * around
+    wanted = (advanced(step).displacement(points) - advanced(-step).displacement(points)) / step / 2
+    found = first.displacement(points) + second.displacement(points)
+    # what is regular there is smaller by the root of 1e-4
+    assert np.abs(found - wanted).max() < 0.02 * np.abs(wanted).max()
+
+
+@levels
+@pytest.mark.parametrize("rule", ["conforming", *RULES])
+def test_the_energy_says_the_same_of_the_ends_as_the_displacement(rule, count):
+    """Two measurements that share nothing but the answer. Both are of first order in h: ends that
+    are 1.2 elements short have released (1.2 h)²/4a, 0.1 elements on the coarse level, less."""
+    differ = [one.released - (one.ends @ crack.modes).sum() for crack, one in of(rule, count)]
+    assert np.abs(differ).max() < 0.5 * 16 / count  # elements, both ends together
+
+
+@levels
+@pytest.mark.parametrize("rule", RULES)
+def test_where_the_answer_has_its_ends_follows_from_the_nodes_of_their_edges(rule, count):
+    answers = [one for _, one in of(rule, count)]
+    off = np.array([
+        [end.acts - shift for end, shift in zip(one.realised, one.ends[:, 0], strict=True)]
+        for one in answers
+    ])  # fmt: skip
+    stated = answers[0].realised[0].uncertainty
+    assert np.mean(np.abs(off) <= stated) >= 0.9  # 95 % of twice as many ends, other places
+    assert np.abs(off).max() < 2 * stated
+    moved = np.array([[end.moved for end in one.realised] for one in answers])
+    assert (moved.min() < -0.5) if rule == "inside" else (moved.max() > 0.5)
+    assert moved.max() < 1e-9 or rule == "through"
+    assert moved.min() > -1e-9 or rule == "inside"
+
+
+@levels
+@pytest.mark.parametrize("rule", RULES)
+def test_the_error_of_a_crack_is_predicted_from_the_places_of_its_ends_before_it_is_solved(
+    rule, count
+):
+    """In units of what an element at each end costs; the rest of the error is second order."""
+    for crack, one in of(rule, count):
+        predicted = crack.error_of([end.acts for end in one.realised])
+        assert abs(np.hypot(predicted, one.rest) - one.error) < 0.25 * crack.error_of([1.0, 1.0])
+
+
+@levels
+def test_conforming_elements_with_a_node_at_the_end_shorten_it_by_a_third_of_an_element_too(count):
+    shifts = np.array([one.ends[:, 0] for _, one in of("conforming", count)])
+    assert np.all((shifts > -0.55) & (shifts < -0.25))
+    assert np.mean(shifts) == pytest.approx(-0.37, abs=0.05)
+
+
+@levels
+def test_what_a_rule_costs_against_conforming_elements_depends_on_where_the_ends_fall(count):
+    """No rule keeps to 2.1–2.5 (inside) or 0.6–1.1 (through); both keep to the guide's ranges."""
+    against = np.array([answers["conforming"].error for _, answers in cracks(count)])
+    inside, through = (
+        np.array([one.error for _, one in of(rule, count)]) / against for rule in RULES
+    )
+    assert 1.1 < inside.min() < 2.0
+    assert 2.6 < inside.max() < 3.5
+    assert 0.2 < through.min() < 0.6
+    assert 1.2 < through.max() < 2.5
+    assert np.median(inside) > 1.5 * np.median(through)
+
+
+@pytest.mark.parametrize("solver, elements", [("xfem", -0.45), ("conforming", -0.35)])
+def test_the_same_place_in_an_element_shifts_the_end_by_as_much_on_every_level(solver, elements):
+    """The ends of `statics/griffith_edges`: 1.24 = 0.44/0.35. The solver's last edge is whole, that
+    of the imprinted mesh half as long, because it has a node more there."""
+    found = []
+    for count in (16, 32):
+        scene = crack_scene([[-1.0, 0.0], [1.0, 0.0]], 0.0, {"cells": [[count, count + 1]]})
+        found.append(Crack(scene).solve(solver))
+    assert found[0].ends[:, 0] == pytest.approx([elements] * 2, abs=0.04)
+    assert found[1].ends[:, 0] == pytest.approx(found[0].ends[:, 0], abs=0.03)
+    shares = [one.rest / one.error for one in found]
+    assert shares[1] < 0.9 * shares[0]  # second order against first
+
+
+def test_ends_on_nodes_of_the_mesh_cost_xfem_what_they_cost_conforming_elements():
+    scene = crack_scene([[-1.0, 0.0], [1.0, 0.0]], 0.0, {"cells": [[16, 16]]})
+    crack = Crack(scene)
+    one, other = crack.solve("xfem"), crack.solve("conforming")
+    assert one.error == pytest.approx(other.error, rel=1e-9)
+    assert [end.nodes for end in one.realised] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_ends_are_found_by_their_edge_and_told_apart():
+    """A square of two triangles; the cut ends on the diagonal, a quarter from its middle."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    cells = np.array([[0, 1, 3], [0, 3, 2]])
+    scene = crack_scene([[-1.0, 0.25], [0.4, 0.25]], 0.0, {"cells": [[4, 4]]})
+    facets = np.array([[[-1.0, 0.25], [0.0, 0.25]], [[0.0, 0.25], [0.25, 0.25]]])
+    found = {end.place: end for end in cut_ends(body_of(scene), facets, points, cells, 1.0)}
+    assert found.keys() == {(-1.0, 0.25), (0.4, 0.25)}
+    end = found[0.4, 0.25]
+    assert (end.moved, end.nodes) == pytest.approx((-0.15, -0.4))
+    assert end.acts == pytest.approx(-0.15 - 2 / 3 * 0.25 - 0.355)
+    # nothing is realised near an end: nothing is said of it
+    assert cut_ends(body_of(scene), facets[:0], points, cells, 1.0) == []
