@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["create_simplex_mesh", "import_dolfinx"]
+from verify.errors import InputError
+
+__all__ = ["OLDEST", "create_simplex_mesh", "import_dolfinx"]
+
+OLDEST = (0, 9)  # before, vectors and expressions are others
 
 
 def import_dolfinx() -> ModuleType:
@@ -17,13 +21,21 @@ def import_dolfinx() -> ModuleType:
     ------
     ImportError
         With its ``name`` set, if DOLFINx is not installed.
+    InputError
+        If it is older than `OLDEST`.
     """
     try:
         import_module("dolfinx_solver")
     except ModuleNotFoundError as error:
         if error.name != "dolfinx_solver":
             raise
-    return import_module("dolfinx")
+    dolfinx = import_module("dolfinx")
+    if _version() < OLDEST:
+        oldest = ".".join(map(str, OLDEST))
+        raise InputError(
+            f"DOLFINx {dolfinx.__version__} is too old: the reference needs {oldest} or newer"
+        )
+    return dolfinx
 
 
 def create_simplex_mesh(
@@ -53,8 +65,7 @@ def create_simplex_mesh(
     if comm.rank > 0:
         points, cells = points[:0], cells[:0]
     domain = ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(d,)))
-    major, minor = _version()
-    if (major, minor) >= (0, 10):
+    if _version() >= (0, 10):
         return mesh.create_mesh(comm, cells, domain, points)
     create: Any = mesh.create_mesh  # its last arguments were the other way round before
     return create(comm, cells, points, domain)
