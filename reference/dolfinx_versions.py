@@ -1,4 +1,4 @@
-"""What differs between versions of DOLFINx, in one place."""
+"""What differs between versions of DOLFINx and of the petsc4py below it, in one place."""
 
 from importlib import import_module
 from types import ModuleType
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["OLDEST", "create_simplex_mesh", "import_dolfinx"]
+__all__ = ["OLDEST", "create_simplex_mesh", "import_dolfinx", "take_whole_steps"]
 
 OLDEST = (0, 9)  # before, vectors and expressions are others
 
@@ -69,6 +69,27 @@ def create_simplex_mesh(
         return mesh.create_mesh(comm, cells, domain, points)
     create: Any = mesh.create_mesh  # its last arguments were the other way round before
     return create(comm, cells, points, domain)
+
+
+def take_whole_steps(solver: Any) -> None:
+    """Have Newton's method go all the way it points, without a line search.
+
+    By PETSc's options: petsc4py knows the line search itself since 3.23 only.
+
+    Parameters
+    ----------
+    solver : petsc4py.PETSc.SNES
+        Of type ``newtonls``, nothing else set.
+    """
+    from petsc4py import PETSc
+
+    options: Any = PETSc.Options()
+    name = "whole_steps_snes_linesearch_type"
+    options.setValue(name, "basic")
+    solver.setOptionsPrefix("whole_steps_")
+    solver.setFromOptions()
+    solver.setOptionsPrefix("")
+    options.delValue(name)
 
 
 def _version() -> tuple[int, int]:

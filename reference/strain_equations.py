@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.dolfinx_versions import take_whole_steps
 from reference.elasticity import lame, mean_stiffness
 from reference.linear_solvers import near_null_space, set_multigrid, solve_directly
 from reference.membrane_stretch import MembraneStretch
@@ -243,7 +244,7 @@ class StrainEquations:
         solver = PETSc.SNES().create(matrix.comm)
         solver.setType("newtonls")  # with backtracking, unless told otherwise
         if self._tension is not None:  # what is slack is overshot at first, and comes back from it
-            solver.getLineSearch().setType("basic")
+            take_whole_steps(solver)
         solver.setFunction(self._assemble_residual, self._vector.duplicate())
         solver.setJacobian(self._assemble_tangent, matrix)
         linear = solver.getKSP()
