@@ -101,14 +101,16 @@ class PointNumbers:
         )
         self._table.close(after)
         self._supports.rows = self._supports.rows[:after]
-        fresh = numbers[local:] - self.nodes - count
-        new = np.empty(after - count, dtype=np.int64)
-        rows = np.flatnonzero(fresh >= 0)
-        # of equal points the first is taken
-        new[fresh[rows][::-1]] = rows[::-1]
-        self.positions.append(points.positions[local + new])
-        self.ends.append(numbers[points.ends[new]])
-        self.cut.append(cuts[points.cut[new]])
+        for store in (self.positions, self.ends, self.cut):
+            store.extend(after - count)
+        _write_new(
+            numbers,
+            local,
+            self.nodes,
+            count,
+            (points.positions, points.ends, cuts[points.cut]),
+            (self.positions.rows, self.ends.rows, self.cut.rows),
+        )
         return numbers
 
     def supported(self, points: _Ints, nodes: _Ints) -> NDArray[np.bool_]:
@@ -128,6 +130,22 @@ class PointNumbers:
         count = _meet_nodes(zero, nodes, cuts, table, known, count, self._still_met.rows)
         self._nodes_met.close(count)
         self._still_met.rows = self._still_met.rows[:count]
+
+
+@njit(cache=True)
+def _write_new(numbers, local, nodes, count, found, stores):
+    """Write where points with numbers from `count` on are; of equal points the first is taken."""
+    positions, ends, cut = found
+    all_positions, all_ends, all_cuts = stores
+    for z in range(len(ends)):
+        if numbers[local + z] - nodes != count:
+            continue
+        for i in range(positions.shape[1]):
+            all_positions[count, i] = positions[local + z, i]
+        for e in range(2):
+            all_ends[count, e] = numbers[ends[z, e]]
+        all_cuts[count] = cut[z]
+        count += 1
 
 
 @njit(cache=True)

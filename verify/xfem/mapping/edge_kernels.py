@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from verify.xfem.cutting.point_numbers import runs_through
 from verify.xfem.row_numbers import find_row, number_of_row
 
-__all__ = ["CUTS", "LINE", "EdgeRecord", "bisect_facets", "record_points"]
+__all__ = ["CUTS", "LINE", "EdgeRecord", "bisect_facets", "record_points", "unrecorded"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -67,6 +67,18 @@ class EdgeRecord(NamedTuple):
 def _write_ends(x, y, row):
     """Write the row of the edge between two points, none of which is that of a line."""
     row[0], row[1], row[2], row[_FACE] = -1, min(x, y), max(x, y), _NONE
+
+
+@njit(cache=True)
+def unrecorded(numbers, nodes, recorded):
+    """Zero points among some points that have not been recorded, each once; they are from now."""
+    found, count = np.empty(len(numbers), dtype=np.int64), 0
+    for number in numbers:
+        if number >= nodes and not recorded[number - nodes]:
+            recorded[number - nodes] = True
+            found[count] = number - nodes
+            count += 1
+    return found[:count]
 
 
 @njit(cache=True)

@@ -9,7 +9,6 @@ record is by these.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cutting.distinct import distinct
 from verify.xfem.cutting.point_numbers import PointNumbers
 from verify.xfem.errors import XfemError
 from verify.xfem.growing_array import GrowingArray
@@ -19,6 +18,7 @@ from verify.xfem.mapping.edge_kernels import (
     EdgeRecord,
     bisect_facets,
     record_points,
+    unrecorded,
 )
 from verify.xfem.row_numbers import RowNumbers
 
@@ -53,9 +53,7 @@ class EdgePoints:
         """Record points (by number; mesh nodes are ignored) on the lines on which they lie."""
         fresh = self._recorded.extend(len(self._points.ends) - len(self._recorded))
         self._recorded.rows[fresh:] = False
-        zero = numbers[numbers >= self._points.nodes] - self._points.nodes
-        zero = distinct(zero[~self._recorded.rows[zero]])
-        self._recorded.rows[zero] = True
+        zero = np.sort(unrecorded(numbers, self._points.nodes, self._recorded.rows))
         table, known, lines = self._lines.open_for((CUTS + 1) * len(zero))
         begin = self._first.extend((CUTS + 1) * len(zero))
         self._first.rows[begin:] = -1

@@ -30,8 +30,10 @@ from verify.xfem.mapping.locate_kernels import (
     corner_pieces,
     cut_at,
     locate_many,
+    place_parts,
 )
 from verify.xfem.mapping.moving_surface import MovingSurface
+from verify.xfem.mapping.near_facet_kernels import concerned_facets, levels_at
 from verify.xfem.split import ROUND_OFF, split_cells
 
 __all__ = ["EmbeddedSurface"]
@@ -120,12 +122,15 @@ class EmbeddedSurface:
         leaf, count = np.argsort(tree.order), len(tree.order)
         self._boxes = tree.low[count + leaf], tree.high[count + leaf]
         every = np.arange(len(self.facets))
-        own = self._vertex_cell[self.facets]
-        self._corners = corner_cells(
-            self.points[self.facets], every, own, *self._around, *self._boxes, *self._elements
-        )
+        own, corners = self._vertex_cell[self.facets], (*self.facets.shape, mesh.dim + 1)
+        self._corners = np.empty_like(own), np.empty(corners), np.empty(corners)
+        corner_cells(
+            every, self.points[self.facets], every, own, *self._around, *self._boxes,
+            *self._elements, *self._corners,
+        )  # fmt: skip
         self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
-        self._place = np.full(max(len(self.points), len(self.facets)), -1)
+        most = max(len(self.points), len(self.facets), len(mesh.points))
+        self._place, self._is_moved = np.full(most, -1), np.zeros(len(mesh.cells), dtype=bool)
         nodes = distinct(self.facets)
         self._replace(every, self._fragments(every, nodes, *self._values(nodes)))
 
@@ -147,11 +152,10 @@ class EmbeddedSurface:
         nodes = np.sort(distinct_in_rows(self.facets, near, self._place))
         numbers, values = self._values(nodes)
         # a facet on one side of all cuts, in cells that are as they were, stays as it is
-        moved = np.zeros(len(self._cutter.mesh.cells), dtype=bool)
-        moved[increment.moved] = True
-        levels = values[np.searchsorted(nodes, self.facets[near])]
-        whole = ((levels > 0.0).all(axis=1) | (levels < 0.0).all(axis=1)).all(axis=1)
-        concerned = near[~whole | moved[self._corners[0][near]].any(axis=1)]
+        concerned = concerned_facets(
+            near, self.facets, nodes, values, increment.moved, self._corners[0], self._is_moved,
+            self._place,
+        )  # fmt: skip
         if len(concerned):
             fragments = self._fragments(concerned, nodes, numbers, values)
             yield
@@ -195,16 +199,10 @@ class EmbeddedSurface:
         self.surface.retire(ranges(self._facet_range[facets]))
         ids, source, at, label, whole = fragments
         # where the corners of a whole facet are is known; only which piece that is may be new
-        cell, weights, inside = (array.take(source, axis=0) for array in self._corners)
-        material = self.points.take(self.facets.take(source, axis=0), axis=0)
-        if not whole.all():
-            parts = ~whole
-            material[parts] = at[parts] @ material[parts]
-            found = corner_cells(
-                material[parts], source[parts], cell[parts], *self._around, *self._boxes,
-                *self._elements,
-            )  # fmt: skip
-            cell[parts], weights[parts], inside[parts] = found
+        material, cell, weights, inside = place_parts(
+            self.points, self.facets, source, at, whole, *self._corners, *self._around,
+            *self._boxes, *self._elements,
+        )  # fmt: skip
         piece = corner_pieces(
             cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,
             body.first_piece, body.next_piece.rows,
@@ -284,16 +282,17 @@ class EmbeddedSurface:
 
     def _values(self, vertices: _Ints) -> tuple[_Ints, _Floats]:
         """Cuts between vertices, or through one, and their realised level sets (q, cuts) there."""
-        cells = self._cutter.mesh.cells[self._vertex_cell[vertices]]
+        cells = self._cutter.mesh.cells
         strokes = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
-        nodes = distinct(cells)
-        place, at = np.searchsorted(nodes, cells), self._vertex_at[vertices]
+        nodes = distinct_in_rows(cells, self._vertex_cell.take(vertices), self._place)
         numbers, columns = [], []
         for stroke in strokes:
-            values = (at * stroke.level_sets(nodes)[place]).sum(axis=1)
-            values[np.abs(values) <= self._snap] = 0.0
+            stroke.level_sets(nodes)
+            values, crossed = levels_at(
+                vertices, self._vertex_cell, self._vertex_at, cells, stroke.values, self._snap
+            )
             # the last stroke may still be led elsewhere: what it met before is asked again
-            if values.min() <= 0.0 <= values.max() or stroke is strokes[-1]:
+            if crossed or stroke is strokes[-1]:
                 numbers.append(stroke.number)
                 columns.append(values)
         found = np.stack(columns, axis=1) if columns else np.empty((len(vertices), 0))

@@ -14,6 +14,7 @@ __all__ = [
     "cut_at",
     "locate",
     "locate_many",
+    "place_parts",
 ]
 
 _DEEP = 128  # twice the height of any heap of boxes
@@ -178,22 +179,21 @@ def _among(x, reach, some, floor, ceiling, cells, points, gradients):
 
 @njit(cache=True)
 def corner_cells(
-    corners, facet, likely, near_start, near, floor, ceiling,
-    reach, low, high, order, cells, points, gradients,
+    chosen, corners, facet, likely, near_start, near, floor, ceiling,
+    reach, low, high, order, cells, points, gradients, found, weights, at,
 ):  # fmt: skip
-    """Cell (q, k) of each corner of facets (q, k, s), looked up a little inside the facet.
+    """Find the cell of each corner of chosen facets, looked up a little inside the facet.
 
-    Each is a part of a given `facet` (q,). Cells that are `likely` (q, n) are tried first: where a
-    place is inside of one, it is in no other. Then those of `near` whose boxes, `floor` and
-    `ceiling` (m, s), meet that of the given facet, from `near_start` (f + 1,) on: no box of
-    another cell holds the place. Returns the cells and the coordinates (q, k, d + 1) of the
-    corner, and of the place inside.
+    Of `corners` (q, k, s) those of the facets `chosen` are looked up. Each is a part of a given
+    `facet` (q,). Cells that are `likely` (q, n) are tried first: where a place is inside of one,
+    it is in no other. Then those of `near` whose boxes, `floor` and `ceiling` (m, s), meet that of
+    the given facet, from `near_start` (f + 1,) on: no box of another cell holds the place. Writes
+    the cells `found` (q, k), and the coordinates (q, k, d + 1) of the corner, `weights`, and of
+    the place inside, `at`.
     """
-    count, size, space = corners.shape
-    found = np.empty((count, size), dtype=np.int64)
-    weights = np.empty((count, size, cells.shape[1]))
-    at, inside = np.empty_like(weights), np.empty(space)
-    for q in range(count):
+    _, size, space = corners.shape
+    inside = np.empty(space)
+    for q in chosen:
         some = near[near_start[facet[q]] : near_start[facet[q] + 1]]
         for k in range(size):
             for i in range(space):
@@ -223,7 +223,68 @@ def corner_cells(
                 total += weights[q, k, a]
             for a in range(cells.shape[1]):
                 weights[q, k, a] /= total
-    return found, weights, at
+
+
+@njit(cache=True)
+def place_parts(
+    vertices, facets, source, parts, whole, known_cell, known_weights, known_at,
+    near_start, near, floor, ceiling, reach, low, high, order, cells, points, gradients,
+):  # fmt: skip
+    """Find where the corners of parts of facets are, and in which cell.
+
+    Parameters
+    ----------
+    vertices : (v, s) float array
+        Of the given facets.
+    facets : (f, k) int array
+    source : (q,) int array
+        Given facet of which each is a part.
+    parts : (q, k, k) float array
+        Barycentric coordinates of the corners in it.
+    whole : (q,) bool array
+        Whether a part is the facet itself, of which all is known.
+    known_cell, known_weights, known_at : (f, k), (f, k, d + 1), (f, k, d + 1) arrays
+        What `corner_cells` has found for the given facets.
+    near_start, near, floor, ceiling, reach, low, high, order, cells, points, gradients
+        As `corner_cells` takes them.
+
+    Returns
+    -------
+    places : (q, k, s) float array
+        In metres.
+    cell, weights, at : (q, k), (q, k, d + 1), (q, k, d + 1) arrays
+        As `corner_cells` gives them.
+    """
+    count, size, space = len(source), facets.shape[1], vertices.shape[1]
+    places = np.empty((count, size, space))
+    cell = np.empty((count, size), dtype=np.int64)
+    weights = np.empty((count, size, cells.shape[1]))
+    at = np.empty_like(weights)
+    chosen, more = np.empty(count, dtype=np.int64), 0
+    for q in range(count):
+        facet = source[q]
+        for k in range(size):
+            cell[q, k] = known_cell[facet, k]
+            if whole[q]:
+                for i in range(space):
+                    places[q, k, i] = vertices[facets[facet, k], i]
+                for a in range(cells.shape[1]):
+                    weights[q, k, a] = known_weights[facet, k, a]
+                    at[q, k, a] = known_at[facet, k, a]
+            else:
+                for i in range(space):
+                    place = 0.0
+                    for j in range(size):
+                        place += parts[q, k, j] * vertices[facets[facet, j], i]
+                    places[q, k, i] = place
+        if not whole[q]:
+            chosen[more] = q
+            more += 1
+    corner_cells(
+        chosen[:more], places, source, cell.copy(), near_start, near, floor, ceiling,
+        reach, low, high, order, cells, points, gradients, cell, weights, at,
+    )  # fmt: skip
+    return places, cell, weights, at
 
 
 @njit(cache=True)
