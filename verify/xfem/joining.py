@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.clipping import staircase
-from verify.xfem.joining_kernels import join_across_faces, number_groups
+from verify.xfem.joining_kernels import join_across_faces, number_groups, patch_around
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import Partition
 
@@ -43,17 +43,9 @@ class PatchSlots:
 
 def join_slots(mesh: SimplexMesh, partition: Partition) -> PatchSlots:
     """Join the slots of all pieces that touch, around the nodes of split cells."""
-    is_split = np.zeros(len(mesh.cells), dtype=bool)
-    is_split[partition.parent] = True
-    mark = np.zeros(len(mesh.points), dtype=bool)
-    mark[mesh.cells[is_split]] = True
-    patch = np.flatnonzero(mark[mesh.cells].any(axis=1))
-    place = np.full(len(mesh.cells), -1)
-    place[patch] = np.arange(len(patch))
-    whole = patch[~is_split[patch]]
-    piece_cell = place[np.concatenate([partition.parent, whole])]
-    starts = np.concatenate([[0], np.cumsum(np.bincount(piece_cell, minlength=len(patch)))])
-    pieces = np.argsort(piece_cell, kind="stable")
+    patch, place, piece_cell, starts, pieces = patch_around(
+        partition.parent, mesh.cells, len(mesh.points)
+    )
     # the slots of a group are a tree: each slot knows a smaller one, the first itself
     towards = np.arange(len(piece_cell) * (mesh.dim + 1))
     begin = 0

@@ -5,7 +5,66 @@ from numba import njit
 
 from verify.xfem.row_numbers import point_on_edge
 
-__all__ = ["join_across_faces", "number_groups"]
+__all__ = ["join_across_faces", "number_groups", "patch_around"]
+
+
+@njit(cache=True)
+def patch_around(parent, cells, nodes):
+    """Cells around the nodes of split cells, and the pieces there.
+
+    Parameters
+    ----------
+    parent : (q,) int array
+        Cell of each piece of the split ones.
+    cells : (m, d + 1) int array
+    nodes : int
+        Number of nodes.
+
+    Returns
+    -------
+    patch : (c,) int array
+        The cells, ascending.
+    place : (m,) int array
+        Place of each cell among them, -1 if it is not.
+    piece_cell : (p,) int array
+        Place in `patch` of each piece: those given, then the cells that are not split.
+    starts, pieces : (c + 1,), (p,) int arrays
+        Pieces of each cell of the patch, ascending.
+    """
+    split, mark = np.zeros(len(cells), dtype=np.bool_), np.zeros(nodes, dtype=np.bool_)
+    for cell in parent:
+        split[cell] = True
+        for node in cells[cell]:
+            mark[node] = True
+    patch, place = np.empty(len(cells), dtype=np.int64), np.empty(len(cells), dtype=np.int64)
+    count, whole = 0, 0
+    for cell in range(len(cells)):
+        near = False
+        for node in cells[cell]:
+            near = near or mark[node]
+        place[cell] = -1
+        if near:
+            place[cell], patch[count] = count, cell
+            count += 1
+            whole += not split[cell]
+    piece_cell = np.empty(len(parent) + whole, dtype=np.int64)
+    for p in range(len(parent)):
+        piece_cell[p] = place[parent[p]]
+    at = len(parent)
+    for k in range(count):
+        if not split[patch[k]]:
+            piece_cell[at] = k
+            at += 1
+    starts, pieces = np.zeros(count + 1, dtype=np.int64), np.empty(at, dtype=np.int64)
+    for p in range(at):
+        starts[piece_cell[p] + 1] += 1
+    for k in range(count):
+        starts[k + 1] += starts[k]
+    free = starts[:-1].copy()
+    for p in range(at):
+        pieces[free[piece_cell[p]]] = p
+        free[piece_cell[p]] += 1
+    return patch[:count].copy(), place, piece_cell, starts, pieces
 
 
 @njit(cache=True)

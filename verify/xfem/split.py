@@ -20,7 +20,14 @@ from verify.xfem.crossing import AT_END, REACH, Crossing, TipRule, crossed_throu
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.split_kernels import crossed_cells, crossed_edges, divide_simplices
+from verify.xfem.split_kernels import (
+    crossed_cells,
+    crossed_edges,
+    divide_simplices,
+    gone_through,
+    two_sides,
+    whole_simplices,
+)
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["ROUND_OFF", "Held", "Partition", "split_cells"]
@@ -173,36 +180,20 @@ def _split_by_one(
     edges, places, size = points.cross(crossed, mesh.cells)
     active = np.zeros(len(crossed), dtype=bool)
     if len(crossed):
-        level, depth = np.abs(cut.level_set(places))[edges], cut.depth(places)[edges]
         margin = AT_END if tip == "through" else -AT_END
-        inside = (level <= REACH * size[:, None]) & (depth >= margin * size[:, None])
-        there = edges >= 0
-        active = (inside & there).any(axis=1) if tip == "through" else (inside | ~there).all(axis=1)
+        level, depth = cut.level_set(places), cut.depth(places)
+        active = gone_through(edges, level, depth, size, REACH, margin, tip == "through")
     if held is not None and not active.all():
         doubtful = np.flatnonzero(~active)
         label = np.zeros((len(doubtful), 1), dtype=np.int8)
         active[doubtful] = held(crossed[doubtful], label, 0)
     cells = crossed[active]
-    count, corners = len(cells), mesh.dim + 1
-    whole = np.arange(count)
-    identity = np.zeros((count, corners, corners))
-    identity[:, range(corners), range(corners)] = 1.0
-    simplices, kept = divide_simplices(
-        (whole, mesh.cells[cells], identity, np.ones(count), np.ones(count, dtype=np.int8)),
-        points.values,
-        0,
-        np.ones(count, dtype=bool),
-        whole + count,
-        staircase(corners),
-        points.table,
-    )
+    whole, every, below = whole_simplices(cells, mesh.cells)
+    stairs = staircase(mesh.dim + 1)
+    simplices, kept = divide_simplices(whole, points.values, 0, every, below, stairs, points.table)
     points.divided(simplices[1][kept:])
-    piece, ids, at, share, sign = simplices
-    label = np.ones((2 * count, 1), dtype=np.int8)
-    label[1::2] = -1
-    number = np.where(piece < count, 2 * piece, 2 * (piece - count) + 1)
-    parent = np.repeat(cells, 2)
-    return Partition(parent, label, number, ids, at, share, sign, points, snapped)
+    parent, label = two_sides(cells, simplices[0])
+    return Partition(parent, label, *simplices, points, snapped)
 
 
 def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:

@@ -5,7 +5,18 @@ from numba import njit
 
 from verify.xfem.row_numbers import number_of_row, point_on_edge
 
-__all__ = ["crossed_cells", "crossed_edges", "divide_simplices", "edges_of_cells"]
+__all__ = [
+    "crossed_cells",
+    "crossed_edges",
+    "divide_simplices",
+    "edges_of_cells",
+    "first_divided",
+    "gone_through",
+    "points_of_edges",
+    "points_on_edges",
+    "two_sides",
+    "whole_simplices",
+]
 
 
 @njit(cache=True)
@@ -48,6 +59,110 @@ def edges_of_cells(chosen, cells, points, values, table, known, edges, size):
             edges[q, k] = -1
         size[q] = np.sqrt(longest)
     return count
+
+
+@njit(cache=True)
+def points_on_edges(edges, points, values):
+    """Where the only cut crosses edges, rows (0, plus, minus), and the share of each plus end."""
+    places, share = np.empty((len(edges), points.shape[1])), np.empty(len(edges))
+    for k in range(len(edges)):
+        plus, minus = edges[k, 1], edges[k, 2]
+        above, below = values[plus, 0], values[minus, 0]
+        r, s = above / (above - below), -below / (above - below)
+        for i in range(points.shape[1]):
+            places[k, i] = s * points[plus, i] + r * points[minus, i]
+        share[k] = r
+    return places, share
+
+
+@njit(cache=True)
+def points_of_edges(edges, order, share, places, count):
+    """Give points to edges in some order: the plus end where that is on the cut, else a new one.
+
+    Returns the point (k,) of each edge, and ends and places of the new ones, from `count` on.
+    """
+    point = np.empty(len(edges), dtype=np.int64)
+    ends = np.empty((len(edges), 2), dtype=np.int64)
+    new_places, new = np.empty_like(places), 0
+    for k in order:
+        point[k] = edges[k, 1]
+        if share[k] > 0.0:
+            point[k] = count + new
+            for e in range(2):
+                ends[new, e] = edges[k, 1 + e]
+            for i in range(places.shape[1]):
+                new_places[new, i] = places[k, i]
+            new += 1
+    return point, ends[:new], new_places[:new]
+
+
+@njit(cache=True)
+def gone_through(edges, level, depth, size, reach, at_end, some):
+    """Whether the only cut goes through cells, at all of their `edges` (q, e) or at `some`.
+
+    Parameters
+    ----------
+    edges : (q, e) int array
+        -1 where a cell has no more.
+    level, depth : (k,) float array
+        Of the cut where it crosses each edge.
+    size : (q,) float array
+        Of the cells.
+    reach, at_end : float
+        How far off the cut, and how deep within it, a place must be, in sizes of the cell.
+    some : bool
+    """
+    found = np.empty(len(edges), dtype=np.bool_)
+    for q in range(len(edges)):
+        every, one = True, False
+        for edge in edges[q]:
+            if edge < 0:
+                continue
+            inside = abs(level[edge]) <= reach * size[q] and depth[edge] >= at_end * size[q]
+            every, one = every and inside, one or inside
+        found[q] = one if some else every
+    return found
+
+
+@njit(cache=True)
+def whole_simplices(chosen, cells):
+    """Simplices that are whole cells, as `divide_simplices` takes them, and who is below each."""
+    count, corners = len(chosen), cells.shape[1]
+    piece, below = np.arange(count), np.arange(count, 2 * count)
+    points, barycentric = (
+        np.empty((count, corners), dtype=np.int64),
+        np.zeros((count, corners, corners)),
+    )
+    for q in range(count):
+        for k in range(corners):
+            points[q, k], barycentric[q, k, k] = cells[chosen[q], k], 1.0
+    sign, active = np.ones(count, dtype=np.int8), np.ones(count, dtype=np.bool_)
+    return (piece, points, barycentric, np.ones(count), sign), active, below
+
+
+@njit(cache=True)
+def two_sides(cells, piece):
+    """Write numbers of the parts of divided cells into `piece`: two by two, that above first.
+
+    Returns the cell and the label (2q, 1) of each part.
+    """
+    count = len(cells)
+    for k in range(len(piece)):
+        piece[k] = 2 * piece[k] if piece[k] < count else 2 * (piece[k] - count) + 1
+    parent, label = np.empty(2 * count, dtype=np.int64), np.empty((2 * count, 1), dtype=np.int8)
+    for q in range(2 * count):
+        parent[q], label[q, 0] = cells[q // 2], 1 - 2 * (q % 2)
+    return parent, label
+
+
+@njit(cache=True)
+def first_divided(points, nodes, turn, now):
+    """Note at which turn points of simplices that are no nodes were first used."""
+    for s in range(points.shape[0]):
+        for k in range(points.shape[1]):
+            zero = points[s, k] - nodes
+            if zero >= 0:
+                turn[zero] = min(turn[zero], now)
 
 
 @njit(cache=True)

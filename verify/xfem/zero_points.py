@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import EdgeTable, RowNumbers
-from verify.xfem.split_kernels import edges_of_cells
+from verify.xfem.split_kernels import (
+    edges_of_cells,
+    first_divided,
+    points_of_edges,
+    points_on_edges,
+)
 
 __all__ = ["ZeroPoints"]
 
@@ -106,26 +111,20 @@ class ZeroPoints:
             chosen, cells, self.positions, self.values, table, known, edges, size
         )
         self._edges.close(count)
-        plus, minus = known[:count, 1], known[:count, 2]
-        r, s = self.shares(0, plus, minus)
-        places = s[:, None] * self.positions[plus] + r[:, None] * self.positions[minus]
-        order = np.argsort(plus << 32 | minus)
-        new = r[order] > 0.0
-        point = np.empty(count, dtype=np.int64)
-        point[order] = np.where(new, len(self.positions) - 1 + np.cumsum(new), plus[order])
+        known = known[:count]
+        places, share = points_on_edges(known, self.positions, self.values)
+        order = np.argsort(known[:, 1] << 32 | known[:, 2])
+        point, self.ends, new = points_of_edges(known, order, share, places, len(self.positions))
         self._point.append(point)
-        first = order[new]
-        self.values = np.concatenate([self.values, np.zeros((len(first), 1))])
-        self.positions = np.concatenate([self.positions, places[first]])
-        self.ends = known[first, 1:]
-        self.cut = np.zeros(len(first), dtype=np.int64)
-        self.turn = np.full(len(first), np.iinfo(np.int64).max)
+        self.values = np.concatenate([self.values, np.zeros((len(new), 1))])
+        self.positions = np.concatenate([self.positions, new])
+        self.cut = np.zeros(len(new), dtype=np.int64)
+        self.turn = np.full(len(new), np.iinfo(np.int64).max)
         return edges, places, size
 
     def divided(self, numbers: _Ints) -> None:
-        """Note that cells were divided at these points (mesh nodes among them do not count)."""
-        used = numbers[numbers >= self.nodes] - self.nodes
-        self.turn[used] = np.minimum(self.turn[used], self._turns)
+        """Note that cells were divided at points (s, d + 1), of which mesh nodes do not count."""
+        first_divided(numbers, self.nodes, self.turn, self._turns)
         self._turns += 1
 
     def in_order(self, numbers: _Ints) -> _Ints:

@@ -22,6 +22,8 @@ from verify.xfem.cutting.renumber_kernels import (
     number_unknowns,
     retire,
     separated,
+    simplices_of,
+    slots_before,
     write_pieces,
 )
 from verify.xfem.errors import XfemError
@@ -252,22 +254,19 @@ class GrowingBody:
     def _renumber(self, slots: PatchSlots, state: Division) -> _Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
         patch, partition = state.patch, state.partition
-        pieces, total = len(state.old), len(slots.piece_cell)
-        local_cell = slots.cells[slots.piece_cell]
-        cell = patch.whole_cells[local_cell]
-        nodes = self.mesh.cells[cell]
-        inner = np.zeros(len(patch.whole_nodes), dtype=bool)
-        places = np.searchsorted(patch.whole_cells, state.changed_cells)
-        inner[patch.cells[places]] = True
-        touched = inner[patch.cells[local_cell]]
-
-        solid, old = np.ones(total, dtype=bool), self.first_piece[cell]
-        solid[:pieces], old[:pieces] = state.solid, state.old
-        home = np.ones(nodes.shape, dtype=bool)
-        sign = np.where(partition.points.values[patch.cells[partition.parent]] >= 0.0, 1, -1)
-        label = partition.label[:, None, :]
-        home[:pieces] = ((label == 0) | (label == sign)).all(axis=2)
-
+        cell, touched, home, solid, old = slots_before(
+            slots.cells[slots.piece_cell],
+            np.searchsorted(patch.whole_cells, state.changed_cells),
+            patch.cells,
+            len(patch.whole_nodes),
+            patch.whole_cells,
+            partition.parent,
+            partition.label,
+            partition.points.values,
+            state.solid,
+            state.old,
+            self.first_piece,
+        )
         number = np.empty(int(slots.group.max(initial=-1)) + 1, dtype=np.int64)
         source = np.empty(len(number), dtype=np.int64)
         before = self.node_count
@@ -341,9 +340,13 @@ class GrowingBody:
         """Replace the sub-simplices of the changed cells."""
         patch, partition = division.patch, division.partition
         ids = self.points.number(partition.points, patch.whole_nodes, division.numbers)
-        cell = patch.whole_cells[partition.parent[partition.sub_piece]]
-        rows = np.flatnonzero((partition.sub_fraction > 0.0) & _among(cell, cells))
-        rows = rows[np.argsort(cell[rows], kind="stable")]
+        rows, bounds = simplices_of(
+            cells,
+            patch.whole_cells,
+            partition.parent,
+            partition.sub_piece,
+            partition.sub_fraction,
+        )
         retire(self.sub_piece.rows, self.sub_range, cells)
         begin = len(self.sub_piece)
         self.sub_piece.append(place[partition.sub_piece[rows]])
@@ -351,11 +354,7 @@ class GrowingBody:
         self.sub_barycentric.append(partition.sub_barycentric[rows])
         self.sub_fraction.append(partition.sub_fraction[rows])
         self.sub_sign.append(partition.sub_sign[rows])
-        edges = (
-            np.searchsorted(cell[rows], cells, side="left"),
-            np.searchsorted(cell[rows], cells, side="right"),
-        )
-        self.sub_range[cells] = begin + np.stack(edges, axis=1)
+        self.sub_range[cells] = begin + bounds
 
 
 def _among(values: _Ints, ascending: _Ints) -> NDArray[np.bool_]:

@@ -5,7 +5,16 @@ from numba import njit
 
 from verify.xfem.short_sort import sort_short
 
-__all__ = ["labelled", "match_pieces", "number_unknowns", "retire", "separated", "write_pieces"]
+__all__ = [
+    "labelled",
+    "match_pieces",
+    "number_unknowns",
+    "retire",
+    "separated",
+    "simplices_of",
+    "slots_before",
+    "write_pieces",
+]
 
 
 @njit(cache=True)
@@ -33,6 +42,108 @@ def match_pieces(parent, label, side, solid, piece_label, first_piece, next_piec
         if old[p] < 0 and solid[p] and orphan < 0:
             orphan = p
     return orphan
+
+
+@njit(cache=True)
+def slots_before(
+    local, changed, patch_cells, patch_nodes, whole_cells, parent, label, values, solid, old,
+    first_piece,
+):  # fmt: skip
+    """Find what the slots of a patch are before its unknowns are numbered anew.
+
+    Parameters
+    ----------
+    local : (p,) int array
+        Place in the patch of the cell of each piece: of the parts of split cells first.
+    changed : int array
+        Places of the cells that a cut divides.
+    patch_cells : (c, d + 1) int array
+        Nodes of the patch's cells.
+    patch_nodes : int
+        How many these are.
+    whole_cells : (c,) int array
+        Cells of the mesh.
+    parent : (q,) int array
+        Place of the cell of each part.
+    label : (q, cuts) int8 array
+    values : (n, cuts) float array
+        Level sets at the nodes.
+    solid, old : (q,) arrays
+        Whether a part has a volume, and from which piece it comes.
+    first_piece : (m,) int array
+        Of each cell.
+
+    Returns
+    -------
+    cell : (p,) int array
+    touched, home : (p, d + 1) bool arrays
+        Whether a slot is at a node of changed cells, and whether the node lies in the part.
+    solid, old : (p,) arrays
+        As above, of all pieces.
+    """
+    count, parts, corners = len(local), len(parent), patch_cells.shape[1]
+    inner = np.zeros(patch_nodes, dtype=np.bool_)
+    for place in changed:
+        for node in patch_cells[place]:
+            inner[node] = True
+    cell, every_old = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+    every_solid = np.ones(count, dtype=np.bool_)
+    touched = np.empty((count, corners), dtype=np.bool_)
+    home = np.ones((count, corners), dtype=np.bool_)
+    for p in range(count):
+        cell[p] = whole_cells[local[p]]
+        every_old[p] = first_piece[cell[p]]
+        if p < parts:
+            every_old[p], every_solid[p] = old[p], solid[p]
+        for a in range(corners):
+            touched[p, a] = inner[patch_cells[local[p], a]]
+            if p >= parts:
+                continue
+            node = patch_cells[parent[p], a]
+            for cut in range(label.shape[1]):
+                side = 1 if values[node, cut] >= 0.0 else -1
+                home[p, a] = home[p, a] and (label[p, cut] == 0 or label[p, cut] == side)
+    return cell, touched, home, every_solid, every_old
+
+
+@njit(cache=True)
+def simplices_of(cells, whole_cells, parent, piece, fraction):
+    """Sub-simplices with a volume in some cells, cell by cell.
+
+    Parameters
+    ----------
+    cells : (k,) int array
+        Ascending.
+    whole_cells, parent, piece : int arrays
+        The cell of a sub-simplex is ``whole_cells[parent[piece]]``.
+    fraction : (s,) float array
+        Share of each sub-simplex.
+
+    Returns
+    -------
+    rows : (r,) int array
+        Sub-simplices, those of a cell in the order in which they are given.
+    bounds : (k, 2) int array
+        First place of each cell in `rows`, and one past the last.
+    """
+    owner, bounds = np.empty(len(piece), dtype=np.int64), np.zeros((len(cells), 2), dtype=np.int64)
+    for s in range(len(piece)):
+        cell = whole_cells[parent[piece[s]]]
+        k = np.searchsorted(cells, cell)
+        owner[s] = -1
+        if fraction[s] > 0.0 and k < len(cells) and cells[k] == cell:
+            owner[s] = k
+            bounds[k, 1] += 1
+    total = 0
+    for k in range(len(cells)):
+        bounds[k, 0], total = total, total + bounds[k, 1]
+        bounds[k, 1] = bounds[k, 0]
+    rows = np.empty(total, dtype=np.int64)
+    for s in range(len(piece)):
+        if owner[s] >= 0:
+            rows[bounds[owner[s], 1]] = s
+            bounds[owner[s], 1] += 1
+    return rows, bounds
 
 
 @njit(cache=True)
