@@ -191,9 +191,10 @@ def _split_by_one(
     whole, every, below = whole_simplices(cells, mesh.cells)
     stairs = staircase(mesh.dim + 1)
     simplices, kept = divide_simplices(whole, points.values, 0, every, below, stairs, points.table)
-    points.divided(simplices[1][kept:])
-    parent, label = two_sides(cells, simplices[0])
-    return Partition(parent, label, *simplices, points, snapped)
+    piece, ids, at, share, sign = simplices
+    points.divided(ids[kept:])
+    parent, label = two_sides(cells, piece)
+    return Partition(parent, label, piece, ids, at, share, sign, points, snapped)
 
 
 def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
