@@ -11,7 +11,6 @@ from degenerate_strokes import body, strokes
 from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
 from verify.xfem.mapping.body_surface import BodySurface
 from verify.xfem.virtual import cut_mesh
 
@@ -56,7 +55,7 @@ def cut_one_body(dim: int, seed: int) -> int:
             insertions += 1
             skin.update(increment)
             assert_sound(cutter, skin)
-    if cutter.body.held == 0:
+    if cutter.body.held == 0 and cutter.body.vanished == 0:
         assert_same_cut(cutter.virtual_mesh(), cut_mesh(cutter.mesh, cutter.cuts))
     return insertions
 
@@ -66,21 +65,15 @@ def cut_one_body(dim: int, seed: int) -> int:
 # was not known to lie on it; a cell crossed only within round-off was never asked again; no facet
 # left to be made; faces of elements that are free in part only (2013, 2236, 5136); a point on an
 # edge within a face that no cut follows (9125); points on a line ordered along the difference of
-# two that are 1e-28 apart, and the surface 1/288 off (3107)
-FAILED_IN_SPACE = (308, 394, 497, 2013, 2236, 3107, 5136, 9125, 20073, 20869, 21414)
+# two that are 1e-28 apart, and the surface 1/288 off (3107); a piece
+# that had no volume, and was left out, had 3e-44 of its cell when it was divided further (20428)
+FAILED_IN_SPACE = (308, 394, 497, 2013, 2236, 3107, 5136, 9125, 20073, 20428, 20869, 21414)
 FAILED_ONCE = [(2, 147), (2, 1823)] + [(3, seed) for seed in FAILED_IN_SPACE]
 
 
 @pytest.mark.parametrize(("dim", "seed"), FAILED_ONCE)
 def test_what_once_failed_does_not(dim, seed) -> None:
     assert cut_one_body(dim, seed) > 0
-
-
-@pytest.mark.xfail(
-    strict=True, raises=XfemError, reason="one of 12 000 insertions is refused; cause not found"
-)
-def test_no_degenerate_cut_is_refused_for_what_is_separate_already() -> None:
-    cut_one_body(3, 20428)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

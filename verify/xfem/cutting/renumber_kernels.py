@@ -107,8 +107,8 @@ def slots_before(
 
 
 @njit(cache=True)
-def simplices_of(cells, whole_cells, parent, piece, fraction):
-    """Sub-simplices with a volume in some cells, cell by cell.
+def simplices_of(cells, whole_cells, parent, piece, place, fraction):
+    """Sub-simplices with a volume in pieces of some cells, cell by cell.
 
     Parameters
     ----------
@@ -116,6 +116,8 @@ def simplices_of(cells, whole_cells, parent, piece, fraction):
         Ascending.
     whole_cells, parent, piece : int arrays
         The cell of a sub-simplex is ``whole_cells[parent[piece]]``.
+    place : (p,) int array
+        Where each piece is stored, -1 for those that are left out.
     fraction : (s,) float array
         Share of each sub-simplex.
 
@@ -131,7 +133,8 @@ def simplices_of(cells, whole_cells, parent, piece, fraction):
         cell = whole_cells[parent[piece[s]]]
         k = np.searchsorted(cells, cell)
         owner[s] = -1
-        if fraction[s] > 0.0 and k < len(cells) and cells[k] == cell:
+        has_volume = fraction[s] > 0.0 and place[piece[s]] >= 0
+        if has_volume and k < len(cells) and cells[k] == cell:
             owner[s] = k
             bounds[k, 1] += 1
     total = 0
