@@ -258,6 +258,7 @@ class InternalForce:
         scale: float,
         force: _Floats,
         blocks: _Floats,
+        least: float = 0.0,
     ) -> None:
         """Add the stiffness of a membrane across its plane, at the last evaluation.
 
@@ -271,6 +272,9 @@ class InternalForce:
             Times the stiffness times the vector is added to `force` (N, 3).
         scale : float
             Times the stiffness is added to `blocks` (B, 3, 3).
+        least : float
+            Tension over μ that every direction is taken to have at least: without it what is slack
+            has no stiffness across its plane.
 
         Raises
         ------
@@ -281,7 +285,7 @@ class InternalForce:
             raise XfemError("stiffness from tension of a solid; expected a membrane in space")
         add_tension(
             self.virtual.cells, pattern.targets[: len(self.virtual.cells)], *self.geometry,
-            self.rotations, displacement, vector, share, scale, force, blocks,
+            self.rotations, displacement, vector, share, scale, least, force, blocks,
         )  # fmt: skip
 
     def stiffness(

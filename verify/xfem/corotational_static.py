@@ -21,6 +21,10 @@ _Floats = NDArray[np.float64]
 
 _HALVINGS = 12
 _ROUND_OFF = 256.0 * np.finfo(float).eps
+# of membranes, tensions over μ: at first, below which the exact stiffness is tried, and the least
+_TAUT, _SLACK, _LEAST, _FALL = 1.0, 1e-3, 1e-6, 0.1
+_ENOUGH = 1e-4  # of the fall of the energy that its slope promises
+_UNSEEN = 1e-12  # of the energy
 _INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
 
 
@@ -97,7 +101,8 @@ def static_equilibrium(
     if load_steps < 1:
         raise XfemError(f"{load_steps} load steps; expected at least one")
     full_load = np.zeros(shape) if load is None else load
-    newton = _Newton(force, fixed, tolerance, iterations)
+    method = _Descent if force.is_membrane else _Newton
+    newton = method(force, fixed, tolerance, iterations)
     displacement = np.zeros(shape) if start is None else start.copy()
     counts = []
     for k in range(1, load_steps + 1):
@@ -133,35 +138,45 @@ class _Newton:
     def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took."""
         # the first solve spreads the prescribed change with the stiffness before it
-        residual, _ = self._residual(displacement, load)
+        residual, _, _ = self._residual(displacement, load)
         correction = self._correct(displacement, residual, change)
         displacement = displacement + correction
-        residual, scale = self._residual(displacement, load)
+        residual, scale, _ = self._residual(displacement, load)
         norm = float(np.linalg.norm(residual))
         for count in range(1, self._iterations):
-            reach = np.abs(self._force.virtual.node_points + displacement).max()
-            floor = _ROUND_OFF * np.abs(self._blocks).max() * reach
-            if norm <= max(self._tolerance * scale, floor):
+            if self._is_small(norm, scale, displacement):
                 return displacement, count
             correction = self._correct(displacement, residual, None)
             for halving in range(_HALVINGS):
                 trial = displacement + 0.5**halving * correction
-                residual, scale = self._residual(trial, load)
+                residual, scale, _ = self._residual(trial, load)
                 if np.linalg.norm(residual) < norm:
                     break
             # a residual that must rise first is let rise: the energy may still fall
             displacement, norm = trial, float(np.linalg.norm(residual))
             if not np.isfinite(norm):
                 break
-        raise NotInEquilibriumError(
+        raise self._failure(norm, scale)
+
+    def _is_small(self, norm: float, scale: float, displacement: _Floats) -> bool:
+        """Whether a residual is within the tolerance, or what round-off of positions leaves."""
+        reach = np.abs(self._force.virtual.node_points + displacement).max()
+        return norm <= max(
+            self._tolerance * scale, _ROUND_OFF * float(np.abs(self._blocks).max()) * reach
+        )
+
+    def _failure(self, norm: float, scale: float) -> NotInEquilibriumError:
+        return NotInEquilibriumError(
             f"residual {norm:.3g} N against forces of {scale:.3g} N after {self._iterations} "
             f"iterations; expected {self._tolerance:g} of them. More load steps may help"
         )
 
-    def _residual(self, displacement: _Floats, load: _Floats) -> tuple[_Floats, float]:
-        internal, _ = self._force.evaluate(displacement)
+    def _residual(self, displacement: _Floats, load: _Floats) -> tuple[_Floats, float, float]:
+        """Residual, the scale to which it compares, and the potential energy."""
+        internal, energy = self._force.evaluate(displacement)
         scale = max(float(np.linalg.norm(internal)), float(np.linalg.norm(load)))
-        return np.where(self._fixed, 0.0, load - internal), scale
+        potential = energy - float(np.vdot(load, displacement))
+        return np.where(self._fixed, 0.0, load - internal), scale, potential
 
     def _correct(self, displacement: _Floats, residual: _Floats, change: _Floats | None) -> _Floats:
         try:
@@ -170,13 +185,24 @@ class _Newton:
             return self._solve(displacement, residual, change, exact=False)
 
     def _solve(
-        self, displacement: _Floats, residual: _Floats, change: _Floats | None, exact: bool
+        self,
+        displacement: _Floats,
+        residual: _Floats,
+        change: _Floats | None,
+        exact: bool,
+        least: float = 0.0,
     ) -> _Floats:
         pattern, blocks = self._pattern, self._blocks
         blocks[:] = 0.0
-        kind = "exact" if exact else "tensioned"
         self._force.evaluate(displacement)
-        self._force.add_stiffness(pattern, blocks, 1.0, kind, displacement)  # type: ignore[arg-type]
+        self._force.add_stiffness(
+            pattern, blocks, 1.0, "exact" if exact else "frozen", displacement
+        )
+        if not exact and self._force.is_membrane:
+            nothing = np.zeros_like(displacement)
+            self._force.add_tension(
+                pattern, displacement, nothing, 0.0, 1.0, nothing, blocks, least
+            )
         load = residual.copy()
         if change is not None:
             load -= (pattern.matrix(blocks) @ change.ravel()).reshape(change.shape)
@@ -201,3 +227,50 @@ class _Newton:
                 pass
         self._direct.factorize(self._blocks)
         return self._direct.solve(load)
+
+
+class _Descent(_Newton):
+    """Down the potential energy of a membrane, which has next to no stiffness where it is slack.
+
+    Tangents, not forces, are those of a tension that is at least so much; it falls as long as full
+    steps lower the energy. The exact stiffness follows where it is positive definite; beside a free
+    edge it may never be, and then iterations halve the residual.
+    """
+
+    def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
+        """Equilibrium after a change of the fixed components, and the solves that it took."""
+        least = _TAUT
+        residual, _, _ = self._residual(displacement, load)
+        correction = self._solve(displacement, residual, change, exact=False, least=least)
+        # what is prescribed happens; how far the rest goes with it, the energy decides after that
+        displacement = displacement + correction
+        residual, scale, energy = self._residual(displacement, load)
+        norm = float(np.linalg.norm(residual))
+        for count in range(1, self._iterations):
+            if self._is_small(norm, scale, displacement):
+                return displacement, count
+            correction = self._downhill(displacement, residual, least)
+            fall = float(np.vdot(residual, correction))
+            for halving in range(_HALVINGS):
+                share = 0.5**halving
+                trial = displacement + share * correction
+                residual, scale, after = self._residual(trial, load)
+                size = float(np.linalg.norm(residual))
+                unseen = share * fall < _UNSEEN * abs(energy)  # below the round-off of the energy
+                if after <= energy - _ENOUGH * share * fall or (unseen and size < norm):
+                    displacement, energy, norm = trial, after, size
+                    least = least * _FALL if halving == 0 else least
+                    break
+            else:
+                residual, scale, energy = self._residual(displacement, load)
+                least = max(least, _SLACK) / _FALL
+        raise self._failure(norm, scale)
+
+    def _downhill(self, displacement: _Floats, residual: _Floats, least: float) -> _Floats:
+        """Correction along which the energy falls."""
+        if least < _SLACK:
+            try:
+                return self._solve(displacement, residual, None, exact=True)
+            except SingularStiffnessError:
+                pass
+        return self._solve(displacement, residual, None, exact=False, least=max(least, _LEAST))

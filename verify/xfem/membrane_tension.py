@@ -16,8 +16,11 @@ _COLLAPSED = 1e-6  # stretch below which a direction carries no tension that cou
 
 
 @njit(cache=True)
-def _positive_stress(R, F, lam, mu, normal):
-    """(α, β) of the positive part α (I − N Nᵀ) + β U of the second Piola–Kirchhoff stress."""
+def _positive_stress(R, F, lam, mu, normal, least):
+    """(α, β) of the positive part α (I − N Nᵀ) + β U of the second Piola–Kirchhoff stress.
+
+    Principal values below `least` are taken as that.
+    """
     trace = square = 0.0
     for k in range(3):
         for l in range(3):
@@ -30,11 +33,11 @@ def _positive_stress(R, F, lam, mu, normal):
     gap = np.sqrt(max(2.0 * square - trace * trace, 0.0))
     high, low = 0.5 * (trace + gap), 0.5 * (trace - gap)
     pull = lam * (trace - 2.0)
-    first = second = 0.0
+    first = second = least
     if high > _COLLAPSED:
-        first = max(0.0, (2.0 * mu * (high - 1.0) + pull) / high)
+        first = max(least, (2.0 * mu * (high - 1.0) + pull) / high)
     if low > _COLLAPSED:
-        second = max(0.0, (2.0 * mu * (low - 1.0) + pull) / low)
+        second = max(least, (2.0 * mu * (low - 1.0) + pull) / low)
     if gap <= 1e-12 * trace:
         return 0.5 * (first + second), 0.0
     beta = (first - second) / gap
@@ -44,7 +47,7 @@ def _positive_stress(R, F, lam, mu, normal):
 @njit(cache=True)
 def add_tension(
     cells, targets, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
-    vector, share, scale, force, blocks,
+    vector, share, scale, least, force, blocks,
 ):  # fmt: skip
     """Add `share` times this stiffness times `vector` to `force`, `scale` times it to `blocks`.
 
@@ -59,6 +62,8 @@ def add_tension(
     vector, force : (N, 3) float array
     share, scale : float
         Where zero, nothing is added.
+    least : float
+        Tension over μ that every direction is taken to have at least.
     blocks : (B, 3, 3) float array
     """
     F = np.empty((3, 3))
@@ -71,7 +76,7 @@ def add_tension(
                 F[k, l] = (1.0 if k == l else 0.0) - N[k] * N[l]
                 for i in range(3):
                     F[k, l] += displacement[cells[piece, i], k] * b[i, l]
-        alpha, beta = _positive_stress(R, F, lam[cell], mu[cell], N)
+        alpha, beta = _positive_stress(R, F, lam[cell], mu[cell], N, least * mu[cell])
         if alpha == 0.0 and beta == 0.0:
             continue
         for k in range(3):

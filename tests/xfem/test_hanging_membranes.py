@@ -1,0 +1,80 @@
+"""Membranes that hang: slack at first, taut where they end up, and found in one load step."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from verify.xfem.corotational import InternalForce
+from verify.xfem.corotational_static import static_equilibrium
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.virtual import cut_mesh
+
+STIFFNESS, WEIGHT = 20.0, 19.6  # E times thickness, N/m; weight, N/m²
+WIDTH = 0.1
+
+
+def sheet(counts, height, cuts=(), width=1.0):
+    flat = rectangle_mesh(counts)
+    x, y = flat.points.T
+    points = np.column_stack([x, width * y, height(x, y)])
+    return cut_mesh(SimplexMesh(points, flat.cells), list(cuts))
+
+
+def area(virtual):
+    return float(virtual.volumes.sum())
+
+
+def hang(virtual, poisson, held, prescribed=None, load_steps=1):
+    force = InternalForce(virtual, isotropic(STIFFNESS, poisson, "plane stress"))
+    load = side_wise_mass(virtual, WEIGHT / 9.8).weight([0.0, 0.0, -9.8])
+    fixed = np.repeat(held[:, None], 3, axis=1)
+    path = None if prescribed is None else lambda share: share * prescribed
+    return static_equilibrium(force, fixed, path, load, load_steps)
+
+
+def catenary(span):
+    """Sag and energy of an elastic cable of length 1 between equal heights."""
+
+    def reach(h):
+        return h / STIFFNESS + 2 * h / WEIGHT * np.arcsinh(0.5 * WEIGHT / h) - span
+
+    h = brentq(reach, 1e-6 * WEIGHT, STIFFNESS)
+    s = np.linspace(0.0, 1.0, 20001)
+    tension = np.hypot(h, WEIGHT * (0.5 - s))
+    fall = WEIGHT * np.abs(0.5 - s) * (1.0 / tension + 1.0 / STIFFNESS)
+    return np.trapezoid(fall, s) / 2.0, np.trapezoid(tension**2, s) / (2 * STIFFNESS)
+
+
+@pytest.mark.parametrize("span", [1.0, 0.9])
+def test_a_flat_strip_hangs_as_the_elastic_catenary(span):
+    """Nothing holds a flat strip across itself, and a shorter span pushes it together first."""
+    sag, energy = catenary(span)
+    errors = []
+    for n in (16, 32):
+        virtual = sheet([n, 1], lambda x, y: 0.0 * x, width=WIDTH)
+        x = virtual.node_points[:, 0]
+        drawn = (span - 1.0) * x[:, None] * [1.0, 0.0, 0.0]
+        found = hang(virtual, 0.0, (x == 0.0) | (x == 1.0), drawn)
+        lowest = -found.displacement[:, 2].min()
+        errors.append((abs(found.energy / (WIDTH * energy) - 1.0), abs(lowest / sag - 1.0)))
+    assert max(errors[1]) < 2e-3  # linear elements: h²
+    assert errors[0][0] / errors[1][0] > 3.0
+
+
+@pytest.mark.parametrize("n", [6, 24])
+def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step(n):
+    """Parts of it are slack on their way: halving the residual ended at 7 % of the forces."""
+    bowl = sheet([n, n], lambda x, y: -3.0 * x * (1 - x) * y * (1 - y),
+                 [Plane([0.52, 0.5, 0.0], [1.0, -0.04, 0.0])])  # fmt: skip
+    x, y = bowl.node_points[:, :2].T
+    held = (x == 0.0) | (x == 1.0) | (y == 0.0) | (y == 1.0)
+    found = hang(bowl, 0.3, held)
+    assert found.iterations[0] < 40
+    assert found.reactions.sum(axis=0) == pytest.approx([0.0, 0.0, WEIGHT * area(bowl)], abs=1e-7)
+    # and the same by another way there
+    other = hang(bowl, 0.3, held, load_steps=3)
+    assert other.energy == pytest.approx(found.energy, rel=1e-10)
