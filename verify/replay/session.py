@@ -236,11 +236,12 @@ class Session:
             self._follow(self.body.held_by(grips.supports), grips, self._solver)
         self._begin_account()
 
-    def _parts(self, start: dict[int, _Floats]) -> BodyParts:
-        return BodyParts.of(self.stage, self.cutter.virtual_mesh(), start, self._held)
+    def _parts(self, virtual: VirtualMesh, start: dict[int, _Floats]) -> BodyParts:
+        return BodyParts.of(self.stage, virtual, start, self._held)
 
-    def _parts_after(self, increment: Increment) -> BodyParts:
-        return self._parts({hook: increment.inherit(at) for hook, at in self._start.items()})
+    def _parts_after(self, increment: Increment, virtual: VirtualMesh) -> BodyParts:
+        start = {hook: increment.inherit(at) for hook, at in self._start.items()}
+        return self._parts(virtual, start)
 
     def _body_of(self, parts: BodyParts) -> DynamicBody:
         return parts.body(self._load)
@@ -250,7 +251,7 @@ class Session:
 
     def _assemble(self) -> None:
         """Make the body anew that is there already, with what holds it from now on."""
-        parts = self._parts(self._start)
+        parts = self._parts(self.cutter.virtual_mesh(), self._start)
         body = self._body_of(parts)
         solver = Cholesky(body.pattern, self.stage.mesh.space, held_nodes(body))
         self._follow(body, parts.grips, solver)
@@ -343,9 +344,8 @@ class Session:
 
 def _blade_at(path: ToolPath, time: float) -> tuple[_Floats, _Floats]:
     """Tip and other end of a blade at a time."""
-    count = path.blades.shape[1]
-    place = [
-        [np.interp(time, path.times, path.blades[:, k, i]) for i in range(path.blades.shape[2])]
-        for k in (0, count - 1)
-    ]
-    return np.array(place[0]), np.array(place[1])
+    after = min(max(int(np.searchsorted(path.times, time)), 1), len(path.times) - 1)
+    begin, end = path.times[after - 1], path.times[after]
+    share = min(max((time - begin) / (end - begin), 0.0), 1.0) if end > begin else 0.0
+    blade = (1.0 - share) * path.blades[after - 1] + share * path.blades[after]
+    return blade[0], blade[-1]

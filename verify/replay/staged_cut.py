@@ -17,6 +17,7 @@ from verify.xfem.cholesky import Cholesky
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody
+from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]
 
@@ -45,7 +46,7 @@ class StagedCut:
     cutter : SemiProgressiveCutter
     surfaces : Surfaces
     parts_after : callable
-        What the body is made of after an increment.
+        What the body is made of after an increment, given all its pieces.
     body_of : callable
         The body of these parts.
     end_of_step : callable
@@ -56,7 +57,7 @@ class StagedCut:
 
     cutter: SemiProgressiveCutter
     surfaces: Surfaces
-    parts_after: Callable[[Increment], BodyParts]
+    parts_after: Callable[[Increment, VirtualMesh], BodyParts]
     body_of: Callable[[BodyParts], DynamicBody]
     end_of_step: Callable[[], float]
     timed: Callable[[str], AbstractContextManager[None]]
@@ -91,9 +92,11 @@ class StagedCut:
         yield None
         with self.timed("cutting"):
             increment = self.cutter.divide(division, self.end_of_step())
+        with self.timed("assembly"):
+            virtual = self.cutter.virtual_mesh()
         yield increment
         with self.timed("assembly"):
-            parts = self.parts_after(increment)
+            parts = self.parts_after(increment, virtual)
             body = self.body_of(parts)
             other = solver.extended(body.pattern, increment.source, held_nodes(body))
         yield increment

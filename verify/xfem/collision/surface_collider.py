@@ -164,7 +164,7 @@ class SurfaceCollider:
 
     def pierced(self, start: ArrayLike, end: ArrayLike) -> Contacts:
         """Facets that a segment pierces, in order along it."""
-        ends = self._check(np.stack([np.asarray(start), np.asarray(end)]))
+        ends = self._check(np.array([start, end], dtype=float))
         facet, share, at = segment_hits(
             ends[0], ends[1], self.positions, self._facets, self._tree.low, self._tree.high,
             self._tree.order,
@@ -176,7 +176,7 @@ class SurfaceCollider:
         """Facets within the radius of a tool's axis from start to end (a capsule)."""
         if not radius >= 0.0:
             raise XfemError(f"tool of radius {radius}; expected zero or more")
-        ends = self._check(np.stack([np.asarray(start), np.asarray(end)]))
+        ends = self._check(np.array([start, end], dtype=float))
         facet, distance, share, at = capsule_contacts(
             ends[0], ends[1], radius, self.positions, self._facets, self._tree.low,
             self._tree.high, self._tree.order,
@@ -184,7 +184,9 @@ class SurfaceCollider:
         return self._contacts(facet, distance, at, share)
 
     def _contacts(self, facet: _Ints, distance: _Floats, at: _Floats, share: _Floats) -> Contacts:
-        number = np.where(facet >= 0, self._numbers[facet], -1) if len(self._numbers) else facet
+        if len(facet) == 0 or len(self._numbers) == 0:
+            return Contacts(facet, facet, distance, at, share)
+        number = np.where(facet >= 0, self._numbers[facet], -1)
         piece = np.where(number >= 0, self.surface.facet_piece.rows[number], -1)
         return Contacts(number, piece, distance, at, share)
 
