@@ -149,21 +149,22 @@ def _newton_step(v):
         a20 = r02 * f00 + r12 * f10 + r22 * f20
         a21 = r02 * f01 + r12 * f11 + r22 * f21
         a22 = r02 * f02 + r12 * f12 + r22 * f22
-        # Hessian tr(S) I − S and its factorisation L D Lᵀ
+        # Hessian tr(S) I − S and its inverse by cofactors: one division, where elimination needs
+        # three after each other, for which the lanes would wait
+        h00, h11, h22 = a11 + a22, a00 + a22, a00 + a11
         h01, h02, h12 = -0.5 * (a01 + a10), -0.5 * (a02 + a20), -0.5 * (a12 + a21)
-        d0 = a11 + a22
-        l10, l20 = h01 / d0, h02 / d0
-        d1 = a00 + a22 - l10 * h01
-        e21 = h12 - l20 * h01
-        l21 = e21 / d1
-        d2 = a00 + a11 - l20 * h02 - l21 * e21
+        c00, c01, c02 = h11 * h22 - h12 * h12, h02 * h12 - h01 * h22, h01 * h12 - h02 * h11
+        c11, c12 = h00 * h22 - h02 * h02, h01 * h02 - h00 * h12
+        c22 = h00 * h11 - h01 * h01
+        determinant = h00 * c00 + h01 * c01 + h02 * c02
         # turn that makes Rᵀ F symmetric to first order
-        t0 = a21 - a12
-        t1 = a02 - a20 - l10 * t0
-        t2 = (a10 - a01 - l20 * t0 - l21 * t1) / d2
-        t1 = t1 / d1 - l21 * t2
-        t0 = t0 / d0 - l10 * t1 - l20 * t2
-        good = (d0 > least) & (d1 > least) & (d2 > least)
+        s0, s1, s2 = a21 - a12, a02 - a20, a10 - a01
+        inverse = 1.0 / determinant
+        t0 = inverse * (c00 * s0 + c01 * s1 + c02 * s2)
+        t1 = inverse * (c01 * s0 + c11 * s1 + c12 * s2)
+        t2 = inverse * (c02 * s0 + c12 * s1 + c22 * s2)
+        # the pivots of elimination, each times those before it
+        good = (h00 > least) & (c22 > least * h00) & (determinant > least * c22)
         turn = t0 * t0 + t1 * t1 + t2 * t2
         v[13 * LANES + l] = turn if good else np.inf
         t0, t1, t2 = 0.5 * t0, 0.5 * t1, 0.5 * t2
@@ -171,7 +172,8 @@ def _newton_step(v):
         nx = x + w * t0 + y * t2 - z * t1
         ny = y + w * t1 + z * t0 - x * t2
         nz = z + w * t2 + x * t1 - y * t0
-        scale = 1.0 / np.sqrt(nw * nw + nx * nx + ny * ny + nz * nz)
+        # the new one is longer by that of (1, t): known before it is, and so is its root
+        scale = 1.0 / np.sqrt((w * w + x * x + y * y + z * z) * (1.0 + 0.25 * turn))
         v[9 * LANES + l] = nw * scale if good else w
         v[10 * LANES + l] = nx * scale if good else x
         v[11 * LANES + l] = ny * scale if good else y
