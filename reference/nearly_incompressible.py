@@ -31,14 +31,10 @@ _MOST_DIRECT = 60_000
 def wants_pressure(scene: Scene, degree: int) -> bool:
     """Whether a scene is solved better with a pressure.
 
-    In plane stress nothing locks: the sheet is free to become thicker. And the stress that stress
-    intensities are computed from is Hooke's of the displacement alone, whose trace a mixed
-    displacement meets in the mean only: there one without a pressure is better.
+    In plane stress nothing locks: the sheet is free to become thicker.
     """
     material = scene.material
-    stresses = any(quantity.kind == "stress_intensity" for quantity in scene.quantities)
-    nearly = material.poisson >= LEAST_POISSON and material.plane != "stress"
-    return degree == 2 and nearly and not stresses
+    return degree == 2 and material.poisson >= LEAST_POISSON and material.plane != "stress"
 
 
 def solve_mixed(

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from reference.exact.hooke import hooke
 from reference.fracture.cells import CellGradients, cell_gradients
+from reference.fracture.pressure import stress_of
 from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution
@@ -93,11 +94,12 @@ def j_integral(
         If a radius is not positive or too small for the mesh.
     """
     law = hooke(material)
+    stresses = stress_of(solution, law)
     values = []
     for radius in np.atleast_1d(radii):
         around = ring(solution, tip, float(radius), whole=body_force is not None)
         at = around.at
-        stress = law.stress(at.gradient)
+        stress = stresses(around.cells, at)
         energy = 0.5 * np.sum(stress * at.gradient, axis=(2, 3))
         along = at.gradient @ direction  # u_i,1
         flux = np.einsum("mqij,mqi->mqj", stress, along) - energy[..., None] * direction

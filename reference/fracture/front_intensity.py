@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.exact.hooke import hooke
-from reference.fracture.cells import cell_gradients
+from reference.fracture.cells import CellGradients, cell_gradients
 from reference.fracture.front import Front
 from reference.fracture.front_modes import mode_field
+from reference.fracture.pressure import stress_of
 from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution
@@ -92,10 +93,14 @@ def front_intensity(
         _check_fit(solution, place, away, radius)
     within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
     ahead = at.axes[:, 0]
+    stresses = stress_of(solution, hooke(material))
     nodal = np.zeros((len(corners), 3))  # M of each mode is linear in the extension of each node
     for start in range(0, len(within), _CHUNK):
         part = within[start : start + _CHUNK]
-        found = _interaction(solution, material, front, part, ahead, place, body_force)
+        field = cell_gradients(solution, part)
+        stress = stresses(part, field)
+        moves = ahead[place[solution.cells[part, :4]]]
+        found = _interaction(material, front, field, stress, moves, body_force)
         nodes = place[solution.cells[part, :4]].ravel()
         for mode in range(3):
             values = found[:, :, mode].ravel()
@@ -158,28 +163,26 @@ def _check_fit(solution: Solution, place: NDArray[np.int64], away: Array, radius
 
 
 def _interaction(
-    solution: Solution,
     material: Material,
     front: Front,
-    cells: NDArray[np.int64],
+    at: CellGradients,
+    stress: Array,
     ahead: Array,
-    place: NDArray[np.int64],
     body_force: Array | None,
 ) -> Array:
     """M (m, 4, 3) of the three modes in some cells, if a corner alone moves by one ahead."""
-    at = cell_gradients(solution, cells)
     local = front.coordinates(at.points.reshape(-1, 3))
     axes = local.axes
     # a corner's direction and slopes in the axes of each point: (points, 4, 3)
-    unit = np.repeat(ahead[place[solution.cells[cells, :4]]], at.points.shape[1], axis=0)
+    unit = np.repeat(ahead, at.points.shape[1], axis=0)
     unit = unit @ axes.swapaxes(1, 2)
     slope = at.hats.reshape(-1, 4, 3) @ axes.swapaxes(1, 2)
     gradient = axes @ at.gradient.reshape(-1, 3, 3) @ axes.swapaxes(1, 2)
-    stress = hooke(material).stress(gradient)
+    stress = axes @ stress.reshape(-1, 3, 3) @ axes.swapaxes(1, 2)
     turned = gradient.swapaxes(1, 2)
-    share = np.tile(at.corner_shares, (len(cells), 1))
+    share = np.tile(at.corner_shares, (len(at.points), 1))
     weights = at.weights.reshape(-1, 1)
-    found = np.empty((len(cells), 4, 3))
+    found = np.empty((len(at.points), 4, 3))
     for mode in (1, 2, 3):
         field = mode_field(mode, material, local.ahead, local.across, front.curvature)
         work = np.sum(field.stress * gradient, axis=(1, 2))  # σ̂ : ε = σ : ε̂
@@ -192,5 +195,5 @@ def _interaction(
             source -= (field.gradient.swapaxes(1, 2) @ force[:, :, None])[:, :, 0]
         density = np.sum((unit @ flux) * slope, axis=2)
         density += share * (unit @ source[:, :, None])[:, :, 0]
-        found[:, :, mode - 1] = (weights * density).reshape(len(cells), -1, 4).sum(axis=1)
+        found[:, :, mode - 1] = (weights * density).reshape(len(at.points), -1, 4).sum(axis=1)
     return found

@@ -37,7 +37,7 @@ def square(cuts=(), **changes):
 TENSION = {"top": [0, 1], "bottom": [0, -1]}
 
 
-def plate(width, height, cuts, loads, supports=None, left=0.0, **changes):
+def plate(width, height, cuts, loads, supports=None, left=0.0, poisson=0.3, **changes):
     """Give a plate under tractions in balance, held at two corners so that nothing reacts."""
     corner = f"x > {width - 1e-12 * width} and y"
     held = [
@@ -51,7 +51,7 @@ def plate(width, height, cuts, loads, supports=None, left=0.0, **changes):
     return square(
         cuts,
         geometry={"kind": "rectangle", "lower": [left, 0], "upper": [width, height]},
-        material={"young": 1.0, "poisson": 0.3, "plane": "strain"},
+        material={"young": 1.0, "poisson": poisson, "plane": "strain"},
         supports=supports or held,
         loads=[{"kind": "traction", "where": w, "traction": t} for w, t in loads.items()],
         **changes,

@@ -1,9 +1,11 @@
 """Locking: what an element loses as Poisson's ratio goes to 1/2, and a pressure gains."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from ranks_of_tests import on_ranks
-from reference_scenes import energy_of, needs_fenicsx, polyline, square
+from reference_scenes import TENSION, energy_of, needs_fenicsx, plate, polyline, square
 from solid_scenes import cube, polygon
 
 from reference.exact import exact_solution
@@ -125,6 +127,49 @@ def test_the_reference_takes_a_pressure_by_itself_and_converges_from_the_first_l
     assert solver.solve(plane(0.3), 0, repetitions=0).notes["unknowns"] == "displacement"
     # the potential energy is a saddle value: no bound, but close
     assert one.ledger["strain"][0] == pytest.approx(two.ledger["strain"][0], rel=5e-4)
+
+
+def test_the_pressure_that_a_solution_leaves_out_is_found_again_from_its_displacement():
+    """By it the solution has the energy that the solver found with its own pressure."""
+    from reference.exact.hooke import hooke
+    from reference.fracture.cells import cell_gradients
+    from reference.fracture.pressure import NodalPressure
+    from verify.solvers import find_solver
+
+    scene = plane(0.4999)
+    found = find_solver("reference").solve(scene, 0, repetitions=0)
+    law, cells = hooke(scene.material), np.arange(len(found.cells))
+    at = cell_gradients(found, cells)
+    stress = NodalPressure(found, law).stress(law, cells, at)
+    pressure = 0.5 * np.trace(stress, axis1=2, axis2=3)  # 2με + pI, and div u counted in με
+    strain = 0.5 * (at.gradient + at.gradient.swapaxes(2, 3))
+    pressure -= law.shear * np.trace(strain, axis1=2, axis2=3)
+    density = law.shear * np.sum(strain**2, axis=(2, 3)) + pressure**2 / (2 * law.lame)
+    energy = np.sum(density * at.weights)
+    assert energy == pytest.approx(found.ledger["strain"][0], rel=1e-9)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+def test_stress_intensities_are_as_exact_at_4999_as_at_a_third(poisson):
+    """Tractions alone: K is the same for every ν."""
+    from reference.fracture import stress_intensity, tips
+    from verify.solvers import find_solver
+
+    cut = polyline("a", (0, 1), (0.5, 1))
+    scene = plate(1, 2, [cut], TENSION, poisson=poisson)
+    found = find_solver("reference").solve(scene, 1, repetitions=0)
+    assert (found.notes["unknowns"] == "displacement and pressure") == (poisson > 0.45)
+    (tip,) = tips(scene)
+    of = [found, replace(found, notes={})]  # the second time with Hooke's stress of u alone
+    one, blind = (
+        stress_intensity(f, scene.material, tip.point, tip.direction, tip.radii()).mode_1
+        / (2.825465 * np.sqrt(np.pi * 0.5))
+        - 1
+        for f in of
+    )
+    assert abs(one) < 2e-5  # 9e-6 and 11e-6
+    if poisson > 0.45:
+        assert abs(blind) > 20 * abs(one)
 
 
 def sector(height, curvature):

@@ -11,6 +11,7 @@ from reference.boundary_values import constrained_values
 from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_solution
+from reference.fracture.pressure import MIXED
 from reference.large_strain import solve_large_strain
 from reference.meshing import ConformingMesh
 from reference.nearly_incompressible import solve_mixed, wants_pressure
@@ -131,7 +132,7 @@ class ReferenceSolver:
     """Elements of the degree that the scene asks for, graded to every singular point.
 
     Quadratic elements of a linear static scene have a pressure of their own from Poisson's ratio
-    0.45 on, so that they do not lock, unless a stress intensity is asked for.
+    0.45 on, so that they do not lock.
 
     A motion is integrated by the trapezoidal rule, at finite rotation by the energy–momentum
     scheme, with the scene's time step on level 0; every level halves it with the elements, so
@@ -261,7 +262,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             linear.timings,
             {"cg": linear.answer.iterations} if linear.answer.iterations else {},
             {
-                "unknowns": "displacement and pressure" if pressure else "displacement",
+                "unknowns": MIXED if pressure else "displacement",
                 "linear solver": linear.answer.method,
                 "round-off": f"{linear.answer.round_off:.1e}",
                 "residual": f"{linear.answer.residual:.1e}",
