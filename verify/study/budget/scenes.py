@@ -24,7 +24,17 @@ Array = NDArray[np.float64]
 
 
 def with_kinematics(scene: Scene, kinematics: str) -> Scene:
-    """Return `scene` in ``"linear"`` or ``"corotational"`` kinematics, without acceptance."""
+    """Return `scene` in ``"linear"`` or ``"corotational"`` kinematics, without acceptance.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If it is a membrane, which has no linear kinematics to begin a budget with.
+    """
+    if scene.cell_dimension < scene.dimension:
+        raise UnsupportedSceneError(
+            "the error of a membrane is not taken apart: it has no linear kinematics to begin with"
+        )
     return _changed(scene, kinematics, {"analysis": {"kinematics": kinematics}})
 
 

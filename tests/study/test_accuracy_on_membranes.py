@@ -1,0 +1,208 @@
+"""The whole judgement on membranes: interpolants of a known field stand in for solvers."""
+
+from dataclasses import replace
+
+import meshio
+import numpy as np
+import pytest
+from cut_meshes import grid
+from membrane_meshes import bowl, layers, line, membrane, roof
+
+from verify.compare.hooke import law_of
+from verify.errors import UnsupportedSceneError
+from verify.report.bodies import deformed_body, error_body
+from verify.result import SolveRecord, Status, Verdict
+from verify.runner.error_field import nodal_error, write_error_field
+from verify.scene import load_scene
+from verify.study.accuracy import assess_accuracy
+from verify.study.budget.scenes import with_kinematics
+
+CASE = """
+title = "a sheet"
+requirement = "it shall hold"
+[geometry]
+kind = "file"
+file = "sheet.vtu"
+dimension = 3
+cells = "surface"
+[mesh]
+pattern = "given"
+[material]
+young = 1.0
+poisson = 0.3
+thickness = 0.01
+[analysis]
+kinematics = "corotational"
+[[supports]]
+where = "boundary"
+displacement = [0.0, 0.0, 0.0]
+[[cuts]]
+kind = "polygon"
+name = "cut"
+points = [[-1.0, -0.1, -1.0], [-1.0, -0.1, 2.0], [2.0, 1.1, 2.0], [2.0, 1.1, -1.0]]
+[[quantities]]
+kind = "strain_energy"
+[[quantities]]
+kind = "opening"
+name = "opening"
+point = [0.25, 0.4, 0.2]
+[[quantities]]
+kind = "displacement"
+name = "corner"
+point = [1.0, 1.0, 0.0]
+component = "y"
+[[quantities]]
+kind = "maximum_displacement"
+"""
+NAMES = ("displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_max")
+
+
+class Quadratic:
+    """Smooth on each side of the cut; `near` decides the side."""
+
+    singular_points = np.zeros((0, 3))
+
+    def __init__(self, swapped=False):
+        self._sign = -1 if swapped else 1
+
+    def _above(self, points, near):
+        near = points if near is None else near
+        return self._sign * (near[:, 1] - line(near[:, 0])) > 0
+
+    def displacement(self, points, near=None):
+        x, y, z = points.T
+        above = 0.1 * np.column_stack([x * y, 0.3 + z * z, y * z - x])
+        below = 0.1 * np.column_stack([y * y, x * z, x * x - z])
+        return np.where(self._above(points, near)[:, None], above, below)
+
+    def gradient(self, points, near=None):
+        x, y, z = points.T
+        o, i = np.zeros_like(x), np.ones_like(x)
+        above = 0.1 * np.array([[y, x, o], [o, o, 2 * z], [-i, z, y]]).transpose(2, 0, 1)
+        below = 0.1 * np.array([[o, 2 * y, o], [z, o, x], [2 * x, o, -i]]).transpose(2, 0, 1)
+        return np.where(self._above(points, near)[:, None, None], above, below)
+
+
+def interpolant(n, shape=roof, flip=False):
+    points, cells, layer = layers(shape, n, flip=flip)
+    far = np.where(layer[:, None] == 1, [[0.5, 3.0, 0.0]], [[0.5, -3.0, 0.0]])
+    u = Quadratic().displacement(points, far)
+    edge = points[layer == 1]
+    low = edge[np.abs(edge[:, 1] - line(edge[:, 0])) < 1e-9]
+    facets = np.stack([low[:-1], low[1:]], axis=1)
+    return membrane(points, cells, u, size=1 / n, unknowns=3 * len(points), cut_facets=facets)
+
+
+@pytest.fixture
+def sheet(tmp_path):
+    def make(checks="", shape=roof, n=4):
+        points, cells = grid(n, n)
+        meshio.Mesh(shape(*points.T), [("triangle", cells)]).write(tmp_path / "sheet.vtu")
+        (tmp_path / "case.toml").write_text(CASE + checks)
+        return load_scene(tmp_path / "case.toml")
+
+    return make
+
+
+def assess(scene, solvers, exact=None):
+    rows = [
+        SolveRecord("case", name, level, Status.SOLVED, size=s.size)
+        for name, own in solvers.items()
+        for level, s in own.items()
+    ]
+    return assess_accuracy(scene, rows, solvers, exact)
+
+
+def limit(metric, at_most):
+    return f'[[acceptance]]\ncheck = "error"\nmetric = "{metric}"\nat_most = {at_most}\n'
+
+
+EXACT = '[exact]\nsolution = "quadratic"\n'
+
+
+def test_interpolants_on_a_membrane_converge_to_the_exact_field(sheet):
+    checks = "".join(limit(m, 0.05) for m in ("displacement_l2", "jump_l2", "opening"))
+    result = assess(
+        sheet(EXACT + checks), {"xfem": {k: interpolant(4 * 2**k) for k in range(3)}}, Quadratic()
+    )
+    assert [(v.verdict, v.reason) for v in result.verdicts if v.verdict is not Verdict.PASS] == []
+    order = {rate.metric: rate.order for rate in result.rates}
+    # linear elements: two in the displacement, also on cuts, and one in the energy norm
+    assert order["displacement_l2"] == pytest.approx(2, abs=0.1)
+    assert order["jump_l2"] == pytest.approx(2, abs=0.2)
+    assert order["energy_norm"] == pytest.approx(1, abs=0.1)
+    finest = result.solves[2]
+    assert finest.metric("corner").value == pytest.approx(0.03, abs=1e-13)
+    largest = finest.metric("maximum_displacement")
+    assert abs(largest.reference - largest.value) <= largest.uncertainty
+    energy = finest.metric("strain_energy")
+    assert energy.unit == "J"
+    assert energy.uncertainty < 1e-4 * energy.reference
+
+
+def test_conforming_levels_on_a_membrane_judge_as_the_exact_field_does(sheet):
+    fine = {k: interpolant(6 * 2**k, flip=True) for k in range(3)}
+    true = assess(sheet(EXACT), {"xfem": {0: interpolant(4)}}, Quadratic())
+    against = assess(sheet(), {"xfem": {0: interpolant(4)}, "reference": fine})
+    for name in NAMES:
+        measured, truth = against.solves[0].metric(name), true.solves[0].metric(name)
+        assert abs(measured.value - truth.value) <= measured.uncertainty + truth.uncertainty, name
+    named = {metric.name: metric for metric in against.solves[0].metrics}
+    for name in ("strain_energy", "opening", "corner"):
+        exact = true.solves[0].metric(name).reference
+        assert abs(named[name].reference - exact) <= named[name].uncertainty + 1e-9
+
+
+def test_a_reference_that_is_no_finer_than_what_it_judges_cannot_tell(sheet):
+    coarse = {k: interpolant(n, flip=True) for k, n in enumerate((2, 4, 6))}
+    result = assess(
+        sheet(limit("jump_l2", 0.02)), {"xfem": {0: interpolant(8)}, "reference": coarse}
+    )
+    assert result.verdicts[0].verdict is Verdict.UNDECIDED
+
+
+def test_swapped_sides_of_a_membrane_fail(sheet):
+    checks = EXACT + limit("jump_l2", 0.05) + limit("displacement_l2", 0.05)
+    result = assess(sheet(checks), {"xfem": {0: interpolant(8)}}, Quadratic(swapped=True))
+    assert [v.verdict for v in result.verdicts] == [Verdict.FAIL] * 2
+
+
+def test_another_surface_or_a_part_of_one_is_an_error(sheet):
+    scene, whole = sheet(EXACT + limit("jump_l2", 0.1)), interpolant(4)
+    part = replace(whole, cells=whole.cells[:-3])
+    lifted = replace(whole, points=whole.points + np.array([0.0, 0.0, 0.05]))
+    for solution, reason in ((part, "of the body"), (lifted, "off the surface of the body")):
+        result = assess(scene, {"xfem": {0: solution}}, Quadratic())
+        assert result.verdicts[0].verdict is Verdict.ERROR
+        assert reason in result.verdicts[0].reason
+
+
+def test_a_finer_triangulation_of_a_curved_membrane_is_compared_and_says_how_far_it_is_off(sheet):
+    scene = sheet(EXACT, bowl, 12).model_copy()
+    scene._file = sheet(EXACT, bowl, 12).file
+    result = assess(scene, {"xfem": {0: interpolant(24, bowl)}}, Quadratic())
+    assert "off the surface of the scene" in result.solves[0].notes["surface"]
+    # the same field on the surface's own triangles, twice as coarse: four times the error
+    own = assess(scene, {"xfem": {0: interpolant(12, bowl)}}, Quadratic())
+    ratio = [r.solves[0].metric("jump_l2").value for r in (own, result)]
+    assert 0.1 * ratio[0] < ratio[1] < ratio[0]
+
+
+def test_the_error_of_a_membrane_is_drawn(tmp_path):
+    solution = interpolant(6)
+    error = nodal_error(solution, Quadratic())
+    # nodes carry the exact values; a hundredth of the way into a cell little is lost
+    assert 0 < error.max() < 1e-3
+    write_error_field(solution, Quadratic(), tmp_path / "error.vtu")
+    for body in (error_body(tmp_path / "error.vtu"), deformed_body(solution, 1.0)):
+        assert len(body.triangles) == len(solution.cells)
+        assert body.points.shape == (len(solution.points), 3)
+        # the ridge, the rim and both faces of the cut are drawn: more edges than those of the rim
+        assert len(body.edges) > 4 * 6 + 2 * 6
+
+
+def test_a_membrane_has_no_error_budget(sheet):
+    scene = sheet()
+    assert law_of(scene).shear == pytest.approx(0.01 / 2.6)
+    with pytest.raises(UnsupportedSceneError, match="membrane is not taken apart"):
+        with_kinematics(scene, "linear")
