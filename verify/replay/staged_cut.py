@@ -21,7 +21,7 @@ from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]
 
-MOST = 20  # elements that a cut whose work is spread may split, but for ties
+MOST = 24  # elements that a cut whose work is spread may split, but for ties
 
 _DONE = object()
 
