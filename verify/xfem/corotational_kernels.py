@@ -12,6 +12,7 @@ corners of an element need not.
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -155,18 +156,8 @@ def _turn_in_space(cells, gradients, parent, normals, displacement, quaternions,
             rotation_matrix(quaternions[piece], rotations[piece])
 
 
-@cache
-def corotational_kernels(space: int) -> SimpleNamespace:
-    """Loops for the plane or for space.
-
-    Returns
-    -------
-    SimpleNamespace
-        ``turn``, ``internal_force``, ``frozen_product``, ``add_frozen_stiffness``,
-        ``add_spin_stiffness``.
-    """
-    spins = 1 if space == 2 else 3
-
+def _internal_force(space: int) -> Any:
+    # the loops below are made for each space, so that innermost ones have a constant length
     @njit(cache=True)
     def internal_force(
         cells, gradients, parent, volumes, normals, lam, mu, rotations, displacement, force
@@ -233,6 +224,10 @@ def corotational_kernels(space: int) -> SimpleNamespace:
                     force[node, k] += total
         return energy
 
+    return internal_force
+
+
+def _frozen_product(space: int) -> Any:
     @njit(cache=True)
     def frozen_product(
         cells, gradients, parent, volumes, normals, lam, mu, rotations, vector, scale, product
@@ -283,6 +278,10 @@ def corotational_kernels(space: int) -> SimpleNamespace:
                         total += D[k, l] * gradients[cell, i, l]
                     product[node, k] += total
 
+    return frozen_product
+
+
+def _add_frozen_stiffness(space: int) -> Any:
     @njit(cache=True)
     def add_frozen_stiffness(
         targets, gradients, parent, volumes, normals, lam, mu, rotations, scale, blocks
@@ -326,6 +325,12 @@ def corotational_kernels(space: int) -> SimpleNamespace:
                             blocks[upper, k, l] += value
                             if i != j:
                                 blocks[lower, l, k] += value
+
+    return add_frozen_stiffness
+
+
+def _add_spin_stiffness(space: int) -> Any:
+    spins = 1 if space == 2 else 3
 
     @njit(cache=True)
     def add_spin_stiffness(
@@ -390,10 +395,23 @@ def corotational_kernels(space: int) -> SimpleNamespace:
                             blocks[at, k, l] += total
         return left_out
 
+    return add_spin_stiffness
+
+
+@cache
+def corotational_kernels(space: int) -> SimpleNamespace:
+    """Loops for the plane or for space.
+
+    Returns
+    -------
+    SimpleNamespace
+        ``turn``, ``internal_force``, ``frozen_product``, ``add_frozen_stiffness``,
+        ``add_spin_stiffness``.
+    """
     return SimpleNamespace(
         turn=_turn_in_plane if space == 2 else _turn_in_space,
-        internal_force=internal_force,
-        frozen_product=frozen_product,
-        add_frozen_stiffness=add_frozen_stiffness,
-        add_spin_stiffness=add_spin_stiffness,
+        internal_force=_internal_force(space),
+        frozen_product=_frozen_product(space),
+        add_frozen_stiffness=_add_frozen_stiffness(space),
+        add_spin_stiffness=_add_spin_stiffness(space),
     )

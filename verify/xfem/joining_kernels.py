@@ -163,6 +163,19 @@ def _join_face(cell, other, skip, p, q, cells, towards):
 
 
 @njit(cache=True)
+def _find_relevant(here, there, starts, pieces, label, relevant):
+    """Write which cuts divide either of two cells (places in the patch); whether any does."""
+    some = False
+    for cut in range(label.shape[1]):
+        relevant[cut] = False
+        for c in (here, there):
+            for k in range(starts[c], starts[c + 1]):
+                if pieces[k] < len(label) and label[pieces[k], cut] != 0:
+                    relevant[cut] = some = True
+    return some
+
+
+@njit(cache=True)
 def join_across_faces(
     begin, patch, cells, neighbours, place, starts, pieces, label, values, stairs, edges, towards
 ):
@@ -204,15 +217,9 @@ def join_across_faces(
             there = place[across] if across >= 0 else -1
             if there <= here:
                 continue
-            some = False
             for cut in range(cuts):
-                relevant[cut] = False
-                for c in (here, there):
-                    for k in range(starts[c], starts[c + 1]):
-                        if pieces[k] < len(label) and label[pieces[k], cut] != 0:
-                            relevant[cut] = some = True
                 sides[0, cut] = 0
-            if not some:
+            if not _find_relevant(here, there, starts, pieces, label, relevant):
                 _join_face(
                     cell, across, skip, pieces[starts[here]], pieces[starts[there]], cells, towards
                 )

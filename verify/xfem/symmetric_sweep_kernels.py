@@ -13,6 +13,17 @@ __all__ = ["add_lower_product", "solve_lower", "solve_upper", "symmetric_product
 _FUSED = {"contract"}
 
 
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _add_product(blocks, at, x, column, a, b, c):
+    """Add block `at`, of three, times the vector at a column to (a, b, c)."""
+    u, v, w = x[column, 0], x[column, 1], x[column, 2]
+    return (
+        a + blocks[at, 0, 0] * u + blocks[at, 0, 1] * v + blocks[at, 0, 2] * w,
+        b + blocks[at, 1, 0] * u + blocks[at, 1, 1] * v + blocks[at, 1, 2] * w,
+        c + blocks[at, 2, 0] * u + blocks[at, 2, 1] * v + blocks[at, 2, 2] * w,
+    )
+
+
 @njit(cache=True, fastmath=_FUSED)
 def solve_upper(starts, columns, diagonal, blocks, inverse, p, t, e, u):
     """Find t = (D + Lᵀ)⁻¹ p, with e = Lᵀ t and u = D t = p − e.
@@ -37,10 +48,7 @@ def solve_upper(starts, columns, diagonal, blocks, inverse, p, t, e, u):
         for back in range(starts[row + 1] - 1 - diagonal[row]):
             at = np.uint64(starts[row + 1] - 1 - back)
             column = np.uint64(columns[at])
-            x, y, z = t[column, 0], t[column, 1], t[column, 2]
-            a += blocks[at, 0, 0] * x + blocks[at, 0, 1] * y + blocks[at, 0, 2] * z
-            b += blocks[at, 1, 0] * x + blocks[at, 1, 1] * y + blocks[at, 1, 2] * z
-            c += blocks[at, 2, 0] * x + blocks[at, 2, 1] * y + blocks[at, 2, 2] * z
+            a, b, c = _add_product(blocks, at, t, column, a, b, c)
         e[row, 0], e[row, 1], e[row, 2] = a, b, c
         x, y, z = p[row, 0] - a, p[row, 1] - b, p[row, 2] - c
         u[row, 0], u[row, 1], u[row, 2] = x, y, z
@@ -134,11 +142,7 @@ def symmetric_product(starts, columns, diagonal, blocks, x, out):
         if size == 3:
             a = b = c = 0.0
             for at in range(np.uint64(diagonal[row]), np.uint64(starts[row + 1])):
-                j = np.uint64(columns[at])
-                u, v, w = x[j, 0], x[j, 1], x[j, 2]
-                a += blocks[at, 0, 0] * u + blocks[at, 0, 1] * v + blocks[at, 0, 2] * w
-                b += blocks[at, 1, 0] * u + blocks[at, 1, 1] * v + blocks[at, 1, 2] * w
-                c += blocks[at, 2, 0] * u + blocks[at, 2, 1] * v + blocks[at, 2, 2] * w
+                a, b, c = _add_product(blocks, at, x, np.uint64(columns[at]), a, b, c)
             out[row, 0], out[row, 1], out[row, 2] = a, b, c
             continue
         for k in range(size):

@@ -32,18 +32,31 @@ def ranges(bounds):
 
 
 @njit(cache=True)
+def _note(item, place, found, count):
+    """Write an integer to `found` unless it is there already; how many there are."""
+    if place[item] < 0:
+        place[item], found[count] = 0, item
+        count += 1
+    return count
+
+
+@njit(cache=True)
+def _noted(place, found, count):
+    """Return what has been found, and leave `place` as it was before."""
+    for k in range(count):
+        place[found[k]] = -1
+    return found[:count]
+
+
+@njit(cache=True)
 def distinct_in_rows(table, rows, place):
     """Distinct integers of some rows of a table; `place` is -1 for each integer, and stays so."""
     found = np.empty(len(rows) * table.shape[1], dtype=np.int64)
     count = 0
     for row in rows:
         for item in table[row]:
-            if place[item] < 0:
-                place[item], found[count] = 0, item
-                count += 1
-    for k in range(count):
-        place[found[k]] = -1
-    return found[:count]
+            count = _note(item, place, found, count)
+    return _noted(place, found, count)
 
 
 @njit(cache=True)
@@ -56,10 +69,5 @@ def distinct_in_lists(starts, items, rows, place):
     count = 0
     for row in rows:
         for k in range(starts[row], starts[row + 1]):
-            item = items[k]
-            if place[item] < 0:
-                place[item], found[count] = 0, item
-                count += 1
-    for k in range(count):
-        place[found[k]] = -1
-    return found[:count]
+            count = _note(items[k], place, found, count)
+    return _noted(place, found, count)
