@@ -1,6 +1,7 @@
 """Mass–spring: what springs can be fitted to, and what not."""
 
 from itertools import combinations
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from verify.methods.catalogue import cut_by
 from verify.methods.spring_fit import spring_stiffness
 from verify.methods.spring_force import SpringForce
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.corotational import TangentKind
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
@@ -138,6 +140,20 @@ def test_force_and_stiffness_are_derivatives_of_the_energy(dim, kinematics):
     # central differences of step 1e-6: 1e-12 of truncation, 1e-10 of round-off
     assert np.abs(gradient - found).max() < 1e-8
     assert np.abs(np.array(columns).T - K).max() < 1e-8
+
+
+@pytest.mark.parametrize("kind", get_args(TangentKind))
+def test_springs_have_every_stiffness_that_solvers_ask_for_and_one_alone_is_indefinite(kind):
+    mesh = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.3, 0.8]], [[0, 1, 2]])
+    force = SpringForce(cut_mesh(mesh, []), Material(np.array(0.4), np.array(0.7)))
+    u = -0.4 * mesh.points  # compressed: a spring gives way across
+    force.evaluate(u)
+    pattern = block_pattern(mesh.cells, 3)
+    blocks = np.zeros((len(pattern.columns), 2, 2))
+    force.add_stiffness(pattern, blocks, 1.0, kind, u)
+    lowest = np.linalg.eigvalsh(pattern.matrix(blocks).toarray())[0]
+    # of numbers of the size of a spring, 1
+    assert (lowest < -0.1) if kind == "exact" else (lowest > -1e-14)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -106,11 +106,11 @@ class SpringForce(InternalForce):
     ) -> None:
         """Add `scale` times the stiffness at the last `evaluate`; see `InternalForce`.
 
-        "frozen" leaves out what compressed springs take away from it across, so that it is never
-        indefinite.
+        "frozen" and "tensioned" leave out what compressed springs take away from it across, so that
+        they are never indefinite.
         """
-        if kind not in ("frozen", "exact"):
-            raise XfemError(f"stiffness '{kind}'; expected frozen or exact")
+        if kind not in ("frozen", "tensioned", "exact"):
+            raise XfemError(f"stiffness '{kind}'; expected frozen, tensioned or exact")
         targets = pattern.targets[: len(self.virtual.cells)]
         add_spring_stiffness(
             targets, self._edges, self.springs, self._directions, self._excess,
