@@ -1,7 +1,7 @@
 """What moves, as a scene states it: mass, elasticity, damping, loads and supports over time."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from reference.dynamics_law import law_of
 from reference.elasticity import load_form
 from reference.large_strain import solve_large_strain
 from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
-from reference.space import ConformingSpace
+from reference.space import ConformingSpace, SharedUnknowns
 from verify.errors import InputError
 from verify.scene import Gravity, Scene, Support
 from verify.scene.history import factor_at, first_factor, slope_at
@@ -49,12 +49,16 @@ class MovingBody:
     space : ConformingSpace
     exact : ExactSolution or None
         For supports and loads that are said to be exact.
+    pressure : bool
+        Whether a linear law has the pressure as an unknown.
 
     Attributes
     ----------
     law : Law
     mass : NodalMatrix
         Consistent.
+    inertia : PETSc Mat
+        The same, of all unknowns of the law.
     weight : (k,) array
         Dead load of gravity, N.
     held : (h,) int array
@@ -66,19 +70,23 @@ class MovingBody:
         If there is no density, or a support or load acts nowhere.
     """
 
-    def __init__(self, scene: Scene, space: ConformingSpace, exact: Any) -> None:
+    def __init__(
+        self, scene: Scene, space: ConformingSpace, exact: Any, pressure: bool = False
+    ) -> None:
         import ufl
-        from dolfinx import fem
 
         density = scene.material.density
         if density is None:
             raise InputError("material.density is missing: motion needs it", str(scene.file or ""))
         self.scene, self.space, self.exact = scene, space, exact
         V = space.function_space
-        inertia = fem.Constant(V.mesh, np.asarray(density))
-        inertia = inertia * ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V)) * ufl.dx
-        self.mass = NodalMatrix(assembled_matrix(inertia), space)
-        self.law = law_of(scene.material, space, scene.analysis.kinematics)
+        mass = _mass_matrix(density, ufl.TrialFunction(V), ufl.TestFunction(V))
+        self.mass = NodalMatrix(mass, space)
+        self.law = law_of(scene.material, space, scene.analysis.kinematics, pressure)
+        self.inertia = mass
+        if self.law.unknowns is not space:
+            W = self.law.unknowns.function_space
+            self.inertia = _mass_matrix(density, ufl.TrialFunctions(W)[0], ufl.TestFunctions(W)[0])
         self.weight = np.zeros(space.node_points.size)
         self._driven: list[tuple[Array, Any]] = []
         for load in scene.loads:
@@ -135,7 +143,7 @@ class MovingBody:
 
     def accelerations(self, forces: Array) -> Array:
         """Solve M a = forces, with a = 0 where held."""
-        return self._solved(self.mass.petsc.copy(), forces)
+        return self._solved(self.mass.petsc.copy(), self.space, "definite", forces)
 
     def _linear_equilibrium(self, factors: list[float]) -> Array:
         load = self.weight.copy()
@@ -144,13 +152,20 @@ class MovingBody:
         u = np.zeros_like(load)
         pairs = zip(self._supports, factors, strict=True)
         u[self.held] = self._filled([one.values(factor) for one, factor in pairs])
-        return u + self._solved(self.law.tangent(u), load - self.law.force(u))
+        left = load - self.law.force(u)
+        return u + self._solved(self.law.tangent(u), self.law.unknowns, "symmetric", left)
 
-    def _solved(self, matrix: Any, forces: Array) -> Array:
-        """Solve a positive definite system, with zero where held, and destroy it."""
+    def _solved(
+        self,
+        matrix: Any,
+        unknowns: SharedUnknowns,
+        kind: Literal["definite", "symmetric"],
+        forces: Array,
+    ) -> Array:
+        """Solve a system, with zero where held, and destroy it."""
         right = forces.copy()
         right[self.held] = 0.0
-        solver = NodalSolver(matrix, self.space, self.held)
+        solver = NodalSolver(matrix, unknowns, self.held, kind)
         found = solver.solve(right)
         solver.destroy()
         return found
@@ -190,3 +205,12 @@ class MovingBody:
         for one, value in zip(self._supports, values, strict=True):
             filled[one.place] = value
         return filled.ravel()[self.held]
+
+
+def _mass_matrix(density: float, u: Any, v: Any) -> Any:
+    """Assemble the consistent mass of trial and test displacements."""
+    import ufl
+    from dolfinx import fem
+
+    domain = ufl.domain.extract_unique_domain(v)
+    return assembled_matrix(fem.Constant(domain, np.asarray(density)) * ufl.inner(u, v) * ufl.dx)

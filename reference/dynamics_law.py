@@ -21,6 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.elasticity import lame, stiffness_form
+from reference.linear_solvers import direct_solver
+from reference.mixed_space import mixed_space
+from reference.nearly_incompressible import saddle_form
 from reference.nodal_algebra import (
     NodalMatrix,
     assembled_matrix,
@@ -28,19 +31,27 @@ from reference.nodal_algebra import (
     nodal_integral,
 )
 from reference.polar_stretch import PolarStretch
-from reference.space import ConformingSpace
+from reference.space import ConformingSpace, SharedUnknowns
 from reference.strain_energies import corotated, corotated_value
 from verify.scene import Material
 
-__all__ = ["CorotatedLaw", "Law", "LinearLaw", "law_of"]
+__all__ = ["CorotatedLaw", "Law", "LinearLaw", "MixedLaw", "law_of"]
 
 Array = NDArray[np.float64]
 
 
 class Law(Protocol):
-    """Forces (k,) and tangents (PETSc, to be destroyed by the caller) of displacements (k,)."""
+    """Forces (k,) and tangents (PETSc, to be destroyed by the caller) of displacements (k,).
+
+    Attributes
+    ----------
+    linear : bool
+    unknowns : SharedUnknowns
+        Of the tangents: the displacements, and with them what the law eliminates.
+    """
 
     linear: bool
+    unknowns: SharedUnknowns
 
     def energy(self, u: Array) -> float:
         """Return the stored energy, J (in the plane per metre)."""
@@ -85,13 +96,14 @@ class LinearLaw:
     def __init__(self, material: Material, space: ConformingSpace) -> None:
         import ufl
 
+        self.unknowns: SharedUnknowns = space
         V = space.function_space
         form = stiffness_form(material, ufl.TrialFunction(V), ufl.TestFunction(V))
         self._stiffness = NodalMatrix(assembled_matrix(form), space)
 
     def energy(self, u: Array) -> float:
         """½ u·K u."""
-        return 0.5 * float(u @ (self._stiffness @ u))
+        return 0.5 * float(u @ self.force(u))
 
     def force(self, u: Array) -> Array:
         """K u."""
@@ -99,11 +111,11 @@ class LinearLaw:
 
     def averaged(self, u: Array, later: Array) -> Array:
         """Return the force at the mean displacement."""
-        return self._stiffness @ (0.5 * (u + later))
+        return self.force(0.5 * (u + later))
 
     def viscous(self, u: Array, v: Array) -> Array:
         """K v."""
-        return self._stiffness @ v
+        return self.force(v)
 
     def tangent(self, u: Array) -> Any:
         """K."""
@@ -118,6 +130,51 @@ class LinearLaw:
     def viscous_tangent(self, u: Array) -> Any:
         """K."""
         return self.tangent(u)
+
+
+class MixedLaw(LinearLaw):
+    """Linear elasticity with a pressure, so that nothing locks; its tangents are saddle points.
+
+    The pressure has no inertia: p = C⁻¹ Bᵀ u follows the displacement, and leaves the stiffness
+    K = A + B C⁻¹ Bᵀ: products solve for p, and its inverse is that of the saddle point.
+
+    Parameters
+    ----------
+    material : Material
+    space : ConformingSpace
+        Of degree 2.
+    """
+
+    def __init__(self, material: Material, space: ConformingSpace) -> None:
+        import ufl
+
+        self.unknowns = mixed = mixed_space(space)
+        W = mixed.function_space
+        form = saddle_form(material, ufl.TrialFunctions(W), ufl.TestFunctions(W))
+        self._saddle = assembled_matrix(form)
+        self._x, self._product = self._saddle.createVecs()
+        of_p = mixed.pressure_indices()
+        self._of_p = of_p
+        self._compliance = self._saddle.createSubMatrix(of_p, of_p)  # −C
+        self._compliance.scale(-1.0)
+        self._pressure = direct_solver(self._compliance)
+
+    def force(self, u: Array) -> Array:
+        """K u."""
+        x, product = self._x, self._product
+        x.array[:] = self.unknowns.own_part(u)
+        self._saddle.mult(x, product)
+        right = product.getSubVector(self._of_p)
+        pressure = x.getSubVector(self._of_p)
+        self._pressure.solve(right, pressure)
+        product.restoreSubVector(self._of_p, right)
+        x.restoreSubVector(self._of_p, pressure)
+        self._saddle.mult(x, product)
+        return self.unknowns.everywhere(product.array).ravel()
+
+    def tangent(self, u: Array) -> Any:
+        """Saddle point of A, B and C."""
+        return self._saddle.copy()
 
 
 class CorotatedLaw:
@@ -136,6 +193,7 @@ class CorotatedLaw:
         from dolfinx import fem
 
         self._space = space
+        self.unknowns: SharedUnknowns = space
         V = space.function_space
         lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
         self._before, self._after, self._velocity = (fem.Function(V) for _ in range(3))
@@ -201,9 +259,13 @@ class CorotatedLaw:
             self._first.update()
 
 
-def law_of(material: Material, space: ConformingSpace, kinematics: str) -> Law:
-    """Make the law of the kinematics of a scene."""
-    return (LinearLaw if kinematics == "linear" else CorotatedLaw)(material, space)
+def law_of(
+    material: Material, space: ConformingSpace, kinematics: str, pressure: bool = False
+) -> Law:
+    """Make the law of the kinematics of a scene; a linear one with a pressure if that is wanted."""
+    if kinematics != "linear":
+        return CorotatedLaw(material, space)
+    return (MixedLaw if pressure else LinearLaw)(material, space)
 
 
 def _mean_turn(first: PolarStretch, last: PolarStretch) -> Any:

@@ -38,8 +38,15 @@ class Ledger:
         self._kinetic = self._strain = 0.0
 
     def open(self, body: MovingBody, state: State) -> None:
-        """Go on with another body in the same state."""
+        """Go on with another body in the same state.
+
+        A pressure that may jump across a cut from now on has more energy by the same displacement;
+        without one nothing changes.
+        """
+        strain = self._strain
         self._kinetic, self._strain = _energies(body, state)
+        if self.rows:
+            self._done["algorithmic"] -= self._strain - strain
 
     def started(self, body: MovingBody, state: State) -> None:
         """Enter what supports did that took up another velocity at once."""

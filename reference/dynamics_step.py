@@ -203,10 +203,10 @@ class Stepper:
             damping = body.law.viscous_tangent(0.5 * (before + u) if self.averaged else u)
             matrix.axpy(keep * h * scheme.gamma * stiffness, damping)
             damping.destroy()
-        matrix.axpy(1 - scheme.alpha_m + keep * h * scheme.gamma * mass, body.mass.petsc)
+        matrix.axpy(1 - scheme.alpha_m + keep * h * scheme.gamma * mass, body.inertia)
         symmetric = body.law.linear or not self.averaged
         kind: Any = "symmetric" if symmetric else "general"
-        self._solver = NodalSolver(matrix, body.space, body.held, kind)
+        self._solver = NodalSolver(matrix, body.law.unknowns, body.held, kind)
 
 
 def _scale(forces: StepForces) -> float:

@@ -2,9 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from reference.linear_solvers import Answer, near_null_space
 from reference.mixed_space import MixedSpace
 
@@ -60,8 +57,8 @@ def solve_saddle(
     comm = matrix.comm
     own = mixed.displacement_dofs[: space.owned]
     # GAMG wants the components of a node side by side, so this order is kept in the block
-    of_u = _index_set(own.ravel() + mixed.first, comm)
-    of_p = _index_set(mixed.pressure_dofs + mixed.first, comm)
+    of_u = mixed.indices(own.ravel())
+    of_p = mixed.pressure_indices()
     of_u.setBlockSize(d)
     block = matrix.createSubMatrix(of_u, of_u)
     near = near_null_space(block, space)
@@ -106,13 +103,6 @@ def solve_saddle(
             f"{reason}); {tolerance:.1e} is wanted"
         )
     return Answer("PETSc, MINRES with GAMG and pressures", min(size, left), left, iterations)
-
-
-def _index_set(numbers: NDArray[np.int64], comm: Any) -> Any:
-    from petsc4py import PETSc
-
-    found: Any = PETSc.IS()
-    return found.createGeneral(numbers.astype(PETSc.IntType), comm=comm)
 
 
 def _residual(matrix: Any, x: Any, vector: Any, out: Any) -> float:

@@ -53,6 +53,18 @@ class MixedSpace(SharedUnknowns):
         """Gather nodal displacements on all ranks; see the base class."""
         return self.space.everywhere(local[self._own_displacements])
 
+    def indices(self, own: NDArray[np.int64]) -> Any:
+        """Give some unknowns of this rank as PETSc's index set."""
+        from petsc4py import PETSc
+
+        numbers = (own + self.first).astype(PETSc.IntType)
+        found: Any = PETSc.IS()
+        return found.createGeneral(numbers, comm=self.function_space.mesh.comm)
+
+    def pressure_indices(self) -> Any:
+        """Give the pressures of this rank as PETSc's index set."""
+        return self.indices(self.pressure_dofs)
+
     @property
     def _own_displacements(self) -> NDArray[np.int64]:
         return self.displacement_dofs[: self.space.owned].ravel()

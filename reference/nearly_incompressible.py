@@ -20,7 +20,7 @@ from reference.weak_place import naming_weak_places
 from verify.errors import InputError
 from verify.scene import Material, Scene
 
-__all__ = ["LEAST_POISSON", "solve_mixed", "wants_pressure"]
+__all__ = ["LEAST_POISSON", "saddle_form", "solve_mixed", "wants_pressure"]
 
 # Poisson's ratio from which the pressure pays, measured: docs/reference-in-space.md
 LEAST_POISSON = 0.45
@@ -80,7 +80,7 @@ def solve_mixed(
     held = constrained_values(scene, space, exact)
     tests = ufl.TestFunctions(W)
     load = fem.form(load_form(scene, space, tests[0], exact))
-    form = fem.form(_saddle(scene.material, ufl.TrialFunctions(W), tests))
+    form = fem.form(saddle_form(scene.material, ufl.TrialFunctions(W), tests))
     matrix, vector, solution = held_system(form, load, mixed, *held)
     x = solution.x.petsc_vec
     timings = {"assembly": perf_counter() - start}
@@ -110,7 +110,8 @@ def solve_mixed(
     return LinearSolve(displacement, energy, answer, timings)
 
 
-def _saddle(material: Material, trial: Any, test: Any) -> Any:
+def saddle_form(material: Material, trial: Any, test: Any) -> Any:
+    """Write the virtual work of displacement and pressure, (u, p) against (v, q)."""
     import ufl
     from dolfinx import fem
 

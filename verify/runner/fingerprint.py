@@ -76,7 +76,9 @@ def code_of_solver(name: str) -> str:
 
 def code_of_comparison() -> str:
     """Return the hash of the sources that a verdict depends on, given the solutions."""
-    return digest_of([versions(), _sources(_COMPARING, _PACKAGE.parent / "reference" / "exact")])
+    reference = _PACKAGE.parent / "reference"
+    folders = (reference / "exact", reference / "fracture")  # stress intensities are measured
+    return digest_of([versions(), _sources(_COMPARING, *folders)])
 
 
 def _sources(parts: Iterable[str], *folders: Path) -> list[tuple[str, str]]:

@@ -131,8 +131,8 @@ class ConformingSolver:
 class ReferenceSolver:
     """Elements of the degree that the scene asks for, graded to every singular point.
 
-    Quadratic elements of a linear static scene have a pressure of their own from Poisson's ratio
-    0.45 on, so that they do not lock.
+    Quadratic elements of linear kinematics have a pressure of their own from Poisson's ratio 0.45
+    on, so that they do not lock.
 
     A motion is integrated by the trapezoidal rule, at finite rotation by the energy–momentum
     scheme, with the scene's time step on level 0; every level halves it with the elements, so
@@ -191,7 +191,7 @@ def _solve(
         if scene.analysis.kind == "static":
             return _equilibrium(scene, conforming_space(mesh, degree, comm), exact, pressure)
         largest = motion.largest(level, size)
-        return _moved(scene, mesh, degree, exact, motion.scheme, largest, comm, trial)
+        return _moved(scene, mesh, degree, exact, motion.scheme, largest, comm, pressure, trial)
 
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
@@ -233,10 +233,11 @@ def _moved(
     scheme: str,
     largest: float,
     comm: Any,
+    pressure: bool,
     trial: bool,
 ) -> _Answer:
     """Solve a dynamic scene."""
-    found = move(scene, mesh, degree, exact, scheme, largest, comm, trial)
+    found = move(scene, mesh, degree, exact, scheme, largest, comm, pressure, trial)
     return _Answer(
         found.space,
         found.times,

@@ -13,6 +13,7 @@ from reference.dynamics_body import MovingBody
 from reference.dynamics_cuts import partly_opened
 from reference.dynamics_ledger import Ledger
 from reference.dynamics_step import State, Stepper
+from reference.fracture.pressure import MIXED
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
@@ -75,6 +76,7 @@ def move(
     scheme: str,
     largest: float,
     comm: Any = None,
+    pressure: bool = False,
     trial: bool = False,
 ) -> ConformingMotion:
     """Integrate the motion of a dynamic scene.
@@ -92,6 +94,8 @@ def move(
         Largest time step, s.
     comm : MPI communicator, optional
         Of the ranks that share the work, each with the whole answer; default: each by itself.
+    pressure : bool
+        Whether linear kinematics have the pressure as an unknown.
     trial : bool
         Whether to stop after the first step: what compiles, compiles in it.
 
@@ -103,7 +107,7 @@ def move(
     RuntimeError
         If a step or the initial equilibrium is not found.
     """
-    return _Mover(scene, mesh, degree, exact, scheme, largest, comm).run(trial)
+    return _Mover(scene, mesh, degree, exact, scheme, largest, comm, pressure).run(trial)
 
 
 class _Mover:
@@ -118,9 +122,11 @@ class _Mover:
         scheme: str,
         largest: float,
         comm: Any,
+        pressure: bool,
     ) -> None:
         self.scene, self.mesh, self.degree, self.exact = scene, mesh, degree, exact
         self.comm = comm
+        self.pressure = pressure and scene.analysis.kinematics == "linear"
         self.scheme, self.largest = scheme, largest
         self.times = np.array(scene.analysis.output_times)
         self.opens = [self._snapped(float(getattr(cut, "opens_at", 0.0))) for cut in scene.cuts]
@@ -138,7 +144,7 @@ class _Mover:
         space = self._space(0.0 if open_before else -1.0)
         clock = perf_counter()
         with naming_weak_places(self.scene, space):
-            state = self._initial(MovingBody(self.scene, space, self.exact))
+            state = self._initial(self._body(space))
         self.timings["initial state"] += perf_counter() - clock
         starts = sorted({0.0, *self.opens})
         outputs: list[tuple[ConformingSpace, State]] = []
@@ -146,7 +152,7 @@ class _Mover:
             clock = perf_counter()
             opened = self._space(start)
             state = _carried(space, opened, state)
-            space, body = opened, MovingBody(self.scene, opened, self.exact)
+            space, body = opened, self._body(opened)
             self.timings["loading"] += perf_counter() - clock
             last = k == len(starts) - 1
             end = float(self.times[-1]) if last else starts[k + 1]
@@ -182,6 +188,9 @@ class _Mover:
             mesh = partly_opened(self.scene, self.mesh, opened)
             self.spaces[opened] = conforming_space(mesh, self.degree, self.comm)
         return self.spaces[opened]
+
+    def _body(self, space: ConformingSpace) -> MovingBody:
+        return MovingBody(self.scene, space, self.exact, self.pressure)
 
     def _initial(self, body: MovingBody) -> State:
         """State at the time 0, before what opens then."""
@@ -269,7 +278,9 @@ class _Mover:
     def _notes(self) -> dict[str, str]:
         sizes = sorted(self.sizes)
         said = " … ".join(f"{s:.6g} s" for s in dict.fromkeys((sizes[0], sizes[-1])))
-        return {"scheme": self.scheme, "mass": "consistent", "time step": said}
+        unknowns = MIXED if self.pressure else "displacement"
+        notes = {"scheme": self.scheme, "mass": "consistent", "time step": said}
+        return {**notes, "unknowns": unknowns}
 
 
 def _carried(space: ConformingSpace, other: ConformingSpace, state: State) -> State:
