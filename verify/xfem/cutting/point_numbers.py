@@ -15,7 +15,7 @@ from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import RowNumbers, find_row, number_of_row
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["FoundPoints", "PointNumbers", "runs_through"]
+__all__ = ["FoundPoints", "PointNumbers", "runs_through", "spans"]
 
 _Ints = NDArray[np.int64]
 
@@ -113,15 +113,6 @@ class PointNumbers:
         )
         return numbers
 
-    def supported(self, points: _Ints, nodes: _Ints) -> NDArray[np.bool_]:
-        """Whether mesh nodes (q, c) are among those that span the simplex of each point (q,).
-
-        The weights of all others are zero at the point; its own may round to zero.
-        """
-        found = np.empty(nodes.shape, dtype=np.bool_)
-        _supported(points, nodes, self.nodes, self._supports.rows, found)
-        return found
-
     def _meet_nodes(self, values: NDArray[np.float64], nodes: _Ints, cuts: _Ints) -> None:
         """Note which cuts run exactly through mesh nodes; of a growing one that may change."""
         zero = values == 0.0
@@ -149,13 +140,14 @@ def _write_new(numbers, local, nodes, count, found, stores):
 
 
 @njit(cache=True)
-def _supported(points, nodes, count, supports, found):
-    for q in range(len(points)):
-        for a in range(nodes.shape[1]):
-            found[q, a] = points[q] == nodes[q, a]
-            if points[q] >= count:
-                for k in range(_NODES):
-                    found[q, a] = found[q, a] or supports[points[q] - count, k] == nodes[q, a]
+def spans(node, point, count, supports):
+    """Whether a mesh node is among those that span the simplex of a point; `count` are nodes."""
+    if point < count:
+        return point == node
+    found = False
+    for k in range(_NODES):
+        found = found or supports[point - count, k] == node
+    return found
 
 
 @njit(cache=True)

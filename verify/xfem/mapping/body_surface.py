@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.cutting.distinct import ranges
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
+from verify.xfem.mapping.corner_kernels import place_corners
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.exposed_kernels import exposed_facets
 from verify.xfem.mapping.membrane_facets import membrane_facets, rim_edges
@@ -72,20 +73,13 @@ class BodySurface:
         self._facet_range[cells] = 0
         ids, at, piece, cell, inner = self._facets_of(cells)
         ids, at, source = self._edges.bisect(ids, at)
-        piece, cell = piece[source], cell[source]
-        nodes = mesh.cells[cell]
-        corner_nodes = np.repeat(nodes, ids.shape[1], axis=0)
-        self.surface.add(
-            ids,
-            at @ mesh.points[nodes],
-            at,
-            body.points.supported(ids.ravel(), corner_nodes).reshape(at.shape),
-            np.repeat(piece, ids.shape[1]).reshape(ids.shape),
-            inner[source],
-            body.piece_cells.rows,
-            cell,
-            self._facet_range,
+        material, counts, pieces, cell, inner = place_corners(
+            ids, at, source, piece, cell, inner, mesh.cells, mesh.points, body.points.supports
         )
+        self.surface.add(
+            ids, material, at, counts, pieces, inner, body.piece_cells.rows, cell,
+            self._facet_range,
+        )  # fmt: skip
 
     def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:
         """Point numbers, barycentric corners, piece, cell, whether on a cut, of their facets."""

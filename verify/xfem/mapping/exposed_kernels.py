@@ -9,33 +9,56 @@ __all__ = ["exposed_facets"]
 
 
 @njit(cache=True)
-def _find_facet(s, skip, begin, end, piece, sub_piece, sub_points):
-    """Give another simplex from `begin` to `end` that has the facet of s opposite to a corner.
+def _same_facet(s, skip, t, other, sub_points):
+    """Whether the facets of two simplices opposite to these corners have the same points."""
+    corners, same = sub_points.shape[1], True
+    for i in range(corners):
+        found = i == skip
+        for j in range(corners):
+            found = found or (j != other and sub_points[s, i] == sub_points[t, j])
+        same = same and found
+    return same
 
-    Of simplices of one piece if that is not -1; -1 if there is none.
-    """
+
+@njit(cache=True)
+def _find_facet(s, skip, begin, end, sub_points):
+    """Give another simplex from `begin` to `end` with the facet of s opposite to `skip`, or -1."""
     corners, total = sub_points.shape[1], -sub_points[s, skip]
     for k in range(corners):
         total += sub_points[s, k]
     for t in range(begin, end):
-        if t == s or (piece >= 0 and sub_piece[t] != piece):
+        if t == s:
             continue
         rest = -total
         for k in range(corners):
             rest += sub_points[t, k]
         for other in range(corners):
             # the sums tell most facets apart
-            if sub_points[t, other] != rest:
-                continue
-            same = True
-            for i in range(corners):
-                found = i == skip
-                for j in range(corners):
-                    found = found or (j != other and sub_points[s, i] == sub_points[t, j])
-                same = same and found
-            if same:
+            if sub_points[t, other] == rest and _same_facet(s, skip, t, other, sub_points):
                 return t
     return -1
+
+
+@njit(cache=True)
+def _mark_shared(begin, end, sub_piece, sub_points, sums, shared):
+    """Mark the facets (k, d + 1) that two simplices of one piece share; `sums` (k,) is room."""
+    corners = sub_points.shape[1]
+    for s in range(begin, end):
+        sums[s - begin] = 0
+        for k in range(corners):
+            sums[s - begin] += sub_points[s, k]
+            shared[s - begin, k] = False
+    for s in range(begin, end):
+        for t in range(s + 1, end):
+            if sub_piece[t] != sub_piece[s]:
+                continue
+            more = sums[t - begin] - sums[s - begin]
+            for skip in range(corners):
+                for other in range(corners):
+                    # the sums tell most facets apart
+                    apart = sub_points[t, other] - sub_points[s, skip] != more
+                    if not apart and _same_facet(s, skip, t, other, sub_points):
+                        shared[s - begin, skip] = shared[t - begin, other] = True
 
 
 @njit(cache=True)
@@ -97,6 +120,7 @@ def _beyond(
                     continue
                 ids[count, k] = sub_points[s, v]
                 for b in range(corners):
+                    at[count, k, b] = 0.0
                     for j in range(corners):
                         if cells[across, j] == cells[cell, b]:
                             at[count, k, b] = sub_barycentric[s, v, j]
@@ -105,6 +129,31 @@ def _beyond(
             _turn(ids[count], at[count], -orientation[across] * sub_sign[s], skip)
             count += 1
     return count
+
+
+@njit(cache=True)
+def _rows(room, corners):
+    """Point numbers, barycentric corners, piece, cell and whether on a cut, not yet written."""
+    return (
+        np.empty((room, corners - 1), dtype=np.int64),
+        np.empty((room, corners - 1, corners)),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.bool_),
+    )
+
+
+@njit(cache=True)
+def _with_room(out, count, more):
+    """Give the same rows with room for more, and as many again."""
+    new = _rows(2 * (count + more), out[1].shape[2])
+    for row in range(count):
+        for k in range(out[0].shape[1]):
+            new[0][row, k] = out[0][row, k]
+            for a in range(out[1].shape[2]):
+                new[1][row, k, a] = out[1][row, k, a]
+        new[2][row], new[3][row], new[4][row] = out[2][row], out[3][row], out[4][row]
+    return new
 
 
 @njit(cache=True)
@@ -118,20 +167,21 @@ def exposed_facets(
     and whether it lies on a cut. Facets are oriented outwards.
     """
     corners = cells.shape[1]
-    room = 0
+    room = 256
     for cell in wanted:
-        room += corners * max(1, sub_range[cell, 1] - sub_range[cell, 0])
+        room += corners + 2 * (sub_range[cell, 1] - sub_range[cell, 0])
+    out, count = _rows(room, corners), np.int64(0)
+    sums, shared = np.empty(32, dtype=np.int64), np.empty((32, corners), dtype=np.bool_)
+    for cell in wanted:
+        begin, end = sub_range[cell, 0], sub_range[cell, 1]
+        most = corners * max(1, end - begin)
         for a in range(corners):
             across = neighbours[cell, a]
             if across >= 0:
-                room += corners * (sub_range[across, 1] - sub_range[across, 0])
-    ids = np.empty((room, corners - 1), dtype=np.int64)
-    at = np.zeros((room, corners - 1, corners))
-    piece_of, cell_of = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
-    inner = np.empty(room, dtype=np.bool_)
-    out, count = (ids, at, piece_of, cell_of, inner), np.int64(0)
-    for cell in wanted:
-        begin, end = sub_range[cell, 0], sub_range[cell, 1]
+                most += corners * (sub_range[across, 1] - sub_range[across, 0])
+        if count + most > len(out[0]):
+            out = _with_room(out, count, most)
+        ids, at, piece_of, cell_of, inner = out
         if not split[cell]:
             piece = first_piece[cell]
             for a in range(corners):
@@ -143,7 +193,9 @@ def exposed_facets(
                     k = 0
                     for b in range(corners):
                         if b != a:
-                            ids[count, k], at[count, k, b] = cells[cell, b], 1.0
+                            ids[count, k] = cells[cell, b]
+                            for c in range(corners):
+                                at[count, k, c] = 1.0 if c == b else 0.0
                             k += 1
                     piece_of[count], cell_of[count] = piece, cell
                     inner[count] = across >= 0
@@ -157,9 +209,13 @@ def exposed_facets(
                     sub_points, sub_barycentric, sub_sign, orientation, out, count,
                 )  # fmt: skip
             continue
+        if end - begin > len(sums):
+            sums = np.empty(2 * (end - begin), dtype=np.int64)
+            shared = np.empty((2 * (end - begin), corners), dtype=np.bool_)
+        _mark_shared(begin, end, sub_piece, sub_points, sums, shared)
         for s in range(begin, end):
             for skip in range(corners):
-                if _find_facet(s, skip, begin, end, sub_piece[s], sub_piece, sub_points) >= 0:
+                if shared[s - begin, skip]:
                     continue
                 face = _face_of(sub_barycentric[s], skip)
                 if face >= 0:
@@ -172,7 +228,7 @@ def exposed_facets(
                     if across >= 0:
                         first, last = sub_range[across, 0], sub_range[across, 1]
                     # the same facet of the cell across may be that of a piece that moves otherwise
-                    same = _find_facet(s, skip, first, last, np.int64(-1), sub_piece, sub_points)
+                    same = _find_facet(s, skip, first, last, sub_points)
                     if other >= 0 and (
                         same < 0
                         or _meets(
@@ -197,6 +253,7 @@ def exposed_facets(
                 inner[count] = face < 0 or neighbours[cell, face] >= 0
                 _turn(ids[count], at[count], orientation[cell] * sub_sign[s], skip)
                 count += 1
+    ids, at, piece_of, cell_of, inner = out
     return ids[:count], at[:count], piece_of[:count], cell_of[:count], inner[:count]
 
 
