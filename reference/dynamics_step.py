@@ -93,8 +93,8 @@ class Stepper:
         if not self.averaged:
             self._before = self._resisting(start.displacement, start.velocity)
         self._load = self._external(start.time)
-        # Newton starts from u + Δt v. With the old acceleration kept on, as loads that jump leave it
-        # behind, elements smaller than Δt² a would begin inside out.
+        # Newton starts from u + Δt v: with the acceleration that a jump of the loads leaves behind,
+        # elements smaller than Δt² a would begin inside out
         a = -(scheme.beta_old / scheme.beta) * start.acceleration
         still = self._end(start, 0.0 * a)[0]
         values, _ = body.prescribed(start.time + h)
