@@ -80,6 +80,7 @@ class MovingBody:
             raise InputError("material.density is missing: motion needs it", str(scene.file or ""))
         self.scene, self.space, self.exact = scene, space, exact
         V = space.function_space
+        density *= scene.material.thickness or 1.0  # of a membrane
         mass = _mass_matrix(density, ufl.TrialFunction(V), ufl.TestFunction(V))
         self.mass = NodalMatrix(mass, space)
         self.law = law_of(scene.material, space, scene.analysis.kinematics, pressure)

@@ -12,7 +12,8 @@ which leaves the stress 2 μ F̄ + (½ λ (s₀ + s₁ − 2 d) − 2 μ) D. In 
 is quadratic and blind to rotations: D = ∂q/∂F(F̄) / (s₀ + s₁). In space U₁² − U₀² =
 Ū (U₁ − U₀) + (U₁ − U₀) Ū with the mean stretch Ū = ½ (U₀ + U₁), so that D = F̄ Ū⁻¹: exact, not 0/0
 at rest, and without a quadrature over the step. It asks for a regular Ū: a cell that is pressed
-through zero volume at a mean stretch of zero has no such mean force.
+through zero volume at a mean stretch of zero has no such mean force. So it is on a membrane, in whose
+tangent planes U is.
 """
 
 from typing import Any, Protocol
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from reference.elasticity import lame, stiffness_form
 from reference.linear_solvers import direct_solver
+from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import mixed_space
 from reference.nearly_incompressible import saddle_form
 from reference.nodal_algebra import (
@@ -195,15 +197,16 @@ class CorotatedLaw:
         self._space = space
         self.unknowns: SharedUnknowns = space
         V = space.function_space
-        lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
+        thickness = material.thickness or 1.0
+        lam, mu = (fem.Constant(V.mesh, thickness * value) for value in lame(material))
         self._before, self._after, self._velocity = (fem.Function(V) for _ in range(3))
         v, w = ufl.TestFunction(V), ufl.TrialFunction(V)
         degree = 4 * space.degree - 2
-        first, last = (PolarStretch(u, degree) for u in (self._before, self._after))
+        polar = MembraneStretch if space.mesh.cell_dimension < space.dimension else PolarStretch
+        first, last = (polar(u, degree) for u in (self._before, self._after))
         self._first, self._last, dx = first, last, last.measure
         force = last.derivative(corotated(last, lam, mu) * dx, v)
-        d = space.dimension
-        share = lam / 2 * (first.s + last.s - 2 * d) - 2 * mu
+        share = lam / 2 * (first.s + last.s - 2 * last.stretches) - 2 * mu
         stress = mu * (first.F + last.F) + share * _mean_turn(first, last)
         averaged = ufl.inner(stress, ufl.grad(v)) * dx
         viscous = _turned_work(last.R, ufl.grad(self._velocity), ufl.grad(v), lam, mu) * dx
@@ -268,7 +271,7 @@ def law_of(
     return (MixedLaw if pressure else LinearLaw)(material, space)
 
 
-def _mean_turn(first: PolarStretch, last: PolarStretch) -> Any:
+def _mean_turn(first: PolarStretch | MembraneStretch, last: PolarStretch | MembraneStretch) -> Any:
     """D of the module: a discrete gradient of tr U."""
     import ufl
 
@@ -276,7 +279,10 @@ def _mean_turn(first: PolarStretch, last: PolarStretch) -> Any:
     if len(mean[0, :]) == 2:
         return 2 * (mean + ufl.cofac(mean)) / (first.s + last.s)
     stretches = [ufl.sym(state.R.T * state.F) for state in (first, last)]
-    return mean * ufl.inv(0.5 * (stretches[0] + stretches[1]))
+    stretch = 0.5 * (stretches[0] + stretches[1])
+    if isinstance(last, MembraneStretch):  # across the tangent plane nothing is stretched
+        stretch += last.normal
+    return mean * ufl.inv(stretch)
 
 
 def _turned_work(turn: Any, rate: Any, test: Any, lam: Any, mu: Any) -> Any:

@@ -32,6 +32,8 @@ class MembraneStretch:
         Change of area; sum of the two stretches.
     stretches : int
         2.
+    normal : ufl expression (3, 3)
+        Projection on the undeformed normals.
     measure : ufl.Measure
     """
 
@@ -41,8 +43,9 @@ class MembraneStretch:
         mesh = displacement.function_space.mesh
         self._displacement, self.stretches = displacement, 2
         self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
-        self._plane = ufl.Jacobian(mesh) * ufl.JacobianInverse(mesh)
-        F = self.F = self._plane + ufl.grad(displacement)
+        plane = ufl.Jacobian(mesh) * ufl.JacobianInverse(mesh)
+        self.normal = ufl.Identity(3) - plane
+        F = self.F = plane + ufl.grad(displacement)
         C = F.T * F
         self.J = ufl.sqrt((ufl.tr(C) ** 2 - ufl.tr(C * C)) / 2)
         self.s = ufl.sqrt(ufl.tr(C) + 2 * self.J)
@@ -61,5 +64,4 @@ class MembraneStretch:
         """Stiffness of a unit tension in all directions across the undeformed tangent planes."""
         import ufl
 
-        normal = ufl.Identity(3) - self._plane
-        return ufl.inner(normal * ufl.grad(trial), ufl.grad(test))
+        return ufl.inner(self.normal * ufl.grad(trial), ufl.grad(test))

@@ -49,10 +49,10 @@ def kinetic(solution: Solution, density: float) -> Kinetic:
     """
     if solution.velocity is None:
         raise InputError("a solution without velocities has no kinetic energy")
-    d = solution.dimension
+    d, k = solution.dimension, solution.cell_dimension
     shape = simplices(solution.points, solution.cells)
-    place, share = simplex_rule(d, 2 if solution.order == 1 else 4)
-    hats = _shape_functions(place, d, solution.order)
+    place, share = simplex_rule(k, 2 if solution.order == 1 else 4)
+    hats = _shape_functions(place, k, solution.order)
     mass = density * (shape.volume[:, None] * share).ravel()
     rows: dict[str, list[Array]] = {"energy": [], "linear": [], "angular": [], "scales": []}
     for u, v in zip(solution.displacement, solution.velocity, strict=True):
@@ -74,10 +74,10 @@ def kinetic(solution: Solution, density: float) -> Kinetic:
     )  # fmt: skip
 
 
-def _shape_functions(place: Array, d: int, order: int) -> Array:
-    """Values (q, k) of the nodes' shape functions at barycentric points (q, d + 1)."""
+def _shape_functions(place: Array, k: int, order: int) -> Array:
+    """Values (q, n) of the nodes' shape functions at barycentric points (q, k + 1)."""
     if order == 1:
         return place
-    ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)][: d * (d + 1) // 2]
+    ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)][: k * (k + 1) // 2]
     edges = [4 * place[:, a] * place[:, b] for a, b in ends]
     return np.column_stack([place * (2 * place - 1), *edges])

@@ -31,22 +31,14 @@ import_dolfinx()  # fail here, by name, and not in the middle of a solve
 def _refusal(scene: Scene) -> str | None:
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
-        if geometry.cells == "surface" and (reason := _no_membrane(scene)):
-            return reason
+        if geometry.cells == "surface" and scene.exact is not None:
+            return "exact fields on membranes are not offered by the reference"
         if reason := not_imprinted(scene):
             return reason
     elif not isinstance(geometry, Rectangle | Polygon | Box):
         return f"conforming meshes of a '{geometry.kind}' geometry are not offered yet"
     if any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
         return "a cut that grows while the body moves is played (verify play), not solved"
-    return None
-
-
-def _no_membrane(scene: Scene) -> str | None:
-    if scene.analysis.kind == "dynamic":
-        return "the motion of membranes is not offered by the reference"
-    if scene.exact is not None:
-        return "exact fields on membranes are not offered by the reference"
     return None
 
 

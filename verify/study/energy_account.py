@@ -42,7 +42,8 @@ def account_metrics(
     if solution.velocity is None or scene.material.density is None:
         why = "the solution has no velocities"
         return metrics, notes | {name: why for name in ACCOUNT if "momentum" in name}
-    found = kinetic(solution, scene.material.density)
+    thickness = scene.material.thickness or 1.0  # of a membrane
+    found = kinetic(solution, thickness * scene.material.density)
     for kind, momentum, scale in (
         ("linear", found.linear, found.linear_scale),
         ("angular", found.angular, found.angular_scale),

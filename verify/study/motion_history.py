@@ -29,7 +29,8 @@ def motion_history(scene: Scene, solution: Solution) -> dict[str, list[float]]:
     if total is not None:
         rows["total"] = total
     if solution.velocity is not None and scene.material.density is not None:
-        found = kinetic(solution, scene.material.density)
+        thickness = scene.material.thickness or 1.0  # of a membrane
+        found = kinetic(solution, thickness * scene.material.density)
         rows |= _components("linear_momentum", found.linear, _AXES)
         rows |= _components("angular_momentum", found.angular, _AXES[-found.angular.shape[1] :])
     return {name: [float(value) for value in row] for name, row in rows.items()}
