@@ -12,8 +12,8 @@ which leaves the stress 2 μ F̄ + (½ λ (s₀ + s₁ − 2 d) − 2 μ) D. In 
 is quadratic and blind to rotations: D = ∂q/∂F(F̄) / (s₀ + s₁). In space U₁² − U₀² =
 Ū (U₁ − U₀) + (U₁ − U₀) Ū with the mean stretch Ū = ½ (U₀ + U₁), so that D = F̄ Ū⁻¹: exact, not 0/0
 at rest, and without a quadrature over the step. It asks for a regular Ū: a cell that is pressed
-through zero volume at a mean stretch of zero has no such mean force. So it is on a membrane, in whose
-tangent planes U is.
+through zero volume at a mean stretch of zero has no such mean force. On a membrane alike: there U
+is the stretch within the tangent planes.
 """
 
 from typing import Any, Protocol

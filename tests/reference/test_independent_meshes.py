@@ -12,7 +12,12 @@ FINER = 0.83  # of the sizes: no node of one mesh is one of the other's by desig
 
 def judged_by_meshes():
     scenes = {name: load_scene(name) for name in list_cases()}
-    return [n for n, s in scenes.items() if not s.judged_by_exact and s.played_only is None]
+    return [
+        name
+        for name, scene in scenes.items()
+        if not scene.judged_by_exact and scene.played_only is None
+        and scene.mesh.pattern != "given"  # of which there is one sequence
+    ]  # fmt: skip
 
 
 @pytest.fixture
