@@ -80,7 +80,6 @@ def test_random_strokes_in_space() -> None:
 
 
 @pytest.mark.heavy
-@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_thousands_of_random_strokes(dim) -> None:
     THOROUGH(_claims(dim, 4))()

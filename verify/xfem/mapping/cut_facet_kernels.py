@@ -70,6 +70,40 @@ def _write(end, out, f, corners, a, b, c, at, side):
 
 
 @njit(cache=True)
+def _number_points(edges, place, share, known):
+    """Give the points on edges their numbers (z,), new ones from `known` on, and count these.
+
+    Edges and places of the new ones come first afterwards.
+    """
+    number, count = np.empty(len(edges), dtype=np.int64), 0
+    for z in range(len(edges)):
+        number[z] = edges[z, 0]  # where the level set is zero at an end, the point is that end
+        if share[z, 1] > 0.0:
+            number[z] = known + count
+            for i in range(2):
+                edges[count, i] = edges[z, i]
+            for i in range(place.shape[1]):
+                place[count, i] = place[z, i]
+            count += 1
+    return number, count
+
+
+@njit(cache=True)
+def _take_corners(f, facets, of_facet, inside, corners, where):
+    """Write the corners of a facet; which edge is not crossed, and whether the others are split."""
+    alone, through, crossed = np.int64(0), True, False
+    for k in range(3):
+        corners[k] = facets[f, k]
+        for j in range(3):
+            where[k, j] = 1.0 if j == k else 0.0
+        if of_facet[f, k] < 0:
+            alone = np.int64(k)
+        else:
+            crossed, through = True, through and inside[of_facet[f, k]]
+    return alone, crossed and through
+
+
+@njit(cache=True)
 def divide_facets(
     facets, values, points, cut, reach, low, high, order, cells, nodes, gradients,
     piece_label, first_piece, next_piece,
@@ -109,17 +143,7 @@ def divide_facets(
         place, cut, reach, low, high, order, cells, nodes, gradients,
         piece_label, first_piece, next_piece,
     )  # fmt: skip
-    # where the level set is zero at an end, the point is that end
-    number, count = np.empty(len(edges), dtype=np.int64), 0
-    for z in range(len(edges)):
-        number[z] = edges[z, 0]
-        if share[z, 1] > 0.0:
-            number[z] = len(points) + count
-            for i in range(2):
-                edges[count, i] = edges[z, i]
-            for i in range(points.shape[1]):
-                place[count, i] = place[z, i]
-            count += 1
+    number, count = _number_points(edges, place, share, len(points))
     room = 3 * len(facets)
     ids, at = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, 3))
     source, side = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int8)
@@ -129,16 +153,8 @@ def divide_facets(
     # the corners of a facet and two new points on its edges
     corners, where = np.empty(5, dtype=np.int64), np.empty((5, 3))
     for f in range(len(facets)):
-        alone, through, crossed = zero, True, False
-        for k in range(3):
-            corners[k] = facets[f, k]
-            for j in range(3):
-                where[k, j] = 1.0 if j == k else 0.0
-            if of_facet[f, k] < 0:
-                alone = np.int64(k)
-            else:
-                crossed, through = True, through and inside[of_facet[f, k]]
-        if not (crossed and through):
+        alone, divided = _take_corners(f, facets, of_facet, inside, corners, where)
+        if not divided:
             end = _write(end, out, f, corners, zero, zero + 1, zero + 2, where, np.int8(0))
             continue
         # the corner alone on its side is opposite to the edge that is not crossed
