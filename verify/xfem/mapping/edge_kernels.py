@@ -29,8 +29,10 @@ class EdgeRecord(NamedTuple):
     ----------
     nodes : (n, s) float array
         Mesh nodes, in metres.
-    crossed : (n,) bool array
-        Whether an edge at the node has a point.
+    crossed, faced : (n,) bool array
+        Whether an edge at the node has a point, and whether a face there has one inside.
+    edge_line : (z,) int array
+        Line of the edge of the mesh on which each zero point lies, -1 if it is on none.
     positions : (z, s) float array
         Zero points, numbered after these.
     supports : (z, 7) int array
@@ -51,6 +53,8 @@ class EdgeRecord(NamedTuple):
 
     nodes: _Floats
     crossed: NDArray[np.bool_]
+    faced: NDArray[np.bool_]
+    edge_line: _Ints
     positions: _Floats
     supports: _Ints
     table: _Ints
@@ -82,7 +86,10 @@ def unrecorded(numbers, nodes, recorded):
 
 
 @njit(cache=True)
-def record_points(zero, supports, ends, crossed, table, known, lines, first, tally, entries, used):
+def record_points(
+    zero, supports, ends, crossed, faced, edge_line, table, known, lines, first, tally, entries,
+    used,
+):  # fmt: skip
     """Enter points into the lists of their lines; the counts of lines and entries."""
     row = np.empty(LINE, dtype=np.int64)
     for z in zero:
@@ -90,6 +97,8 @@ def record_points(zero, supports, ends, crossed, table, known, lines, first, tal
             continue  # inside an element: nobody else meets it
         if supports[z, _FACE - 1] != _NONE:
             # in a face, where the edge on which it was found may be a diagonal
+            for k in range(_FACE):
+                faced[supports[z, k]] = True
             _write_ends(ends[z, 0], ends[z, 1], row)
             line, lines = number_of_row(row, table, known, lines)
             entries[used, 0], entries[used, 1] = z, first[line]
@@ -110,6 +119,7 @@ def record_points(zero, supports, ends, crossed, table, known, lines, first, tal
             used += 1
             if row[_FACE] == _NONE:
                 crossed[row[0]] = crossed[row[1]] = True
+                edge_line[z] = line
                 break
     return lines, used
 
@@ -225,7 +235,7 @@ def _on_cut(number, line, record, row):
 
 
 @njit(cache=True)
-def _lines(x, y, nodes, supports, table, known, tally, row, found):
+def _lines(x, y, nodes, supports, faced, edge_line, table, known, tally, row, found):
     """Write the lines on which an edge may lie that have other points than its ends; their count.
 
     A line in a face holds no points on edges of the mesh, which are on the lines of these.
@@ -239,9 +249,14 @@ def _lines(x, y, nodes, supports, table, known, tally, row, found):
         if not (_join(x, nodes, supports, row) and _join(y, nodes, supports, row)):
             return 0
     if row[_FACE - 1] == _NONE:
-        found[0] = find_row(row[:LINE], table, known)
+        zero = max(x, y) - nodes
+        found[0] = edge_line[zero] if zero >= 0 else -1
+        if found[0] < 0:
+            found[0] = find_row(row[:LINE], table, known)
         own = (x >= nodes) + (y >= nodes)
         return 1 if found[0] >= 0 and tally[found[0]] > own else 0
+    if not (faced[row[0]] and faced[row[1]] and faced[row[_FACE - 1]]):
+        return 0
     # in a face of the mesh: of each cut on which x lies, or y if x is a mesh node
     number, count = (x if x >= nodes else y) - nodes, 0
     for end in (x, y):
@@ -303,6 +318,7 @@ def bisect_facets(facets, at, record, room):
     lines = np.empty(CUTS + 1, dtype=np.int64)
     # arrays taken out once: taking them out for every edge costs more than most edges do
     crossed, supports, tally = record.crossed, record.supports, record.tally
+    faced, edge_line = record.faced, record.edge_line
     table, known = record.table, record.known
     zero = np.int64(0)  # a literal 0 would be a type of its own to compile for
     count = zero
@@ -322,7 +338,10 @@ def bisect_facets(facets, at, record, room):
                 k += 1
                 if x < nodes and y < nodes and not (crossed[x] and crossed[y]):
                     continue
-                for line in lines[: _lines(x, y, nodes, supports, table, known, tally, row, lines)]:
+                some = _lines(
+                    x, y, nodes, supports, faced, edge_line, table, known, tally, row, lines
+                )
+                for line in lines[:some]:
                     if z < 0 and _on_cut(x, line, record, row) and _on_cut(y, line, record, row):
                         z, share = _between(x, y, line, record)
             if z < 0:

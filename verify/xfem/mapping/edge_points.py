@@ -41,7 +41,8 @@ class EdgePoints:
 
     def __init__(self, nodes: _Floats, points: PointNumbers) -> None:
         self._nodes, self._points = nodes, points
-        self._crossed = np.zeros(len(nodes), dtype=bool)
+        self._crossed, self._faced = (np.zeros(len(nodes), dtype=bool) for _ in range(2))
+        self._edge_line = GrowingArray(np.empty(0, dtype=np.int64))
         self._lines = RowNumbers(LINE)
         self._tally = GrowingArray(np.empty(0, dtype=np.int64))
         self._first = GrowingArray(np.empty(0, dtype=np.int64))
@@ -53,6 +54,8 @@ class EdgePoints:
         """Record points (by number; mesh nodes are ignored) on the lines on which they lie."""
         fresh = self._recorded.extend(len(self._points.ends) - len(self._recorded))
         self._recorded.rows[fresh:] = False
+        self._edge_line.extend(len(self._recorded) - fresh)
+        self._edge_line.rows[fresh:] = -1
         zero = np.sort(unrecorded(numbers, self._points.nodes, self._recorded.rows))
         table, known, lines = self._lines.open_for((CUTS + 1) * len(zero))
         begin = self._first.extend((CUTS + 1) * len(zero))
@@ -62,8 +65,9 @@ class EdgePoints:
         used = len(self._entries)
         self._entries.extend((CUTS + 1) * len(zero))
         lines, used = record_points(
-            zero, self._points.supports, self._points.ends.rows, self._crossed, table, known,
-            lines, self._first.rows, self._tally.rows, self._entries.rows, used,
+            zero, self._points.supports, self._points.ends.rows, self._crossed, self._faced,
+            self._edge_line.rows, table, known, lines, self._first.rows, self._tally.rows,
+            self._entries.rows, used,
         )  # fmt: skip
         self._lines.close(lines)
         self._first.rows = self._first.rows[:lines]
@@ -93,6 +97,8 @@ class EdgePoints:
         record = EdgeRecord(
             self._nodes,
             self._crossed,
+            self._faced,
+            self._edge_line.rows,
             self._points.positions.rows,
             self._points.supports,
             self._lines.table,
