@@ -9,7 +9,7 @@ from verify.compare.displacement_error import displacement_error
 from verify.compare.energy_error import energy_error
 from verify.compare.hooke import MembraneLaw
 from verify.compare.integration import integrate_norm, rules
-from verify.compare.jump_error import jump_error
+from verify.compare.jump_error import displacement_jump, jump_error
 from verify.compare.locate import SolutionField
 from verify.compare.maximum_error import maximum_error
 from verify.compare.membrane_body import cut_membrane
@@ -22,7 +22,7 @@ from verify.compare.realised import field_of
 from verify.compare.simplex_rule import points_in
 from verify.compare.strain_energy import field_strain_energy, strain_energy
 from verify.errors import UnsupportedSceneError
-from verify.scene.spatial_cuts import DiscCut, PolygonCut
+from verify.scene.spatial_cuts import DiscCut, PolygonCut, SweptCut
 
 LAW = MembraneLaw(0.7, 0.4)
 SLOPE = np.array([[0.1, 0.2, 0.05], [-0.3, 0.05, 0.1], [0.02, 0.15, -0.2]])
@@ -325,3 +325,54 @@ def test_cuts_that_do_not_part_a_membrane_in_two_are_refused():
     disc = DiscCut(kind="disc", centre=(0.5, 0.5, 0.3), normal=(1, 0, 0), radius=0.2)
     with pytest.raises(UnsupportedSceneError, match="'disc' through a membrane"):
         cut_membrane(*surface, [disc])
+
+
+def test_each_sector_of_crossing_cuts_in_a_curved_membrane_keeps_its_own_values():
+    """Four quarters of a bowl, each with its own nodes, moved by their own numbers."""
+    whole, cells = grid(6, 6)
+    cuts = [
+        upright(bowl, (0.5, -0.5), (0.5, 1.5), "up"),  # its positive side is x < 1/2
+        upright(bowl, (-0.5, 0.5), (1.5, 0.5), "along"),  # y > 1/2
+    ]
+    body = cut_membrane(bowl(*whole.T), cells, cuts)
+    assert not len(body.tips)
+    quarter, quarter_cells = grid(3, 3)
+    corners = [np.array([i, j]) / 2 for i in (0, 1) for j in (0, 1)]
+    points = np.vstack([bowl(*(0.5 * quarter + corner).T) for corner in corners])
+    quarters = np.vstack([quarter_cells + k * len(quarter) for k in range(4)])
+    values = np.array([[0.0, 0, 0], [1.0, 0, 0], [0, 5.0, 0], [0, 0, 20.0]])
+    u = np.repeat(values, len(quarter), axis=0)
+    field, still = (field_of(membrane(points, quarters, v), body) for v in (u, 0 * u))
+    rule = membrane_cut_rule(body, 0.1)
+    up = np.abs(rule.points[:, 0] - 0.5) < 1e-12
+    late = np.where(up, rule.points[:, 1], rule.points[:, 0]) > 0.5
+    # over "up": left minus right, below and above y = 1/2; over "along": above minus below
+    expected = np.where(
+        up[:, None],
+        np.where(late[:, None], values[1] - values[3], values[0] - values[2]),
+        np.where(late[:, None], values[3] - values[2], values[1] - values[0]),
+    )
+    assert np.abs(displacement_jump(field, rule) - expected).max() == 0.0
+    square = rule.weights @ np.sum(expected**2, axis=1)
+    assert jump_error(field, still, rule).absolute == pytest.approx(np.sqrt(square), rel=1e-12)
+    surface = membrane_rule(body, 0.1)
+    which = 2 * (surface.points[:, 0] > 0.5) + (surface.points[:, 1] > 0.5)
+    found = field.displacement(surface.points, surface.points)
+    assert np.abs(found - values[which]).max() == 0.0
+
+
+def test_a_swept_cut_with_a_kink_is_one_line_on_the_surface():
+    points, cells = grid(6, 6)
+    plan = [(0.21, 0.33), (0.62, 0.57), (0.44, 1.4)]
+    swept = SweptCut(
+        kind="swept", name="bent", points=[(x, y, -1.0) for x, y in plan], along=(0.0, 0.0, 3.0)
+    )
+    body = cut_membrane(roof(*points.T), cells, [swept])
+    assert len(body.patches) == 2
+    assert np.abs(body.tips - roof(*np.array(plan[:1]).T)).max() < 1e-12
+    # up to the ridge and down, and along the other plane until the rim at y = 1
+    x = np.array([0.21, 0.5, 0.62, 0.62 - 0.18 * 0.43 / 0.83])
+    y = np.array([0.33, 0.33 + 0.24 * 0.29 / 0.41, 0.57, 1.0])
+    length = np.linalg.norm(np.diff(roof(x, y), axis=0), axis=1).sum()
+    assert body.cuts["bent"].lengths.sum() == pytest.approx(length, rel=1e-12)
+    assert membrane_cut_rule(body, 0.1).weights.sum() == pytest.approx(length, rel=1e-12)

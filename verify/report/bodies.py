@@ -136,7 +136,7 @@ def _body(
         inner = _all_edges(elements[:, :3], ((0, 1), (1, 2), (2, 0)))
     elif cells.shape[1] == 3:  # a membrane
         triangles = cells
-        edges = _creases(drawn, triangles)
+        edges = _creases(drawn, triangles, oriented=False)
         inner = _all_edges(elements[:, :3], ((0, 1), (1, 2), (2, 0)))
     else:
         triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))
@@ -161,18 +161,27 @@ def _all_edges(cells: NDArray[np.int64], pairs: tuple[tuple[int, int], ...]) -> 
     return edges
 
 
-def _creases(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the edges of a surface where it ends or bends sharply."""
+def _creases(
+    points: NDArray[np.float64], triangles: NDArray[np.int64], oriented: bool = True
+) -> NDArray[np.int64]:
+    """Return the edges of a surface where it ends or bends sharply.
+
+    Triangles that are not `oriented` alike bend by less than a right angle.
+    """
     a, b, c = (points[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     edges = np.concatenate([triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
     owner = np.tile(np.arange(len(triangles)), 3)
-    unique, inverse, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    unique, first, inverse, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
     )
+    inverse, turned = inverse.reshape(-1), normals[owner]
+    if not oriented:
+        alike = np.einsum("ij,ij->i", turned, turned[first][inverse])
+        turned = np.where(alike[:, None] < 0.0, -turned, turned)
     total = np.zeros((len(unique), 3))
-    np.add.at(total, inverse.reshape(-1), normals[owner])
+    np.add.at(total, inverse, turned)
     # |n1 + n2| = 2 cos(angle/2) for the two facets of an inner edge
     sharp = np.linalg.norm(total, axis=1) < 2 * np.cos(np.deg2rad(_FEATURE_ANGLE) / 2)
     creases: NDArray[np.int64] = unique[(count != 2) | sharp]
