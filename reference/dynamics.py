@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.elasticity import stiffness_form
+from reference.elasticity import mass_form, stiffness_form
 from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
 from verify.errors import InputError
@@ -115,15 +115,10 @@ class LinearMotion:
         import ufl
         from dolfinx import fem
 
-        if material.density is None:
-            raise InputError("material.density is missing: motion needs it")
         V = space.function_space
         u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-        density = fem.Constant(V.mesh, np.asarray(material.density))
-        stiffness = assembled_matrix(stiffness_form(material, u, v))
-        self._stiffness = NodalMatrix(stiffness, space)
-        mass = assembled_matrix(density * ufl.inner(u, v) * ufl.dx)
-        self._mass = NodalMatrix(mass, space)
+        self._mass = NodalMatrix(assembled_matrix(mass_form(material, u, v)), space)
+        self._stiffness = NodalMatrix(assembled_matrix(stiffness_form(material, u, v)), space)
         self._damping, self._held, self._time = damping, unknowns, start
         self._space = space
         self._u = np.array(displacement, dtype=float).ravel()

@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from reference.boundary_values import constrained_values
 from reference.dynamics_law import law_of
-from reference.elasticity import load_form
+from reference.elasticity import load_form, mass_form
 from reference.large_strain import solve_large_strain
 from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
 from reference.space import ConformingSpace, SharedUnknowns
-from verify.errors import InputError
 from verify.scene import Gravity, Scene, Support
 from verify.scene.history import factor_at, first_factor, slope_at
 from verify.scene.parts import on_part
@@ -75,19 +74,17 @@ class MovingBody:
     ) -> None:
         import ufl
 
-        density = scene.material.density
-        if density is None:
-            raise InputError("material.density is missing: motion needs it", str(scene.file or ""))
         self.scene, self.space, self.exact = scene, space, exact
         V = space.function_space
-        density *= scene.material.thickness or 1.0  # of a membrane
-        mass = _mass_matrix(density, ufl.TrialFunction(V), ufl.TestFunction(V))
-        self.mass = NodalMatrix(mass, space)
+        where = str(scene.file or "")
+        inertia = mass_form(scene.material, ufl.TrialFunction(V), ufl.TestFunction(V), where)
+        self.inertia = assembled_matrix(inertia)
+        self.mass = NodalMatrix(self.inertia, space)
         self.law = law_of(scene.material, space, scene.analysis.kinematics, pressure)
-        self.inertia = mass
         if self.law.unknowns is not space:
             W = self.law.unknowns.function_space
-            self.inertia = _mass_matrix(density, ufl.TrialFunctions(W)[0], ufl.TestFunctions(W)[0])
+            pair = ufl.TrialFunctions(W)[0], ufl.TestFunctions(W)[0]
+            self.inertia = assembled_matrix(mass_form(scene.material, *pair))
         self.weight = np.zeros(space.node_points.size)
         self._driven: list[tuple[Array, Any]] = []
         for load in scene.loads:
@@ -206,12 +203,3 @@ class MovingBody:
         for one, value in zip(self._supports, values, strict=True):
             filled[one.place] = value
         return filled.ravel()[self.held]
-
-
-def _mass_matrix(density: float, u: Any, v: Any) -> Any:
-    """Assemble the consistent mass of trial and test displacements."""
-    import ufl
-    from dolfinx import fem
-
-    domain = ufl.domain.extract_unique_domain(v)
-    return assembled_matrix(fem.Constant(domain, np.asarray(density)) * ufl.inner(u, v) * ufl.dx)

@@ -26,6 +26,7 @@ __all__ = [
     "held_system",
     "lame",
     "load_form",
+    "mass_form",
     "mean_stiffness",
     "solve_linear",
     "stiffness_form",
@@ -172,6 +173,24 @@ def stiffness_form(material: Material, u: Any, v: Any) -> Any:
     strain = ufl.sym(ufl.grad(u))
     stress = 2 * mu * strain + lam * ufl.tr(strain) * ufl.Identity(len(u))
     return ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx
+
+
+def mass_form(material: Material, u: Any, v: Any, where: str = "") -> Any:
+    """Write the virtual work ∫ ρ u · v of an acceleration u.
+
+    Raises
+    ------
+    InputError
+        If there is no density; `where` names the case file.
+    """
+    import ufl
+    from dolfinx import fem
+
+    if material.density is None:
+        raise InputError("material.density is missing: motion and vibration need it", where)
+    mass = material.density * (material.thickness or 1.0)  # of a membrane per area
+    density = fem.Constant(ufl.domain.extract_unique_domain(v), np.asarray(mass))
+    return density * ufl.inner(u, v) * ufl.dx
 
 
 def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:

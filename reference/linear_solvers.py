@@ -1,5 +1,6 @@
 """Solving symmetric positive definite systems: directly, or by multigrid to a true residual."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ __all__ = [
     "IllConditionedError",
     "direct_solver",
     "general_solver",
+    "iterate",
     "near_null_space",
     "rigid_motions",
     "set_multigrid",
@@ -22,7 +24,7 @@ __all__ = [
 
 _LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 _MOST_ITERATIONS = 2000
-_RESTARTS = 4
+_RUNS = 6
 _MULTIGRID = {
     "ksp_norm_type": "unpreconditioned",
     "pc_type": "gamg",
@@ -155,30 +157,69 @@ def solve_by_multigrid(matrix: Any, x: Any, vector: Any, tolerance: float) -> An
     set_multigrid(solver)
     solver.setType("cg")
     solver.setInitialGuessNonzero(True)
-    residual, before = vector.duplicate(), x.duplicate()
-    loads = _residual(matrix, x, vector, residual)
-    iterations, left, size = 0, 1.0, 0.0
-    for _ in range(_RESTARTS):
+
+    def aim(loads: float, _left: float) -> None:
         solver.setTolerances(
             rtol=1e-30, atol=0.5 * tolerance * loads, divtol=1e10, max_it=_MOST_ITERATIONS
         )
+
+    try:
+        return iterate(solver, matrix, x, vector, tolerance, aim, "CG with GAMG")
+    finally:
+        solver.destroy()
+
+
+def iterate(
+    solver: Any,
+    matrix: Any,
+    x: Any,
+    vector: Any,
+    tolerance: float,
+    aim: Callable[[float, float], None],
+    method: str,
+    persist: bool = False,
+) -> Answer:
+    """Start an iterative solver from x again and again until the true residual is small.
+
+    Parameters
+    ----------
+    solver, matrix, x, vector : PETSc KSP, Mat and Vecs
+    tolerance : float
+        Of the true residual, relative to that of the start.
+    aim : callable
+        Sets the solver's own tolerances for its next run; it is given the norm of the residual at
+        the start, and what share of that the last run has left (0 before the first).
+    method : str
+    persist : bool
+        Whether to go on after a run that PETSc says has failed.
+
+    Raises
+    ------
+    RuntimeError
+        If the tolerance is not reached; with PETSc's reason.
+    """
+    residual, before = vector.duplicate(), x.duplicate()
+    loads = _residual(matrix, x, vector, residual)
+    iterations, left, size = 0, 0.0, 0.0
+    for _ in range(_RUNS):
+        aim(loads, left)
         x.copy(before)
         solver.solve(vector, x)
         iterations += solver.getIterationNumber()
         left = _residual(matrix, x, vector, residual) / (loads or 1.0)
         before.aypx(-1.0, x)
         size = float(before.norm() / (x.norm() or 1.0))
-        if left <= tolerance or _failed(solver):
+        failed = solver.getConvergedReason() < 0
+        if left <= tolerance or (failed and not persist):
             break
-    reason = solver.getConvergedReason()
-    for entry in (solver, residual, before):
-        entry.destroy()
+    residual.destroy()
+    before.destroy()
     if not left <= tolerance:
         raise RuntimeError(
-            f"multigrid left a residual of {left:.1e} after {iterations} iterations (PETSc reason "
-            f"{reason}); {tolerance:.1e} is wanted"
+            f"{method} left a residual of {left:.1e} after {iterations} iterations (PETSc reason "
+            f"{solver.getConvergedReason()}); {tolerance:.1e} is wanted"
         )
-    return Answer("PETSc, CG with GAMG", min(size, left), left, iterations)
+    return Answer(f"PETSc, {method}", min(size, left), left, iterations)
 
 
 def set_multigrid(solver: Any) -> None:
@@ -243,10 +284,6 @@ def _factorised(matrix: Any, kind: str) -> Any:
     solver.getPC().setFactorSolverType("mumps")
     solver.setUp()
     return solver
-
-
-def _failed(solver: Any) -> bool:
-    return bool(solver.getConvergedReason() < 0)
 
 
 def _residual(matrix: Any, x: Any, vector: Any, out: Any) -> float:

@@ -2,13 +2,12 @@
 
 from typing import Any
 
-from reference.linear_solvers import Answer, near_null_space
+from reference.linear_solvers import Answer, iterate, near_null_space
 from reference.mixed_space import MixedSpace
 
 __all__ = ["solve_saddle"]
 
 _MOST_ITERATIONS = 2000
-_RESTARTS = 6
 _BLOCKS = {
     "pc_type": "fieldsplit",
     "pc_fieldsplit_type": "schur",
@@ -77,35 +76,19 @@ def solve_saddle(
     split.setFieldSplitIS(("u", of_u), ("p", of_p))
     split.setFieldSplitSchurPreType(PETSc.PC.FieldSplitSchurPreType.USER, mass)
     solver.setFromOptions()
-    residual, before = vector.duplicate(), x.duplicate()
-    loads = _residual(matrix, x, vector, residual)
-    left, size, iterations, wanted = 1.0, 0.0, 0, 0.1 * tolerance
-    for _ in range(_RESTARTS):
-        # judged by the preconditioned residual, which MINRES minimises
+    wanted = 0.1 * tolerance
+
+    def aim(_loads: float, left: float) -> None:
+        # MINRES minimises the preconditioned residual, and judges by it
+        nonlocal wanted
+        wanted *= min(0.1, 0.5 * tolerance / left) if left else 1.0
         solver.setTolerances(rtol=wanted, atol=0.0, max_it=_MOST_ITERATIONS)
-        x.copy(before)
-        solver.solve(vector, x)
-        iterations += solver.getIterationNumber()
-        left = _residual(matrix, x, vector, residual) / (loads or 1.0)
-        before.aypx(-1.0, x)
-        size = float(before.norm() / (x.norm() or 1.0))
-        if left <= tolerance:
-            break
-        wanted *= min(0.1, 0.5 * tolerance / left)
-    reason = solver.getConvergedReason()
-    for name in _BLOCKS:
-        options.delValue(f"mixed_{name}")
-    for entry in (solver, residual, before, near, block, mass, of_u, of_p):
-        entry.destroy()
-    if not left <= tolerance:
-        raise RuntimeError(
-            f"MINRES left a residual of {left:.1e} after {iterations} iterations (PETSc reason "
-            f"{reason}); {tolerance:.1e} is wanted"
-        )
-    return Answer("PETSc, MINRES with GAMG and pressures", min(size, left), left, iterations)
 
-
-def _residual(matrix: Any, x: Any, vector: Any, out: Any) -> float:
-    matrix.mult(x, out)
-    out.aypx(-1.0, vector)
-    return float(out.norm())
+    method = "MINRES with GAMG and pressures"
+    try:
+        return iterate(solver, matrix, x, vector, tolerance, aim, method, persist=True)
+    finally:
+        for name in _BLOCKS:
+            options.delValue(f"mixed_{name}")
+        for entry in (solver, near, block, mass, of_u, of_p):
+            entry.destroy()

@@ -48,16 +48,9 @@ def solve_mixed(
 
     Parameters
     ----------
-    scene : Scene
-        Plane strain or in space.
-    space : ConformingSpace
-        Of degree 2.
-    exact : ExactSolution or None
-        For supports and loads that are said to be exact.
-    method : {"direct", "multigrid"}, optional
-        MUMPS, or MINRES with GAMG for the displacements; default by the number of unknowns.
-    tolerance : float
-        Of multigrid: the norm of the true residual over that of the loads.
+    scene, space, exact, method, tolerance
+        As for `reference.elasticity.solve_linear`, but in plane strain or in space, on a space of
+        degree 2, and multigrid is MINRES with GAMG for the displacements.
 
     Raises
     ------

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.elasticity import stiffness_form
+from reference.elasticity import mass_form, stiffness_form
 from reference.nodal_algebra import assembled_matrix
 from reference.space import ConformingSpace
-from verify.errors import InputError
 from verify.scene import Material
 
 __all__ = ["Vibration", "largest_frequency", "lowest_frequencies"]
@@ -73,15 +72,11 @@ def _matrices(
 ) -> tuple[Any, Any]:
     """Stiffness and mass; the unknowns held are out of both, but for ones on the diagonal of K."""
     import ufl
-    from dolfinx import fem
 
-    if material.density is None:
-        raise InputError("material.density is missing: vibration needs it")
     V = space.function_space
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    density = fem.Constant(V.mesh, np.asarray(material.density))
+    mass = assembled_matrix(mass_form(material, u, v))
     stiffness = assembled_matrix(stiffness_form(material, u, v))
-    mass = assembled_matrix(density * ufl.inner(u, v) * ufl.dx)
     rows = space.rows(unknowns)
     stiffness.zeroRowsColumns(rows, 1.0)
     mass.zeroRowsColumns(rows, 0.0)

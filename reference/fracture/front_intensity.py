@@ -92,19 +92,8 @@ def front_intensity(
     for radius in radii:
         _check_fit(solution, place, away, radius)
     within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
-    ahead = at.axes[:, 0]
-    stresses = stress_of(solution, hooke(material))
-    nodal = np.zeros((len(corners), 3))  # M of each mode is linear in the extension of each node
-    for start in range(0, len(within), _CHUNK):
-        part = within[start : start + _CHUNK]
-        field = cell_gradients(solution, part)
-        stress = stresses(part, field)
-        moves = ahead[place[solution.cells[part, :4]]]
-        found = _interaction(material, front, field, stress, moves, body_force)
-        nodes = place[solution.cells[part, :4]].ravel()
-        for mode in range(3):
-            values = found[:, :, mode].ravel()
-            nodal[:, mode] += np.bincount(nodes, values, minlength=len(corners))
+    nodes = place[solution.cells[within, :4]]
+    nodal = _nodal_shares(solution, material, front, within, nodes, at.axes[:, 0], body_force)
     hats = np.array([_hat(front, at.along, centre, width) for centre in centres])
     falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
     modulus = 0.5 * material.young / (1 - material.poisson**2)
@@ -160,6 +149,29 @@ def _check_fit(solution: Solution, place: NDArray[np.int64], away: Array, radius
             f"a domain of radius {radius:.4g} m is too small: cells at the front reach "
             f"{corner[touching].max():.4g} m; expected less"
         )
+
+
+def _nodal_shares(
+    solution: Solution,
+    material: Material,
+    front: Front,
+    cells: NDArray[np.int64],
+    nodes: NDArray[np.int64],
+    ahead: Array,
+    body_force: Array | None,
+) -> Array:
+    """M (c, 3) of the three modes, linear in the extension of each node along `ahead` (c, 3)."""
+    stresses = stress_of(solution, hooke(material))
+    nodal = np.zeros((len(ahead), 3))
+    for start in range(0, len(cells), _CHUNK):
+        part, corners = cells[start : start + _CHUNK], nodes[start : start + _CHUNK]
+        field = cell_gradients(solution, part)
+        stress = stresses(part, field)
+        found = _interaction(material, front, field, stress, ahead[corners], body_force)
+        for mode in range(3):
+            values = found[:, :, mode].ravel()
+            nodal[:, mode] += np.bincount(corners.ravel(), values, minlength=len(ahead))
+    return nodal
 
 
 def _interaction(

@@ -78,21 +78,37 @@ def imprint_polygons(points: Array, cells: Cells, polygons: list[Array]) -> Mesh
     """
     mesh: Mesh = (points, cells, np.zeros((0, 3), dtype=np.int64))
     for corners in polygons:
-        mesh = _imprint(mesh, corners)
+        mesh = trace_polygon(mesh, corners, insert=True)
     points, cells, facets = mesh
-    _, start, times = np.unique(cell_facets(cells), axis=0, return_index=True, return_counts=True)
-    inner = {tuple(f) for f in cell_facets(cells)[start[times == 2]].tolist()}
-    kept = [f for f in np.unique(np.sort(facets, axis=1), axis=0).tolist() if tuple(f) in inner]
-    if polygons and not kept:
+    kept = interior_facets(cells, facets)
+    if polygons and not len(kept):
         raise InputError("cuts: none of them lies inside the mesh")
-    return loosen_front(points, cells, np.array(kept, dtype=np.int64).reshape(-1, 3))
+    return loosen_front(points, cells, kept)
 
 
-def _imprint(mesh: Mesh, corners: Array) -> Mesh:
+def interior_facets(cells: Cells, facets: Cells) -> Cells:
+    """Keep those of some facets that two cells share, each once."""
+    every, times = np.unique(cell_facets(cells), axis=0, return_counts=True)
+    inner = {tuple(facet) for facet in every[times == 2].tolist()}
+    found = np.unique(np.sort(facets, axis=1), axis=0).tolist()
+    kept = [facet for facet in found if tuple(facet) in inner]
+    return np.array(kept, dtype=np.int64).reshape(-1, facets.shape[1])
+
+
+def trace_polygon(mesh: Mesh, corners: Array, insert: bool) -> Mesh:
+    """Split cells, of triangles or tetrahedra, until a polygon runs along facets; add these.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    corners : (k, 3) array
+    insert : bool
+        Whether its corners become nodes, as they must within tetrahedra.
+    """
     origin, axes = plane_frame(corners)
     outline = (corners - origin) @ axes[:2].T
     mesh, on_plane = split_by_plane(mesh, outline, origin, axes)
-    for end in outline:
+    for end in outline if insert else ():
         mesh, on_plane = _insert(mesh, on_plane, end, origin, axes)
     for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         mesh, on_plane = split_by_line(mesh, on_plane, a, b, origin, axes)

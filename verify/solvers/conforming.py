@@ -183,7 +183,9 @@ def _solve(
         if scene.analysis.kind == "static":
             return _equilibrium(scene, conforming_space(mesh, degree, comm), exact, pressure)
         largest = motion.largest(level, size)
-        return _moved(scene, mesh, degree, exact, motion.scheme, largest, comm, pressure, trial)
+        scheme = motion.scheme
+        found = move(scene, mesh, degree, exact, scheme, largest, comm, pressure, trial)
+        return _Answer(**vars(found))
 
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
@@ -215,31 +217,6 @@ def _shared(
         return make_mesh()
     shared: tuple[ConformingMesh, float] = comm.bcast(make_mesh() if comm.rank == 0 else None)
     return shared
-
-
-def _moved(
-    scene: Scene,
-    mesh: ConformingMesh,
-    degree: int,
-    exact: Any,
-    scheme: str,
-    largest: float,
-    comm: Any,
-    pressure: bool,
-    trial: bool,
-) -> _Answer:
-    """Solve a dynamic scene."""
-    found = move(scene, mesh, degree, exact, scheme, largest, comm, pressure, trial)
-    return _Answer(
-        found.space,
-        found.times,
-        found.displacement,
-        found.velocity,
-        found.ledger,
-        found.timings,
-        found.iterations,
-        found.notes,
-    )
 
 
 def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: bool) -> _Answer:
