@@ -15,6 +15,7 @@ from verify.xfem.collision.simplex_kernels import (
 )
 
 __all__ = [
+    "as_array",
     "boxes_of_facets",
     "items_near_plane",
     "merge_boxes",
@@ -71,6 +72,15 @@ def merge_boxes(low, high):
 
 
 @njit(cache=True)
+def as_array(found):
+    """Array (q,) of listed integers: `np.array` of a list takes longer to compile."""
+    items = np.empty(len(found), dtype=np.int64)
+    for k in range(len(found)):
+        items[k] = found[k]
+    return items
+
+
+@njit(cache=True)
 def items_near_plane(low, high, order, box_low, box_high, normal, point, margin):
     """Items whose boxes meet a box, and come within a margin of a plane (normal 0: no plane)."""
     count = len(order)
@@ -92,7 +102,7 @@ def items_near_plane(low, high, order, box_low, box_high, normal, point, margin)
         else:
             stack[top], stack[top + 1] = 2 * node, 2 * node + 1
             top += 2
-    return np.array(found, dtype=np.int64)
+    return as_array(found)
 
 
 @njit(cache=True)

@@ -107,6 +107,19 @@ def slots_before(
 
 
 @njit(cache=True)
+def _place_in(ascending, value):
+    """Place of the first that is not below a value (`np.searchsorted` takes longer to compile)."""
+    low, high = 0, len(ascending)
+    while low < high:
+        middle = (low + high) // 2
+        if ascending[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True)
 def simplices_of(cells, whole_cells, parent, piece, place, fraction):
     """Sub-simplices with a volume in pieces of some cells, cell by cell.
 
@@ -131,7 +144,7 @@ def simplices_of(cells, whole_cells, parent, piece, place, fraction):
     owner, bounds = np.empty(len(piece), dtype=np.int64), np.zeros((len(cells), 2), dtype=np.int64)
     for s in range(len(piece)):
         cell = whole_cells[parent[piece[s]]]
-        k = np.searchsorted(cells, cell)
+        k = _place_in(cells, cell)
         owner[s] = -1
         has_volume = fraction[s] > 0.0 and place[piece[s]] >= 0
         if has_volume and k < len(cells) and cells[k] == cell:

@@ -8,7 +8,7 @@ point whether it lies on the sweep and whether the blade has passed it. The tole
 import numpy as np
 from numba import njit
 
-from verify.xfem.collision.tree_kernels import items_near_plane
+from verify.xfem.collision.tree_kernels import as_array, items_near_plane
 from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.sweep_kernels import probe
 
@@ -56,7 +56,7 @@ def cells_hit(sweep, after, front, margin, low, high, order):
             low, high, order, floor, ceiling, sweep.normals[t], corners[t, 0], margin
         ):
             found.append(item)  # noqa: PERF402 - `extend` takes longer to compile
-    return np.array(found, dtype=np.int64)
+    return as_array(found)
 
 
 @njit(cache=True)
@@ -157,4 +157,4 @@ def walk(
             if other >= 0 and turns[other] != turn:
                 turns[other] = turn
                 queue.append(other)
-    return np.array(candidates, dtype=np.int64), np.array(frontier, dtype=np.int64)
+    return as_array(candidates), as_array(frontier)

@@ -36,10 +36,18 @@ def _beyond(place, piece, cell, displacement, points, cells, piece_cells, simple
         for i in range(3):
             simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
     for a in range(3):
+        # of the corner from its foot on the edge opposite to it, and of the place along that
         p, q = simplex[(a + 1) % 3], simplex[(a + 2) % 3]
-        edge, inwards = q - p, simplex[a] - p
-        inwards -= (inwards @ edge) / (edge @ edge) * edge
-        if (place - p) @ inwards < _ON_EDGE * (inwards @ inwards):
+        along = length = 0.0
+        for i in range(3):
+            along += (simplex[a, i] - p[i]) * (q[i] - p[i])
+            length += (q[i] - p[i]) ** 2
+        inside = square = 0.0
+        for i in range(3):
+            inwards = simplex[a, i] - p[i] - along / length * (q[i] - p[i])
+            inside += (place[i] - p[i]) * inwards
+            square += inwards**2
+        if inside < _ON_EDGE * square:
             return True
     return False
 
@@ -125,7 +133,9 @@ def pull_back_to_membrane(
                 places[q], other, cell, displacement, points, cells, piece_cells, simplex, trial
             )
             if least < best and is_material(other, cell, trial, cells, piece_label, levels):
-                best, found[q], at[:] = least, other, trial
+                best, found[q] = least, other
+                for a in range(3):
+                    at[a] = trial[a]
             other = next_piece[other]
         for a in range(3):
             for i in range(3):
