@@ -6,6 +6,7 @@ realised and from the nodes of the edge there. That is held here on cracks whose
 fractions of an element, in two directions, on two levels (the finer one: `make heavy`).
 """
 
+from dataclasses import asdict
 from functools import cache
 
 import numpy as np
@@ -15,11 +16,16 @@ from tip_advance import tip_advances
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
+from verify.report.budget_figures import budget_section
 from verify.study.budget import cut_ends
 
 ANGLES, PLACES = (20.0, -35.0), range(6)
 RULES = ("inside", "through")
 levels = pytest.mark.parametrize("count", [16, pytest.param(32, marks=pytest.mark.heavy)])
+
+
+PAGE = {"level": 0, "tolerance": 0.05, "metric": "displacement_l2", "chain": [], "notes": [],
+        "budgets": [], "candidates": []}  # fmt: skip
 
 
 def ends_at(place, angle, size):
@@ -173,5 +179,8 @@ def test_ends_are_found_by_their_edge_and_told_apart():
     end = found[0.4, 0.25]
     assert (end.moved, end.nodes) == pytest.approx((-0.15, -0.4))
     assert end.acts == pytest.approx(-0.15 - 2 / 3 * 0.25 - 0.355)
+    page = str(budget_section(PAGE | {"ends": [asdict(end)]}))
+    assert [f"{text} h" in page for text in ("−0.15", "−0.40", "−0.67 ± 0.22")] == [True] * 3
+    assert "acts as" not in str(budget_section(PAGE | {"ends": []}))
     # nothing is realised near an end: nothing is said of it
     assert cut_ends(body_of(scene), facets[:0], points, cells, 1.0) == []

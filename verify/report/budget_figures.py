@@ -74,10 +74,12 @@ def _ends(record: Mapping[str, Any]) -> Markup | None:
     titles = ("end of a cut, m", "realised at", "hindmost node there", "acts as an end at")
     head = tag("tr", [tag("th", title, scope="col") for title in titles])
     rows = [
-        tag("tr", tag("th", f"({one['place'][0]:.4g}, {one['place'][1]:.4g})", scope="row"),
-            tag("td", f"{one['moved']:+.2f} h"), tag("td", f"{one['nodes']:+.2f} h"),
-            tag("td", f"{one['acts']:+.2f} ± {one['uncertainty']:.2f} h"))
+        tag("tr", tag("th", _signed(f"({x:.4g}, {y:.4g})"), scope="row"),
+            tag("td", _signed(f"{one['moved']:+.2f} h")),
+            tag("td", _signed(f"{one['nodes']:+.2f} h")),
+            tag("td", _signed(f"{one['acts']:+.2f} ± {one['uncertainty']:.2f} h")))
         for one in record["ends"]
+        for x, y in [one["place"]]
     ]  # fmt: skip
     said = (
         "Along the cut from its end as asked, positive beyond it, in elements. Without tip "
@@ -87,6 +89,10 @@ def _ends(record: Mapping[str, Any]) -> Markup | None:
     )
     table = tag("table", tag("thead", head), tag("tbody", rows), class_="map")
     return joined(tag("p", said, class_="quiet"), tag("div", table, class_="scroll"))
+
+
+def _signed(said: str) -> str:
+    return said.replace("-", "−")
 
 
 def _bars(budget: Mapping[str, Any]) -> Markup:
@@ -100,7 +106,9 @@ def _bars(budget: Mapping[str, Any]) -> Markup:
     def x(value: float) -> float:
         return x0 + (value - low) / length * (x1 - x0)
 
-    content = [text(2, 12, metric_title(budget["metric"]) + ", relative", class_="axis")]
+    title = metric_title(budget["metric"])
+    title = title if title.startswith("relative") else f"{title}, relative"
+    content = [text(2, 12, title, class_="axis")]
     for row, part in enumerate(parts):
         y = _TOP + _ROW * row
         colour = _TOTAL if row == len(parts) - 1 else _COLOUR
