@@ -181,8 +181,9 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
         print(f"cuts spread, medians of five runs: at most {longest:.2f} ms, "
               f"{ratio:.2f} resting steps; {np.mean(step <= 2e-3):.1%} within 2 ms")  # fmt: skip
     at_once, cuts = np.median(runs["processor time"], axis=0), runs["processor time", "busy"]
-    assert np.median(at_once[~cuts]) < 0.35 * kernel
-    # seen: 4 to 5 and 1.8 to 2.1 times a resting step, the longest of all 2.0 to 2.4 times
+    # 0.11 and 0.16 seen, with a dozen processes on two cores
+    assert np.median(at_once[~cuts]) < 0.25 * kernel
+    # seen: 4 to 5 and 1.8 to 2.1 times a resting step, the longest of all 2.0 to 2.8 times
     assert np.median(at_once[cuts]) < 6.5 * np.median(at_once[~cuts])
     assert np.median(step[busy]) < 2.8 * resting
     assert ratio < 3.3
