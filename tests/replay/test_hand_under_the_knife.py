@@ -144,14 +144,15 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
     """For the reader: absolute times. Asserted: ratios to a kernel of the same machine.
 
     Processor time, so that what else the machine does counts as little as can be. The kernel takes
-    about 10 ms. A step is a sweep over 1400 pieces, a factorisation of 1500 unknowns and the
+    about 10 ms. A step is a sweep over 1400 pieces, a factorisation of 1200 unknowns and the
     positions of three surfaces; one that cuts also divides elements and surfaces and makes mass,
     sparsity and solver anew. Inner surface, mapping and collision are included, records are not.
     """
     for spread in (False, True):
         Session(slashed(hand), account=False, spread=spread).run()  # compiles
-    found, runs = {}, {}
+    found, runs, kernels = {}, {}, []
     for _ in range(5):  # in turn, because the speed of a machine may change from second to second
+        kernels += kernel_seconds(2, clock=thread_time)
         for name, clock, spread in (
             ("wall time", perf_counter, False),
             ("processor time", thread_time, False),
@@ -163,7 +164,7 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
             runs.setdefault(name, []).append([record.total_seconds for record in session.records])
             last = session.records
             runs[name, "busy"] = np.array([record.busy for record in last])
-    kernel = float(np.median(kernel_seconds(clock=thread_time)))
+    kernel = float(np.median(kernels))
     assert 170 <= last[-1].split <= 260
     # every replay is the same, so the median over five of a step is that of the same work
     name = "processor time, cuts spread"
@@ -181,10 +182,10 @@ def test_a_step_of_the_hand_with_200_cut_elements_is_fast(hand, capsys) -> None:
         print(f"cuts spread, medians of five runs: at most {longest:.2f} ms, "
               f"{ratio:.2f} resting steps; {np.mean(step <= 2e-3):.1%} within 2 ms")  # fmt: skip
     at_once, cuts = np.median(runs["processor time"], axis=0), runs["processor time", "busy"]
-    # 0.11 and 0.16 seen, with a dozen processes on two cores
+    # seen, with a dozen processes on two cores: 0.11 to 0.16, 0.6 to 0.9, 0.2 to 0.3, 0.3 to 0.45
     assert np.median(at_once[~cuts]) < 0.25 * kernel
-    # seen: 4 to 5 and 1.8 to 2.1 times a resting step, the longest of all 2.0 to 2.8 times
-    assert np.median(at_once[cuts]) < 6.5 * np.median(at_once[~cuts])
-    assert np.median(step[busy]) < 2.8 * resting
-    assert ratio < 3.3
-    assert step[busy].max() < 0.7 * at_once[cuts].max()
+    assert np.median(at_once[cuts]) < 1.2 * kernel
+    assert np.median(step[busy]) < 0.45 * kernel
+    assert step[busy].max() < 0.6 * kernel
+    # seen: a third
+    assert step[busy].max() < 0.55 * at_once[cuts].max()
