@@ -21,7 +21,10 @@ from verify.threads import ONE_THREAD
 __all__ = ["DEBIAN_PACKAGES", "Finding", "examine"]
 
 _SECONDS = 120.0
-_FENICSX = 'python -m pip install "dolfinx-solver-real>=0.11", or the fenics-dolfinx of conda-forge'
+_FENICSX = (
+    'python -m pip install "dolfinx-solver-real>=0.11", or the fenics-dolfinx of conda-forge, '
+    "or apt-get install -y python3-dolfinx (Debian 13)"
+)
 
 # what the loader says is missing -> Debian package
 DEBIAN_PACKAGES = {
