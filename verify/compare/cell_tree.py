@@ -32,10 +32,17 @@ class CellTree:
     cells: NDArray[np.int64]
 
 
-def build_cell_tree(lower: NDArray[np.float64], upper: NDArray[np.float64]) -> CellTree:
-    """Build the tree from the bounding boxes (m, d) of the cells; NaN marks cells to leave out."""
+def build_cell_tree(
+    lower: NDArray[np.float64], upper: NDArray[np.float64], surface: bool = False
+) -> CellTree:
+    """Build the tree from the bounding boxes (m, d) of the cells; NaN marks cells to leave out.
+
+    Cells on a `surface` are ordered in cubes: in boxes as flat as a shallow surface is, its height
+    would count as much as its length, which makes finding its cells half as slow again.
+    """
     kept = np.flatnonzero(np.isfinite(lower).all(axis=1))
-    order = kept[morton_order(0.5 * (lower[kept] + upper[kept]))]
+    centres = 0.5 * (lower[kept] + upper[kept])
+    order = kept[np.argsort(_morton(centres, surface), kind="stable")]
     leaves = 1
     while leaves * LEAF < len(order):
         leaves *= 2
@@ -65,11 +72,13 @@ def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.argsort(_morton(points), kind="stable")
 
 
-def _morton(centres: NDArray[np.float64]) -> NDArray[np.int64]:
+def _morton(centres: NDArray[np.float64], in_cubes: bool = False) -> NDArray[np.int64]:
     """Interleave the bits of the coordinates, so that near cells get near numbers."""
     d = centres.shape[1]
     bits = 31 if d == 2 else 20
     extent = np.maximum(np.ptp(centres, axis=0), 1e-300)
+    if in_cubes:
+        extent[:] = extent.max()
     whole = ((centres - centres.min(axis=0)) / extent * (2**bits - 1)).astype(np.int64)
     code = np.zeros(len(centres), dtype=np.int64)
     for bit in range(bits):

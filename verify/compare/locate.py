@@ -73,12 +73,13 @@ class SolutionField:
         self.degenerate_cells = int(shape.degenerate.sum())
         lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
         lower[shape.degenerate] = np.nan
-        self._tree = build_cell_tree(lower, upper)
+        membrane = solution.cell_dimension < solution.dimension
+        self._tree = build_cell_tree(lower, upper, surface=membrane)
         self._centres = shape.corners.mean(axis=1)
         self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
         self._origin = np.ascontiguousarray(shape.corners[:, 0])
         self._across = self._sides = None
-        if solution.cell_dimension < solution.dimension:
+        if membrane:
             self._across = np.ascontiguousarray(triangle_frames(shape.corners)[:, 2])
             self._sides = np.zeros((len(self._cells), 0), dtype=np.int8)
         self._set_nodal(solution.displacement[step])

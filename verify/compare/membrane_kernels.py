@@ -50,21 +50,24 @@ def _nearest(
 ):  # fmt: skip
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
-    stack = np.empty(64, dtype=np.int64)
-    stack[0], top = 1, 1
+    stack, gaps = np.empty(64, dtype=np.int64), np.empty(64)  # nodes and their distances
+    stack[0], gaps[0], top = 1, 0.0, 1
     best, nearest, best_depth, best_side = -1, np.inf, -np.inf, False
     while top > 0:
         top -= 1
         node = stack[top]
-        if np.sqrt(box_distance2(x, lower[node], upper[node])) > nearest + tolerance:
+        if gaps[top] > nearest + tolerance:
             continue
         if node < leaves:
             left, right = 2 * node, 2 * node + 1
-            left2 = box_distance2(x, lower[left], upper[left])
-            if left2 < box_distance2(x, lower[right], upper[right]):
-                left, right = right, left
-            stack[top], stack[top + 1] = left, right  # the nearer child is taken first
-            top += 2
+            left_gap = np.sqrt(box_distance2(x, lower[left], upper[left]))
+            right_gap = np.sqrt(box_distance2(x, lower[right], upper[right]))
+            if left_gap < right_gap:  # the nearer child is taken first
+                left, right, left_gap, right_gap = right, left, right_gap, left_gap
+            for child, gap in ((left, left_gap), (right, right_gap)):
+                if gap <= nearest + tolerance:
+                    stack[top], gaps[top] = child, gap
+                    top += 1
             continue
         for k in range((node - leaves) * leaf_size, (node - leaves + 1) * leaf_size):
             cell = cells[k]
@@ -75,6 +78,8 @@ def _nearest(
             away, depth = _distance_and_depth(x, normals[cell], across[cell], corners[cell])
             if away > nearest + tolerance:
                 continue
+            if away <= tolerance < depth:  # inside: there is no other
+                return cell, away
             towards = 0.0
             if sided:
                 for a in range(3):

@@ -104,7 +104,7 @@ def _triangles_at(body: MembraneBody, points: Array) -> NDArray[np.int64]:
     """Triangle (n,) of the body that each of `points` (n, 3) on it lies in."""
     corners = np.ascontiguousarray(body.corners)
     shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
+    tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
     no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
     found: NDArray[np.int64] = nearest_triangles(
         points, np.zeros((0, 3)), no_sides[0], tree.lower, tree.upper, tree.cells, corners,
