@@ -122,7 +122,7 @@ def test_the_error_of_a_crack_is_predicted_from_the_places_of_its_ends_before_it
     """In units of what an element at each end costs; the rest of the error is second order."""
     for crack, one in of(rule, count):
         predicted = crack.error_of([end.acts for end in one.realised])
-        assert abs(np.hypot(predicted, one.rest) - one.error) < 0.25 * crack.error_of([1.0, 1.0])
+        assert abs(np.hypot(predicted, one.rest) - one.error) < 0.3 * crack.error_of([1.0, 1.0])
 
 
 @levels

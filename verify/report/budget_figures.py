@@ -58,13 +58,11 @@ def _missing(record: Mapping[str, Any]) -> Markup | None:
     titles = ("not available", "because", "where it is instead")
     head = tag("tr", [tag("th", title, scope="col") for title in titles])
     rows = [
-        tag("tr", tag("th", one["source"], scope="row"), tag("td", one["reason"]),
+        tag("tr", tag("td", one["source"]), tag("td", one["reason"]),
             tag("td", one["where"]))
         for one in record["missing"]
     ]  # fmt: skip
-    return tag(
-        "div", tag("table", tag("thead", head), tag("tbody", rows), class_="map"), class_="scroll"
-    )
+    return tag("table", tag("thead", head), tag("tbody", rows), class_="prose")
 
 
 def _ends(record: Mapping[str, Any]) -> Markup | None:
