@@ -208,7 +208,8 @@ class Stepper:
         matrix.axpy(1 - scheme.alpha_m + keep * h * scheme.gamma * mass, body.inertia)
         symmetric = body.law.linear or not self.averaged
         kind: Any = "symmetric" if symmetric else "general"
-        self._solver = NodalSolver(matrix, body.law.unknowns, body.held, kind)
+        # what a solve misses the next iteration corrects, if it is little
+        self._solver = NodalSolver(matrix, body.law.unknowns, body.held, kind, largest=1e-3)
 
 
 def _scale(forces: StepForces) -> float:

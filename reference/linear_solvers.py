@@ -97,10 +97,20 @@ def general_solver(matrix: Any) -> Any:
     return _factorised(matrix, "lu")
 
 
-def solve_directly(solver: Any, matrix: Any, x: Any, vector: Any) -> Answer:
+def solve_directly(
+    solver: Any, matrix: Any, x: Any, vector: Any, largest: float = _LARGEST_CORRECTION
+) -> Answer:
     """Solve and refine by two residual corrections.
 
     The correction estimates the error itself, which the residual of a stiff system does not.
+
+    Parameters
+    ----------
+    solver : PETSc KSP
+    matrix, x, vector : PETSc Mat and Vecs
+        x holds the values of the constrained unknowns.
+    largest : float
+        How large the last correction may be, relative to x.
 
     Raises
     ------
@@ -125,7 +135,7 @@ def solve_directly(solver: Any, matrix: Any, x: Any, vector: Any) -> Answer:
     correction.destroy()
     if reason < 0:
         raise RuntimeError(f"MUMPS did not solve the system (PETSc reason {reason})")
-    if not size <= _LARGEST_CORRECTION:
+    if not size <= largest:
         raise IllConditionedError(last, size)
     return Answer("PETSc, MUMPS Cholesky", size, left, 0)
 

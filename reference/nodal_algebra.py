@@ -56,6 +56,8 @@ class NodalSolver:
     held : (h,) int array
         Scalar displacements, by nodes.
     kind : {"definite", "symmetric", "general"}
+    largest : float
+        Share of the first solution that may be lost in round-off.
     """
 
     def __init__(
@@ -64,7 +66,9 @@ class NodalSolver:
         unknowns: SharedUnknowns,
         held: NDArray[np.int32],
         kind: Literal["definite", "symmetric", "general"] = "definite",
+        largest: float = 1e-6,
     ) -> None:
+        self._largest = largest
         self._unknowns, self._matrix, self._proven = unknowns, matrix, False
         matrix.zeroRowsColumns(unknowns.rows(held), mean_stiffness(matrix))
         self._solver = _SOLVERS[kind](matrix)
@@ -87,7 +91,7 @@ class NodalSolver:
             self._solver.solve(self._b, self._x)
         else:
             self._x.set(0.0)
-            solve_directly(self._solver, self._matrix, self._x, self._b)
+            solve_directly(self._solver, self._matrix, self._x, self._b, self._largest)
             self._proven = True
         return self._unknowns.everywhere(self._x.array).ravel()
 

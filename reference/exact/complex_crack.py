@@ -4,7 +4,7 @@ In the axes of the crack, z = x + iy, with functions φ, ω that are analytic of
 
     2μ (u + iv) = κ φ(z) − ω(z̄) − (z − z̄) conj φ'(z),
 
-which leaves the faces y = 0± free of traction wherever φ± = ω∓ there up to a constant.
+which leaves the faces y = 0± free of traction wherever φ± = −ω∓ there up to a constant.
 """
 
 from abc import abstractmethod

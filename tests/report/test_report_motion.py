@@ -99,7 +99,7 @@ def test_momenta_of_a_rigid_motion_are_mass_times_velocity_and_inertia_times_spi
               "work_of_loads": np.array([0.0, 0.5])}  # fmt: skip
     solution = Solution(points=points, cells=body.cells, displacement=np.zeros((2, *points.shape)),
                         times=np.array([0.0, 1.0]), velocity=speed, ledger=ledger)  # fmt: skip
-    scene = SimpleNamespace(material=SimpleNamespace(density=density))
+    scene = SimpleNamespace(material=SimpleNamespace(density=density, thickness=None))
     found = motion_history(scene, solution)
     corners = points[body.cells]
     area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
