@@ -5,8 +5,10 @@ import pytest
 import xfem_exact_fields as exact
 from xfem_bodies import boundary_nodes, relative_l2_error
 
+from verify.xfem.conjugate_gradients import NotConvergedError
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.loads import body_force
 from verify.xfem.polyline import Polyline
 from verify.xfem.static import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -61,6 +63,22 @@ def test_a_large_cut_cube_is_solved_by_iteration_as_exactly_as_by_factorisation(
     assert np.abs(solution.displacement - direct.displacement).max() < 1e-12
     assert solution.residual < 1e-11
     assert solve(rectangle_mesh((48, 48)), LINE, exact.f1, "auto")[1].solver == "direct"
+
+
+def test_a_thin_strip_that_bends_is_factorised_where_iterations_do_not_end():
+    """Equilibrium: the load works twice the strain energy; asked for, iterations say why not."""
+    mesh = box_mesh((240, 5, 1), upper=(1.2, 0.02, 0.001))
+    virtual = cut_mesh(mesh, [])
+    held = Supports.none(virtual).prescribe(virtual, np.flatnonzero(mesh.points[:, 0] == 0.0))
+    load = body_force(virtual, (0.0, 0.0, -1.0))
+    solution = solve_static(virtual, isotropic(1e4, 0.3, "solid"), held, load)
+    assert virtual.node_count > 2000
+    assert solution.solver == "direct"
+    work = np.sum(load * solution.displacement)
+    # round-off times the condition number, (length/thickness)⁴
+    assert work == pytest.approx(2.0 * solution.strain_energy, rel=1e-4)
+    with pytest.raises(NotConvergedError):
+        solve_static(virtual, isotropic(1e4, 0.3, "solid"), held, load, "iterative")
 
 
 def test_swapped_sides_of_the_prescribed_values_are_seen_in_the_displacement():

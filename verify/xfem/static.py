@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from verify.xfem.assembly_kernels import constrain
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cholesky import Cholesky
-from verify.xfem.conjugate_gradients import ConjugateGradients
+from verify.xfem.conjugate_gradients import ConjugateGradients, NotConvergedError
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
@@ -24,6 +24,7 @@ _Floats = NDArray[np.float64]
 
 ITERATE_FROM = 2000  # nodes in space: docs/xfem-linear-solvers.md has the measurement
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
+_MOST = 2000  # iterations before a factorisation is the quicker way
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,8 @@ def solve_static(
     solver : {"auto", "direct", "iterative"}
         Sparse Cholesky factorisation, or conjugate gradients with nodal-block Jacobi down to the
         residual that a factorisation leaves. ``auto`` takes the faster one: the latter for solids
-        of 2000 nodes and more, without a ghost penalty.
+        of 2000 nodes and more, without a ghost penalty; and the former after all if the latter do
+        not converge (thin bodies that bend).
     ghost : GhostPenalty, optional
         Added to the stiffness.
 
@@ -104,12 +106,14 @@ def solve_static(
     pattern = ghost.pattern() if ghost else block_pattern(virtual.cells, virtual.node_count)
     if solver not in ("auto", "direct", "iterative"):
         raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
-    if solver == "auto":
+    chosen = solver == "auto"
+    if chosen:
         large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
         solver = "iterative" if large and ghost is None else "direct"
     inverse: Cholesky | ConjugateGradients
     if solver == "iterative":
-        inverse = ConjugateGradients(pattern, shape[1], _ROUNDING)
+        limit = _MOST if chosen else 5 * _MOST
+        inverse = ConjugateGradients(pattern, shape[1], _ROUNDING, limit)
     else:
         inverse = Cholesky(pattern, shape[1], supports.fixed.all(axis=1))
     clock.append(perf_counter())
@@ -123,7 +127,15 @@ def solve_static(
     clock.append(perf_counter())
     inverse.factorize(blocks)
     clock.append(perf_counter())
-    displacement = supports.values + inverse.solve(right)
+    try:
+        displacement = inverse.solve(right)
+    except NotConvergedError:
+        if not chosen:
+            raise
+        solver, inverse = "direct", Cholesky(pattern, shape[1], supports.fixed.all(axis=1))
+        inverse.factorize(blocks)
+        displacement = inverse.solve(right)
+    displacement += supports.values
     clock.append(perf_counter())
     internal, energy = stiffness.force(displacement)
     penalty, penalty_energy = ghost.force(displacement) if ghost else (0.0, 0.0)
