@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from reference.space import ConformingSpace
 
 __all__ = [
+    "LARGEST_CORRECTION",
     "Answer",
     "IllConditionedError",
     "direct_solver",
@@ -22,7 +23,7 @@ __all__ = [
     "symmetric_solver",
 ]
 
-_LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
+LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 _MOST_ITERATIONS = 2000
 _RUNS = 6
 _MULTIGRID = {
@@ -98,7 +99,7 @@ def general_solver(matrix: Any) -> Any:
 
 
 def solve_directly(
-    solver: Any, matrix: Any, x: Any, vector: Any, largest: float = _LARGEST_CORRECTION
+    solver: Any, matrix: Any, x: Any, vector: Any, largest: float = LARGEST_CORRECTION
 ) -> Answer:
     """Solve and refine by two residual corrections.
 

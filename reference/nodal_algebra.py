@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from reference.elasticity import mean_stiffness
 from reference.linear_solvers import (
+    LARGEST_CORRECTION,
     direct_solver,
     general_solver,
     solve_directly,
@@ -66,7 +67,7 @@ class NodalSolver:
         unknowns: SharedUnknowns,
         held: NDArray[np.int32],
         kind: Literal["definite", "symmetric", "general"] = "definite",
-        largest: float = 1e-6,
+        largest: float = LARGEST_CORRECTION,
     ) -> None:
         self._largest = largest
         self._unknowns, self._matrix, self._proven = unknowns, matrix, False

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
-from verify.xfem.block_pattern import block_pattern
+from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.cholesky import Cholesky
 from verify.xfem.conjugate_gradients import ConjugateGradients, NotConvergedError
 from verify.xfem.elasticity import Material
@@ -110,12 +110,8 @@ def solve_static(
     if chosen:
         large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
         solver = "iterative" if large and ghost is None else "direct"
-    inverse: Cholesky | ConjugateGradients
-    if solver == "iterative":
-        limit = _MOST if chosen else 5 * _MOST
-        inverse = ConjugateGradients(pattern, shape[1], _ROUNDING, limit)
-    else:
-        inverse = Cholesky(pattern, shape[1], supports.fixed.all(axis=1))
+    limit = _MOST if chosen else 5 * _MOST
+    inverse = _inverse(solver, pattern, supports, limit)
     clock.append(perf_counter())
     blocks = stiffness.assemble(pattern)
     internal, _ = stiffness.force(supports.values)
@@ -132,23 +128,47 @@ def solve_static(
     except NotConvergedError:
         if not chosen:
             raise
-        solver, inverse = "direct", Cholesky(pattern, shape[1], supports.fixed.all(axis=1))
+        solver = "direct"
+        inverse = _inverse(solver, pattern, supports, limit)
         inverse.factorize(blocks)
         displacement = inverse.solve(right)
     displacement += supports.values
     clock.append(perf_counter())
+    phases = ("analysis", "assembly", "factorisation", "solve")
+    timings = dict(zip(phases, np.diff(clock).tolist(), strict=True))
+    return _solution(stiffness, ghost, supports, force, displacement, timings, solver)
+
+
+def _inverse(
+    solver: str, pattern: BlockPattern, supports: Supports, limit: int
+) -> Cholesky | ConjugateGradients:
+    block = supports.fixed.shape[1]
+    if solver == "iterative":
+        return ConjugateGradients(pattern, block, _ROUNDING, limit)
+    return Cholesky(pattern, block, supports.fixed.all(axis=1))
+
+
+def _solution(
+    stiffness: LinearStiffness,
+    ghost: GhostPenalty | None,
+    supports: Supports,
+    force: _Floats,
+    displacement: _Floats,
+    timings: dict[str, float],
+    solver: str,
+) -> StaticSolution:
+    """Energies, reactions (N) and residual of a displacement (N, d) under forces (N, d)."""
     internal, energy = stiffness.force(displacement)
     penalty, penalty_energy = ghost.force(displacement) if ghost else (0.0, 0.0)
     internal += penalty
     unbalanced = internal - force
     scale = max(np.abs(internal).max(), np.abs(force).max(), np.finfo(float).tiny)
-    phases = ("analysis", "assembly", "factorisation", "solve")
     return StaticSolution(
         displacement=displacement,
         strain_energy=energy,
         reaction=np.where(supports.fixed, unbalanced, 0.0),
         residual=float(np.abs(unbalanced[~supports.fixed]).max(initial=0.0) / scale),
-        timings=dict(zip(phases, np.diff(clock).tolist(), strict=True)),
+        timings=timings,
         penalty_energy=penalty_energy,
         solver=solver,
     )
