@@ -3,10 +3,10 @@ import pytest
 from solid_meshes import cube_grid, height, inclined, sliver_body, solid_scene
 
 from verify.compare.body import body_of
+from verify.compare.body_rule import body_rule
 from verify.compare.simplex_rule import points_in, simplex_rule
 from verify.compare.splitting import bisect, measures, split_at_level
 from verify.compare.surface_rule import nearest_on_cut, surface_rule
-from verify.compare.volume_rule import volume_rule
 from verify.scene import load_scene
 
 DISC = {"kind": "disc", "centre": [0.5, 0.5, 0.5], "normal": [0.0, 1.0, 1.0], "radius": 0.3}
@@ -36,7 +36,7 @@ CUTS = {
 
 @pytest.mark.parametrize("cuts", CUTS.values(), ids=CUTS.keys())
 def test_weights_sum_to_the_volume_and_points_lie_inside(cuts):
-    rule = volume_rule(body_of(solid_scene(cuts)), 0.15)
+    rule = body_rule(body_of(solid_scene(cuts)), 0.15)
     # 1e5 weights, each to a few bits
     assert abs(rule.weights.sum() - 1) < 1e-13
     assert rule.weights.min() > 0
@@ -45,7 +45,7 @@ def test_weights_sum_to_the_volume_and_points_lie_inside(cuts):
 
 
 def test_each_side_of_a_plane_cut_has_its_exact_volume_down_to_1e_9():
-    rule = volume_rule(sliver_body(1e-9), 0.15)
+    rule = body_rule(sliver_body(1e-9), 0.15)
     assert abs(rule.weights.sum() - 1) < 1e-13
     above = rule.points[:, 2] - height(rule.points)
     # both halves of the cube are the same but for the sliver
@@ -60,7 +60,7 @@ def test_a_tube_has_its_volume_to_second_order():
     exact = np.pi * 0.09
     off = []
     for spacing in (0.2, 0.1, 0.05):
-        rule = volume_rule(body, spacing)
+        rule = body_rule(body, spacing)
         inside = np.linalg.norm(rule.points[:, :2] - 0.5, axis=1) < 0.3
         off.append(abs(rule.weights[inside].sum() - exact) / exact)
     # the sagitta is a thirtieth of the spacing; the mantle over the volume 2/R
@@ -163,7 +163,7 @@ def test_fronts_are_the_rims_inside_the_body():
 
 def test_cells_are_graded_to_a_front():
     body = body_of(solid_scene([HALF]))
-    rule = volume_rule(body, 0.2, depth=1 / 16)
+    rule = body_rule(body, 0.2, depth=1 / 16)
     away = body.tip_distance(rule.points)
     size = (6 * 4 * rule.weights) ** (1 / 3)
     assert size[away < 0.01].max() < 0.05
@@ -173,7 +173,7 @@ def test_cells_are_graded_to_a_front():
 def test_an_inverse_square_root_at_a_front_is_integrated():
     # 1/√r about a front along y through the cube: ∫ 1/√r over a rectangle, by polar pieces
     body = body_of(solid_scene([HALF]))
-    rule = volume_rule(body, 0.15, order=3, depth=2e-2)
+    rule = body_rule(body, 0.15, order=3, depth=2e-2)
     r = np.linalg.norm(rule.points[:, [0, 2]] - [0.6, 0.5], axis=1)
     angle, weight = np.polynomial.legendre.leggauss(60)
     exact = 0.0
@@ -199,7 +199,7 @@ def test_a_body_given_by_tetrahedra_has_its_volume_and_its_cut_its_area(tmp_path
         f'[[cuts]]\nkind = "polygon"\npoints = {inclined()["points"]}\n'
     )
     body = body_of(load_scene(case))
-    rule = volume_rule(body, 0.2)
+    rule = body_rule(body, 0.2)
     assert rule.weights.sum() == pytest.approx(1, abs=1e-13)
     above = rule.points[:, 2] > height(rule.points)
     assert rule.weights[above].sum() == pytest.approx(0.5, abs=1e-13)

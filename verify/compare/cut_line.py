@@ -1,6 +1,8 @@
 """Quadrature along the cuts, graded to their ends; each point has two sides."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +10,7 @@ from numpy.typing import NDArray
 from verify.compare.body import Body
 from verify.compare.slabs import graded_breaks
 
-__all__ = ["AWAY", "CutRule", "cut_rule", "place_on_cut"]
+__all__ = ["AWAY", "CutRule", "along_cut", "cut_rule", "place_on_cut"]
 
 Array = NDArray[np.float64]
 
@@ -38,6 +40,24 @@ class CutRule:
     positive: Array
     negative: Array
 
+    @classmethod
+    def beside(cls, points: Array, weights: Array, normals: Array, away: Array | float) -> Self:
+        """Rule with its sides at distances `away` (n,) along the normals, m."""
+        shift = np.multiply(np.reshape(away, (-1, 1)), normals)
+        return cls(points, weights, normals, points + shift, points - shift)
+
+    @classmethod
+    def joined(cls, rules: Sequence[Self], dimension: int) -> Self:
+        """Join rules in space or in the plane, or none at all."""
+        empty = np.zeros((0, dimension))
+        none = cls(empty, np.zeros(0), empty, empty, empty)
+        columns = ([getattr(r, f.name) for r in (none, *rules)] for f in fields(cls))
+        return cls(*map(np.concatenate, columns))
+
+    def reordered(self, order: NDArray[np.int64]) -> Self:
+        """Return the same points in another order."""
+        return type(self)(*(getattr(self, f.name)[order] for f in fields(self)))
+
 
 def cut_rule(body: Body, spacing: float, order: int = 3, depth: float = 1e-4) -> CutRule:
     """Quadrature along all cuts of a body, inside it.
@@ -52,24 +72,48 @@ def cut_rule(body: Body, spacing: float, order: int = 3, depth: float = 1e-4) ->
     depth : float
         Size of the cells at the ends of a cut, relative to `spacing`.
     """
-    x, w = np.polynomial.legendre.leggauss(order)
-    rows = []
+    found = []
     for part in body.parts:
         ends = np.array([part.start, part.end])
-        length = part.piece.length
-        special = ends[_is_special(part.piece.point(ends), body)] * length
-        breaks = graded_breaks(ends * length, special, spacing, depth * spacing) / length
-        step = np.diff(breaks)
-        t = (breaks[:-1, None] + step[:, None] * 0.5 * (x + 1)).ravel()
-        weights = (step[:, None] * length * 0.5 * w).ravel()
-        away = np.repeat(np.maximum(1e-3 * step * length, AWAY * body.size), order)
-        rows.append((part.piece.point(t), weights, part.piece.tangent(t), away))
-    if not rows:
-        return CutRule(*(np.zeros(shape) for shape in ((0, 2), (0,), (0, 2), (0, 2), (0, 2))))
-    points, weights, tangents, away = (np.concatenate(column) for column in zip(*rows, strict=True))
-    normals = np.column_stack([-tangents[:, 1], tangents[:, 0]])
-    shift = away[:, None] * normals
-    return CutRule(points, weights, normals, points + shift, points - shift)
+        at_end = _is_special(part.piece.point(ends), body)
+        t, weights, away = along_cut(
+            ends, part.piece.length, at_end, body.size, spacing, order, depth
+        )
+        normals = _left_of(part.piece.tangent(t))
+        found.append(CutRule.beside(part.piece.point(t), weights, normals, away))
+    return CutRule.joined(found, 2)
+
+
+def along_cut(
+    ends: Array, length: float, special: NDArray[np.bool_], size: float,
+    spacing: float, order: int, depth: float,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Points of a quadrature along a piece of a cut, graded to those ends that are special.
+
+    Parameters
+    ----------
+    ends : (2,) array
+        Parameters at which the piece starts and ends.
+    length : float
+        For a parameter that runs from 0 to 1, m.
+    special : (2,) bool array
+    size : float
+        Of the body, m.
+    spacing, order, depth
+        See `cut_rule`.
+
+    Returns
+    -------
+    parameters, weights, away : (n,) arrays
+        The last is how far from the cut a point beside it shall be, m.
+    """
+    x, w = np.polynomial.legendre.leggauss(order)
+    stops = ends * length
+    breaks = graded_breaks(stops, stops[special], spacing, depth * spacing) / length
+    step = np.diff(breaks)
+    t = (breaks[:-1, None] + step[:, None] * 0.5 * (x + 1)).ravel()
+    weights = (step[:, None] * length * 0.5 * w).ravel()
+    return t, weights, np.repeat(np.maximum(1e-3 * step * length, AWAY * size), order)
 
 
 def place_on_cut(body: Body, cut: str, fraction: float) -> CutRule:
@@ -80,10 +124,12 @@ def place_on_cut(body: Body, cut: str, fraction: float) -> CutRule:
     where = fraction * starts[-1]
     index = min(int(np.searchsorted(starts[1:], where)), len(pieces) - 1)
     t = np.array([np.clip((where - starts[index]) / lengths[index], 0.0, 1.0)])
-    point, tangent = pieces[index].point(t), pieces[index].tangent(t)
-    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-    shift = AWAY * body.size * normal
-    return CutRule(point, np.ones(1), normal, point + shift, point - shift)
+    point, normal = pieces[index].point(t), _left_of(pieces[index].tangent(t))
+    return CutRule.beside(point, np.ones(1), normal, AWAY * body.size)
+
+
+def _left_of(tangents: Array) -> Array:
+    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
 
 
 def _is_special(points: Array, body: Body) -> NDArray[np.bool_]:

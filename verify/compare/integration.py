@@ -7,15 +7,16 @@ largest difference among them, although the finest rule is the one that counts.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import factorial
 
 from verify.compare.body import AnyBody, Body
+from verify.compare.body_rule import body_rule
 from verify.compare.cut_line import CutRule, cut_rule
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.membrane_rule import membrane_cut_rule, membrane_rule
+from verify.compare.membrane_cut_rule import membrane_cut_rule
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.surface_rule import surface_rule
-from verify.compare.volume_rule import volume_rule
 
 __all__ = ["MeasuredNorm", "cut_rules", "integrate_norm", "rules", "spread_of"]
 
@@ -45,15 +46,13 @@ def rules(body: AnyBody, size: float, count: int = 3) -> list[Rule]:
             area_rule(body, factor * size / 3, angle, grading=_GRADING)
             for factor, angle in list(zip(_FAMILY, slab_angles(body), strict=True))[:count]
         ]
-    if isinstance(body, MembraneBody):
-        spacing = max(size / 3, (2 * body.measure / _MOST) ** 0.5)
-        return [
-            membrane_rule(body, factor * spacing, seed, grading=_GRADING)
-            for seed, factor in enumerate(_FAMILY[:count])
-        ]
-    spacing = max(size / 3, (6 * body.measure / _MOST) ** (1 / 3))
+    k = body.cell_dimension
+    spacing = max(size / 3, (factorial(k) * body.measure / _MOST) ** (1 / k))
+    # a front takes many more cells than a tip
+    depth, grading = (0.05, _GRADING) if k == 2 else (0.25, 1.0)
     return [
-        volume_rule(body, factor * spacing, seed) for seed, factor in enumerate(_FAMILY[:count])
+        body_rule(body, factor * spacing, seed, depth=depth, grading=grading)
+        for seed, factor in enumerate(_FAMILY[:count])
     ]
 
 

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.facet_kernels import distance_to_segments
+from verify.compare.cell_tree import build_cell_tree
 from verify.compare.membrane_cuts import SHORT, SurfaceLines, nearest_on_lines, surface_lines
+from verify.compare.membrane_kernels import nearest_triangles
 from verify.compare.patches import PlanePatch, patches_of
-from verify.compare.splitting import measures
+from verify.compare.simplex_body import SimplexBody
+from verify.compare.simplices import simplices, triangle_frames
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.cuts import Cut
@@ -24,57 +26,42 @@ Array = NDArray[np.float64]
 _SAME = 2 * SHORT  # of the body's size: ends of lines that are closer are one point
 
 
-@dataclass(frozen=True)
-class MembraneBody:
+@dataclass(frozen=True, kw_only=True)
+class MembraneBody(SimplexBody):
     """The triangles of a mesh file, with cuts.
 
     Parameters
     ----------
-    corners : (m, 3, 3) array
-        Triangles that make up the body.
-    patches : list of PlanePatch
-        The cuts as asked.
-    cuts : dict of str to SurfaceLines
-        The lines along which these cross the surface.
-    tips : (t, 3) array
-        Ends of the lines inside the surface.
+    corners, cuts, front
+        See `SimplexBody`.
+    lines : dict of str to SurfaceLines
+        The lines along which the cuts cross the surface.
     """
 
-    corners: Array
-    patches: list[PlanePatch]
-    cuts: dict[str, SurfaceLines]
-    tips: Array
-    dimension = 3
-    box = None
+    lines: dict[str, SurfaceLines]
 
     @property
-    def measure(self) -> float:
-        """Area, m²."""
-        return float(measures(self.corners).sum())
+    def tips(self) -> Array:
+        """Ends (t, 3) of the lines inside the surface."""
+        return np.asarray(self.front[:, 0])
 
-    @property
-    def size(self) -> float:
-        """Diagonal of the bounding box, m."""
-        return float(np.linalg.norm(np.ptp(self.corners.reshape(-1, 3), axis=0)))
-
-    @property
-    def has_cuts(self) -> bool:
-        """Whether anything is cut."""
-        return any(len(lines.ends) for lines in self.cuts.values())
-
-    @property
-    def front(self) -> Array:
-        """Tips as segments (t, 2, 3) without length: what quadratures are graded to."""
-        return np.stack([self.tips, self.tips], axis=1)
-
-    def tip_distance(self, points: Array) -> Array:
-        """Distance (n,) of points (n, 3) to the nearest tip; infinite without one."""
-        points = np.ascontiguousarray(points)
-        return np.asarray(distance_to_segments(points, self.tips, self.tips))
+    def frames_at(self, points: Array) -> Array:
+        """Two tangents and the normal (n, 3, 3) of the triangles that points (n, 3) lie in."""
+        corners = np.ascontiguousarray(self.corners)
+        frames = triangle_frames(corners)
+        shape = simplices(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
+        no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
+        found = nearest_triangles(
+            points, np.zeros((0, 3)), no_sides[0], tree.lower, tree.upper, tree.cells, corners,
+            shape.normals, np.ascontiguousarray(frames[:, 2]), corners.mean(axis=1), no_sides[1],
+            1e-10 * self.size,
+        )[0]  # fmt: skip
+        return frames[found]
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 3) on the lines of the cuts, and whether they are tips (n,)."""
-        ends = np.concatenate([lines.ends for lines in self.cuts.values()])
+        ends = np.concatenate([lines.ends for lines in self.lines.values()])
         foot, _ = nearest_on_lines(points, ends)
         return foot, self.tip_distance(foot) <= _SAME * self.size
 
@@ -92,29 +79,30 @@ def cut_membrane(points: Array, cells: NDArray[np.int64], asked: Sequence[Cut]) 
     UnsupportedSceneError
         If a cut is not plane in parts, crosses no triangle, or runs along a fold.
     """
-    patches: list[PlanePatch] = []
-    cuts = {}
+    cuts, lines = {}, {}
     for cut in asked:
         if not isinstance(cut, PolygonCut | SweptCut):
             raise UnsupportedSceneError(
                 f"a cut of kind '{cut.kind}' through a membrane cannot be compared on yet; "
                 "polygons and swept polylines can"
             )
-        mine = [patch for patch in patches_of(cut) if isinstance(patch, PlanePatch)]
-        cuts[cut.name] = surface_lines(points, cells, mine, cut.name)
-        if not len(cuts[cut.name].ends):
+        patches = [patch for patch in patches_of(cut) if isinstance(patch, PlanePatch)]
+        found = surface_lines(points, cells, patches, cut.name)
+        if not len(found.ends):
             raise UnsupportedSceneError(f"cut '{cut.name}' does not cross the membrane")
-        patches += mine
-    return MembraneBody(points[cells], patches, cuts, _tips(cuts, rim_edges((points, cells))))
+        cuts[cut.name], lines[cut.name] = patches, found
+    tips = _tips([line.ends for line in lines.values()], rim_edges((points, cells)))
+    front = np.stack([tips, tips], axis=1)
+    return MembraneBody(corners=points[cells], cuts=cuts, front=front, lines=lines)
 
 
-def _tips(cuts: dict[str, SurfaceLines], rim: Array) -> Array:
-    """Find the ends (t, 3) of lines that are neither on the rim nor met by another line."""
-    everything = np.concatenate([rim, *(lines.ends for lines in cuts.values())])
+def _tips(lines: Sequence[Array], rim: Array) -> Array:
+    """Find the ends (t, 3) of lines (s, 2, 3) that are neither on the rim nor met by another."""
+    everything = np.concatenate([rim, *lines])
     size = float(np.linalg.norm(np.ptp(everything.reshape(-1, 3), axis=0)))
     start, along = everything[:, 0], everything[:, 1] - everything[:, 0]
     tips = []
-    for end in (end for lines in cuts.values() for end in lines.ends.reshape(-1, 3)):
+    for end in everything[len(rim) :].reshape(-1, 3):
         share = np.clip(np.sum((end - start) * along, 1) / np.sum(along**2, 1), 0.0, 1.0)
         away = np.linalg.norm(start + share[:, None] * along - end, axis=1)
         if np.sum(away <= _SAME * size) == 1:  # its own piece, and no other

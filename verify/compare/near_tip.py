@@ -47,6 +47,6 @@ def _lengths_with_tip(body: MembraneBody) -> list[float]:
     """Lengths of the cuts of a membrane that end inside it, m."""
     return [
         float(lines.lengths.sum())
-        for lines in body.cuts.values()
+        for lines in body.lines.values()
         if (body.tip_distance(lines.ends.reshape(-1, 3)) <= 1e-9 * body.size).any()
     ]

@@ -9,7 +9,7 @@ from verify.compare.cut_line import CutRule, place_on_cut
 from verify.compare.jump_error import displacement_jump
 from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
-from verify.compare.membrane_rule import nearest_on_membrane_cut
+from verify.compare.membrane_cut_rule import nearest_on_membrane_cut
 from verify.compare.surface_rule import nearest_on_cut
 
 __all__ = ["cut_place", "opening"]

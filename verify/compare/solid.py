@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import build_cell_tree
-from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.locate_kernels import find_cells
-from verify.compare.patches import Patch, patches_of
+from verify.compare.patches import patches_of
+from verify.compare.simplex_body import SimplexBody
 from verify.compare.simplices import simplices
-from verify.compare.splitting import measures
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.geometry import Box, MeshFile
@@ -28,55 +27,19 @@ _RIM = 64  # pieces that a rim is divided into per body's size, where it is trim
 _MARGIN = 1e-9  # of the body's size: closer to its surface is on it
 
 
-@dataclass(frozen=True)
-class SolidBody:
+@dataclass(frozen=True, kw_only=True)
+class SolidBody(SimplexBody):
     """A box, or the tetrahedra of a mesh file, with cuts.
 
     Parameters
     ----------
-    corners : (m, 4, 3) array
-        Tetrahedra that make up the body.
-    box : (2, 3) array, optional
-        Lower and upper corner, if it is a box.
-    cuts : dict of str to list of Patch
-        The cuts as asked, not trimmed.
-    front : (f, 2, 3) array
-        Pieces of the cuts' rims inside the body.
+    corners, cuts, front, box
+        See `SimplexBody`.
     inside : callable
         Whether points (n, 3) lie inside the body or on its surface.
     """
 
-    corners: Array
-    box: Array | None
-    cuts: dict[str, list[Patch]]
-    front: Array
     inside: Inside
-    dimension = 3
-
-    @property
-    def measure(self) -> float:
-        """Volume, m³."""
-        return float(measures(self.corners).sum())
-
-    @property
-    def size(self) -> float:
-        """Diagonal of the bounding box, m."""
-        return float(np.linalg.norm(np.ptp(self.corners.reshape(-1, 3), axis=0)))
-
-    @property
-    def patches(self) -> list[Patch]:
-        """Patches of all cuts."""
-        return [patch for patches in self.cuts.values() for patch in patches]
-
-    @property
-    def has_cuts(self) -> bool:
-        """Whether anything is cut."""
-        return bool(self.cuts)
-
-    def tip_distance(self, points: Array) -> Array:
-        """Distance (n,) of points (n, 3) to the nearest front; infinite without one."""
-        starts, ends = (np.ascontiguousarray(self.front[:, k]) for k in (0, 1))
-        return np.asarray(distance_to_segments(np.ascontiguousarray(points), starts, ends))
 
     def nearest_on_cuts(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Nearest points (n, 3) on the cuts as asked, and whether they are ends of these (n,)."""
@@ -108,7 +71,8 @@ def solid_of(scene: Scene) -> SolidBody:
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
         cuts[cut.name] = patches_of(cut)
         fronts.append(_trimmed(rim_edges(cut.surface(size / _RIM)), inside, size))
-    return SolidBody(corners, box, cuts, np.concatenate(fronts), inside)
+    front = np.concatenate(fronts)
+    return SolidBody(corners=corners, cuts=cuts, front=front, box=box, inside=inside)
 
 
 def _material(scene: Scene) -> tuple[Array, Array | None, Inside]:

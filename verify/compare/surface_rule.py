@@ -39,7 +39,7 @@ def surface_rule(body: SolidBody, spacing: float, order: int = 2, depth: float =
     CutRule
         Exact areas for plane polygons in a box; else to the last cells on the body's surface.
     """
-    rows = []
+    found = []
     for patch in body.patches:
         cells, sizes = _cells(patch, body, spacing, depth)
         uv, weights = points_in(cells, order)
@@ -48,14 +48,10 @@ def surface_rule(body: SolidBody, spacing: float, order: int = 2, depth: float =
         kept = body.inside(points)
         if body.box is None or not patch.plane:
             uv, weights, away, points = uv[kept], weights[kept], away[kept], points[kept]
-        rows.append((points, weights * patch.stretch(uv), patch.normal(uv), away))
-    if not rows:
-        return CutRule(*(np.zeros(shape) for shape in ((0, 3), (0,), (0, 3), (0, 3), (0, 3))))
-    points, weights, normals, away = (np.concatenate(column) for column in zip(*rows, strict=True))
-    near = morton_order(points) if len(points) else np.zeros(0, dtype=np.int64)
-    points, weights, normals, away = points[near], weights[near], normals[near], away[near]
-    shift = away[:, None] * normals
-    return CutRule(points, weights, normals, points + shift, points - shift)
+        weights = weights * patch.stretch(uv)
+        found.append(CutRule.beside(points, weights, patch.normal(uv), away))
+    rule = CutRule.joined(found, 3)
+    return rule.reordered(morton_order(rule.points)) if len(rule.points) else rule
 
 
 def nearest_on_cut(body: SolidBody, cut: str, point: Array) -> CutRule:
@@ -70,8 +66,7 @@ def nearest_on_cut(body: SolidBody, cut: str, point: Array) -> CutRule:
             ends = [patch.level(foot + s * step * np.eye(3)) for s in (1.0, -1.0)]
             normal = (ends[0] - ends[1])[None]
             normal /= np.linalg.norm(normal)
-            shift = AWAY * body.size * normal
-            best = CutRule(foot, np.ones(1), normal, foot + shift, foot - shift)
+            best = CutRule.beside(foot, np.ones(1), normal, AWAY * body.size)
     assert best is not None
     return best
 

@@ -9,17 +9,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from verify.compare.body import AnyBody, Body
+from verify.compare.body_rule import body_rule
 from verify.compare.errors import ERRORS, Rules
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
-from verify.compare.membrane_body import MembraneBody
-from verify.compare.membrane_rule import membrane_rule
 from verify.compare.motion import ExactMotion, Motion
 from verify.compare.near_tip import NEAR, near_radius
 from verify.compare.simplices import simplices
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy
-from verify.compare.volume_rule import volume_rule
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.acceptance import (
@@ -150,14 +148,11 @@ def _exact_rules(body: AnyBody) -> Sequence[Rule]:
             area_rule(body, body.size / n, angle, 7, 1e-8)
             for n, angle in zip((14, 10), slab_angles(body)[:2], strict=True)
         ]
-    if isinstance(body, MembraneBody):
-        return [
-            membrane_rule(body, body.size / n, seed, 5, 1e-6) for seed, n in enumerate((14, 10))
-        ]
-    order = 3 if len(body.front) else 5
-    return [
-        volume_rule(body, body.size / n, seed, order, 1 / 32) for seed, n in enumerate((14, 10))
-    ]
+    if body.cell_dimension == 2:
+        order, depth = 5, 1e-6
+    else:
+        order, depth = 3 if len(body.front) else 5, 1 / 32
+    return [body_rule(body, body.size / n, seed, order, depth) for seed, n in enumerate((14, 10))]
 
 
 def conforming_reference(

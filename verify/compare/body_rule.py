@@ -1,4 +1,4 @@
-"""Quadrature of a cut body in space: neutral tetrahedra, split by the cuts, graded to fronts.
+"""Quadrature of a cut body in space: neutral simplices, split by the cuts, graded to fronts.
 
 A box is divided by a grid of its own, whose planes are shifted at random (with a fixed seed), so
 that its points do not fall in step with a structured mesh; the simplices of a mesh file are
@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.cell_tree import morton_order
-from verify.compare.membrane_body import MembraneBody
 from verify.compare.patches import Patch
+from verify.compare.simplex_body import SimplexBody
 from verify.compare.simplex_rule import points_in
 from verify.compare.slabs import Rule
-from verify.compare.solid import SolidBody
 from verify.compare.splitting import bisect, split_at_level
 
-__all__ = ["volume_cells", "volume_rule"]
+__all__ = ["body_rule"]
 
 Array = NDArray[np.float64]
 
@@ -27,21 +26,21 @@ _SHAKE = 0.15
 _DIAGONAL = 3**0.5
 
 
-def volume_rule(
-    body: SolidBody, spacing: float, seed: int = 0, order: int = 2, depth: float = 0.25,
+def body_rule(
+    body: SimplexBody, spacing: float, seed: int = 0, order: int = 2, depth: float = 0.25,
     grading: float = 1.0,
 ) -> Rule:  # fmt: skip
-    """Quadrature of a body in space.
+    """Quadrature of a solid or of a membrane.
 
     Parameters
     ----------
-    body : SolidBody
+    body : SimplexBody
     spacing : float
         Size of the cells, m.
     seed : int
         Of the random shifts.
     order : int
-        Of the rule in each tetrahedron, see `simplex_rule`.
+        Of the rule in each simplex, see `simplex_rule`.
     depth : float
         Size of the cells at fronts, relative to the spacing.
     grading : float
@@ -50,22 +49,18 @@ def volume_rule(
     Returns
     -------
     Rule
-        Exact volumes of the body and, for plane cuts, of each of its parts.
+        Exact measures of the body and, for plane cuts, of each of its parts; of a membrane with
+        frames.
     """
-    points, weights = points_in(volume_cells(body, spacing, seed, depth, grading), order)
+    points, weights = points_in(_cells(body, spacing, seed, depth, grading), order)
     kept = np.flatnonzero(weights > 0.0)
-    near = kept[morton_order(points[kept])]
-    return Rule(np.ascontiguousarray(points[near]), weights[near])
+    kept = kept[morton_order(points[kept])]
+    points = np.ascontiguousarray(points[kept])
+    return Rule(points, weights[kept], body.frames_at(points))
 
 
-def volume_cells(
-    body: SolidBody | MembraneBody,
-    spacing: float,
-    seed: int = 0,
-    depth: float = 0.25,
-    grading: float = 1.0,
-) -> Array:
-    """Tetrahedra (m, 4, 3) of the quadrature, or triangles (m, 3, 3)."""
+def _cells(body: SimplexBody, spacing: float, seed: int, depth: float, grading: float) -> Array:
+    """Simplices (m, k + 1, 3) of the quadrature."""
     random = np.random.default_rng(seed)
     if body.box is not None:
         cells = _shaken_grid(body.box, spacing, random)
