@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cut_meshes import STRAIGHT, grid, layered, quadratic, scene, solution
+from judged_fields import Cubic, judged
 
 from verify.errors import InputError
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
@@ -13,30 +14,11 @@ def line(x):
     return 0.5 + (x - 0.5) / 3
 
 
-class Cubic:
-    """A smooth field on each side of the cut; `near` decides the side."""
+def height(points):
+    return points[:, 1] - line(points[:, 0])
 
-    singular_points = np.zeros((0, 2))
 
-    def __init__(self, swapped=False):
-        self._sign = -1 if swapped else 1
-
-    def _above(self, points, near):
-        near = points if near is None else near
-        return self._sign * (near[:, 1] - line(near[:, 0])) > 0
-
-    def displacement(self, points, near=None):
-        x, y = points.T
-        above = np.column_stack([x * x * y, 0.3 + y**3 - x])
-        below = np.column_stack([y * y, x * y * y])
-        return np.where(self._above(points, near)[:, None], above, below)
-
-    def gradient(self, points, near=None):
-        x, y = points.T
-        one = np.ones_like(x)
-        above = np.array([[2 * x * y, x * x], [-one, 3 * y * y]]).transpose(2, 0, 1)
-        below = np.array([[0 * x, 2 * y], [y * y, 2 * x * y]]).transpose(2, 0, 1)
-        return np.where(self._above(points, near)[:, None, None], above, below)
+EXACT = Cubic(height)
 
 
 def interpolant(n, order=1):
@@ -47,7 +29,7 @@ def interpolant(n, order=1):
         points, cells = quadratic(points, cells)
         layer = np.concatenate([layer, np.tile(layer_of_cell, 3)])
     far = np.where(layer[:, None] == 1, [[0.5, 2.0]], [[0.5, -2.0]])
-    u = Cubic().displacement(points, far)
+    u = EXACT.displacement(points, far)
     return solution(points, cells, u, order=order, size=1 / n, unknowns=2 * len(points))
 
 
@@ -61,13 +43,7 @@ def records(solver, levels):
 
 
 def assess(checks, solvers, exact=None, **more):
-    """`solvers`: name -> {level: solution}."""
-    rows = [
-        r
-        for name, own in solvers.items()
-        for r in records(name, {i: round(1 / s.size) for i, s in own.items()})
-    ]
-    return assess_accuracy(case(checks, exact is not None, **more), rows, solvers, exact)
+    return judged(case(checks, exact is not None, **more), solvers, exact)
 
 
 LEVELS = {0: interpolant(8), 1: interpolant(16), 2: interpolant(32)}
@@ -87,7 +63,7 @@ def test_interpolants_of_a_smooth_field_converge_with_orders_two_and_one(tmp_pat
         {"kind": "displacement", "name": "corner", "point": [1.0, 1.0], "component": "y"},
     ]
     solvers = {"xfem": LEVELS, "conforming": LEVELS}
-    result = assess(checks, solvers, Cubic(), quantities=quantities)
+    result = assess(checks, solvers, EXACT, quantities=quantities)
     assert [v.verdict for v in result.verdicts] == [Verdict.PASS] * 5
     finest = result.solves[2]
     assert finest.metric("corner").value == pytest.approx(0.3, abs=1e-14)
@@ -104,7 +80,7 @@ def test_interpolants_of_a_smooth_field_converge_with_orders_two_and_one(tmp_pat
 
 
 def test_the_strain_energy_of_an_exact_field_is_integrated_to_round_off():
-    result = assess([], {"xfem": LEVELS}, Cubic())
+    result = assess([], {"xfem": LEVELS}, EXACT)
     metric = result.solves[0].metric("strain_energy")
     # cubic fields: polynomials of degree 4, which both rules integrate exactly
     assert metric.uncertainty < 1e-13
@@ -116,7 +92,7 @@ def test_a_comparison_with_the_sides_swapped_fails():
         {"check": "error", "metric": "jump_l2", "at_most": 0.05},
         {"check": "error", "metric": "displacement_l2", "at_most": 0.05},
     ]
-    result = assess(checks, {"xfem": LEVELS}, Cubic(swapped=True))
+    result = assess(checks, {"xfem": LEVELS}, Cubic(height, swapped=True))
     assert [v.verdict for v in result.verdicts] == [Verdict.FAIL] * 2
     assert result.solves[-1].metric("jump_l2").value > 1.5
 
@@ -129,7 +105,7 @@ def reference(sizes, order=2):
 
 
 def test_a_fine_reference_judges_as_the_exact_field_does():
-    true = assess([BOUND], {"xfem": LEVELS}, Cubic())
+    true = assess([BOUND], {"xfem": LEVELS}, EXACT)
     against = assess([BOUND], {"xfem": LEVELS, "reference": reference((12, 24, 48))})
     assert against.verdicts[0].verdict is true.verdicts[0].verdict is Verdict.PASS
     for name in ("displacement_l2", "energy_norm", "jump_l2"):
@@ -145,7 +121,7 @@ def test_a_too_coarse_reference_leaves_the_verdict_undecided_with_the_reason():
     (found,) = result.verdicts
     assert found.verdict is Verdict.UNDECIDED
     assert "is not clearly below the error" in found.reason
-    truth = assess([BOUND], {"xfem": LEVELS}, Cubic()).verdicts[0].observed
+    truth = assess([BOUND], {"xfem": LEVELS}, EXACT).verdicts[0].observed
     assert found.low <= truth <= found.high
 
 
@@ -167,7 +143,7 @@ def test_a_failed_solve_stays_a_record_and_is_an_error_not_a_pass():
     rows = records("xfem", {0: 8, 1: 16, 2: 32})
     rows[2] = replace(rows[2], status=Status.TIMEOUT, reason="stopped after 1 s")
     solved = {"xfem": {0: LEVELS[0], 1: LEVELS[1]}}
-    result = assess_accuracy(case([BOUND]), rows, solved, Cubic())
+    result = assess_accuracy(case([BOUND]), rows, solved, EXACT)
     assert result.verdicts[0].verdict is Verdict.ERROR
     assert "stopped after 1 s" in result.verdicts[0].reason
     assert len(result.solves) == 3
@@ -183,7 +159,9 @@ def test_no_solve_at_all_is_still_a_result():
 
 
 def test_a_relative_error_against_zero_is_left_out_with_a_note():
-    class Still(Cubic):
+    class Still:
+        singular_points = EXACT.singular_points
+
         def displacement(self, points, near=None):
             return np.zeros_like(points)
 
@@ -217,7 +195,7 @@ def test_a_solution_on_a_sixth_of_a_cube_is_not_measured_but_named():
 def test_a_solution_on_half_of_the_body_is_not_measured_but_named():
     whole = LEVELS[0]
     half = solution(whole.points, whole.cells[:64], whole.displacement[0], size=whole.size)
-    result = assess([BOUND], {"xfem": {0: half}}, Cubic())
+    result = assess([BOUND], {"xfem": {0: half}}, EXACT)
     assert result.verdicts[0].verdict is Verdict.ERROR
     assert "cover 0.5 of the body" in result.verdicts[0].reason
 

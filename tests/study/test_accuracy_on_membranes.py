@@ -6,15 +6,15 @@ import meshio
 import numpy as np
 import pytest
 from cut_meshes import grid
+from judged_fields import Quadratic, judged
 from membrane_meshes import bowl, layers, line, membrane, roof
 
 from verify.compare.hooke import law_of
 from verify.errors import UnsupportedSceneError
 from verify.report.bodies import deformed_body, error_body
-from verify.result import SolveRecord, Status, Verdict
+from verify.result import Verdict
 from verify.runner.error_field import nodal_error, write_error_field
 from verify.scene import load_scene
-from verify.study.accuracy import assess_accuracy
 from verify.study.budget.scenes import with_kinematics
 
 CASE = """
@@ -57,36 +57,17 @@ kind = "maximum_displacement"
 NAMES = ("displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_max")
 
 
-class Quadratic:
-    """Smooth on each side of the cut; `near` decides the side."""
+def above(points):
+    return points[:, 1] - line(points[:, 0])
 
-    singular_points = np.zeros((0, 3))
 
-    def __init__(self, swapped=False):
-        self._sign = -1 if swapped else 1
-
-    def _above(self, points, near):
-        near = points if near is None else near
-        return self._sign * (near[:, 1] - line(near[:, 0])) > 0
-
-    def displacement(self, points, near=None):
-        x, y, z = points.T
-        above = 0.1 * np.column_stack([x * y, 0.3 + z * z, y * z - x])
-        below = 0.1 * np.column_stack([y * y, x * z, x * x - z])
-        return np.where(self._above(points, near)[:, None], above, below)
-
-    def gradient(self, points, near=None):
-        x, y, z = points.T
-        o, i = np.zeros_like(x), np.ones_like(x)
-        above = 0.1 * np.array([[y, x, o], [o, o, 2 * z], [-i, z, y]]).transpose(2, 0, 1)
-        below = 0.1 * np.array([[o, 2 * y, o], [z, o, x], [2 * x, o, -i]]).transpose(2, 0, 1)
-        return np.where(self._above(points, near)[:, None, None], above, below)
+TRUTH = Quadratic(above)
 
 
 def interpolant(n, shape=roof, flip=False):
     points, cells, layer = layers(shape, n, flip=flip)
     far = np.where(layer[:, None] == 1, [[0.5, 3.0, 0.0]], [[0.5, -3.0, 0.0]])
-    u = Quadratic().displacement(points, far)
+    u = TRUTH.displacement(points, far)
     edge = points[layer == 1]
     low = edge[np.abs(edge[:, 1] - line(edge[:, 0])) < 1e-9]
     facets = np.stack([low[:-1], low[1:]], axis=1)
@@ -104,15 +85,6 @@ def sheet(tmp_path):
     return make
 
 
-def assess(scene, solvers, exact=None):
-    rows = [
-        SolveRecord("case", name, level, Status.SOLVED, size=s.size)
-        for name, own in solvers.items()
-        for level, s in own.items()
-    ]
-    return assess_accuracy(scene, rows, solvers, exact)
-
-
 def limit(metric, at_most):
     return f'[[acceptance]]\ncheck = "error"\nmetric = "{metric}"\nat_most = {at_most}\n'
 
@@ -122,8 +94,8 @@ EXACT = '[exact]\nsolution = "quadratic"\n'
 
 def test_interpolants_on_a_membrane_converge_to_the_exact_field(sheet):
     checks = "".join(limit(m, 0.05) for m in ("displacement_l2", "jump_l2", "opening"))
-    result = assess(
-        sheet(EXACT + checks), {"xfem": {k: interpolant(4 * 2**k) for k in range(3)}}, Quadratic()
+    result = judged(
+        sheet(EXACT + checks), {"xfem": {k: interpolant(4 * 2**k) for k in range(3)}}, TRUTH
     )
     assert [(v.verdict, v.reason) for v in result.verdicts if v.verdict is not Verdict.PASS] == []
     order = {rate.metric: rate.order for rate in result.rates}
@@ -142,8 +114,8 @@ def test_interpolants_on_a_membrane_converge_to_the_exact_field(sheet):
 
 def test_conforming_levels_on_a_membrane_judge_as_the_exact_field_does(sheet):
     fine = {k: interpolant(6 * 2**k, flip=True) for k in range(3)}
-    true = assess(sheet(EXACT), {"xfem": {0: interpolant(4)}}, Quadratic())
-    against = assess(sheet(), {"xfem": {0: interpolant(4)}, "reference": fine})
+    true = judged(sheet(EXACT), {"xfem": {0: interpolant(4)}}, TRUTH)
+    against = judged(sheet(), {"xfem": {0: interpolant(4)}, "reference": fine})
     for name in NAMES:
         measured, truth = against.solves[0].metric(name), true.solves[0].metric(name)
         assert abs(measured.value - truth.value) <= measured.uncertainty + truth.uncertainty, name
@@ -155,7 +127,7 @@ def test_conforming_levels_on_a_membrane_judge_as_the_exact_field_does(sheet):
 
 def test_a_reference_that_is_no_finer_than_what_it_judges_cannot_tell(sheet):
     coarse = {k: interpolant(n, flip=True) for k, n in enumerate((2, 4, 6))}
-    result = assess(
+    result = judged(
         sheet(limit("jump_l2", 0.02)), {"xfem": {0: interpolant(8)}, "reference": coarse}
     )
     assert result.verdicts[0].verdict is Verdict.UNDECIDED
@@ -163,7 +135,7 @@ def test_a_reference_that_is_no_finer_than_what_it_judges_cannot_tell(sheet):
 
 def test_swapped_sides_of_a_membrane_fail(sheet):
     checks = EXACT + limit("jump_l2", 0.05) + limit("displacement_l2", 0.05)
-    result = assess(sheet(checks), {"xfem": {0: interpolant(8)}}, Quadratic(swapped=True))
+    result = judged(sheet(checks), {"xfem": {0: interpolant(8)}}, Quadratic(above, swapped=True))
     assert [v.verdict for v in result.verdicts] == [Verdict.FAIL] * 2
 
 
@@ -172,7 +144,7 @@ def test_another_surface_or_a_part_of_one_is_an_error(sheet):
     part = replace(whole, cells=whole.cells[:-3])
     lifted = replace(whole, points=whole.points + np.array([0.0, 0.0, 0.05]))
     for solution, reason in ((part, "of the body"), (lifted, "off the surface of the body")):
-        result = assess(scene, {"xfem": {0: solution}}, Quadratic())
+        result = judged(scene, {"xfem": {0: solution}}, TRUTH)
         assert result.verdicts[0].verdict is Verdict.ERROR
         assert reason in result.verdicts[0].reason
 
@@ -180,20 +152,20 @@ def test_another_surface_or_a_part_of_one_is_an_error(sheet):
 def test_a_finer_triangulation_of_a_curved_membrane_is_compared_and_says_how_far_it_is_off(sheet):
     scene = sheet(EXACT, bowl, 12).model_copy()
     scene._file = sheet(EXACT, bowl, 12).file
-    result = assess(scene, {"xfem": {0: interpolant(24, bowl)}}, Quadratic())
+    result = judged(scene, {"xfem": {0: interpolant(24, bowl)}}, TRUTH)
     assert "off the surface of the scene" in result.solves[0].notes["surface"]
     # the same field on the surface's own triangles, twice as coarse: four times the error
-    own = assess(scene, {"xfem": {0: interpolant(12, bowl)}}, Quadratic())
+    own = judged(scene, {"xfem": {0: interpolant(12, bowl)}}, TRUTH)
     ratio = [r.solves[0].metric("jump_l2").value for r in (own, result)]
     assert 0.1 * ratio[0] < ratio[1] < ratio[0]
 
 
 def test_the_error_of_a_membrane_is_drawn(tmp_path):
     solution = interpolant(6)
-    error = nodal_error(solution, Quadratic())
+    error = nodal_error(solution, TRUTH)
     # nodes carry the exact values; a hundredth of the way into a cell little is lost
     assert 0 < error.max() < 1e-3
-    write_error_field(solution, Quadratic(), tmp_path / "error.vtu")
+    write_error_field(solution, TRUTH, tmp_path / "error.vtu")
     for body in (error_body(tmp_path / "error.vtu"), deformed_body(solution, 1.0)):
         assert len(body.triangles) == len(solution.cells)
         assert body.points.shape == (len(solution.points), 3)

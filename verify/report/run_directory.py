@@ -11,14 +11,14 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from verify.errors import InputError
-from verify.report.ranking_record import RankingRecord
+from verify.ranking import Ranking
 from verify.result import CaseResult, SolveRecord, read_result
 
 __all__ = ["CaseEntry", "Run", "load_run"]
 
 _RESULT = TypeAdapter(CaseResult)
 _SOLVE = TypeAdapter(SolveRecord)
-_RANKING = TypeAdapter(RankingRecord)
+_RANKING = TypeAdapter(Ranking)
 
 
 @dataclass(frozen=True)

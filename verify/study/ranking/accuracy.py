@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Sequence
 from math import isfinite
 
+from verify.ranking import Comparison, LeftOut
 from verify.result import CaseResult, SolveRecord, Status
 from verify.study.energy_account import ACCOUNT
-from verify.study.ranking.standing import Comparison, Item, LeftOut, compared_by_mean
+from verify.study.ranking.standing import Item, compared_by_mean
 from verify.verdict import ERROR_METRICS, Interval, NotMeasuredError, error_interval
 
 __all__ = ["EQUAL_SIZE", "FINEST", "QUANTITIES", "accuracy_comparisons"]

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from verify.ranking import Comparison, LeftOut
 from verify.result import CaseResult
 from verify.study.cost.work import WorkPoint, time_at, work_points
-from verify.study.ranking.standing import Comparison, Item, LeftOut, compared_by_mean
+from verify.study.ranking.standing import Item, compared_by_mean
 from verify.study.rates import ROUND_OFF
 from verify.verdict import Interval
 

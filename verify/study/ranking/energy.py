@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from math import isfinite
 
+from verify.ranking import Comparison
 from verify.result import CaseResult, Status
 from verify.study.energy_account import ACCOUNT
-from verify.study.ranking.standing import Comparison, Item, compared_by_worst
+from verify.study.ranking.standing import Item, compared_by_worst
 from verify.verdict import error_interval
 
 __all__ = ["energy_comparisons"]

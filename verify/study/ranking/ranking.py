@@ -4,18 +4,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from verify.ranking import LeftOut, Ranking
 from verify.result import CaseResult, Status, Verdict
 from verify.study.energy_account import ACCOUNT
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons
 from verify.study.ranking.energy import energy_comparisons
 from verify.study.ranking.stability import stability_standings
-from verify.study.ranking.standing import LeftOut
 from verify.verdict import ERROR_METRICS
 
-__all__ = ["SCHEMA", "rank_solvers", "ranked_solvers"]
+__all__ = ["rank_solvers", "ranked_solvers"]
 
-SCHEMA = 1
 _REFERENCE = "reference"
 
 
@@ -39,24 +38,22 @@ def rank_solvers(
     Returns
     -------
     dict
-        Plain data of schema `SCHEMA`: ``solvers``, ``conformance``, the comparisons
-        ``accuracy``, ``energy`` and ``cost``, the standings ``stability``, ``left_out`` and
-        ``contended`` (why times may be off, if they may).
+        A `Ranking` as plain data.
     """
     solvers = ranked_solvers(results)
-    return {
-        "schema": SCHEMA,
-        "kind": "ranking",
-        "cases": [result.case for result in results],
-        "solvers": solvers,
-        "conformance": {name: dict(found) for name, found in (conformance or {}).items()},
-        "accuracy": [asdict(one) for one in accuracy_comparisons(results, solvers)],
-        "stability": [asdict(one) for one in stability_standings(results, solvers)],
-        "energy": [asdict(one) for one in energy_comparisons(results, solvers)],
-        "cost": [asdict(one) for one in cost_comparisons(results, solvers)],
-        "left_out": [asdict(one) for one in _left_out(results)],
-        "contended": _why_times_may_be_off(results, solvers),
-    }
+    found = Ranking(
+        schema=1,
+        cases=[result.case for result in results],
+        solvers=solvers,
+        conformance={name: dict(found) for name, found in (conformance or {}).items()},
+        accuracy=accuracy_comparisons(results, solvers),
+        stability=stability_standings(results, solvers),
+        energy=energy_comparisons(results, solvers),
+        cost=cost_comparisons(results, solvers),
+        left_out=_left_out(results),
+        contended=_why_times_may_be_off(results, solvers),
+    )
+    return asdict(found)
 
 
 def _why_times_may_be_off(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[str]:

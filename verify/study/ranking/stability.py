@@ -1,53 +1,15 @@
 """Who gets there at all: solves that failed or blew up, refusals, regularisations."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isfinite
 
+from verify.ranking import StabilityStanding
 from verify.result import CaseResult, SolveRecord, Status
 
-__all__ = ["StabilityStanding", "stability_standings"]
+__all__ = ["stability_standings"]
 
 _ANSWER = ("displacement_l2", "displacement_l2_max")
 _BLOWN_UP = 1.0  # relative error: as far off as a body that does not move
-
-
-@dataclass(frozen=True)
-class StabilityStanding:
-    """How the solves of one solver ended.
-
-    Parameters
-    ----------
-    solver : str
-    rank : int
-        One more than the number of solvers with a smaller share of solves lost.
-    tied : bool
-    asked, solved, refused : int
-        Refusals are not held against a solver: it says what it cannot do.
-    failed, timeout, memory : int
-    blown_up : int
-        Solved, but as far off as a body that does not move, or not finite.
-    inside_out : int
-        Solves whose notes tell of elements turned inside out.
-    lost : float
-        Share of the solves not refused that failed, ran out of time or memory, or blew up.
-    regularisations : dict of str to int
-        What was dropped, snapped, clamped, scaled or floored, and how often.
-    """
-
-    solver: str
-    rank: int | None
-    tied: bool
-    asked: int
-    solved: int
-    refused: int
-    failed: int
-    timeout: int
-    memory: int
-    blown_up: int
-    inside_out: int
-    lost: float | None
-    regularisations: dict[str, int]
 
 
 def stability_standings(

@@ -4,19 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from verify.ranking import Comparison, LeftOut, Standing
 from verify.study.rates import ROUND_OFF
 from verify.verdict import Interval
 
-__all__ = ["Comparison", "Item", "LeftOut", "Standing", "compared_by_mean", "compared_by_worst"]
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """What does not count in a comparison, and why; an empty solver means all of them."""
-
-    case: str
-    solver: str
-    reason: str
+__all__ = ["Item", "compared_by_mean", "compared_by_worst"]
 
 
 @dataclass(frozen=True)
@@ -34,64 +26,6 @@ class Item:
     case: str
     found: dict[str, Interval]
     missing: dict[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Standing:
-    """A solver in a comparison.
-
-    Parameters
-    ----------
-    solver : str
-    rank : int or None
-        One more than the number of solvers that are certainly better (their intervals lie
-        wholly below). None for a solver without a number in some item: its `value` is over fewer
-        items than that of the others.
-    tied : bool
-        Whether another has the same rank.
-    value, low, high : float or None
-        The number and the interval in which it lies.
-    count : int
-        Items that it rests on.
-    where : str
-        Case that decided, where the worst counts.
-    """
-
-    solver: str
-    rank: int | None
-    tied: bool
-    value: float | None
-    low: float | None
-    high: float | None
-    count: int
-    where: str = ""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """All solvers in one respect.
-
-    Parameters
-    ----------
-    metric : str
-        What was compared.
-    view : str
-        Under which condition.
-    how : str
-        How cases are joined: ``"mean"``, geometric mean of the ratios to the best of each case,
-        or ``"worst"``.
-    items : int
-    standings : list of Standing
-        Best first, those without rank last.
-    left_out : list of LeftOut
-    """
-
-    metric: str
-    view: str
-    how: str
-    items: int
-    standings: list[Standing]
-    left_out: list[LeftOut]
 
 
 def compared_by_mean(
