@@ -118,6 +118,16 @@ def static_equilibrium(
     return StaticEquilibrium(displacement, energy, reactions, tuple(counts))
 
 
+class _Place(NamedTuple):
+    """Displacement (N, d), its residual (N, d) and what both are judged by."""
+
+    displacement: _Floats
+    residual: _Floats
+    norm: float
+    scale: float  # to which the norm compares, N
+    energy: float  # potential, J
+
+
 class _Newton:
     def __init__(
         self, force: InternalForce, fixed: NDArray[np.bool_], tolerance: float, iterations: int
@@ -137,46 +147,46 @@ class _Newton:
 
     def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took."""
-        # the first solve spreads the prescribed change with the stiffness before it
-        residual, _, _ = self._residual(displacement, load)
-        correction = self._correct(displacement, residual, change)
-        displacement = displacement + correction
-        residual, scale, _ = self._residual(displacement, load)
-        norm = float(np.linalg.norm(residual))
+        start = self._place(displacement, load)
+        place = self._place(displacement + self._spread(start, change), load)
         for count in range(1, self._iterations):
-            if self._is_small(norm, scale, displacement):
-                return displacement, count
-            correction = self._correct(displacement, residual, None)
-            for halving in range(_HALVINGS):
-                trial = displacement + 0.5**halving * correction
-                residual, scale, _ = self._residual(trial, load)
-                if np.linalg.norm(residual) < norm:
-                    break
-            # a residual that must rise first is let rise: the energy may still fall
-            displacement, norm = trial, float(np.linalg.norm(residual))
-            if not np.isfinite(norm):
+            if self._is_small(place):
+                return place.displacement, count
+            place = self._next(place, load)
+            if not np.isfinite(place.norm):
                 break
-        raise self._failure(norm, scale)
+        raise NotInEquilibriumError(
+            f"residual {place.norm:.3g} N against forces of {place.scale:.3g} N after "
+            f"{self._iterations} iterations; expected {self._tolerance:g} of them. More load steps "
+            "may help"
+        )
 
-    def _is_small(self, norm: float, scale: float, displacement: _Floats) -> bool:
+    def _spread(self, start: _Place, change: _Floats) -> _Floats:
+        """Spread the prescribed change with the stiffness before it."""
+        return self._correct(start.displacement, start.residual, change)
+
+    def _next(self, place: _Place, load: _Floats) -> _Place:
+        """Place after a correction."""
+        correction = self._correct(place.displacement, place.residual, None)
+        for halving in range(_HALVINGS):
+            trial = self._place(place.displacement + 0.5**halving * correction, load)
+            if trial.norm < place.norm:
+                break
+        # a residual that must rise first is let rise: the energy may still fall
+        return trial
+
+    def _is_small(self, place: _Place) -> bool:
         """Whether a residual is within the tolerance, or what round-off of positions leaves."""
-        reach = np.abs(self._force.virtual.node_points + displacement).max()
-        return norm <= max(
-            self._tolerance * scale, _ROUND_OFF * float(np.abs(self._blocks).max()) * reach
-        )
+        reach = np.abs(self._force.virtual.node_points + place.displacement).max()
+        round_off = _ROUND_OFF * float(np.abs(self._blocks).max()) * reach
+        return place.norm <= max(self._tolerance * place.scale, round_off)
 
-    def _failure(self, norm: float, scale: float) -> NotInEquilibriumError:
-        return NotInEquilibriumError(
-            f"residual {norm:.3g} N against forces of {scale:.3g} N after {self._iterations} "
-            f"iterations; expected {self._tolerance:g} of them. More load steps may help"
-        )
-
-    def _residual(self, displacement: _Floats, load: _Floats) -> tuple[_Floats, float, float]:
-        """Residual, the scale to which it compares, and the potential energy."""
+    def _place(self, displacement: _Floats, load: _Floats) -> _Place:
         internal, energy = self._force.evaluate(displacement)
         scale = max(float(np.linalg.norm(internal)), float(np.linalg.norm(load)))
         potential = energy - float(np.vdot(load, displacement))
-        return np.where(self._fixed, 0.0, load - internal), scale, potential
+        residual = np.where(self._fixed, 0.0, load - internal)
+        return _Place(displacement, residual, float(np.linalg.norm(residual)), scale, potential)
 
     def _correct(self, displacement: _Floats, residual: _Floats, change: _Floats | None) -> _Floats:
         try:
@@ -237,34 +247,30 @@ class _Descent(_Newton):
     edge it may never be, and then iterations halve the residual.
     """
 
-    def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
-        """Equilibrium after a change of the fixed components, and the solves that it took."""
-        least = _TAUT
-        residual, _, _ = self._residual(displacement, load)
-        correction = self._solve(displacement, residual, change, exact=False, least=least)
-        # what is prescribed happens; how far the rest goes with it, the energy decides after that
-        displacement = displacement + correction
-        residual, scale, energy = self._residual(displacement, load)
-        norm = float(np.linalg.norm(residual))
-        for count in range(1, self._iterations):
-            if self._is_small(norm, scale, displacement):
-                return displacement, count
-            correction = self._downhill(displacement, residual, least)
-            fall = float(np.vdot(residual, correction))
-            for halving in range(_HALVINGS):
-                share = 0.5**halving
-                trial = displacement + share * correction
-                residual, scale, after = self._residual(trial, load)
-                size = float(np.linalg.norm(residual))
-                unseen = share * fall < _UNSEEN * abs(energy)  # below the round-off of the energy
-                if after <= energy - _ENOUGH * share * fall or (unseen and size < norm):
-                    displacement, energy, norm = trial, after, size
-                    least = least * _FALL if halving == 0 else least
-                    break
-            else:
-                residual, scale, energy = self._residual(displacement, load)
-                least = max(least, _SLACK) / _FALL
-        raise self._failure(norm, scale)
+    _least = _TAUT
+
+    def _spread(self, start: _Place, change: _Floats) -> _Floats:
+        """Let what is prescribed happen; how far the rest goes with it, the energy says later."""
+        self._least = _TAUT
+        return self._solve(
+            start.displacement, start.residual, change, exact=False, least=self._least
+        )
+
+    def _next(self, place: _Place, load: _Floats) -> _Place:
+        """Place further down; the same one with more tension if no way leads there."""
+        correction = self._downhill(place.displacement, place.residual, self._least)
+        fall = float(np.vdot(place.residual, correction))
+        for halving in range(_HALVINGS):
+            share = 0.5**halving
+            trial = self._place(place.displacement + share * correction, load)
+            # below the round-off of the energy
+            unseen = share * fall < _UNSEEN * abs(place.energy)
+            falls = trial.energy <= place.energy - _ENOUGH * share * fall
+            if falls or (unseen and trial.norm < place.norm):
+                self._least *= _FALL if halving == 0 else 1.0
+                return trial
+        self._least = max(self._least, _SLACK) / _FALL
+        return place
 
     def _downhill(self, displacement: _Floats, residual: _Floats, least: float) -> _Floats:
         """Correction along which the energy falls."""

@@ -101,42 +101,57 @@ def solve_static(
             f"load {force.shape} and supports {supports.fixed.shape}; expected finite {shape}"
         )
     check_bodies(virtual, supports)
+    method, limit = _method(solver, virtual, ghost)
     stiffness = LinearStiffness(virtual, material)
     clock = [perf_counter()]
     pattern = ghost.pattern() if ghost else block_pattern(virtual.cells, virtual.node_count)
-    if solver not in ("auto", "direct", "iterative"):
-        raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
-    chosen = solver == "auto"
-    if chosen:
-        large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
-        solver = "iterative" if large and ghost is None else "direct"
-    limit = _MOST if chosen else 5 * _MOST
-    inverse = _inverse(solver, pattern, supports, limit)
+    inverse = _inverse(method, pattern, supports, limit)
     clock.append(perf_counter())
-    blocks = stiffness.assemble(pattern)
-    internal, _ = stiffness.force(supports.values)
-    if ghost:
-        ghost.add_stiffness(pattern, blocks)
-        internal += ghost.force(supports.values)[0]
-    constrain(pattern.starts, pattern.columns, supports.fixed, blocks)
-    right = np.where(supports.fixed, 0.0, force - internal)
+    blocks, right = _system(stiffness, ghost, pattern, supports, force)
     clock.append(perf_counter())
     inverse.factorize(blocks)
     clock.append(perf_counter())
     try:
         displacement = inverse.solve(right)
     except NotConvergedError:
-        if not chosen:
+        if solver != "auto":
             raise
-        solver = "direct"
-        inverse = _inverse(solver, pattern, supports, limit)
+        method = "direct"
+        inverse = _inverse(method, pattern, supports, limit)
         inverse.factorize(blocks)
         displacement = inverse.solve(right)
     displacement += supports.values
     clock.append(perf_counter())
     phases = ("analysis", "assembly", "factorisation", "solve")
     timings = dict(zip(phases, np.diff(clock).tolist(), strict=True))
-    return _solution(stiffness, ghost, supports, force, displacement, timings, solver)
+    return _solution(stiffness, ghost, supports, force, displacement, timings, method)
+
+
+def _method(solver: str, virtual: VirtualMesh, ghost: GhostPenalty | None) -> tuple[str, int]:
+    """Direct or iterative, and how many iterations that may take."""
+    if solver not in ("auto", "direct", "iterative"):
+        raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
+    if solver != "auto":
+        return solver, 5 * _MOST
+    large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
+    return "iterative" if large and ghost is None else "direct", _MOST
+
+
+def _system(
+    stiffness: LinearStiffness,
+    ghost: GhostPenalty | None,
+    pattern: BlockPattern,
+    supports: Supports,
+    force: _Floats,
+) -> tuple[_Floats, _Floats]:
+    """Blocks of the matrix, and the right-hand side (N, d) for what is added to the supports."""
+    blocks = stiffness.assemble(pattern)
+    internal, _ = stiffness.force(supports.values)
+    if ghost:
+        ghost.add_stiffness(pattern, blocks)
+        internal += ghost.force(supports.values)[0]
+    constrain(pattern.starts, pattern.columns, supports.fixed, blocks)
+    return blocks, np.where(supports.fixed, 0.0, force - internal)
 
 
 def _inverse(
