@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+from verify.calibration import KERNEL
 from verify.result import (
     CaseResult,
     Metric,
@@ -33,7 +34,7 @@ SCENE = {
     ],
 }  # fmt: skip
 
-QUIET = "kernel 1: 0.0100 0.0101 0.0100 0.0101 0.0100"
+QUIET = f"kernel {KERNEL}: 0.0100 0.0101 0.0100 0.0101 0.0100"
 
 
 def metrics(energy=2.001, sag=-0.52, error=0.01, reference=-0.5, width=0.001):

@@ -7,6 +7,7 @@ import pytest
 
 from verify.replay import Session, quality_of
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.in_pieces import in_one_go
 from verify.xfem.tool_path import ToolPath
 
 ROUND_OFF = 1e-12
@@ -66,19 +67,19 @@ def test_spread_or_not_the_same_elements_are_split_into_the_same_pieces(hand, pl
     assert_cut_alike(spread, at_once)
 
 
-def test_an_element_is_split_within_nine_steps_of_being_crossed(hand) -> None:
-    """Seven pieces, at times an eighth; the cut is made in the second of the next seven."""
+def test_an_element_is_split_within_ten_steps_of_being_crossed(hand) -> None:
+    """Eight pieces, at times a ninth; the cut is made in the second of the next eight."""
     session = Session(incised(hand, hooks=[]), account=False, spread=True)
     session.run()
     crossings, h = session.cutter.crossings, session.stage.time_step
     late = (crossings.seen - crossings.leave) / h
-    assert 0.0 <= late.min() <= late.max() <= 9.0 * (1.0 + 1e-9)
-    # and a step that splits is followed by five that follow the cut, in which none is split
+    assert 0.0 <= late.min() <= late.max() <= 10.0 * (1.0 + 1e-9)
+    # and a step that splits is followed by six that follow the cut, in which none is split
     split = np.array([record.newly_split > 0 for record in session.records])
     assert split.sum() > 3
-    for k in np.flatnonzero(split[:-5]):
-        assert not split[k + 1 : k + 6].any()
-        assert all(record.busy for record in session.records[k - 1 : k + 6])
+    for k in np.flatnonzero(split[:-6]):
+        assert not split[k + 1 : k + 7].any()
+        assert all(record.busy for record in session.records[k - 1 : k + 7])
 
 
 def test_elements_beyond_the_most_of_a_cut_wait_and_are_split_like_the_others(
@@ -113,7 +114,7 @@ def test_a_spread_replay_is_the_same_to_the_last_bit(hand, played) -> None:
 
 
 def test_a_path_led_elsewhere_after_a_look_does_not_change_what_was_found(hand) -> None:
-    """Between the look and the cut a live blade may move on, and turn."""
+    """Between pieces of a look, and before the cut, a live blade may move on, and turn."""
     begin, end = hand.strokes[0].blades[[0, -1]]
     halfway = 0.5 * (begin + end)
     live = ToolPath(np.stack([begin, halfway]), [0.0, 0.2])
@@ -122,7 +123,13 @@ def test_a_path_led_elsewhere_after_a_look_does_not_change_what_was_found(hand) 
     for cutter in (straight, bent):
         cutter.begin(live)
     before = bent.body.node_count
-    division = bent.look(0.2)
+    looking = bent.looking(0.2)
+    next(looking)
+    turned = 0.5 * (halfway + end) + np.array([0.01, 0.0, 0.0])
+    bent.extend(turned[None], [0.3])
+    assert bent.strokes[0].path is live  # not while it is looked at
+    division = in_one_go(looking)
+    assert bent.strokes[0].path.times[-1] == bent.strokes[0].led.times[-1] == 0.3
     assert bent.body.node_count == before
     assert not bent.body.split_cells.any()
     bent.extend((end + np.array([0.02, 0.0, 0.0]))[None], [0.4])

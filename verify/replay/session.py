@@ -13,6 +13,7 @@ from verify.replay.stage import Stage
 from verify.replay.staged_cut import MOST, Followed, Pieces, StagedCut
 from verify.replay.step_record import PHASES, StepRecord
 from verify.replay.surfaces import Picture, Surfaces
+from verify.replay.touched_memory import touch_memory
 from verify.xfem.cholesky import Cholesky
 from verify.xfem.collision.surface_collider import Contacts, SurfaceCollider
 from verify.xfem.cutting.growing_body import Increment
@@ -92,6 +93,7 @@ class Session:
         self._assemble()
         self.state = self.body.rest()
         self._ledger = EnergyLedger(self.body, self.state)
+        touch_memory()
 
     @property
     def time(self) -> float:

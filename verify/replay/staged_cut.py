@@ -17,13 +17,12 @@ from verify.xfem.cholesky import Cholesky
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody
+from verify.xfem.in_pieces import InPieces
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]
 
-MOST = 24  # elements that a cut whose work is spread may split, but for ties
-
-_DONE = object()
+MOST = 32  # elements that a cut whose work is spread may split, but for ties
 
 Pieces = Generator[Increment | None, None, "Followed | None"]
 
@@ -70,7 +69,7 @@ class StagedCut:
         until : float
             s.
         most : int or None
-            How many elements may be split, see `SemiProgressiveCutter.look`.
+            How many elements may be split, see `SemiProgressiveCutter.looking`.
         solver : Cholesky
             Of the body as it is. Until the last piece is done it may be used, but only to
             factorise and solve in one go: its memory is shared with that of the body to come.
@@ -85,33 +84,37 @@ class StagedCut:
         Followed or None
             None if nothing was cut.
         """
-        with self.timed("cutting"):
-            division = self.cutter.look(until, most)
+        looking = self.cutter.looking(until, most)
+        division = yield from self._each("cutting", looking, None)
         if division is None:
             return None
-        yield None
         with self.timed("cutting"):
             increment = self.cutter.divide(division, self.end_of_step())
-        with self.timed("assembly"):
-            virtual = self.cutter.virtual_mesh()
         yield increment
         with self.timed("assembly"):
-            parts = self.parts_after(increment, virtual)
+            parts = self.parts_after(increment, self.cutter.virtual_mesh())
             body = self.body_of(parts)
+        yield increment
+        with self.timed("assembly"):
             other = solver.extended(body.pattern, increment.source, held_nodes(body))
-        yield increment
         if other.is_worn:
-            with self.timed("assembly"):
-                other = other.renewed(body.pattern, held_nodes(body))
-            yield increment
-        goes, going = self.surfaces.following(increment), True
-        while going:
-            with self.timed("cutting"):
-                going = next(goes, _DONE) is not _DONE
-            yield increment
-        with self.timed("cutting"):
-            self.surfaces.material.update(increment)
-        yield increment
+            renewing = other.renewing(body.pattern, held_nodes(body))
+            other = yield from self._each("assembly", renewing, increment)
         with self.timed("assembly"):
             body.force.prepare(body.pattern)
+        yield increment
+        yield from self._each("cutting", self.surfaces.following(increment), increment)
         return Followed(increment, body, parts.grips, other)
+
+    def _each[Made](
+        self, phase: str, work: InPieces[Made], known: Increment | None
+    ) -> Generator[Increment | None, None, Made]:
+        """Do some work in its own pieces, each of them timed."""
+        while True:
+            with self.timed(phase):
+                try:
+                    next(work)
+                except StopIteration as done:
+                    made: Made = done.value
+                    return made
+            yield known

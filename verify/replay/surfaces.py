@@ -3,8 +3,6 @@
 Those of a solid can be separate meshes. A plane body and a membrane are their own surface.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +10,7 @@ from verify.replay.stage import Stage
 from verify.replay.surface_part import SurfacePart, embed_together
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.in_pieces import InPieces
 from verify.xfem.mapping.body_surface import BodySurface
 from verify.xfem.mapping.moving_surface import MovingSurface
 from verify.xfem.virtual import VirtualMesh
@@ -68,10 +67,11 @@ class Surfaces:
         self._followers = [surface for surface in followers if surface is not None]
         self._positions = [np.empty((0, stage.mesh.space)) for _ in self._followers]
 
-    def following(self, increment: Increment) -> Iterator[None]:
-        """Let the surfaces beside that of the material follow a cut, in two goes."""
+    def following(self, increment: Increment) -> InPieces[None]:
+        """Let them follow a cut, in pieces; each is sound all along."""
         if self._embedded is not None:
             yield from self._embedded.following(increment)
+        yield from self.material.following(increment)
 
     def move(self, displacement: _Floats) -> None:
         """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""

@@ -17,6 +17,7 @@ from verify.xfem.dense_tiles import COLUMNS, ROWS
 from verify.xfem.errors import XfemError
 from verify.xfem.front_plan_kernels import assembly_lists, front_rows
 from verify.xfem.front_tree import levels, merge_and_order
+from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.minimum_degree import minimum_degree
 
 __all__ = ["Cholesky", "SingularStiffnessError"]
@@ -67,15 +68,16 @@ class Cholesky:
         self._stacks = (np.empty(0), np.empty(0))
         self._runs = np.empty((3, 0), dtype=np.int64)
         self._tile = np.empty(COLUMNS * (COLUMNS + 1) // 2)
-        self._find_order(pattern)
+        in_one_go(self._finding_order(pattern))
 
     @property
     def _free(self) -> int:
         return max(1, int(np.count_nonzero(~self._held)))
 
-    def _find_order(self, pattern: BlockPattern) -> None:
+    def _finding_order(self, pattern: BlockPattern) -> InPieces[None]:
         starts, columns, _ = coupled = _coupled(pattern.starts, pattern.columns, self._held)
         order, bounds = minimum_degree(starts, columns)
+        yield
         row_start, _, parent = front_rows(starts, columns, order, bounds, _ANYWHERE)
         order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
         self._plan(coupled, order, bounds, _ANYWHERE)
@@ -103,17 +105,19 @@ class Cholesky:
         other = self._with_held(pattern, held)
         was_held = np.concatenate([self._held, self._held[source]])
         if (was_held & ~other._held).any():
-            other._find_order(pattern)
+            in_one_go(other._finding_order(pattern))
             return other
         order, bounds = _insert(self._order, self._bounds, source)
         coupled = _coupled(pattern.starts, pattern.columns, other._held)
         other._plan(coupled, order, bounds, self._parent)
         return other
 
-    def renewed(self, pattern: BlockPattern, held: NDArray[np.bool_] | None = None) -> "Cholesky":
-        """Solver for any pattern, in an order found anew, with the memory of this solver."""
+    def renewing(
+        self, pattern: BlockPattern, held: NDArray[np.bool_] | None = None
+    ) -> "InPieces[Cholesky]":
+        """Make a solver for any pattern, in an order found anew, with the memory of this one."""
         other = self._with_held(pattern, held)
-        other._find_order(pattern)
+        yield from other._finding_order(pattern)
         return other
 
     def _with_held(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> "Cholesky":

@@ -28,7 +28,8 @@ from verify.xfem.cutting.renumber_kernels import (
 )
 from verify.xfem.errors import XfemError
 from verify.xfem.growing_array import GrowingArray
-from verify.xfem.joining import PatchSlots, join_slots
+from verify.xfem.in_pieces import InPieces, in_one_go
+from verify.xfem.joining import join_slots
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import ROUND_OFF, Held, Partition, split_cells
 
@@ -166,12 +167,14 @@ class GrowingBody:
         return self.cut_count - 1
 
     def split(self, candidates: _Ints, cuts_near: CutsNear) -> Increment | None:
-        """Bring some cells up to date with the cuts; None if nothing changes: see `look`."""
-        division = self.look(candidates, cuts_near)
+        """Bring some cells up to date with the cuts; None if nothing changes: see `looking`."""
+        division = in_one_go(self.looking(candidates, cuts_near))
         return None if division is None else self.divide(division)
 
-    def look(self, candidates: _Ints, cuts_near: CutsNear) -> Division | None:
+    def looking(self, candidates: _Ints, cuts_near: CutsNear) -> InPieces[Division | None]:
         """Find how some cells are to be divided, None if they are not; the body stays as it is.
+
+        Done in pieces, between which neither the body nor the cuts may change.
 
         Parameters
         ----------
@@ -191,6 +194,7 @@ class GrowingBody:
             patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
             numbers, cuts = cuts_near(patch)
             partition = split_cells(patch, cuts, held=self._held_in(patch, numbers))
+            yield
             division = self._compare(patch, partition, numbers)
             all_wanted = distinct(np.concatenate([wanted, division.changed_cells]))
             if len(all_wanted) == len(wanted):
@@ -208,9 +212,8 @@ class GrowingBody:
             If a cut would join what is already separate.
         """
         cells = division.changed_cells
-        slots = join_slots(division.patch, division.partition)
         before = self.node_count
-        place = self._renumber(slots, division)
+        place = self._renumber(division)
         self._store_simplices(division, cells, place)
         self.split_cells[cells] = True
         self._dropped[cells] = 0
@@ -262,11 +265,14 @@ class GrowingBody:
             left = np.flatnonzero(orphans & solid)
             if len(left):
                 raise XfemError(f"a cut would join parts of cell {cell[left[0]]} that are separate")
-        return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
+        slots = join_slots(patch, partition)
+        return Division(
+            patch, partition, numbers, cell, label, fraction, solid, old, changed, slots
+        )
 
-    def _renumber(self, slots: PatchSlots, state: Division) -> _Ints:
+    def _renumber(self, state: Division) -> _Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
-        patch, partition = state.patch, state.partition
+        patch, partition, slots = state.patch, state.partition, state.slots
         cell, touched, home, solid, old = slots_before(
             slots.cells[slots.piece_cell],
             np.searchsorted(patch.whole_cells, state.changed_cells),

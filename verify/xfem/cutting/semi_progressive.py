@@ -21,6 +21,7 @@ from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.stroke import Stroke
 from verify.xfem.cutting.whole_mesh import whole_mesh
 from verify.xfem.errors import XfemError
+from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh
@@ -129,11 +130,13 @@ class SemiProgressiveCutter:
         Increment or None
             None if no element was split.
         """
-        division = self.look(time)
+        division = in_one_go(self.looking(time))
         return None if division is None else self.divide(division, time)
 
-    def look(self, time: float, most: int | None = None) -> Division | None:
+    def looking(self, time: float, most: int | None = None) -> InPieces[Division | None]:
         """Move all tools to where they are at that time, and find what they have crossed.
+
+        Done in pieces. A path that is extended in between is followed afterwards.
 
         Parameters
         ----------
@@ -148,6 +151,15 @@ class SemiProgressiveCutter:
         Division or None
             For `divide`, with which the body must be divided before it is looked at again.
         """
+        for stroke in self.strokes:
+            stroke.hold()
+        try:
+            return (yield from self._looking(time, most))
+        finally:
+            for stroke in self.strokes:
+                stroke.release()
+
+    def _looking(self, time: float, most: int | None) -> InPieces[Division | None]:
         if self.waits:
             found = [stroke.waiting for stroke in self.strokes]
         else:
@@ -157,12 +169,14 @@ class SemiProgressiveCutter:
             pairs = zip(self.strokes, found, strict=True)
             found = [stroke.admit(candidates, limit) for stroke, candidates in pairs]
         candidates = np.concatenate([_NONE, *found])
-        division = self.body.look(candidates, self._cuts_near) if len(candidates) else None
+        division = None
+        if len(candidates):
+            division = yield from self.body.looking(candidates, self._cuts_near)
         if division is not None:
             self._fix(division)
         elif self.waits:
             # the first are crossed through so barely that they wait for the blade to go on
-            return self.look(time)
+            return (yield from self._looking(time, None))
         return division
 
     def divide(self, division: Division, time: float) -> Increment:

@@ -103,6 +103,8 @@ class Stroke:
         self._turns = np.zeros(len(mesh.cells), dtype=np.int64)
         self._turn = 0
         self._frontier = np.empty(0, dtype=np.int64)
+        self._longer: ToolPath | None = None  # the path from the next look on
+        self._held = False
 
     def advance(self, time: float, elements: BoundingTree) -> _Ints:
         """Move the blade to where it is at that time; cells that may have to be split.
@@ -168,8 +170,25 @@ class Stroke:
 
     def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
         """Add positions to the path; level sets of nodes already used for a cut stay."""
-        self.path = self.path.extended(blades, times)
-        self.values[~self._fixed] = np.nan
+        self._longer = self.led.extended(blades, times)
+        if not self._held:
+            self.release()
+
+    @property
+    def led(self) -> ToolPath:
+        """The path with all that has been added to it."""
+        return self._longer or self.path
+
+    def hold(self) -> None:
+        """Keep the path as it is until `release`, though it may be extended meanwhile."""
+        self._held = True
+
+    def release(self) -> None:
+        """Follow the path as it has been extended."""
+        self._held = False
+        if self._longer is not None:
+            self.path, self._longer = self._longer, None
+            self.values[~self._fixed] = np.nan
 
     def fix(self, nodes: _Ints) -> None:
         """From now on the level sets of these nodes do not change."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.cutting.distinct import ranges
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
+from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.mapping.corner_kernels import place_corners
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.exposed_kernels import exposed_facets
@@ -44,16 +45,20 @@ class BodySurface:
         self._facet_range = np.zeros((len(mesh.cells), 2), dtype=np.int64)
         split = np.flatnonzero(body.split_cells)
         if self._membrane:
-            self._cover(np.arange(len(mesh.cells)), split)
+            in_one_go(self._covering(np.arange(len(mesh.cells)), split))
             return
         self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
         boundary = np.unique(mesh.boundary_facets[:, 0])
-        self._cover(np.union1d(boundary, split), split)
+        in_one_go(self._covering(np.union1d(boundary, split), split))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
         if increment is not None:
-            self._cover(increment.touched, increment.cells)
+            in_one_go(self.following(increment))
+
+    def following(self, increment: Increment) -> InPieces[None]:
+        """Follow a cut in pieces; the body must not be cut again in between."""
+        return self._covering(increment.touched, increment.cells)
 
     @property
     def rims(self) -> _Ints:
@@ -65,17 +70,18 @@ class BodySurface:
             return np.empty((0, 2), dtype=np.int64)
         return rim_edges(self._body, self.surface)
 
-    def _cover(self, cells: _Ints, split: _Ints) -> None:
+    def _covering(self, cells: _Ints, split: _Ints) -> InPieces[None]:
         """Make the facets of some cells anew; `split` are those with new sub-simplices."""
         body, mesh = self._body, self._body.mesh
         self._edges.add(body.sub_points.rows[ranges(body.sub_range[split])].ravel())
-        self.surface.retire(ranges(self._facet_range[cells]))
-        self._facet_range[cells] = 0
         ids, at, piece, cell, inner = self._facets_of(cells)
+        yield
         ids, at, source = self._edges.bisect(ids, at)
         material, counts, pieces, cell, inner = place_corners(
             ids, at, source, piece, cell, inner, mesh.cells, mesh.points, body.points.supports
         )
+        self.surface.retire(ranges(self._facet_range[cells]))
+        self._facet_range[cells] = 0
         self.surface.add(
             ids, material, at, counts, pieces, inner, body.piece_cells.rows, cell,
             self._facet_range,

@@ -6,7 +6,6 @@ from the pieces, so the surface opens where the material does, and nowhere else.
 elements that a cut touched are looked at again (thesis 3.2.4, 4.4.2).
 """
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.point_numbers import FoundPoints, PointNumbers
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
+from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.mapping.cut_facet_kernels import divide_facets
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.locate_kernels import (
@@ -132,20 +132,15 @@ class EmbeddedSurface:
         most = max(len(self.points), len(self.facets), len(mesh.points))
         self._place, self._is_moved = np.full(most, -1), np.zeros(len(mesh.cells), dtype=bool)
         nodes = distinct(self.facets)
-        self._replace(every, self._fragments(every, nodes, *self._values(nodes)))
+        in_one_go(self._replacing(every, nodes, *self._values(nodes)))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
         if increment is not None:
-            for _ in self.following(increment):
-                pass
+            in_one_go(self.following(increment))
 
-    def following(self, increment: Increment) -> Iterator[None]:
-        """Follow a cut in two goes; until the second one the surface is what it was.
-
-        The first divides facets, the second finds the pieces with which their parts move. The body
-        must not be cut again in between.
-        """
+    def following(self, increment: Increment) -> InPieces[None]:
+        """Follow a cut in pieces; the body must not be cut again in between."""
         near = np.sort(distinct_in_lists(*self._near, increment.moved, self._place))
         if len(near) == 0:
             return
@@ -157,9 +152,7 @@ class EmbeddedSurface:
             self._place,
         )  # fmt: skip
         if len(concerned):
-            fragments = self._fragments(concerned, nodes, numbers, values)
-            yield
-            self._replace(concerned, fragments)
+            yield from self._replacing(concerned, nodes, numbers, values)
 
     def parts_of(self, given: _Ints) -> _Ints:
         """Facets in use that are parts of some given ones, in the order of these."""
@@ -193,32 +186,46 @@ class EmbeddedSurface:
         around = np.cumsum([0, *map(len, cells)])
         return (np.concatenate([[0], np.cumsum(counts)]), facet[order]), (around, cell)
 
-    def _replace(self, facets: _Ints, fragments: "_Fragments") -> None:
-        """Put the parts of some facets in the place of what there is of these."""
+    def _replacing(
+        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
+    ) -> InPieces[None]:
+        """Put the parts of some facets in the place of what there is of these.
+
+        They are divided, given the cuts and their level sets (q, cuts) at the vertices; then it is
+        found with which pieces the parts move.
+        """
         body = self._cutter.body
-        self.surface.retire(ranges(self._facet_range[facets]))
-        ids, source, at, label, whole = fragments
+        several = len(numbers) > 1 or self.facets.shape[1] == 2
+        divide = self._divided_by_several if several else self._divided_by_one
+        divided = divide(facets, nodes, numbers, values)
+        yield
+        ids, source, at, label, whole = self._fragments(facets, numbers, *divided)
         # where the corners of a whole facet are is known; only which piece that is may be new
         material, cell, weights, inside = place_parts(
             self.points, self.facets, source, at, whole, *self._corners, *self._around,
             *self._boxes, *self._elements,
         )  # fmt: skip
+        yield
         piece = corner_pieces(
             cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,
             body.first_piece, body.next_piece.rows,
         )  # fmt: skip
+        self.surface.retire(ranges(self._facet_range[facets]))
         self.surface.add(
             ids, material, weights, weights != 0.0, piece, np.zeros(len(ids), dtype=bool),
             body.piece_cells.rows, source, self._facet_range,
         )  # fmt: skip
 
     def _fragments(
-        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
+        self,
+        facets: _Ints,
+        numbers: _Ints,
+        ids: _Ints,
+        source: _Ints,
+        at: _Floats,
+        side: NDArray[np.int8],
     ) -> "_Fragments":
-        """Divide some facets, given the cuts and their level sets (q, cuts) at the vertices."""
-        several = len(numbers) > 1 or self.facets.shape[1] == 2
-        divide = self._divided_by_several if several else self._divided_by_one
-        ids, source, at, side = divide(facets, nodes, numbers, values)
+        """Bisect divided facets where others are, and say on which sides of the cuts they lie."""
         self._edges.add(ids.ravel())
         ids, at, origin = self._edges.bisect(ids, at)
         source, side = source[origin], side[origin]
