@@ -1,13 +1,13 @@
 """Arguments of ``verify cache``."""
 
-import argparse
-from collections.abc import Callable
 from pathlib import Path
+
+from verify.cli.shared_arguments import Add, add_action, add_json
 
 __all__ = ["add_cache_command"]
 
 
-def add_cache_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+def add_cache_command(add: Add) -> None:
     """Add ``cache`` to the command line."""
     command = add(
         "cache",
@@ -19,17 +19,19 @@ def add_cache_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
         "it stands on. The folder is VERIFY_CACHE, else below XDG_CACHE_HOME or ~/.cache.",
     )
     actions = command.add_subparsers(metavar="ACTION", dest="action", required=True)
-    listing = actions.add_parser("list", help="what is kept", description="What is kept.")
-    listing.add_argument("--json", action="store_true", help="print JSON")
-    text = "remove references"
-    clear = actions.add_parser("clear", help=text, description=f"{text.capitalize()}.")
+    listing = add_action(actions.add_parser, "list", "what is kept")
+    add_json(listing)
+    clear = add_action(actions.add_parser, "clear", "remove references")
     clear.add_argument(
         "cases", metavar="CASE", nargs="*", help="name or pattern (default: all that is kept)"
     )
     clear.add_argument(
         "--outdated", action="store_true", help="only those of another code or other versions"
     )
-    text = "write the references of cases into one file, for runs without FEniCSx"
-    export = actions.add_parser("export", help=text, description=f"{text.capitalize()}.")
+    export = add_action(
+        actions.add_parser,
+        "export",
+        "write the references of cases into one file, for runs without FEniCSx",
+    )
     export.add_argument("bundle", metavar="BUNDLE", type=Path, help="zip file to write")
     export.add_argument("cases", metavar="CASE", nargs="+", help="name, pattern or file of a case")

@@ -1,14 +1,20 @@
 """Arguments of the commands around solvers of others and around regression."""
 
-import argparse
-from collections.abc import Callable
 from pathlib import Path
 
-from verify.cli.argument_types import count, positive
+from verify.cli.shared_arguments import (
+    Add,
+    add_action,
+    add_case,
+    add_json,
+    add_out,
+    add_repetitions,
+    add_run,
+    add_strict,
+    add_timeout,
+)
 
 __all__ = ["add_extension_commands"]
-
-Add = Callable[[str, str, str], argparse.ArgumentParser]
 
 
 def add_extension_commands(add: Add) -> None:
@@ -27,10 +33,8 @@ def _add_export(add: Add) -> None:
         "  verify export my_case.toml --out mine --level 0 --conforming\n\n"
         "The program answers in f3/level-<k>/solution.json and .vtu; see docs/extending.md.",
     )
-    command.add_argument("case", metavar="CASE", help="name of a case, or a case file")
-    command.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
-    )
+    add_case(command)
+    add_out(command)
     command.add_argument(
         "--level", metavar="K", dest="levels", type=int, action="append", default=[],
         help="only this mesh level, 0 is the coarsest; repeat for several (default: all)",
@@ -39,7 +43,7 @@ def _add_export(add: Add) -> None:
         "--conforming", action="store_true",
         help="also write meshes that conform to the cuts, with their nodes doubled",
     )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print the files as JSON")
+    add_json(command, "print the files as JSON")
 
 
 def _add_import(add: Add) -> None:
@@ -50,7 +54,7 @@ def _add_import(add: Add) -> None:
         "  verify import statics/f3_inclined f3 --solver freefem --beside xfem --out run\n\n"
         "Exit codes are those of `verify run`.",
     )
-    command.add_argument("case", metavar="CASE", help="name of a case, or a case file")
+    add_case(command)
     command.add_argument(
         "answers", metavar="DIR", type=Path, help="directory with level-<k>/solution.json"
     )
@@ -71,18 +75,10 @@ def _add_import(add: Add) -> None:
         help="the checks that the case makes of this solver are made of the program "
         "(default: xfem)",
     )  # fmt: skip
-    command.add_argument(
-        "--timeout", metavar="S", type=positive, default=600.0,
-        help="wall seconds after which a solve beside it is killed (default: 600)",
-    )  # fmt: skip
-    command.add_argument(
-        "--repetitions", metavar="N", type=count, default=1,
-        help="timed repetitions of the solves beside it (default: 1)",
-    )  # fmt: skip
-    command.add_argument(
-        "--strict", action="store_true", help="undecided verdicts and refusals: exit code 5"
-    )
-    command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+    add_timeout(command, 600.0, "a solve beside it is killed")
+    add_repetitions(command, 1, what="timed repetitions of the solves beside it")
+    add_strict(command)
+    add_json(command, "print the verdicts as JSON")
 
 
 def _add_conform(add: Add) -> None:
@@ -107,11 +103,8 @@ def _add_conform(add: Add) -> None:
         "--check", metavar="NAME", dest="checks", action="append", default=[],
         help="only this check; repeat for several (default: all)",
     )  # fmt: skip
-    command.add_argument(
-        "--timeout", metavar="S", type=positive, default=120.0,
-        help="wall seconds after which a solve is killed (default: 120)",
-    )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print the checks as JSON")
+    add_timeout(command, 120.0)
+    add_json(command, "print the checks as JSON")
 
 
 def _add_baseline(add: Add) -> None:
@@ -137,8 +130,8 @@ def _add_baseline(add: Add) -> None:
         "check": "compare a finished run with the file",
         "update": "move own values that are named, never the independent ones",
     }.items():
-        action = actions.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
-        action.add_argument("run", metavar="RUN", type=Path, help="directory of a finished run")
+        action = add_action(actions.add_parser, name, text)
+        add_run(action)
         action.add_argument(
             "--file", metavar="FILE", type=Path, default=Path("baseline.json"),
             help="the baseline, to be committed (default: baseline.json)",
@@ -150,16 +143,14 @@ def _add_baseline(add: Add) -> None:
                 "without it the difference is shown and nothing is moved",
             )  # fmt: skip
         if name == "check":
-            action.add_argument(
-                "--strict", action="store_true", help="what is undecided: exit code 5"
-            )
+            add_strict(action, "what is undecided: exit code 5")
             action.add_argument(
                 "--partial", action="store_true",
                 help="leave out cases of the file that the run was not asked for",
             )  # fmt: skip
-        action.add_argument("--json", action="store_true", help="print JSON")
+        add_json(action)
     text = "show which verdicts differ between two runs"
-    action = actions.add_parser("diff", help=text, description=f"{text[0].upper()}{text[1:]}.")
-    action.add_argument("run", metavar="OLD", type=Path, help="directory of a finished run")
-    action.add_argument("other", metavar="NEW", type=Path, help="directory of a finished run")
-    action.add_argument("--json", action="store_true", help="print JSON")
+    action = add_action(actions.add_parser, "diff", text)
+    add_run(action, "run", "OLD")
+    add_run(action, "other", "NEW")
+    add_json(action)

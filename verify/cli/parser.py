@@ -12,6 +12,15 @@ from verify.cli.argument_types import count, positive
 from verify.cli.cache_parser import add_cache_command
 from verify.cli.extension_parser import add_extension_commands
 from verify.cli.play_parser import add_play_commands
+from verify.cli.shared_arguments import (
+    Add,
+    add_case,
+    add_json,
+    add_repetitions,
+    add_strict,
+    add_timeout,
+    sentence,
+)
 from verify.cli.study_parser import add_study_command
 
 __all__ = ["build_parser"]
@@ -75,7 +84,7 @@ def build_parser() -> argparse.ArgumentParser:
         command = commands.add_parser(
             name,
             help=text,
-            description=f"{text[0].upper()}{text[1:]}.",
+            description=sentence(text),
             epilog=epilog,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
@@ -92,7 +101,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_doctor(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+def _add_doctor(add: Add) -> None:
     command = add(
         "doctor",
         "say what of the software that the solvers stand on is here, works, or is missing",
@@ -105,10 +114,10 @@ def _add_doctor(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None
         action="store_true",
         help="compile all kernels now, in two processes, and say what each module took",
     )
-    command.add_argument("--json", action="store_true", help="print JSON")
+    add_json(command)
 
 
-def _add_reading_commands(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+def _add_reading_commands(add: Add) -> None:
     command = add(
         "list",
         "list the cases, or the exact solutions",
@@ -117,15 +126,15 @@ def _add_reading_commands(add: Callable[[str, str, str], argparse.ArgumentParser
     )
     command.add_argument("--exact", action="store_true", help="list exact solutions instead")
     command.add_argument("-k", metavar="EXPR", dest="expression", help="only matching cases")
-    command.add_argument("--json", action="store_true", help="print JSON")
+    add_json(command)
 
     command = add(
         "describe",
         "say in words what a case asks",
         "examples:\n  verify describe statics/f1_patch\n  verify describe my_case.toml",
     )
-    command.add_argument("case", metavar="CASE", help="name of a case, or a case file")
-    command.add_argument("--json", action="store_true", help="print the case with all defaults")
+    add_case(command)
+    add_json(command, "print the case with all defaults")
 
     command = add(
         "check",
@@ -133,7 +142,7 @@ def _add_reading_commands(add: Callable[[str, str, str], argparse.ArgumentParser
         "examples:\n  verify check my_case.toml\n  verify check cases/*/*.toml",
     )
     command.add_argument("files", metavar="FILE", nargs="+", help="case file")
-    command.add_argument("--json", action="store_true", help="print JSON")
+    add_json(command)
 
     add(
         "schema",
@@ -173,10 +182,7 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "-j", metavar="N", dest="jobs", type=count, default=1,
         help="processes at the same time (default: 1)",
     )  # fmt: skip
-    command.add_argument(
-        "--timeout", metavar="S", type=positive, default=600.0,
-        help="wall seconds after which a solve is killed (default: 600)",
-    )  # fmt: skip
+    add_timeout(command, 600.0)
     command.add_argument(
         "--memory", metavar="GB", type=positive,
         help="resident memory above which a solve is killed "
@@ -191,13 +197,8 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "--set", metavar="SOLVER.NAME=VALUE", dest="parameters", action="append", default=[],
         help="parameter of a solver, e.g. xfem.scheme=implicit_euler; repeat for several",
     )  # fmt: skip
-    command.add_argument(
-        "--repetitions", metavar="N", type=count, default=3,
-        help="timed repetitions of each solve (default: 3)",
-    )  # fmt: skip
-    command.add_argument(
-        "--strict", action="store_true", help="undecided verdicts and refusals: exit code 5"
-    )
+    add_repetitions(command, 3)
+    add_strict(command)
     command.add_argument(
         "--cluster", metavar="ADDRESS",
         help="solve on the workers of the Dask scheduler at tcp://HOST:PORT or in this file",
@@ -221,7 +222,7 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--no-report", action="store_true", help="leave the report to `verify report DIR`"
     )
-    command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+    add_json(command, "print the verdicts as JSON")
 
 
 def _late(name: str) -> Callable[[argparse.Namespace], int]:

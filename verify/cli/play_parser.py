@@ -1,12 +1,10 @@
 """Arguments of ``verify play`` and ``verify data``."""
 
-import argparse
-from collections.abc import Callable
 from pathlib import Path
 
-__all__ = ["add_play_commands"]
+from verify.cli.shared_arguments import Add, add_case, add_json
 
-Add = Callable[[str, str, str], argparse.ArgumentParser]
+__all__ = ["add_play_commands"]
 
 
 def add_play_commands(add: Add) -> None:
@@ -21,7 +19,7 @@ def add_play_commands(add: Add) -> None:
         "In a window the left mouse button is the scalpel; the stroke is written as a tool_path\n"
         "that can be pasted into a case file.",
     )
-    command.add_argument("case", metavar="CASE", help="name of a case, or a case file")
+    add_case(command)
     command.add_argument(
         "--out", metavar="GIF", type=Path, help="draw off-screen into this file, .gif or .png "
         "(the last frame)",
@@ -42,7 +40,7 @@ def add_play_commands(add: Add) -> None:
         help="spread the work of a cut over steps: the longest step is a third as long, and what "
         "is cut opens some steps later",
     )  # fmt: skip
-    command.add_argument("--json", action="store_true", help="print the summary as JSON")
+    add_json(command, "print the summary as JSON")
 
     command = add(
         "data",
@@ -63,4 +61,4 @@ def add_play_commands(add: Add) -> None:
         type=Path,
         help="a wheel that is here already: nothing is fetched",
     )
-    command.add_argument("--json", action="store_true", help="print the files as JSON")
+    add_json(command, "print the files as JSON")

@@ -3,14 +3,21 @@
 import argparse
 import os
 from collections.abc import Callable
-from pathlib import Path
 
 from verify.cli.argument_types import count, positive
+from verify.cli.shared_arguments import (
+    Add,
+    add_action,
+    add_case,
+    add_json,
+    add_out,
+    add_repetitions,
+)
 
 __all__ = ["add_study_command"]
 
 
-def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+def add_study_command(add: Add) -> None:
     """Add ``study`` to the command line."""
     command = add(
         "study",
@@ -33,7 +40,7 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
         "thesis": "the tables and figures of the thesis measured again, its claims judged",
         "calibration": "stated uncertainty of the reference against its true error",
     }.items():
-        kind = kinds.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        kind = add_action(kinds.add_parser, name, text)
         if name == "slivers":
             kind.add_argument(
                 "--dimension", type=int, choices=(2, 3), help="only 2D or 3D (default: both)"
@@ -44,15 +51,17 @@ def add_study_command(add: Callable[[str, str, str], argparse.ArgumentParser]) -
                 help="processes side by side (default: all cores; nothing measured is a time)",
             )  # fmt: skip
         kind.add_argument("--quick", action="store_true", help="less of it, in under a minute")
-        _add_output(kind)
+        add_out(kind)
+        add_json(kind, "print the findings as JSON")
     _add_cost(kinds.add_parser)
     _add_budget(kinds.add_parser)
 
 
 def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
-    text = "work against precision while the first cut of a case grows, at equal accuracy"
-    kind = add("cost", help=text, description=f"{text[0].upper()}{text[1:]}.")
-    kind.add_argument("case", metavar="CASE", help="name of a case, or a case file")
+    kind = add_action(
+        add, "cost", "work against precision while the first cut of a case grows, at equal accuracy"
+    )
+    add_case(kind)
     kind.add_argument(
         "--steps", metavar="N", type=count, default=4, help="steps of the cut (default: 4)"
     )
@@ -65,14 +74,17 @@ def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
         "--metric", default="energy_norm", choices=("displacement_l2", "energy_norm", "jump_l2"),
         help="the error that is held equal (default: energy_norm)",
     )  # fmt: skip
-    _add_repetitions(kind, 5, "5")
-    _add_output(kind)
+    add_repetitions(kind, 5)
+    add_out(kind)
+    add_json(kind, "print the findings as JSON")
 
 
 def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
-    text = "where the error of the XFEM answer comes from, and the cheapest adequate model"
-    kind = add("budget", help=text, description=f"{text[0].upper()}{text[1:]}.")
-    kind.add_argument("case", metavar="CASE", help="name of a case, or a case file")
+    kind = add_action(
+        add, "budget",
+        "where the error of the XFEM answer comes from, and the cheapest adequate model",
+    )  # fmt: skip
+    add_case(kind)
     kind.add_argument(
         "--level", metavar="K", type=int, help="mesh level that is taken apart (default: finest)"
     )
@@ -85,22 +97,9 @@ def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
         help="displacement_l2, energy_norm (in motion their means, displacement_l2_mean, "
         "energy_norm_mean) or a quantity of the case (default: the first of these)",
     )  # fmt: skip
-    _add_repetitions(kind, None, "5; with --quick 2")
+    add_repetitions(kind, None, "5; with --quick 2")
     kind.add_argument(
         "--quick", action="store_true", help="the two coarsest mesh levels, fewer models"
     )
-    _add_output(kind)
-
-
-def _add_repetitions(kind: argparse.ArgumentParser, default: int | None, said: str) -> None:
-    kind.add_argument(
-        "--repetitions", metavar="N", type=count, default=default,
-        help=f"timed repetitions of each solve (default: {said})",
-    )  # fmt: skip
-
-
-def _add_output(kind: argparse.ArgumentParser) -> None:
-    kind.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="directory to write into"
-    )
-    kind.add_argument("--json", action="store_true", help="print the findings as JSON")
+    add_out(kind)
+    add_json(kind, "print the findings as JSON")
