@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from verify.baseline.finished_run import FinishedRun, physics_of
 from verify.baseline.measured import finest, metric_of, quantities_of, speed_of
 from verify.baseline.record import Baseline, CaseBaseline, Independent, Quantity, Speed
+from verify.calibration import KERNEL
 from verify.result import CaseResult, Metric, Verdict
 from verify.runner.ending import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
 
@@ -144,6 +145,11 @@ def _speed_row(case: str, key: str, stored: Speed, result: CaseResult, cpu: str)
     now = speed_of(solve)
     if now.reason:
         return Row(case, key, "speed", Verdict.UNDECIDED, None, stored.ratio, now.reason)
+    if stored.kernel != KERNEL:
+        text = (
+            f"stored in units of kernel {stored.kernel}, now kernel {KERNEL}: `update` it by name"
+        )
+        return Row(case, key, "speed", Verdict.UNDECIDED, None, stored.ratio, text)
     factor, width = now.ratio / stored.ratio, now.spread + stored.spread
     low, high = factor * max(0.0, 1 - width), factor * (1 + width)
     text = f"takes {factor:.2f} times as long ({low:.2f}–{high:.2f})"

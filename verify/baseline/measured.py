@@ -6,7 +6,7 @@ from statistics import median
 from typing import Any
 
 from verify.baseline.record import Independent, Own, Quantity, Speed
-from verify.calibration import seconds_of_note
+from verify.calibration import KERNEL, seconds_of_note
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.verdict import ERROR_METRICS
 
@@ -128,4 +128,4 @@ def _half_width(seconds: list[float]) -> float:
 
 def speed_entry(measured: MeasuredSpeed, cpu: str, origin: dict[str, Any]) -> Speed:
     """Make the entry of a baseline."""
-    return Speed(ratio=measured.ratio, spread=measured.spread, cpu=cpu, **origin)
+    return Speed(ratio=measured.ratio, spread=measured.spread, kernel=KERNEL, cpu=cpu, **origin)

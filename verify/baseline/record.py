@@ -64,6 +64,7 @@ class Speed(_From):
 
     ratio: Positive
     spread: NonNegative = Field(description="relative half-width of `ratio`")
+    kernel: int = Field(default=1, description="number of that kernel; ratios to others differ")
     slower_at_most: Annotated[float, Field(strict=True, gt=1.0)] = 1.5
     cpu: str = ""
 
