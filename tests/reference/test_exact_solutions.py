@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fourth_order import difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -33,15 +34,6 @@ SOLUTIONS = {
 
 def solution(name, material=STRAIN):
     return exact_solution(name, SOLUTIONS[name], material)
-
-
-def difference(field, points, h):
-    """Central differences of order 4; the last axis is the direction."""
-    columns = []
-    for step in h * np.eye(2):
-        near, far = (field(points + k * step) - field(points - k * step) for k in (1, 2))
-        columns.append((8 * near - far) / (12 * h))
-    return np.stack(columns, axis=-1)
 
 
 @pytest.fixture

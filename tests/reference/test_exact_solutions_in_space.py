@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fourth_order import difference
 
 from reference.exact import exact_solution, exact_solution_names
 from verify.errors import InputError
@@ -29,15 +30,6 @@ SOLUTIONS = {
 
 def solution(name, material=SOLID):
     return exact_solution(name, SOLUTIONS[name], material)
-
-
-def difference(field, points, h):
-    """Central differences of order 4; the last axis is the direction."""
-    columns = []
-    for step in h * np.eye(3):
-        near, far = (field(points + k * step) - field(points - k * step) for k in (1, 2))
-        columns.append((8 * near - far) / (12 * h))
-    return np.stack(columns, axis=-1)
 
 
 @pytest.fixture

@@ -1,13 +1,13 @@
 """Who is nearest to the truth, at equal element size and on each one's finest level."""
 
 from collections.abc import Iterable, Sequence
-from math import isfinite
 
 from verify.ranking import Comparison, LeftOut
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult
 from verify.study.energy_account import ACCOUNT
+from verify.study.ranking.finest import interval_of, item_on_finest
 from verify.study.ranking.standing import Item, compared_by_mean
-from verify.verdict import ERROR_METRICS, Interval, NotMeasuredError, error_interval
+from verify.verdict import ERROR_METRICS
 
 __all__ = ["EQUAL_SIZE", "FINEST", "QUANTITIES", "accuracy_comparisons"]
 
@@ -64,20 +64,7 @@ def _label(result: CaseResult, name: str) -> str:
 
 
 def _on_finest(result: CaseResult, name: str, solvers: Sequence[str]) -> Item:
-    """Take every solver on the finest level that it was asked for."""
-    found, missing = {}, {}
-    for solver in solvers:
-        own = [s for s in result.solves if s.solver == solver]
-        if not own:
-            missing[solver] = "was not run on this case"
-            continue
-        last = max(own, key=lambda s: s.level)
-        error = _error(last, name)
-        if error is None:
-            missing[solver] = _why(last, name)
-        else:
-            found[solver] = error
-    return Item(_label(result, name), found, missing)
+    return item_on_finest(result, name, solvers, _label(result, name))
 
 
 def _at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Item | LeftOut:
@@ -87,7 +74,7 @@ def _at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Ite
         solver: {
             s.level: (s, error)
             for s in result.solves
-            if s.solver == solver and (error := _error(s, name)) is not None
+            if s.solver == solver and (error := interval_of(s, name)) is not None
         }
         for solver in solvers
     }
@@ -105,21 +92,3 @@ def _at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Ite
 def _same(sizes: Iterable[float | None]) -> bool:
     known = [size or 0.0 for size in sizes]
     return min(known) > 0.0 and max(known) / min(known) - 1 <= _SAME_SIZE
-
-
-def _error(solve: SolveRecord, name: str) -> Interval | None:
-    measured = solve.metric(name)
-    if solve.status is not Status.SOLVED or measured is None:
-        return None
-    try:
-        found = error_interval(measured)
-    except NotMeasuredError:
-        return None
-    return found if isfinite(found.value) and isfinite(found.high) else None
-
-
-def _why(solve: SolveRecord, name: str) -> str:
-    if solve.status is not Status.SOLVED:
-        return f"level {solve.level} {solve.status}: {solve.reason or 'no reason given'}"
-    said = solve.notes.get(name) or solve.notes.get("comparison") or "not measured"
-    return f"level {solve.level}: {said}"

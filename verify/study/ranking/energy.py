@@ -1,13 +1,12 @@
 """Who keeps energy and momentum, in cases that move."""
 
 from collections.abc import Sequence
-from math import isfinite
 
 from verify.ranking import Comparison
-from verify.result import CaseResult, Status
+from verify.result import CaseResult
 from verify.study.energy_account import ACCOUNT
-from verify.study.ranking.standing import Item, compared_by_worst
-from verify.verdict import error_interval
+from verify.study.ranking.finest import item_on_finest
+from verify.study.ranking.standing import compared_by_worst
 
 __all__ = ["energy_comparisons"]
 
@@ -20,7 +19,7 @@ def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) ->
     comparisons = []
     for metric in ACCOUNT:
         items = [
-            _item(result, metric, solvers)
+            item_on_finest(result, metric, solvers, result.case)
             for result in results
             if any(s.metric(metric) for s in result.solves if s.solver in solvers)
             and not ("momentum" in metric and _acted_on(result))
@@ -32,21 +31,3 @@ def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) ->
 
 def _acted_on(result: CaseResult) -> bool:
     return bool(result.scene.get("supports") or result.scene.get("loads"))
-
-
-def _item(result: CaseResult, metric: str, solvers: Sequence[str]) -> Item:
-    found, missing = {}, {}
-    for solver in solvers:
-        own = [s for s in result.solves if s.solver == solver]
-        if not own:
-            missing[solver] = "was not run on this case"
-            continue
-        last = max(own, key=lambda s: s.level)
-        measured = last.metric(metric)
-        if last.status is not Status.SOLVED:
-            missing[solver] = f"level {last.level} {last.status}: {last.reason}"
-        elif measured is None or not isfinite(measured.value):
-            missing[solver] = last.notes.get(metric, "not measured")
-        else:
-            found[solver] = error_interval(measured)
-    return Item(result.case, found, missing)

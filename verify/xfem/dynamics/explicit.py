@@ -114,7 +114,23 @@ class CentralDifferences(_Explicit):
         )
 
 
-class SymplecticEuler(_Explicit):
+class _Euler(_Explicit):
+    def step(self, state: MotionState) -> StepForces:
+        """Advance by one step."""
+        check_state(state, self.body.shape)
+        h = self.step_size
+        acceleration, forces = self._acceleration(state.displacement, state.velocity, state.time)
+        velocity = state.velocity + h * acceleration
+        moving = self._moving(state.velocity, velocity)
+        self._finish(state, state.displacement + h * moving, velocity, state.time + h)
+        return forces
+
+    def _moving(self, before: _Floats, after: _Floats) -> _Floats:
+        """Velocity (N, d) with which the displacement goes on."""
+        raise NotImplementedError
+
+
+class SymplecticEuler(_Euler):
     """New velocity first, then the displacement with it: stable up to the critical step.
 
     Parameters
@@ -124,17 +140,11 @@ class SymplecticEuler(_Explicit):
         In seconds.
     """
 
-    def step(self, state: MotionState) -> StepForces:
-        """Advance by one step."""
-        check_state(state, self.body.shape)
-        h = self.step_size
-        acceleration, forces = self._acceleration(state.displacement, state.velocity, state.time)
-        velocity = state.velocity + h * acceleration
-        self._finish(state, state.displacement + h * velocity, velocity, state.time + h)
-        return forces
+    def _moving(self, before: _Floats, after: _Floats) -> _Floats:
+        return after
 
 
-class ForwardEuler(_Explicit):
+class ForwardEuler(_Euler):
     """(2.43–44) as printed: unstable at every step without damping; a negative control.
 
     Parameters
@@ -144,11 +154,5 @@ class ForwardEuler(_Explicit):
         In seconds.
     """
 
-    def step(self, state: MotionState) -> StepForces:
-        """Advance by one step."""
-        check_state(state, self.body.shape)
-        h = self.step_size
-        acceleration, forces = self._acceleration(state.displacement, state.velocity, state.time)
-        displacement = state.displacement + h * state.velocity
-        self._finish(state, displacement, state.velocity + h * acceleration, state.time + h)
-        return forces
+    def _moving(self, before: _Floats, after: _Floats) -> _Floats:
+        return before

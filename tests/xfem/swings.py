@@ -1,0 +1,75 @@
+"""Bodies held at one face and let go from a stretch of 15 %: what their energy does."""
+
+import numpy as np
+from cut_bodies import DENSITY, material
+from test_sliver_policies import shaken
+
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.corotational import InternalForce
+from verify.xfem.critical_step import critical_step
+from verify.xfem.cuts import Plane
+from verify.xfem.dynamics import CentralDifferences, DynamicBody
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+STRAIN, POISSON = 0.15, 0.3
+
+
+def rest_step(virtual, mass, stuff):
+    force = InternalForce(virtual, stuff, "linear")
+    pattern = block_pattern(virtual.cells, virtual.node_count)
+    blocks = force.stiffness(pattern, np.zeros_like(virtual.node_points), "frozen")
+    return critical_step(pattern.matrix(blocks), mass)
+
+
+def stretched(points):
+    along = points[:, 0]
+    displacement = np.zeros_like(points)
+    displacement[:, 0] = STRAIN * np.sin(np.pi * along / 2) * 2 / np.pi
+    contraction = -POISSON * STRAIN * np.cos(np.pi * along / 2)
+    displacement[:, 1:] = contraction[:, None] * (points[:, 1:] - 0.5)
+    displacement[along < 1e-9] = 0.0
+    return displacement
+
+
+def uniform(points):
+    return 0.15 * points * np.eye(points.shape[1])[0]
+
+
+def let_go(virtual, share, steps, every=10, start=stretched):
+    """Largest energy over that at the start, and at how many instants a piece was inverted."""
+    stuff = material(virtual.mesh.dim)
+    mass = side_wise_mass(virtual, DENSITY)
+    force = InternalForce(virtual, stuff)
+    supports = Supports.none(virtual).prescribe(virtual, virtual.mesh.points[:, 0] < 1e-9)
+    dynamic = DynamicBody(force, mass, supports=supports)
+    state = dynamic.rest()
+    state.displacement[:] = start(virtual.node_points)
+    before = force.evaluate(state.displacement)[1]
+    integrator = CentralDifferences(dynamic, share * rest_step(virtual, mass, stuff))
+    largest, inverted = 0.0, 0
+    for step in range(steps):
+        integrator.step(state)
+        if step % every == 0:
+            inverted += len(force.inverted(state.displacement)) > 0
+            kinetic = 0.5 * (mass.apply(state.velocity) * state.velocity).sum()
+            largest = max(largest, (force.evaluate(state.displacement)[1] + kinetic) / before)
+            if not largest < 100.0:
+                break
+    return largest, inverted
+
+
+def plate(seed):
+    random = np.random.default_rng(100 + seed)
+    normal = random.normal(size=2)
+    mesh = shaken(rectangle_mesh((8, 8)), seed, 0.1)
+    return cut_mesh(mesh, [Plane(0.5 + 0.05 * random.uniform(-1.0, 1.0, 2), normal)])
+
+
+def cube(seed):
+    random = np.random.default_rng(100 + seed)
+    normal = random.normal(size=3)
+    cut = Plane(0.5 + 0.05 * random.uniform(-1.0, 1.0, 3), normal)
+    return cut_mesh(box_mesh((3, 3, 3)), [cut])
