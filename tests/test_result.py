@@ -1,7 +1,10 @@
 """The result model: what is written is what is read; a damaged file is one clear line."""
 
 import json
+import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from verify.errors import InputError
@@ -49,6 +52,48 @@ def test_a_result_is_read_as_it_was_written(tmp_path):
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["result.json"]
 
 
+def strict(path):
+    """Read as readers do that know JSON's words only."""
+
+    def refuse(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    return json.loads(path.read_text(), parse_constant=refuse)
+
+
+def test_numbers_that_are_not_finite_are_null_and_named_and_come_back(tmp_path):
+    odd = Metric("a~/b", math.nan, "1", None, math.inf)
+    solve = replace(judged().solves[0], metrics=[odd], account={"~/": [0.0, -math.inf]})
+    rate = Rate("xfem", "energy_norm", None, 0.0, "floor", [2.0, math.nan])
+    path = tmp_path / "result.json"
+    write_result(replace(judged(), solves=[solve], rates=[rate]), path)
+    written, found = strict(path), read_result(path)
+    assert written["solves"][0]["metrics"][0]["value"] is None
+    assert written["not_finite"] == {
+        "/solves/0/metrics/0/value": "nan",
+        "/solves/0/metrics/0/uncertainty": "inf",
+        "/solves/0/account/~0~1/1": "-inf",
+        "/rates/0/pairwise/1": "nan",
+    }
+    metric = found.solves[0].metrics[0]
+    assert math.isnan(metric.value)
+    assert metric.reference is None
+    assert metric.uncertainty == math.inf
+    assert found.solves[0].account == {"~/": [0.0, -math.inf]}
+    assert math.isnan(found.rates[0].pairwise[1])
+
+
+def test_numpys_scalars_are_numbers_in_a_result(tmp_path):
+    solve = replace(
+        judged().solves[0], level=np.int64(3), size=np.float32(0.5), notes={"a": np.bool_(True)}
+    )
+    path = tmp_path / "result.json"
+    write_result(replace(judged(), solves=[solve]), path)
+    written = strict(path)["solves"][0]
+    assert (written["level"], written["size"], written["notes"]) == (3, 0.5, {"a": True})
+    assert "not_finite" not in strict(path)
+
+
 @pytest.mark.parametrize(
     "verdicts, worst",
     [
@@ -93,9 +138,12 @@ def damaged(change):
         ),
         (damaged(lambda r: r["solves"][0].update(colour="red")), "not a readable result"),
         (damaged(lambda r: r["verdicts"][0].pop("limit")), "not a readable result"),
+        (damaged(lambda r: r.update(not_finite={"/solves/9/size": "nan"})), "not a readable"),
+        (damaged(lambda r: r.update(not_finite={"/case": "many"})), "not a readable result"),
     ],
-    ids=["missing", "cut off", "binary", "list", "newer", "no solves", "status", "key", "limit"],
-)
+    ids=["missing", "cut off", "binary", "list", "newer", "no solves", "status", "key", "limit",
+         "no such place", "no number"],
+)  # fmt: skip
 def test_a_damaged_result_is_said_in_one_line(tmp_path, damage, fault):
     path = tmp_path / "result.json"
     write_result(judged(Verdict.PASS), path)

@@ -9,7 +9,7 @@ from typing import Any
 from verify.errors import InputError
 from verify.whole_files import write_whole
 
-__all__ = ["read_json", "write_json"]
+__all__ = ["plain", "read_json", "write_json"]
 
 
 def write_json(content: Any, path: Path) -> None:
@@ -20,7 +20,7 @@ def write_json(content: Any, path: Path) -> None:
     OSError
         With the name of the file; what was there before stays.
     """
-    write_whole(path, json.dumps(_plain(content), indent=1, allow_nan=False) + "\n")
+    write_whole(path, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -42,17 +42,36 @@ def read_json(path: Path) -> dict[str, Any]:
     return content
 
 
-def _plain(value: Any) -> Any:
-    """Replace what JSON has no word for: numbers that are not finite become null."""
+def plain(value: Any, lost: dict[str, str] | None = None, place: str = "") -> Any:
+    """Replace what JSON has no word for: numbers that are not finite become null.
+
+    Parameters
+    ----------
+    value : object
+        Numpy's scalars and arrays become Python's; what is unknown becomes its text.
+    lost : dict, optional
+        Takes up what became null: ``"nan"``, ``"inf"`` or ``"-inf"`` by place, which is a JSON
+        pointer (RFC 6901).
+    place : str
+        Of `value`.
+    """
+
+    def inside(key: object, entry: Any) -> Any:
+        return plain(entry, lost, f"{place}/{str(key).replace('~', '~0').replace('/', '~1')}")
+
     match value:
         case float():
-            return float(value) if math.isfinite(value) else None
+            if math.isfinite(value):
+                return float(value)
+            if lost is not None:
+                lost[place] = str(float(value))
+            return None
         case Mapping():
-            return {str(key): _plain(entry) for key, entry in value.items()}
+            return {str(key): inside(key, entry) for key, entry in value.items()}
         case list() | tuple():
-            return [_plain(entry) for entry in value]
+            return [inside(index, entry) for index, entry in enumerate(value)]
         case None | bool() | int() | str():
             return value
     if hasattr(value, "tolist"):  # numpy's scalars and arrays
-        return _plain(value.tolist())
+        return plain(value.tolist(), lost, place)
     return str(value)

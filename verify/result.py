@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.whole_files import write_whole
+from verify.json_files import plain, write_json
 
 __all__ = [
     "SCHEMA_VERSION",
@@ -185,9 +185,15 @@ class CaseResult:
 
 
 def write_result(result: CaseResult, path: Path) -> None:
-    """Write `result` as JSON, in one step (a reader never sees half a file)."""
+    """Write `result` as JSON, in one step (a reader never sees half a file).
+
+    Numbers that are not finite, for which JSON has no word, are null there, and named with what
+    they are under ``not_finite``; numpy's scalars are plain numbers.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, json.dumps(asdict(result), indent=1))
+    lost: dict[str, str] = {}
+    content = plain(asdict(result), lost)
+    write_json({**content, "not_finite": lost} if lost else content, path)
 
 
 def read_result(path: Path) -> CaseResult:
@@ -207,6 +213,8 @@ def read_result(path: Path) -> CaseResult:
     if not isinstance(record, dict) or record.get("schema") != SCHEMA_VERSION:
         raise InputError(f"not a result of schema version {SCHEMA_VERSION}", str(path))
     try:
+        for place, number in record.pop("not_finite", {}).items():
+            _put(record, place, float(number))
         record["solves"] = [
             SolveRecord(
                 **{
@@ -222,5 +230,13 @@ def read_result(path: Path) -> CaseResult:
             VerdictRecord(**{**v, "verdict": Verdict(v["verdict"])}) for v in record["verdicts"]
         ]
         return CaseResult(**record)
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"not a readable result ({error})", str(path)) from None
+
+
+def _put(record: Any, place: str, number: float) -> None:
+    """Put a number at a JSON pointer (RFC 6901), where null stands for it."""
+    keys = [key.replace("~1", "/").replace("~0", "~") for key in place.split("/")[1:]]
+    for key in keys[:-1]:
+        record = record[int(key) if isinstance(record, list) else key]
+    record[int(keys[-1]) if isinstance(record, list) else keys[-1]] = number
