@@ -35,6 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ChildProcessError as error:
         return _fail(str(error), 3)
     except OSError as error:
+        if isinstance(error, PermissionError) and error.filename:
+            return _fail(f"{error.filename}: {error.strerror}", 2)
         if error.errno not in DISK_FAILURES:
             raise
         where = f" ({error.filename})" if error.filename else ""

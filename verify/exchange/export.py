@@ -27,7 +27,7 @@ from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
 from verify.json_files import write_json
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, SpatialCut
-from verify.whole_files import whole_file
+from verify.whole_files import asked_place, whole_file
 
 __all__ = ["EXPORT_SCHEMA", "export_case", "level_folder"]
 
@@ -63,7 +63,7 @@ def export_case(
     Raises
     ------
     InputError
-        If `out` holds something else, or a level is not one of the case.
+        If `out` holds something else or may not be written, or a level is not one of the case.
     UnsupportedSceneError
         If a conforming mesh is asked for that is not offered.
     """
@@ -71,16 +71,19 @@ def export_case(
     for level in chosen:
         if not 0 <= level < scene.mesh.count:
             raise InputError(f"mesh level {level}; {scene.name} has 0..{scene.mesh.count - 1}")
-    _check_place(out)
-    files, entries = [], []
+    with asked_place(out):
+        _check_place(out)
+    files: list[Path] = []
+    entries = []
     for level in chosen:
         folder = level_folder(out, level)
         problems = {"mesh": problem_of(scene, level)}
         if conforming:
             problems["conforming"] = problem_of(scene, level, conforming=True)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, problem in problems.items():
-            files += _write_problem(problem, folder, name)
+        with asked_place(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            for name, problem in problems.items():
+                files += _write_problem(problem, folder, name)
         background = problems["mesh"]
         entries.append(
             {
@@ -91,10 +94,11 @@ def export_case(
                 "cells": len(background.cells),
             }
         )
-    if scene.cuts:
-        _write_cuts(scene, out / "cuts.vtu")
-        files.append(out / "cuts.vtu")
-    write_json(_case(scene, entries), out / "case.json")
+    with asked_place(out):
+        if scene.cuts:
+            _write_cuts(scene, out / "cuts.vtu")
+            files.append(out / "cuts.vtu")
+        write_json(_case(scene, entries), out / "case.json")
     return [*files, out / "case.json"]
 
 

@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from verify.errors import InputError
@@ -68,15 +69,17 @@ def write_study(
 
 
 def make_directory(directory: Path) -> None:
-    """Make the directory, if it is not there.
+    """Make the directory, if it is not there, and see whether files can be made in it.
 
     Raises
     ------
     InputError
-        If a file is in its place, or it may not be made.
+        If a file is in its place, or it may not be made or written.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=directory):
+            pass
     except (FileExistsError, NotADirectoryError):
         raise InputError("is a file; expected a directory to write into", str(directory)) from None
     except PermissionError:
