@@ -12,9 +12,12 @@ from reference.space import ConformingSpace
 from reference.strain_equations import StrainEquations
 from verify.scene import Material
 
-__all__ = ["LargeStrainSolve", "solve_large_strain"]
+__all__ = ["Energy", "LargeStrainSolve", "solve_large_strain"]
 
 Array = NDArray[np.float64]
+Energy = Literal[
+    "corotated", "corotated_mixed", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"
+]
 _SMALLEST_STEP = 1e-4
 
 
@@ -32,7 +35,7 @@ class LargeStrainSolve:
         Least det F at the quadrature points.
     inverted : float
         Share of the body where det F is not positive: at most 1e-3 with the corotated energy,
-        none with the others.
+        with a pressure or not, none with the others.
     iterations : int
         Newton iterations in all steps together.
     steps : int
@@ -59,9 +62,7 @@ def solve_large_strain(
     unknowns: NDArray[np.int32],
     prescribed: Callable[[float], Array],
     load: Any = None,
-    energy: Literal[
-        "corotated", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"
-    ] = "corotated",
+    energy: Energy = "corotated",
     first_step: float = 0.25,
 ) -> LargeStrainSolve:
     """Find the equilibrium at load factor 1, from rest at load factor 0.
@@ -79,7 +80,7 @@ def solve_large_strain(
         Their values (k,) in m at a load factor in [0, 1].
     load : callable, optional
         Gives the linear form of the dead loads for a test function; scaled by the load factor.
-    energy : {"corotated", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"}
+    energy : Energy
         Density: μ‖U−I‖² + ½λ tr²(U−I), or one of those in plane strain or in space. Mixed: with
         the pressure as an unknown, of quadratic elements, for nearly incompressible material.
     first_step : float

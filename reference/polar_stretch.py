@@ -30,8 +30,8 @@ class PolarStretch:
 
     Parameters
     ----------
-    displacement : dolfinx.fem.Function
-        Of a vector space on triangles or tetrahedra.
+    solution : dolfinx.fem.Function
+        Of a vector space on triangles or tetrahedra: the displacement.
     degree : int
         Of the quadrature of the forms; they must be measured by `measure`.
 
@@ -48,18 +48,18 @@ class PolarStretch:
         dx with the quadrature of `degree`.
     """
 
-    def __init__(self, displacement: Any, degree: int) -> None:
+    def __init__(self, solution: Any, degree: int) -> None:
         import basix
         import basix.ufl
         import ufl
         from dolfinx import fem
 
-        mesh = displacement.function_space.mesh
+        mesh = solution.function_space.mesh
         d = mesh.geometry.dim
-        self._displacement = displacement
+        self._solution = solution
         self._stretch: Any = None
         self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
-        F = self.F = ufl.Identity(d) + ufl.grad(displacement)
+        F = self.F = ufl.Identity(d) + self._gradient(solution)
         self.J, self.stretches = ufl.det(F), d
         if d == 2:
             self.s = ufl.sqrt((F[0, 0] + F[1, 1]) ** 2 + (F[0, 1] - F[1, 0]) ** 2)
@@ -69,7 +69,7 @@ class PolarStretch:
         space = fem.functionspace(mesh, element)
         self._stretch = self.s = fem.Function(space)
         points, _ = basix.make_quadrature(basix.CellType.tetrahedron, degree)
-        self._gradient = fem.Expression(F, np.array(points, dtype=float))
+        self._deformation = fem.Expression(F, np.array(points, dtype=float))
         cells = mesh.topology.index_map(3)
         self._cells = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
         self._dofs = np.asarray(space.dofmap.list).ravel()
@@ -82,18 +82,24 @@ class PolarStretch:
         """Follow the displacement; before a form is assembled."""
         if self._stretch is not None:
             mesh = self._stretch.function_space.mesh
-            gradients = np.asarray(self._gradient.eval(mesh, self._cells), dtype=float)
+            gradients = np.asarray(self._deformation.eval(mesh, self._cells), dtype=float)
             self._stretch.x.array[self._dofs] = stretch_sum(gradients.reshape(-1, 3, 3))
 
     def derivative(self, form: Any, direction: Any) -> Any:
-        """Differentiate a form by the displacement: R is the derivative of s."""
+        """Differentiate a form by the solution: R is the derivative of s."""
         import ufl
 
-        total = ufl.derivative(form, self._displacement, direction)
+        total = ufl.derivative(form, self._solution, direction)
         if self._stretch is None:
             return total
-        along = ufl.inner(self.R, ufl.grad(direction))
+        along = ufl.inner(self.R, self._gradient(direction))
         return total + ufl.derivative(form, self._stretch, along)
+
+    def _gradient(self, of: Any) -> Any:
+        """Gradient of the displacement in a function or argument of the solution's space."""
+        import ufl
+
+        return ufl.grad(of)
 
 
 def stretch_sum(F: Array) -> Array:

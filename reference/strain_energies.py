@@ -6,6 +6,7 @@ __all__ = [
     "ENERGIES",
     "VALUES",
     "corotated",
+    "corotated_mixed",
     "corotated_value",
     "neo_hookean",
     "neo_hookean_mixed",
@@ -39,6 +40,30 @@ def corotated_value(polar: Any, lam: Any, mu: Any) -> Any:
 
     d, away = polar.stretches, polar.F - polar.R
     return mu * ufl.inner(away, away) + lam / 2 * (polar.s - d) ** 2
+
+
+def corotated_mixed(state: Any, lam: Any, mu: Any) -> Any:
+    """μ‖U−I‖² + p (tr U − d) − p² / 2λ: the same where the pressure is p = λ tr(U−I).
+
+    Parameters
+    ----------
+    state : MixedStretch
+    lam, mu : ufl expressions
+        Lamé constants, Pa.
+    """
+    import ufl
+
+    d = state.stretches
+    shear = mu * (ufl.inner(state.F, state.F) - 2 * state.s + d)
+    return shear + state.p * (state.s - d) - state.p**2 / (2 * lam)
+
+
+def corotated_mixed_value(state: Any, lam: Any, mu: Any) -> Any:
+    """Give the stored energy as squares, by the equation of the pressure: p² / 2λ is its share."""
+    import ufl
+
+    away = state.F - state.R
+    return mu * ufl.inner(away, away) + state.p**2 / (2 * lam)
 
 
 def neo_hookean(polar: Any, lam: Any, mu: Any) -> Any:
@@ -75,9 +100,14 @@ def st_venant_kirchhoff(polar: Any, lam: Any, mu: Any) -> Any:
 
 ENERGIES = {
     "corotated": corotated,
+    "corotated_mixed": corotated_mixed,
     "neo_hookean": neo_hookean,
     "neo_hookean_mixed": neo_hookean_mixed,
     "st_venant_kirchhoff": st_venant_kirchhoff,
 }
 # densities to evaluate, where they are not those to differentiate
-VALUES = {**ENERGIES, "corotated": corotated_value}
+VALUES = {
+    **ENERGIES,
+    "corotated": corotated_value,
+    "corotated_mixed": corotated_mixed_value,
+}

@@ -10,6 +10,7 @@ from reference.elasticity import lame, mean_stiffness
 from reference.linear_solvers import near_null_space, set_multigrid, solve_directly
 from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import MixedDeformation, mixed_space
+from reference.mixed_stretch import MixedStretch
 from reference.polar_stretch import PolarStretch
 from reference.space import ConformingSpace, SharedUnknowns
 from reference.strain_energies import ENERGIES, VALUES
@@ -24,7 +25,7 @@ _GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall fur
 _MOST_ITERATIONS = 25
 # share of the body that may be inside out: the corotated energy has no barrier, and at a tip or a
 # clamped corner its strains are unbounded, so that a well graded mesh always has such cells there
-_INVERTED = {"corotated": 1e-3}  # none with the others
+_INVERTED = {"corotated": 1e-3, "corotated_mixed": 1e-3}  # none with the others
 # unknowns in space up to which the tangent is factorised; more are solved by multigrid
 _MOST_DIRECT = 40_000
 # A flat membrane without tension has no stiffness across itself, so that its tangent is singular.
@@ -79,9 +80,12 @@ class StrainEquations:
         membrane = space.mesh.cell_dimension < space.dimension
         if membrane and energy != "corotated":
             raise InputError(f"energy '{energy}' of a membrane; expected 'corotated'")
-        polar: Any = PolarStretch if mixed is None else MixedDeformation
-        polar = MembraneStretch if membrane else polar
-        self._polar = polar = polar(self.solution, 4 * space.degree - 2)
+        kinds: dict[str, Any] = {
+            "corotated_mixed": MixedStretch,
+            "neo_hookean_mixed": MixedDeformation,
+        }
+        kind = MembraneStretch if membrane else kinds.get(energy, PolarStretch)
+        self._polar = polar = kind(self.solution, 4 * space.degree - 2)
         thickness = fem.Constant(V.mesh, material.thickness or 1.0)
         total = thickness * ENERGIES[energy](polar, lam, mu) * polar.measure
         v = ufl.TestFunction(V)

@@ -123,8 +123,8 @@ class ConformingSolver:
 class ReferenceSolver:
     """Elements of the degree that the scene asks for, graded to every singular point.
 
-    Quadratic elements of linear kinematics have a pressure of their own from Poisson's ratio 0.45
-    on, so that they do not lock.
+    Quadratic elements of linear kinematics, and in the plane those of statics at finite rotation,
+    have a pressure of their own from Poisson's ratio 0.45 on, so that they do not lock.
 
     A motion is integrated by the trapezoidal rule, at finite rotation by the energy–momentum
     scheme, with the scene's time step on level 0; every level halves it with the elements, so
@@ -220,7 +220,7 @@ def _shared(
 
 
 def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: bool) -> _Answer:
-    """Solve a scene by its kinematics; linearly with a pressure if that is wanted."""
+    """Solve a scene by its kinematics; with a pressure if that is wanted."""
     if scene.analysis.kinematics == "linear":
         linear = (solve_mixed if pressure else solve_linear)(scene, space, exact)
         return _Answer(
@@ -239,6 +239,8 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             },
         )
     unknowns, _ = constrained_values(scene, space, exact)
+    # in space large saddle points of a tangent have no solver but a factorisation
+    pressure = pressure and scene.dimension == 2
     with naming_weak_places(scene, space):
         finite = solve_large_strain(
             scene.material,
@@ -246,6 +248,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             unknowns,
             lambda factor: constrained_values(scene, space, exact, factor)[1],
             lambda v: load_form(scene, space, v, exact),
+            "corotated_mixed" if pressure else "corotated",
         )
     return _Answer(
         space,
@@ -256,6 +259,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
         finite.timings,
         {"newton": finite.iterations, "load steps": finite.steps},
         {
+            "unknowns": MIXED if pressure else "displacement",
             "linear solver": "PETSc SNES, MUMPS Cholesky",
             "smallest det F": f"{finite.smallest_jacobian:.3g}",
             "area inside out": f"{finite.inverted:.1e}",
