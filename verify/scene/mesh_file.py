@@ -35,7 +35,8 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     Raises
     ------
     InputError
-        If the file is missing, unreadable, not simplicial, or degenerate.
+        If the file is missing, unreadable, not simplicial, or degenerate, or if cells overlap that
+        share a facet.
     """
     import meshio
 
@@ -66,7 +67,9 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     points, cells = points[used], compact.reshape(cells.shape).astype(np.int64)
     if not np.isfinite(points).all():
         raise InputError("has coordinates that are not finite", str(path))
-    return points, _oriented(points, cells, str(path))
+    cells = _oriented(points, cells, str(path))
+    _refuse_overlaps(cells, k == d, str(path))
+    return points, cells
 
 
 def _oriented(
@@ -85,3 +88,25 @@ def _oriented(
     negative = volume < 0
     cells[negative, 0], cells[negative, 1] = cells[negative, 1], cells[negative, 0].copy()
     return cells
+
+
+def _refuse_overlaps(cells: NDArray[np.int64], oriented: bool, where: str) -> None:
+    """Refuse cells on the same side of a facet that they share; of a membrane, the same cell twice.
+
+    Cells of positive orientation on either side of a facet name its corners in opposite turns.
+    """
+    facets = [np.delete(cells, i, axis=1) for i in range(cells.shape[1])] if oriented else [cells]
+    rows = []
+    for i, facet in enumerate(facets):
+        pairs = [(a, b) for b in range(facet.shape[1]) for a in range(b)]
+        swaps = sum((facet[:, a] > facet[:, b]).astype(np.int64) for a, b in pairs)
+        side = (swaps + i) % 2 if oriented else np.zeros(len(facet), dtype=np.int64)
+        rows.append(np.column_stack([np.sort(facet, axis=1), side]))
+    asked = np.concatenate(rows)
+    order = np.lexsort(asked.T)
+    same = np.flatnonzero((asked[order[1:]] == asked[order[:-1]]).all(axis=1))
+    if same.size:
+        pair = np.sort(order[same[0] : same[0] + 2] % len(cells))
+        raise InputError(
+            f"cells {pair[0]} and {pair[1]} overlap: they are on the same side of a facet", where
+        )
