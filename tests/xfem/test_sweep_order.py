@@ -6,7 +6,8 @@ from numba import njit
 
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.dynamics.real_time import _held_entries
-from verify.xfem.lane_shuffles import add_vector, address, transpose_square
+from verify.xfem.lane_shuffles import add_to_records, address, gather_records
+from verify.xfem.lane_vectors import load, mean, minus, no_lanes, store, transposed
 from verify.xfem.polar_kernels import LANES
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.sweep_order_kernels import assign_slots, fill_lanes, order_pieces
@@ -79,25 +80,47 @@ def test_slots_are_as_many_as_a_front_of_the_mesh_has_blocks() -> None:
     assert count < 0.3 * (len(pattern.columns) - pattern.node_count) / 2
 
 
-def test_squares_of_lanes_are_transposed_and_vectors_added() -> None:
+def test_numbers_of_records_become_rows_of_lanes_and_rows_are_added_to_records() -> None:
+    """Also where several lanes have the same record."""
     rng = np.random.default_rng(5)
-    before, numbers = rng.random(3 + LANES * LANES), rng.random(20)
-    entries, sums = before.copy(), np.zeros(20)
-    _shuffle(entries, numbers, sums)
-    np.testing.assert_array_equal(entries[:3], before[:3])
-    np.testing.assert_array_equal(
-        entries[3:].reshape(LANES, LANES), before[3:].reshape(LANES, LANES).T
-    )
-    np.testing.assert_array_equal(sums[5 : 5 + LANES], 2.0 * numbers[1 : 1 + LANES])
-    assert not sums[:5].any()
-    assert not sums[5 + LANES :].any()
+    records, rows = rng.random((20, LANES)), rng.random(3 + 5 * LANES)
+    places = np.full((LANES, 3), 7, dtype=np.uint32)
+    places[:, 1] = LANES * rng.integers(0, 4, LANES)
+    at = places[:, 1] // LANES
+    wanted = records.copy()
+    np.add.at(wanted[:, :5], at, rows[3:].reshape(5, LANES).T)
+    after, found = records.copy(), rows.copy()
+    _shuffle(after, places, found)
+    np.testing.assert_allclose(after, wanted, rtol=1e-15)
+    np.testing.assert_array_equal(after[:, 5:], records[:, 5:])
+    np.testing.assert_array_equal(found[:3], rows[:3])
+    np.testing.assert_array_equal(found[3:].reshape(5, LANES), after[at, :5].T)
 
 
 @njit
-def _shuffle(entries, numbers, sums):
-    transpose_square(address(entries), 3)
-    for _ in range(2):
-        add_vector(address(sums), 5, address(numbers), 1)
+def _shuffle(records, places, rows):
+    add_to_records(address(records), address(places), 1, 3, address(rows), 3, 5)
+    gather_records(address(records), address(places), 1, 3, address(rows), 3, 5)
+
+
+def test_a_block_is_transposed_as_its_first_eight_entries() -> None:
+    block, out = np.random.default_rng(6).random((3, 3)), np.full(4 * LANES, np.nan)
+    _transpose(block, out)
+    turned, difference, middle, nothing = out.reshape(4, LANES)
+    np.testing.assert_array_equal(turned, block.T.ravel()[:LANES])
+    np.testing.assert_array_equal(difference, (block - block.T).ravel()[:LANES])
+    np.testing.assert_array_equal(middle, (0.5 * (block + block.T)).ravel()[:LANES])
+    assert not nothing.any()
+
+
+@njit
+def _transpose(block, out):
+    into, entries = address(out), load(address(block), 0)
+    other = transposed(entries)
+    store(into, 0, other)
+    store(into, LANES, minus(entries, other))
+    store(into, 2 * LANES, mean(entries, other))
+    store(into, 3 * LANES, no_lanes())
 
 
 def test_lanes_hold_gradients_and_moduli_of_their_pieces(body) -> None:

@@ -76,7 +76,6 @@ class InternalForce:
         self._gradients = np.ascontiguousarray(mesh.gradients)
         self._normals = _unit_normals(virtual)
         self._shape = (virtual.node_count, space)
-        self._moved = np.empty(self._shape)
         self._sweep: Linearisation | None = None
         self._swept = False  # whether the last rotations are those of the sweep
 
@@ -195,9 +194,7 @@ class InternalForce:
             self.add_stiffness(pattern, blocks, scale)
             return
         self._sweep = self._sweep_over(pattern)
-        np.multiply(velocity, implicit, out=self._moved)
-        self._moved += displacement
-        self._sweep(displacement, self._moved, scale, force, blocks, whole)
+        self._sweep(displacement, velocity, implicit, scale, force, blocks, whole)
         self._swept = self.turning
 
     def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:

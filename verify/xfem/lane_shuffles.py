@@ -1,7 +1,7 @@
-"""Two operations on vectors of `LANES` numbers that the compiler does not find in loops by itself.
+"""Between `LANES` records, each of consecutive numbers, and rows that hold one number of each.
 
-Both work on 64-bit floats, on whatever width the machine has. There are no bounds checks: callers
-count.
+A square of `LANES` × `LANES` numbers is transposed in registers on the way. There are no bounds
+checks: callers count.
 """
 
 from typing import Any
@@ -10,16 +10,12 @@ from numba import types
 from numba.core.cgutils import ir  # of llvmlite, which numba comes with
 from numba.extending import intrinsic
 
+from verify.xfem.lane_vectors import WIDE, wide_at
 from verify.xfem.polar_kernels import LANES
 
-__all__ = ["add_vector", "address", "transpose_square"]
+__all__ = ["add_to_records", "address", "gather_records"]
 
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _MASK = ir.VectorType(ir.IntType(32), LANES)
-
-
-def _vector(builder, address, at):
-    return builder.bitcast(builder.gep(address, [at]), _VECTOR.as_pointer())
 
 
 def _address(typing, array):
@@ -31,50 +27,72 @@ def _address(typing, array):
     return types.CPointer(array.dtype)(array), generate
 
 
-def _transpose_square(typing, entries, at):
-    """Transpose the `LANES` × `LANES` numbers at `entries` from place `at` on, row after row.
+def _transpose(builder, held):
+    """Exchange neighbouring squares log₂ `LANES` times, each twice as wide as the one before."""
+    width = 1
+    while width < LANES:
+        upper = [LANES + l - width if l & width else l for l in range(LANES)]
+        lower = [LANES + l if l & width else l + width for l in range(LANES)]
+        for row in range(LANES):
+            if not row & width:
+                a, b = held[row], held[row + width]
+                held[row] = builder.shuffle_vector(a, b, ir.Constant(_MASK, upper))
+                held[row + width] = builder.shuffle_vector(a, b, ir.Constant(_MASK, lower))
+        width *= 2
 
-    By log₂ `LANES` exchanges of neighbouring squares, each twice as wide as the one before.
+
+def _later(builder, at, distance):
+    return builder.add(at, ir.Constant(at.type, distance))
+
+
+def _record(builder, records, places, first, lane, step):
+    """Address of the record of a lane."""
+    place = builder.load(builder.gep(places, [_later(builder, first, lane * step)]))
+    return wide_at(builder, records, builder.zext(place, first.type))
+
+
+def _gather_records(typing, records, places, first, step, rows, at, count):
+    """Write the first `count` numbers of the records at places[first + `step` lane] as rows.
+
+    Row k goes to `rows` from at + k `LANES` on. `step` and `count` are literal.
     """
 
     def generate(context, builder, signature, arguments):
-        entries, at = arguments
-        rows = [
-            _vector(builder, entries, builder.add(at, ir.Constant(at.type, LANES * row)))
-            for row in range(LANES)
+        records, places, first, _, rows, at, _ = arguments
+        held = [
+            builder.load(
+                _record(builder, records, places, first, lane, step.literal_value), align=8
+            )
+            for lane in range(LANES)
         ]
-        held = [builder.load(row, align=8) for row in rows]
-        width = 1
-        while width < LANES:
-            upper = [LANES + l - width if l & width else l for l in range(LANES)]
-            lower = [LANES + l if l & width else l + width for l in range(LANES)]
-            for row in range(LANES):
-                if not row & width:
-                    a, b = held[row], held[row + width]
-                    held[row] = builder.shuffle_vector(a, b, ir.Constant(_MASK, upper))
-                    held[row + width] = builder.shuffle_vector(a, b, ir.Constant(_MASK, lower))
-            width *= 2
-        for row, numbers in zip(rows, held, strict=True):
-            builder.store(numbers, row, align=8)
+        _transpose(builder, held)
+        for k in range(count.literal_value):
+            builder.store(held[k], wide_at(builder, rows, _later(builder, at, k * LANES)), align=8)
         return context.get_dummy_value()
 
-    return types.void(entries, types.intp), generate
+    return types.void(records, places, types.intp, step, rows, types.intp, count), generate
 
 
-def _add_vector(typing, target, place, entries, at):
-    """Add `LANES` consecutive numbers at `entries`, from `at` on, to those at `target`."""
+def _add_to_records(typing, records, places, first, step, rows, at, count):
+    """Add rows to the first `count` numbers of records; the same arguments the other way."""
 
     def generate(context, builder, signature, arguments):
-        target, place, entries, at = arguments
-        into, numbers = _vector(builder, target, place), _vector(builder, entries, at)
-        total = builder.fadd(builder.load(into, align=8), builder.load(numbers, align=8))
-        builder.store(total, into, align=8)
+        records, places, first, _, rows, at, _ = arguments
+        held = [
+            builder.load(wide_at(builder, rows, _later(builder, at, k * LANES)), align=8)
+            for k in range(count.literal_value)
+        ]
+        held += [ir.Constant(WIDE, None)] * (LANES - len(held))
+        _transpose(builder, held)
+        for lane in range(LANES):
+            record = _record(builder, records, places, first, lane, step.literal_value)
+            builder.store(builder.fadd(builder.load(record, align=8), held[lane]), record, align=8)
         return context.get_dummy_value()
 
-    return types.void(target, types.intp, entries, types.intp), generate
+    return types.void(records, places, types.intp, step, rows, types.intp, count), generate
 
 
 # as they are called in kernels, without the context of typing
 address: Any = intrinsic(_address)
-transpose_square: Any = intrinsic(_transpose_square)
-add_vector: Any = intrinsic(_add_vector)
+gather_records: Any = intrinsic(prefer_literal=True)(_gather_records)
+add_to_records: Any = intrinsic(prefer_literal=True)(_add_to_records)

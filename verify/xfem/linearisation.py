@@ -1,8 +1,9 @@
 """Force and stiffness of corotational tetrahedra in one sweep: what a real-time step needs.
 
 The arrays are in the order and form in which `tetrahedron_lanes` reads them once: pieces sorted by
-their nodes, eight to a batch; blocks above the diagonal are added up in slots that are used again
-when a row is finished, so that sums wait in the cache until they are complete.
+their nodes, eight to a batch, eight batches to a window; blocks above the diagonal are added up in
+slots that are used again when a row is finished, so that sums wait in the cache until they are
+complete.
 """
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.polar_kernels import LANES, new_lanes
 from verify.xfem.sweep_order_kernels import assign_slots, fill_lanes, order_pieces
+from verify.xfem.symmetric_rows import RECORD
 from verify.xfem.tetrahedron_lanes import ENTRIES, linearise, unpack_rotations
 from verify.xfem.virtual import VirtualMesh
 
@@ -19,6 +21,7 @@ __all__ = ["Linearisation"]
 _Floats = NDArray[np.float64]
 
 _LINE = 8  # numbers in a line of the cache
+_WINDOW = 8 * LANES  # pieces; rows are finished after each window
 
 
 class Linearisation:
@@ -45,16 +48,19 @@ class Linearisation:
         turning: bool = True,
     ) -> None:
         pieces, corner, nodes = order_pieces(virtual.cells, virtual.node_count)
+        spread = _spread(len(pieces))
+        pieces, corner, nodes = pieces[spread], corner[spread], nodes[spread]
         slots, slot_of, ends, count = assign_slots(
-            pieces, corner, nodes, pattern.targets, pattern.starts, pattern.diagonal, LANES
+            pieces, corner, nodes, pattern.targets, pattern.starts, pattern.diagonal, _WINDOW
         )
         batches = -(-len(pieces) // LANES)
+        ends = np.minimum(-(-ends // _WINDOW) * _WINDOW, batches * LANES)
         self.pattern, self.turning = pattern, turning
-        self._pieces, self._ends, self._slot_of = pieces, ends, 9 * slot_of
-        self._corners = np.zeros((batches * LANES, 4), dtype=np.uint32)
-        self._corners[: len(pieces)] = 3 * nodes
-        self._slots = np.zeros((batches * LANES, 6), dtype=np.uint32)
-        self._slots[: len(pieces)] = 9 * slots
+        self._pieces, self._ends, self._slot_of = pieces, ends, RECORD * slot_of
+        self._corners = np.zeros(batches * LANES * 4, dtype=np.uint32)
+        self._corners[: nodes.size] = RECORD * nodes.ravel()
+        self._slots = np.zeros(batches * LANES * 6, dtype=np.uint32)
+        self._slots[: slots.size] = RECORD * slots.ravel()
         self._constants = _aligned_zeros(batches, 11 * LANES)
         fill_lanes(
             pieces, corner, virtual.parent, virtual.mesh.gradients, virtual.volumes, lam, mu,
@@ -65,13 +71,17 @@ class Linearisation:
         self._lanes = _aligned_zeros(ENTRIES, LANES).reshape(-1)
         rest = new_lanes()
         self._lanes[: len(rest)] = rest
-        self._waiting = np.zeros(9 * count)
-        self._beside = np.zeros((pattern.node_count, 6))
+        self._motion = _aligned_zeros(pattern.node_count, RECORD)
+        self._waiting = _aligned_zeros(count, RECORD).reshape(-1)
+        self._ninths = np.zeros(count)
+        self._beside = _aligned_zeros(pattern.node_count, RECORD).reshape(-1)
+        self._nodes = _aligned_zeros(pattern.node_count, RECORD).reshape(-1)
 
     def __call__(
         self,
         displacement: _Floats,
-        moved: _Floats,
+        velocity: _Floats,
+        implicit: float,
         scale: float,
         force: _Floats,
         blocks: _Floats,
@@ -83,20 +93,20 @@ class Linearisation:
         ----------
         displacement : (N, 3) float array
             From which the rotations are taken.
-        moved : (N, 3) float array
-            From which, with these rotations, the force is taken; with displacement + h velocity
-            it is that of the displacement plus h K velocity.
+        velocity : (N, 3) float array
+        implicit : float
+            In seconds. The force is that of displacement + `implicit` velocity with these
+            rotations: f_int(u) + `implicit` K v.
         scale : float
         whole : bool
             Without it blocks below the diagonal are not written, which are symmetric.
         """
         pattern = self.pattern
-        force[:] = 0.0
         linearise(
             self._lanes, self._corners, self._slots, self._constants, self._quaternions, self._ends,
             pattern.starts, pattern.columns, pattern.diagonal, pattern.mirror, self._slot_of,
-            displacement, moved, self.turning, whole, scale, self._waiting, self._beside,
-            force, blocks,
+            displacement, velocity, implicit, self.turning, whole, scale, self._motion,
+            self._waiting, self._ninths, self._beside, self._nodes, force, blocks,
         )  # fmt: skip
 
     def write_rotations(self, rotations: _Floats) -> None:
@@ -110,6 +120,17 @@ class Linearisation:
         read = sum(array.nbytes for array in kept) + self._quaternions.nbytes
         vectors = 3 * self.pattern.node_count * 3 * 8
         return read + self._quaternions.nbytes + vectors + len(self.pattern.columns) * 9 * 8
+
+
+def _spread(count: int) -> NDArray[np.int64]:
+    """Order in which the lanes of a batch take pieces from all of a window.
+
+    Neighbours add to the same nodes: one after the other they would wait for each other's sums.
+    """
+    order, whole = np.arange(count), count // _WINDOW * _WINDOW
+    windows = order[:whole].reshape(-1, LANES, _WINDOW // LANES)
+    order[:whole] = windows.transpose(0, 2, 1).ravel()
+    return order
 
 
 def _aligned_zeros(rows: int, columns: int) -> _Floats:

@@ -99,23 +99,23 @@ def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, const
 
 
 @njit(cache=True)
-def assign_slots(pieces, corner, nodes, targets, starts, diagonal, lanes):
+def assign_slots(pieces, corner, nodes, targets, starts, diagonal, window):
     """Give each block above the diagonal a slot from its first piece until its row is finished.
 
-    Rows are finished when the batch is done that has the last piece that begins with their node;
+    Rows are finished when the window is done that has the last piece that begins with their node;
     their slots are then free again, so that there are as many as a front of the mesh has blocks.
     The first slot stays empty: it is that of blocks to which no piece adds.
 
     Parameters
     ----------
     pieces, corner, nodes : (p,), (p, 4), (p, 4) int arrays
-        As from `order_pieces`.
+        As from `order_pieces`, or in another order within each window.
     targets : (p, 4, 4) int array
         Block of each pair of corners.
     starts, diagonal : int arrays
         Pattern.
-    lanes : int
-        Pieces in a batch.
+    window : int
+        Pieces in a window.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def assign_slots(pieces, corner, nodes, targets, starts, diagonal, lanes):
                         count += 1
                 slots[place, pair] = slot_of[block]
                 pair += 1
-        if (place + 1) % lanes == 0:
+        if (place + 1) % window == 0:
             while row < rows and ends[row] <= place + 1:
                 for block in range(diagonal[row] + 1, starts[row + 1]):
                     if slot_of[block] != 0:

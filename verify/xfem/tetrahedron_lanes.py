@@ -14,42 +14,63 @@ write one array and read another are not turned into vector instructions.
 import numpy as np
 from numba import njit
 
+from verify.xfem.lane_shuffles import address, gather_records
+from verify.xfem.lane_vectors import fetch, load, store
 from verify.xfem.polar_kernels import LANES, mend_lane, rotation_matrix, turn_lanes
 from verify.xfem.symmetric_rows import add_blocks, add_forces, finish_row
 
 __all__ = ["ENTRIES", "linearise", "unpack_rotations"]
 
 # places in the memory of the lanes, in entries of `LANES` numbers; 0 to 14 are of the rotations
-_SLOPE = 15  # u_i − u_0, then moved_i − moved_0
-_MOVED = 33  # deformation gradient of what is moved
-_B = 42  # b_1, b_2, b_3
-_MODULI = 51  # w λ and w μ
-_FORCE = 53
-_BLOCKS = 65
-ENTRIES = 119  #: of the memory of the lanes
+_MOVED = 15  # deformation gradient of what is moved
+_B = 24  # b_1, b_2, b_3
+_MODULI = 33  # w λ and w μ
+_FORCE = 35
+_BLOCKS = 47
+_CORNERS = 101  # displacement and what is moved, of four corners
+_AHEAD = 2  # batches by which constants are brought to the cache before they are read
+ENTRIES = 125  #: of the memory of the lanes
 
 
 @njit(cache=True)
-def _gather(corners, start, displacement, moved, v):
-    for l in range(LANES):
-        at = start + np.uint64(l)
-        for component in range(3):
-            k = np.uint64(component)
-            a, b = np.uint64(corners[at, 0]) + k, np.uint64(corners[at, 1]) + k
-            c, d = np.uint64(corners[at, 2]) + k, np.uint64(corners[at, 3]) + k
-            first, other = displacement[a], moved[a]
-            v[(_SLOPE + component) * LANES + l] = displacement[b] - first
-            v[(_SLOPE + 3 + component) * LANES + l] = displacement[c] - first
-            v[(_SLOPE + 6 + component) * LANES + l] = displacement[d] - first
-            v[(_SLOPE + 9 + component) * LANES + l] = moved[b] - other
-            v[(_SLOPE + 12 + component) * LANES + l] = moved[c] - other
-            v[(_SLOPE + 15 + component) * LANES + l] = moved[d] - other
+def _pack(displacement, velocity, implicit, motion):
+    """Write displacement and displacement + implicit velocity of each node beside each other."""
+    for node in range(len(displacement)):
+        for k in range(3):
+            u = displacement[node, k]
+            motion[node, k] = u
+            motion[node, 3 + k] = u + implicit * velocity[node, k]
+
+
+@njit(cache=True)
+def _gather(corners, start, motion, v):
+    for corner in range(4):
+        first, at = 4 * start + corner, (_CORNERS + 6 * corner) * LANES
+        gather_records(motion, corners, first, 4, v, at, 6)
+
+
+@njit(cache=True)
+def _fetch_ahead(batch, batches, corners, slots, constants, quaternions, motion, waiting):
+    """Have what comes next brought to the first cache while this batch is computed."""
+    start = batch * LANES
+    for entry in range(6 * LANES):
+        fetch(waiting, slots[6 * start + entry])
+    if batch + 1 < batches:
+        for entry in range(4 * LANES):
+            fetch(motion, corners[4 * (start + LANES) + entry])
+    # beyond the end nothing comes of it
+    for entry in range(11):
+        fetch(constants, (11 * (batch + _AHEAD) + entry) * LANES)
+    for entry in range(4):
+        fetch(quaternions, (4 * (batch + _AHEAD) + entry) * LANES)
 
 
 @njit(cache=True, inline="always")
-def _gradient_row(v, l, slope, into, x, y, z):
-    """Write one row of a gradient, from slopes and the rows of b_1, b_2, b_3."""
-    p, q, r = v[slope * LANES + l], v[(slope + 3) * LANES + l], v[(slope + 6) * LANES + l]
+def _gradient_row(v, l, component, into, x, y, z):
+    """Write one row of a gradient, from a component at the corners and rows of b_1, b_2, b_3."""
+    at = (_CORNERS + component) * LANES + l
+    first = v[at]
+    p, q, r = v[at + 6 * LANES] - first, v[at + 12 * LANES] - first, v[at + 18 * LANES] - first
     v[into * LANES + l] = x[0] * p + y[0] * q + z[0] * r
     v[(into + 1) * LANES + l] = x[1] * p + y[1] * q + z[1] * r
     v[(into + 2) * LANES + l] = x[2] * p + y[2] * q + z[2] * r
@@ -63,12 +84,12 @@ def _deform(v):
         x = (v[at], v[at + LANES], v[at + 2 * LANES])
         y = (v[at + 3 * LANES], v[at + 4 * LANES], v[at + 5 * LANES])
         z = (v[at + 6 * LANES], v[at + 7 * LANES], v[at + 8 * LANES])
-        _gradient_row(v, l, _SLOPE, 0, x, y, z)
-        _gradient_row(v, l, _SLOPE + 1, 3, x, y, z)
-        _gradient_row(v, l, _SLOPE + 2, 6, x, y, z)
-        _gradient_row(v, l, _SLOPE + 9, _MOVED, x, y, z)
-        _gradient_row(v, l, _SLOPE + 10, _MOVED + 3, x, y, z)
-        _gradient_row(v, l, _SLOPE + 11, _MOVED + 6, x, y, z)
+        _gradient_row(v, l, 0, 0, x, y, z)
+        _gradient_row(v, l, 1, 3, x, y, z)
+        _gradient_row(v, l, 2, 6, x, y, z)
+        _gradient_row(v, l, 3, _MOVED, x, y, z)
+        _gradient_row(v, l, 4, _MOVED + 3, x, y, z)
+        _gradient_row(v, l, 5, _MOVED + 6, x, y, z)
         for k in (0, 4, 8):
             v[k * LANES + l] += 1.0
             v[(_MOVED + k) * LANES + l] += 1.0
@@ -160,9 +181,10 @@ def _resist(factor, v):
 @njit(cache=True)
 def linearise(
     v, corners, slots, constants, quaternions, ends, starts, columns, diagonal, mirror, slot_of,
-    displacement, moved, turning, whole, factor, waiting, beside, force, blocks,
+    displacement, velocity, implicit, turning, whole, factor, motion, waiting, ninths, beside,
+    nodes, force, blocks,
 ):  # fmt: skip
-    """Add the force of a displacement to `force` and write its stiffness to `blocks`.
+    """Write the force of a displacement to `force` and its stiffness to `blocks`.
 
     Pieces beyond the last one fill a batch: they have no stiffness, and their slot is the first.
 
@@ -170,9 +192,9 @@ def linearise(
     ----------
     v : (`ENTRIES` · LANES,) float array
         Memory of the lanes, begun by `new_lanes`.
-    corners : (batches · LANES, 4) uint32 array
-        Three times the nodes of each piece, ascending.
-    slots : (batches · LANES, 6) uint32 array
+    corners : (batches · LANES · 4,) uint32 array
+        `RECORD` times the nodes of each piece, ascending.
+    slots : (batches · LANES · 6,) uint32 array
         Where in `waiting` blocks of the pairs of corners 01, 02, 03, 12, 13, 23 are added up.
     constants : (batches, 11 · LANES) float array
         b_1, b_2, b_3, w λ and w μ of the pieces of a batch, lane by lane.
@@ -186,43 +208,56 @@ def linearise(
         As `slots`, of each block above the diagonal.
     displacement : (N, 3) float array
         From which the rotations are taken.
-    moved : (N, 3) float array
-        From which, with these rotations, the force is taken.
+    velocity : (N, 3) float array
+    implicit : float
+        In seconds. With these rotations the force is that of displacement + `implicit` velocity.
     turning : bool
         Without it rotations stay as they are.
     whole : bool
         Without it blocks below the diagonal are not written.
     factor : float
         Of the stiffness.
-    waiting : float array
-        Zero; zero again afterwards.
-    beside : (N, 6) float array
-        Zero; zero again afterwards.
+    motion : (N, RECORD) float array
+        Room for what is read of each node.
+    waiting, ninths, beside, nodes : float arrays
+        As for `finish_row`, flat. Zero; zero again afterwards.
     force : (N, 3) float array
+        Overwritten.
     blocks : (B, 3, 3) float array
         Overwritten.
     """
-    u, m, f, K = displacement.reshape(-1), moved.reshape(-1), force.reshape(-1), blocks.reshape(-1)
+    _pack(displacement, velocity, implicit, motion)
+    entries, moving, known, turned = (
+        address(v), address(motion), address(constants), address(quaternions),
+    )  # fmt: skip
+    corners_at, slots_at, pattern = address(corners), address(slots), address(starts)
+    columns_at, diagonal_at, mirror_at = address(columns), address(diagonal), address(mirror)
+    slot_at, waiting_at, ninths_at = address(slot_of), address(waiting), address(ninths)
+    beside_at, nodes_at, f, K = address(beside), address(nodes), address(force), address(blocks)
     row, rows = 0, len(ends)
     for batch in range(len(constants)):
-        start = np.uint64(batch * LANES)
-        for entry in range(11 * LANES):
-            v[_B * LANES + entry] = constants[batch, entry]
-        _gather(corners, start, u, m, v)
+        start = batch * LANES
+        for entry in range(11):
+            store(entries, (_B + entry) * LANES, load(known, (11 * batch + entry) * LANES))
+        _fetch_ahead(batch, len(constants), corners_at, slots_at, known, turned, moving, waiting_at)
+        _gather(corners_at, start, moving, entries)
         _deform(v)
-        for entry in range(4 * LANES):
-            v[9 * LANES + entry] = quaternions[batch, entry]
+        for entry in range(4):
+            store(entries, (9 + entry) * LANES, load(turned, (4 * batch + entry) * LANES))
         if turning:
             if not turn_lanes(v):
                 for l in range(LANES):
                     mend_lane(v, l)
-            for entry in range(4 * LANES):
-                quaternions[batch, entry] = v[9 * LANES + entry]
+            for entry in range(4):
+                store(turned, (4 * batch + entry) * LANES, load(entries, (9 + entry) * LANES))
         _resist(factor, v)
-        add_forces(corners, start, v, _FORCE, f)
-        add_blocks(slots, start, v, _BLOCKS, waiting)
-        while row < rows and ends[row] <= (batch + 1) * LANES:
-            finish_row(row, starts, columns, diagonal, mirror, whole, slot_of, waiting, beside, K)
+        add_forces(corners_at, start, entries, _FORCE, nodes_at)
+        add_blocks(slots_at, start, entries, _BLOCKS, waiting_at, ninths_at)
+        while row < rows and ends[row] <= start + LANES:
+            finish_row(
+                row, pattern, columns_at, diagonal_at, mirror_at, whole, slot_at, waiting_at,
+                ninths_at, beside_at, nodes_at, f, K,
+            )  # fmt: skip
             row += 1
 
 
