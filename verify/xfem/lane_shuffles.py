@@ -1,4 +1,4 @@
-"""Between `LANES` records, each of consecutive numbers, and rows that hold one number of each.
+"""Between records of `LANES` numbers, one of each lane, and rows that hold one number of each.
 
 A square of `LANES` × `LANES` numbers is transposed in registers on the way. There are no bounds
 checks: callers count.
@@ -48,11 +48,12 @@ def _later(builder, at, distance):
 def _record(builder, records, places, first, lane, step):
     """Address of the record of a lane."""
     place = builder.load(builder.gep(places, [_later(builder, first, lane * step)]))
-    return wide_at(builder, records, builder.zext(place, first.type))
+    place = builder.zext(place, first.type)
+    return wide_at(builder, records, builder.mul(place, ir.Constant(place.type, LANES)))
 
 
 def _gather_records(typing, records, places, first, step, rows, at, count):
-    """Write the first `count` numbers of the records at places[first + `step` lane] as rows.
+    """Write the first `count` numbers of the records places[first + `step` lane] as rows.
 
     Row k goes to `rows` from at + k `LANES` on. `step` and `count` are literal.
     """

@@ -56,11 +56,11 @@ class Linearisation:
         batches = -(-len(pieces) // LANES)
         ends = np.minimum(-(-ends // _WINDOW) * _WINDOW, batches * LANES)
         self.pattern, self.turning = pattern, turning
-        self._pieces, self._ends, self._slot_of = pieces, ends, RECORD * slot_of
+        self._pieces, self._ends, self._slot_of = pieces, ends, slot_of
         self._corners = np.zeros(batches * LANES * 4, dtype=np.uint32)
-        self._corners[: nodes.size] = RECORD * nodes.ravel()
+        self._corners[: nodes.size] = nodes.ravel()
         self._slots = np.zeros(batches * LANES * 6, dtype=np.uint32)
-        self._slots[: slots.size] = RECORD * slots.ravel()
+        self._slots[: slots.size] = slots.ravel()
         self._constants = _aligned_zeros(batches, 11 * LANES)
         fill_lanes(
             pieces, corner, virtual.parent, virtual.mesh.gradients, virtual.volumes, lam, mu,
@@ -74,7 +74,6 @@ class Linearisation:
         self._motion = _aligned_zeros(pattern.node_count, RECORD)
         self._waiting = _aligned_zeros(count, RECORD).reshape(-1)
         self._ninths = np.zeros(count)
-        self._beside = _aligned_zeros(pattern.node_count, RECORD).reshape(-1)
         self._nodes = _aligned_zeros(pattern.node_count, RECORD).reshape(-1)
 
     def __call__(
@@ -104,9 +103,9 @@ class Linearisation:
         pattern = self.pattern
         linearise(
             self._lanes, self._corners, self._slots, self._constants, self._quaternions, self._ends,
-            pattern.starts, pattern.columns, pattern.diagonal, pattern.mirror, self._slot_of,
+            pattern.starts, pattern.diagonal, pattern.mirror, self._slot_of,
             displacement, velocity, implicit, self.turning, whole, scale, self._motion,
-            self._waiting, self._ninths, self._beside, self._nodes, force, blocks,
+            self._waiting, self._ninths, self._nodes, force, blocks,
         )  # fmt: skip
 
     def write_rotations(self, rotations: _Floats) -> None:

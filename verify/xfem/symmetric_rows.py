@@ -7,6 +7,7 @@ them, which were written not long ago, so that rows are written from one end to 
 diagonal needs, as Σ_j K_ij = 0, is known when its row's turn comes.
 """
 
+import numpy as np
 from numba import njit
 
 from verify.xfem.lane_shuffles import add_to_records
@@ -15,7 +16,7 @@ from verify.xfem.polar_kernels import LANES
 
 __all__ = ["RECORD", "add_blocks", "add_forces", "finish_row"]
 
-RECORD = 8  #: numbers in the record of a node or a slot: a line of the cache
+RECORD = LANES  #: numbers in the record of a node or a slot: a line of the cache
 
 
 @njit(cache=True)
@@ -25,7 +26,7 @@ def add_forces(corners, start, v, at, nodes):
     Parameters
     ----------
     corners : address of (p, 4) uint32
-        Place in `nodes` of the record of each corner.
+        Node of each corner.
     start : int
         First piece.
     v : address
@@ -45,7 +46,7 @@ def add_blocks(slots, start, v, at, waiting, ninths):
     Parameters
     ----------
     slots : address of (p, 6) uint32
-        Place in `waiting` of the slot of each pair.
+        Slot of each pair.
     start : int
         First piece.
     v : address
@@ -60,54 +61,51 @@ def add_blocks(slots, start, v, at, waiting, ninths):
         first, e = 6 * start + pair, (at + 9 * pair) * LANES
         add_to_records(waiting, slots, first, 6, v, e, 8)
         for l in range(LANES):
-            ninths[slots[first + 6 * l] // RECORD] += v[e + 8 * LANES + l]
+            ninths[slots[first + 6 * l]] += v[e + 8 * LANES + l]
 
 
 @njit(cache=True)
 def finish_row(
-    row, starts, columns, diagonal, mirror, whole, slot_of, waiting, ninths, beside, nodes, force,
-    blocks,
+    row, starts, diagonal, mirror, whole, slot_of, waiting, ninths, nodes, force, blocks
 ):  # fmt: skip
-    """Write a row, from the diagonal on or whole, and its force; empty its slots and records.
+    """Write a row, from the diagonal on or whole, and its force; empty its slots and its record.
 
     Parameters
     ----------
     row : int
-    starts, columns, diagonal, mirror : addresses of int
+        Those before it are finished.
+    starts, diagonal, mirror : addresses of int
         Pattern.
     whole : bool
         Whether what is below the diagonal is wanted.
     slot_of : address of (B,) uint32
-        Of each block above the diagonal, the place of its slot in `waiting`.
+        Of each block above the diagonal, its slot.
     waiting, ninths : addresses
         As for `add_blocks`.
-    beside : address of (N, `RECORD`) float
-        First eight entries of minus the blocks beside each diagonal block, or their transposes.
     nodes : address of (N, `RECORD`) float
-        Force on each node, and the ninth entry of what is beside its diagonal block.
+        Force on each node.
     force : address of (N, 3) float
     blocks : address of (B, 3, 3) float
     """
-    none, record, middle = no_lanes(), RECORD * row, diagonal[row]
-    d, ninth = load(beside, record), nodes[record + 3]
+    none, middle = no_lanes(), diagonal[row]
     for k in range(3):
-        force[3 * row + k] = nodes[record + k]
-    store(beside, record, none)
-    store(nodes, record, none)
-    if whole:
-        for place in range(starts[row], middle):
-            above = 9 * mirror[place]
-            store(blocks, 9 * place, transposed(load(blocks, above)))
-            blocks[9 * place + 8] = blocks[above + 8]
+        force[3 * row + k] = nodes[RECORD * row + k]
+    store(nodes, RECORD * row, none)
+    d, ninth = none, 0.0
+    for place in range(starts[row], middle):
+        above = 9 * mirror[place]
+        block, last = load(blocks, above), blocks[above + 8]
+        if whole:
+            store(blocks, 9 * place, transposed(block))
+            blocks[9 * place + 8] = last
+        d, ninth = minus(d, block), ninth - last
     for place in range(middle + 1, starts[row + 1]):
-        slot, other = slot_of[place], RECORD * columns[place]
-        block, last = load(waiting, slot), ninths[slot // RECORD]
-        store(waiting, slot, none)
-        ninths[slot // RECORD] = 0.0
+        slot = np.int64(slot_of[place])
+        block, last = load(waiting, RECORD * slot), ninths[slot]
+        store(waiting, RECORD * slot, none)
+        ninths[slot] = 0.0
         store(blocks, 9 * place, block)
         blocks[9 * place + 8] = last
-        store(beside, other, minus(load(beside, other), block))
-        nodes[other + 3] -= last
         d, ninth = minus(d, block), ninth - last
     # a sum of blocks that are not symmetric is so but for round-off
     store(blocks, 9 * middle, mean(d, transposed(d)))

@@ -17,7 +17,7 @@ from numba import njit
 from verify.xfem.lane_shuffles import address, gather_records
 from verify.xfem.lane_vectors import fetch, load, store
 from verify.xfem.polar_kernels import LANES, mend_lane, rotation_matrix, turn_lanes
-from verify.xfem.symmetric_rows import add_blocks, add_forces, finish_row
+from verify.xfem.symmetric_rows import RECORD, add_blocks, add_forces, finish_row
 
 __all__ = ["ENTRIES", "linearise", "unpack_rotations"]
 
@@ -54,10 +54,10 @@ def _fetch_ahead(batch, batches, corners, slots, constants, quaternions, motion,
     """Have what comes next brought to the first cache while this batch is computed."""
     start = batch * LANES
     for entry in range(6 * LANES):
-        fetch(waiting, slots[6 * start + entry])
+        fetch(waiting, RECORD * np.int64(slots[6 * start + entry]))
     if batch + 1 < batches:
         for entry in range(4 * LANES):
-            fetch(motion, corners[4 * (start + LANES) + entry])
+            fetch(motion, RECORD * np.int64(corners[4 * (start + LANES) + entry]))
     # beyond the end nothing comes of it
     for entry in range(11):
         fetch(constants, (11 * (batch + _AHEAD) + entry) * LANES)
@@ -180,8 +180,8 @@ def _resist(factor, v):
 
 @njit(cache=True)
 def linearise(
-    v, corners, slots, constants, quaternions, ends, starts, columns, diagonal, mirror, slot_of,
-    displacement, velocity, implicit, turning, whole, factor, motion, waiting, ninths, beside,
+    v, corners, slots, constants, quaternions, ends, starts, diagonal, mirror, slot_of,
+    displacement, velocity, implicit, turning, whole, factor, motion, waiting, ninths,
     nodes, force, blocks,
 ):  # fmt: skip
     """Write the force of a displacement to `force` and its stiffness to `blocks`.
@@ -193,16 +193,16 @@ def linearise(
     v : (`ENTRIES` · LANES,) float array
         Memory of the lanes, begun by `new_lanes`.
     corners : (batches · LANES · 4,) uint32 array
-        `RECORD` times the nodes of each piece, ascending.
+        Nodes of each piece, ascending.
     slots : (batches · LANES · 6,) uint32 array
-        Where in `waiting` blocks of the pairs of corners 01, 02, 03, 12, 13, 23 are added up.
+        Where blocks of the pairs of corners 01, 02, 03, 12, 13, 23 are added up.
     constants : (batches, 11 · LANES) float array
         b_1, b_2, b_3, w λ and w μ of the pieces of a batch, lane by lane.
     quaternions : (batches, 4 · LANES) float array
         Rotations: where to start from, and what they have become.
     ends : (N,) int array
         Pieces whose first node is that of the row or one before.
-    starts, columns, diagonal, mirror : int arrays
+    starts, diagonal, mirror : int arrays
         Pattern.
     slot_of : (B,) uint32 array
         As `slots`, of each block above the diagonal.
@@ -219,7 +219,7 @@ def linearise(
         Of the stiffness.
     motion : (N, RECORD) float array
         Room for what is read of each node.
-    waiting, ninths, beside, nodes : float arrays
+    waiting, ninths, nodes : float arrays
         As for `finish_row`, flat. Zero; zero again afterwards.
     force : (N, 3) float array
         Overwritten.
@@ -230,10 +230,10 @@ def linearise(
     entries, moving, known, turned = (
         address(v), address(motion), address(constants), address(quaternions),
     )  # fmt: skip
-    corners_at, slots_at, pattern = address(corners), address(slots), address(starts)
-    columns_at, diagonal_at, mirror_at = address(columns), address(diagonal), address(mirror)
+    corners_at, slots_at = address(corners), address(slots)
+    starts_at, diagonal_at, mirror_at = address(starts), address(diagonal), address(mirror)
     slot_at, waiting_at, ninths_at = address(slot_of), address(waiting), address(ninths)
-    beside_at, nodes_at, f, K = address(beside), address(nodes), address(force), address(blocks)
+    nodes_at, f, K = address(nodes), address(force), address(blocks)
     row, rows = 0, len(ends)
     for batch in range(len(constants)):
         start = batch * LANES
@@ -255,8 +255,8 @@ def linearise(
         add_blocks(slots_at, start, entries, _BLOCKS, waiting_at, ninths_at)
         while row < rows and ends[row] <= start + LANES:
             finish_row(
-                row, pattern, columns_at, diagonal_at, mirror_at, whole, slot_at, waiting_at,
-                ninths_at, beside_at, nodes_at, f, K,
+                row, starts_at, diagonal_at, mirror_at, whole, slot_at, waiting_at, ninths_at,
+                nodes_at, f, K,
             )  # fmt: skip
             row += 1
 
