@@ -79,6 +79,23 @@ def test_uncertain_links_make_both_of_their_parts_uncertain(scene):
     assert found.total.uncertainty == 0.0
 
 
+def test_parts_below_round_off_say_so_and_leave_nothing_undecided(scene):
+    from verify.study.budget.study import _finding
+
+    bare = budgets(scene, chain(1.0, 1.0 + 3e-15, 1.0 - 2e-14, width=1e-14))["length"]
+    assert bare.is_round_off
+    assert _finding(bare).verdict is Verdict.PASS
+    assert _finding(bare).sentence == "every part and the total are round-off."
+    mixed = _finding(budgets(scene, chain(1.0, 1.0 + 3e-15, 1.1))["length"])
+    assert mixed.verdict is Verdict.PASS
+    assert mixed.sentence.startswith("model round-off; mesh 10 % ± 0 %; total 10 %")
+    unknown = budgets(scene, chain(1.0, 1.0 + 3e-15, width=1e-3))["length"]
+    assert not unknown.is_round_off  # the references do not know it that well
+    assert _finding(unknown).verdict is Verdict.UNDECIDED
+    nothing = budgets(scene, chain(0.0, 1e-15, 1e-14))["length"]
+    assert not nothing.is_round_off  # of what, is not known
+
+
 def candidate(kinematics, error, seconds, width=0.0, spread=0.01, reason=""):
     low, high = error - width, error + width
     times = (seconds, seconds * (1 - spread), seconds * (1 + spread))

@@ -119,7 +119,7 @@ def _bars(budget: Mapping[str, Any]) -> Markup:
         content.append(tag("path", d=whisker, class_="bar", stroke="#1b1b1b"))
         content.append(text(x0 - 8, middle + 4, part["source"], text_anchor="end", class_="note"))
         beyond = max(right, first, last) + 5
-        said = f"{100 * part['value']:.3g} %".replace("-", "−")
+        said = "round-off" if part.get("round_off") else _signed(f"{100 * part['value']:.3g} %")
         content.append(text(beyond, middle + 4, said, class_="note"))
     content.append(tag("path", d=f"M{x(0.0):.1f} {_TOP - 6}V{height - 8}", class_="frame"))
     label = f"{budget['metric']}: " + "; ".join(f"{p['source']} {p['value']:.3g}" for p in parts)

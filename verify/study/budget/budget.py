@@ -21,6 +21,8 @@ from verify.study.budget.distances import Distances, Times, distances, norm_name
 
 __all__ = ["Answer", "Budget", "Part", "error_budget"]
 
+_ROUND_OFF = 1e-10  # relative: a thousand steps leave some 1e-13
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -59,11 +61,14 @@ class Part:
         Signed change of a quantity of interest, or norm of the change of the field; relative.
     uncertainty : float
         Half-width, relative, from the references on both sides and the integration.
+    round_off : bool
+        Whether it is certain to be no more than that.
     """
 
     source: str
     value: float
     uncertainty: float
+    round_off: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,6 +103,11 @@ class Budget:
     def largest(self) -> Part:
         """The part that weighs most."""
         return max(self.parts, key=lambda part: abs(part.value))
+
+    @property
+    def is_round_off(self) -> bool:
+        """Whether there is nothing to take apart."""
+        return all(part.round_off for part in (*self.parts, self.total))
 
 
 def error_budget(
@@ -149,7 +159,7 @@ def _of_norm(name: str, chain: Sequence[Answer], found: Distances) -> Budget:
 
     def part(source: str, row: int, i: int, j: int) -> Part:
         known = chain[i].norms.get(name, 0.0) + chain[j].norms.get(name, 0.0)
-        return Part(source, float(values[row, 0]) / unit, float(known + spread[row]) / unit)
+        return _part(source, float(values[row, 0]) / unit, float(known + spread[row]) / unit)
 
     parts = [part(answer.change, i, i, i + 1) for i, answer in enumerate(chain[1:])]
     total = part("total", -1, 0, len(chain) - 1)
@@ -160,15 +170,23 @@ def _of_norm(name: str, chain: Sequence[Answer], found: Distances) -> Budget:
 
 def _of_quantity(name: str, unit: str, chain: Sequence[Answer]) -> Budget:
     values = [answer.quantities[name] for answer in chain]
-    scale = abs(values[0][0]) or 1.0
+    scale = abs(values[0][0])
+
+    def part(source: str, a: tuple[float, float], b: tuple[float, float]) -> Part:
+        if not scale:  # absolute values: how small they are is not known
+            return Part(source, b[0] - a[0], a[1] + b[1])
+        return _part(source, (b[0] - a[0]) / scale, (a[1] + b[1]) / scale)
+
     parts = [
-        Part(answer.change, (b[0] - a[0]) / scale, (a[1] + b[1]) / scale)
+        part(answer.change, a, b)
         for answer, a, b in zip(chain[1:], values[:-1], values[1:], strict=True)
     ]
-    total = Part(
-        "total", (values[-1][0] - values[0][0]) / scale, (values[0][1] + values[-1][1]) / scale
-    )
+    total = part("total", values[0], values[-1])
     left = sum(p.value for p in parts) - total.value
     closes = bool(abs(left) <= 1e-12 * max(1.0, abs(total.value)))
     notes = [] if values[0][0] else ["the quantity is zero in the user's problem: absolute values"]
-    return Budget(name, unit, scale, parts, total, closes, notes)
+    return Budget(name, unit, scale or 1.0, parts, total, closes, notes)
+
+
+def _part(source: str, value: float, uncertainty: float) -> Part:
+    return Part(source, value, uncertainty, abs(value) + uncertainty < _ROUND_OFF)

@@ -1,6 +1,5 @@
 """The budget study of a case: a chain of answers taken apart, and the choice among the models."""
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from time import perf_counter
 from typing import Any
@@ -11,7 +10,7 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Verdict
 from verify.scene import Scene
 from verify.solvers.xfem_scene import background_mesh
-from verify.study.budget.budget import Budget, error_budget
+from verify.study.budget.budget import Budget, Part, error_budget
 from verify.study.budget.candidates import find_candidates
 from verify.study.budget.chain import make_chain
 from verify.study.budget.cheapest import Candidate, cheapest_adequate
@@ -184,21 +183,29 @@ def _contention(chain: Chain) -> str:
 
 
 def _finding(budget: Budget) -> Finding:
-    largest, total = budget.largest, budget.total
-    parts: Sequence[str] = [
-        f"{part.source} {_percent(part.value)} ± {_percent(part.uncertainty)}"
-        for part in budget.parts
-    ]
-    known = total.uncertainty < 0.1 * abs(total.value)
+    total = budget.total
+    topic = f"budget of {budget.metric.replace('_', ' ')}"
+    expected = (
+        "the parts add up to the total" if budget.unit != "1"
+        else "the total is at most the sum of the parts"
+    )  # fmt: skip
+    if budget.is_round_off:
+        return Finding(topic, "every part and the total are round-off.", expected, Verdict.PASS)
+    parts = [f"{part.source} {_said(part)}" for part in budget.parts]
+    known = total.round_off or total.uncertainty < 0.1 * abs(total.value)
     verdict = Verdict.PASS if budget.closes else Verdict.FAIL
     return Finding(
-        f"budget of {budget.metric.replace('_', ' ')}",
-        f"{'; '.join(parts)}; total {_percent(total.value)} ± {_percent(total.uncertainty)}. "
-        f"Most of it: {largest.source}.",
-        "the parts add up to the total" if budget.unit != "1"
-        else "the total is at most the sum of the parts",
+        topic,
+        f"{'; '.join(parts)}; total {_said(total)}. Most of it: {budget.largest.source}.",
+        expected,
         verdict if known or not budget.closes else Verdict.UNDECIDED,
-    )  # fmt: skip
+    )
+
+
+def _said(part: Part) -> str:
+    if part.round_off:
+        return "round-off"
+    return f"{_percent(part.value)} ± {_percent(part.uncertainty)}"
 
 
 def _percent(value: float) -> str:
