@@ -21,6 +21,7 @@ from verify.xfem.symmetric_sweep_kernels import (
     solve_lower,
     solve_upper,
     symmetric_product,
+    vector_width,
 )
 
 STEP = 2e-3
@@ -130,7 +131,8 @@ def test_sweeps_over_the_upper_half_are_those_of_dense_triangles(size):
     rows = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
     unread = pattern.columns < rows
     blocks[unread] = np.nan
-    inverse = np.empty((pattern.node_count, size, size))
+    width = vector_width(size)
+    inverse = np.zeros((pattern.node_count, size, width))
     assert invert_blocks(blocks, pattern.diagonal, inverse) == -1
     parts = np.where(unread[:, None, None], 0.0, blocks)
     upper = pattern.matrix(parts).toarray()  # D + Lᵀ
@@ -138,22 +140,24 @@ def test_sweeps_over_the_upper_half_are_those_of_dense_triangles(size):
     D = pattern.matrix(parts).toarray()
     matrix = (pattern.starts, pattern.columns, pattern.diagonal, blocks)
 
-    p = rng.normal(size=(pattern.node_count, size))
-    t, e, u, s, out = (np.empty_like(p) for _ in range(5))
+    p = np.zeros((pattern.node_count, width))
+    p[:, :size] = rng.normal(size=(pattern.node_count, size))
+    t, e, u, s, out = (np.full_like(p, np.nan) for _ in range(5))
 
     def is_close(given, wanted):
-        return np.abs(given.ravel() - wanted).max() < 1e-13 * np.abs(wanted).max()
+        assert not given[:, size:].any()  # what fills the vectors
+        return np.abs(given[:, :size].ravel() - wanted).max() < 1e-13 * np.abs(wanted).max()
 
     solve_upper(*matrix, inverse, p, t, e, u)
-    assert is_close(t, np.linalg.solve(upper, p.ravel()))
-    assert is_close(u, D @ t.ravel())
-    assert is_close(e, (upper - D) @ t.ravel())
+    assert is_close(t, np.linalg.solve(upper, p[:, :size].ravel()))
+    assert is_close(u, D @ t[:, :size].ravel())
+    assert is_close(e, (upper - D) @ t[:, :size].ravel())
     g = p.copy()
     solve_lower(*matrix, inverse, g, s)
-    assert is_close(s, np.linalg.solve(upper.T, p.ravel()))
-    assert is_close(g, D @ s.ravel())
+    assert is_close(s, np.linalg.solve(upper.T, p[:, :size].ravel()))
+    assert is_close(g, D @ s[:, :size].ravel())
     symmetric_product(*matrix, p, out)
-    assert is_close(out, K @ p.ravel())
+    assert is_close(out, K @ p[:, :size].ravel())
     out[:] = 0.0
     add_lower_product(*matrix, p, out)
-    assert is_close(out, (upper - D).T @ p.ravel())
+    assert is_close(out, (upper - D).T @ p[:, :size].ravel())

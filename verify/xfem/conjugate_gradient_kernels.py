@@ -118,7 +118,7 @@ def _invert_blocks_3(blocks, diagonal, out):
 def conjugate_gradients(
     starts, columns, diagonal, blocks, inverse, load, x, is_zero, work, tolerance, limit
 ):
-    """Improve the contiguous x (N, d) in place until ‖b − Kx‖ ≤ tolerance·‖b‖, in the 2-norm.
+    """Improve x (N, d) in place until ‖b − Kx‖ ≤ tolerance·‖b‖, in the 2-norm.
 
     With K = L + D + Lᵀ, of the system (D + L)⁻¹ K (D + Lᵀ)⁻¹ x̂ = (D + L)⁻¹ b, preconditioned by D,
     which is K preconditioned by (D + L) D⁻¹ (D + Lᵀ), block Gauß–Seidel there and back. Its
@@ -131,11 +131,13 @@ def conjugate_gradients(
     ----------
     starts, columns, diagonal, blocks
         The matrix; what is below its diagonal is not read.
-    inverse : (N, d, d) float array
-        Of the diagonal blocks.
+    inverse : (N, d, `vector_width`) float array
+        Of the diagonal blocks; for blocks of three the fourth numbers are zero.
+    load, x : (N, d) float array
     is_zero : bool
         Whether x is, so that the first residual is the load.
-    work : (7, N, d) float array
+    work : (8, N, `vector_width`) float array
+        Zero where there is no component.
 
     Returns
     -------
@@ -144,19 +146,25 @@ def conjugate_gradients(
         ‖b − Kx‖/‖b‖ by the recurrence.
     """
     r, z, p, t, q, u, g = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
-    flat_x, flat_z, flat_r = x.reshape(-1), z.reshape(-1), r.reshape(-1)
+    y = work[7]  # the solution
+    flat_y, flat_z, flat_r = y.reshape(-1), z.reshape(-1), r.reshape(-1)
     flat_p, flat_t, flat_q = p.reshape(-1), t.reshape(-1), q.reshape(-1)
-    flat_u, flat_g, flat_b = u.reshape(-1), g.reshape(-1), load.reshape(-1)
-    size = _square(flat_b)
+    flat_u, flat_g = u.reshape(-1), g.reshape(-1)
+    size = 0.0
+    for row in range(load.shape[0]):
+        for k in range(load.shape[1]):
+            y[row, k] = x[row, k]
+            size += load[row, k] * load[row, k]
     if size == 0.0:
-        flat_x[:] = 0.0
+        x[:] = 0.0
         return 0, 0.0
     if is_zero:
         flat_z[:] = 0.0
     else:
-        symmetric_product(starts, columns, diagonal, blocks, x, z)
-    for i in range(len(flat_b)):
-        flat_z[i] = flat_b[i] - flat_z[i]
+        symmetric_product(starts, columns, diagonal, blocks, y, z)
+    for row in range(load.shape[0]):
+        for k in range(load.shape[1]):
+            z[row, k] = load[row, k] - z[row, k]
     target, norm = tolerance**2 * size, _square(flat_z)
     if norm <= target or limit == 0:
         return 0, np.sqrt(norm / size)
@@ -173,13 +181,16 @@ def conjugate_gradients(
         if not curvature > 0.0:
             return -1, np.sqrt(norm / size)
         old = rho
-        rho = _advance(rho / curvature, flat_t, flat_q, flat_u, flat_x, flat_r, flat_z)
+        rho = _advance(rho / curvature, flat_t, flat_q, flat_u, flat_y, flat_r, flat_z)
         if rho <= promise or iteration == limit:
             for i in range(len(flat_z)):  # not a slice: numba would compile its words for a misfit
                 flat_t[i] = flat_z[i]
             add_lower_product(starts, columns, diagonal, blocks, r, t)
             norm = _square(flat_t)
-            if norm <= target:
+            if norm <= target or iteration == limit:
+                for row in range(x.shape[0]):
+                    for k in range(x.shape[1]):
+                        x[row, k] = y[row, k]
                 return iteration, np.sqrt(norm / size)
             promise = rho * target / norm
         beta = rho / old

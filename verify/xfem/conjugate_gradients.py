@@ -12,6 +12,7 @@ from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.cholesky import SingularStiffnessError
 from verify.xfem.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
 from verify.xfem.errors import XfemError
+from verify.xfem.symmetric_sweep_kernels import vector_width
 
 __all__ = ["ConjugateGradients", "NotConvergedError"]
 
@@ -47,8 +48,9 @@ class ConjugateGradients:
         if not 0.0 < tolerance < 1.0 or limit < 1:
             raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
         self._pattern, self._tolerance, self._limit = pattern, tolerance, limit
-        self._inverse = np.empty((pattern.node_count, block, block))
-        self._work = np.empty((7, pattern.node_count, block))
+        width = vector_width(block)
+        self._inverse = np.zeros((pattern.node_count, block, width))
+        self._work = np.zeros((8, pattern.node_count, width))
         self._blocks = np.zeros((0, block, block))
         self.iterations = 0
 

@@ -12,31 +12,50 @@ from numba.extending import intrinsic, models, register_model
 
 from verify.xfem.polar_kernels import LANES
 
-__all__ = ["WIDE", "fetch", "load", "mean", "minus", "no_lanes", "store", "transposed", "wide_at"]
+__all__ = [
+    "WIDE",
+    "Vector",
+    "fetch",
+    "load",
+    "mean",
+    "minus",
+    "no_lanes",
+    "plus",
+    "store",
+    "transposed",
+    "wide_at",
+]
 
-WIDE = ir.VectorType(ir.DoubleType(), LANES)  #: type of such a vector for the compiler
+WIDE = ir.VectorType(ir.DoubleType(), LANES)  #: such a vector for the compiler
 _TRANSPOSED = [0, 3, 6, 1, 4, 7, 2, 5]  # where the first eight entries of a transposed block are
 
 
-class _Lanes(types.Type):
-    """Type of a vector in a kernel."""
+class Vector(types.Type):
+    """Type of a vector in a kernel.
 
-    def __init__(self) -> None:
-        super().__init__(name="Lanes")
+    Parameters
+    ----------
+    wide : llvmlite.ir.VectorType
+        What it is for the compiler.
+    """
+
+    def __init__(self, wide: Any) -> None:
+        self.wide = wide
+        super().__init__(name=f"Vector({wide.count})")
 
 
-_LANES_TYPE = _Lanes()
-
-
-@register_model(_Lanes)
-class _LanesModel(models.PrimitiveModel):
+@register_model(Vector)
+class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, WIDE)
+        super().__init__(manager, kind, kind.wide)
 
 
-def wide_at(builder: Any, address: Any, at: Any) -> Any:
+_LANES_TYPE = Vector(WIDE)
+
+
+def wide_at(builder: Any, address: Any, at: Any, wide: Any = WIDE) -> Any:
     """Address of the vector that begins at place `at`, for what generates code."""
-    return builder.bitcast(builder.gep(address, [at]), WIDE.as_pointer())
+    return builder.bitcast(builder.gep(address, [at]), wide.as_pointer())
 
 
 def _load(typing, address, at):
@@ -52,8 +71,8 @@ def _store(typing, address, at, vector):
     """Write consecutive numbers from place `at` on."""
 
     def generate(context, builder, signature, arguments):
-        address, at, vector = arguments
-        builder.store(vector, wide_at(builder, address, at), align=8)
+        address, at, numbers = arguments
+        builder.store(numbers, wide_at(builder, address, at, numbers.type), align=8)
         return context.get_dummy_value()
 
     return types.void(address, types.intp, vector), generate
@@ -82,11 +101,18 @@ def _no_lanes(typing):
     return _LANES_TYPE(), generate
 
 
+def _plus(typing, a, b):
+    def generate(context, builder, signature, arguments):
+        return builder.fadd(*arguments)
+
+    return a(a, b), generate
+
+
 def _minus(typing, a, b):
     def generate(context, builder, signature, arguments):
         return builder.fsub(*arguments)
 
-    return _LANES_TYPE(a, b), generate
+    return a(a, b), generate
 
 
 def _mean(typing, a, b):
@@ -112,6 +138,7 @@ load: Any = intrinsic(_load)
 store: Any = intrinsic(_store)
 fetch: Any = intrinsic(_fetch)
 no_lanes: Any = intrinsic(_no_lanes)
+plus: Any = intrinsic(_plus)
 minus: Any = intrinsic(_minus)
 mean: Any = intrinsic(_mean)
 transposed: Any = intrinsic(_transposed)

@@ -21,7 +21,7 @@ from verify.xfem.dynamics.integrator import (
 from verify.xfem.dynamics.linear_solver import LinearSolver
 from verify.xfem.errors import XfemError
 from verify.xfem.supports import Supports
-from verify.xfem.symmetric_sweep_kernels import symmetric_product
+from verify.xfem.symmetric_sweep_kernels import symmetric_product, vector_width
 
 __all__ = ["RealTimeEuler"]
 
@@ -62,8 +62,8 @@ class RealTimeEuler:
         self._held = _held_entries(
             body.pattern.starts, body.pattern.columns, body.pattern.diagonal, body.fixed
         )
-        self._driven = np.zeros(body.shape)
-        self._resisted = np.empty(body.shape)
+        self._driven = np.zeros((len(body.fixed), vector_width(space)))
+        self._resisted = np.empty_like(self._driven)
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
@@ -161,7 +161,7 @@ class RealTimeEuler:
                 pattern.starts, pattern.columns, pattern.diagonal, self.blocks, self._driven,
                 self._resisted,
             )  # fmt: skip
-            self.load -= self._resisted
+            self.load -= self._resisted[:, : self.load.shape[1]]
         _hold(body.pattern.diagonal, body.fixed, self._held, self._driven, self.blocks, self.load)
 
 
