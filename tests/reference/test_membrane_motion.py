@@ -106,6 +106,21 @@ def test_a_bowl_that_is_let_go_moves_as_that_of_the_compact_solver(tmp_path):
     assert falls[0] == pytest.approx(falls[1], abs=1e-7 * np.abs(falls[0]).max())
 
 
+@pytest.mark.parametrize("name, off", [("reference", 0.002), ("xfem", 0.03)])
+def test_the_lips_of_a_tear_fly_apart_with_the_elastic_wave(name, off):
+    """Without lateral contraction the motion is linear along the band at any stretch."""
+    from verify.compare.body import body_of
+    from verify.compare.hooke import law_of
+    from verify.study.quantities import Measured
+
+    scene = load_scene("dynamics/membrane_torn")
+    level = 1 if name == "reference" else 0
+    found = Measured(moved(scene, name, level), body_of(scene), law_of(scene), scene)
+    for asked in scene.quantities:
+        wanted = 2 * np.sqrt(1e4 / 1000.0) * 0.1 * asked.time  # d'Alembert
+        assert found.quantity(asked) == pytest.approx(wanted, rel=off)
+
+
 def test_two_ranks_move_a_membrane_as_one_does(tmp_path):
     """A bowl that hangs and is torn on its way, in mean forces of each step."""
     bowl_scene(tmp_path, 4, HANGING, duration=0.05, opens=0.02, outputs=2, at=0.25)
