@@ -2,8 +2,8 @@
 
 With b_i the material gradient of shape function i, w the volume of a piece, R its rotation and
 g_i = R b_i, the force f_i = w R (2μE + λ tr(E) I) b_i, E = Rᵀ F − I, is the gradient of
-w (μ‖E‖² + ½λ tr² E). The stiffness with frozen rotations is that of linear elasticity in the g_i,
-and the exact one adds [g_i]ₓᵀ H [g_j]ₓ, H = μI + (λ tr E − 2μ)(tr(V) I − V)⁻¹, V = R Uᵀ Rᵀ.
+w (μ‖E‖² + ½λ tr² E). The stiffness with frozen rotations is that of linear elasticity in the g_i;
+`spin_stiffness_kernels` has what the exact one adds.
 
 A membrane is the same with F and I restricted to its tangent plane. The loops are compiled once
 for the plane and once for space, so that the innermost ones have a constant length; that over the
@@ -25,35 +25,9 @@ from verify.xfem.polar_kernels import (
     rotation_matrix,
     turn_lanes,
 )
+from verify.xfem.spin_stiffness_kernels import add_spin_stiffness, turned_normal
 
 __all__ = ["corotational_kernels"]
-
-_SINGULAR = 1e-8  # of the trace of the stretch: a spin without stiffness of its own
-
-
-@njit(cache=True)
-def _deformation(nodes, b, displacement, normals, cell, F):
-    """Write the deformation gradient of a piece."""
-    space = F.shape[0]
-    for k in range(space):
-        for l in range(space):
-            F[k, l] = 1.0 if k == l else 0.0
-            if len(nodes) == space:
-                F[k, l] -= normals[cell, k] * normals[cell, l]
-    for i in range(len(nodes)):
-        node = nodes[i]
-        for k in range(space):
-            for l in range(space):
-                F[k, l] += displacement[node, k] * b[i, l]
-
-
-@njit(cache=True)
-def _turned_normal(R, normals, cell, n):
-    """Write the normal of a turned membrane to n (3,)."""
-    for k in range(3):
-        n[k] = 0.0
-        for l in range(3):
-            n[k] += R[k, l] * normals[cell, l]
 
 
 @njit(cache=True)
@@ -65,46 +39,6 @@ def _project(D, n):
             across += n[k] * D[k, l]
         for k in range(3):
             D[k, l] -= n[k] * across
-
-
-@njit(cache=True)
-def _spin_row(g, out):
-    """Write the matrix of u ↦ g × u: (1, 2) in the plane, (3, 3) in space."""
-    if len(g) == 2:
-        out[0, 0], out[0, 1] = -g[1], g[0]
-    else:
-        out[:] = 0.0
-        out[0, 1], out[0, 2], out[1, 2] = -g[2], g[1], -g[0]
-        out[1, 0], out[2, 0], out[2, 1] = g[2], -g[1], g[0]
-
-
-@njit(cache=True)
-def _spin_stiffness(V, lam_trace, mu, H):
-    """Write H (1, 1) or (3, 3); without the inverse, and False, where that does not exist."""
-    trace = 0.0
-    for k in range(V.shape[0]):
-        trace += V[k, k]
-    factor = lam_trace - 2.0 * mu
-    if V.shape[0] == 2:
-        regular = trace > 0.0
-        H[0, 0] = mu + factor / trace if regular else 0.0
-        return regular
-    a, b, c = trace - V[0, 0], trace - V[1, 1], trace - V[2, 2]
-    d = -0.5 * (V[0, 1] + V[1, 0])
-    e = -0.5 * (V[0, 2] + V[2, 0])
-    f = -0.5 * (V[1, 2] + V[2, 1])
-    determinant = a * (b * c - f * f) - d * (d * c - e * f) + e * (d * f - b * e)
-    if not determinant > _SINGULAR * abs(trace) ** 3:
-        H[:] = 0.0
-        return False
-    scale = factor / determinant
-    H[0, 0] = mu + scale * (b * c - f * f)
-    H[1, 1] = mu + scale * (a * c - e * e)
-    H[2, 2] = mu + scale * (a * b - d * d)
-    H[0, 1] = H[1, 0] = scale * (e * f - d * c)
-    H[0, 2] = H[2, 0] = scale * (d * f - b * e)
-    H[1, 2] = H[2, 1] = scale * (d * e - a * f)
-    return True
 
 
 @njit(cache=True)
@@ -251,7 +185,7 @@ def _frozen_product(space: int) -> Any:
                     for l in range(space):
                         D[k, l] += vector[node, k] * gradients[cell, i, l]
             if membrane:
-                _turned_normal(R, normals, cell, n)
+                turned_normal(R, normals, cell, n)
                 _project(D, n)
             for k in range(space):
                 for l in range(space):
@@ -307,7 +241,7 @@ def _add_frozen_stiffness(space: int) -> Any:
                 for l in range(space):
                     T[k, l] = wm if k == l else 0.0
             if membrane:
-                _turned_normal(R, normals, cell, n)
+                turned_normal(R, normals, cell, n)
                 for k in range(space):
                     for l in range(space):
                         T[k, l] -= wm * n[k] * n[l]
@@ -329,75 +263,6 @@ def _add_frozen_stiffness(space: int) -> Any:
     return add_frozen_stiffness
 
 
-def _add_spin_stiffness(space: int) -> Any:
-    spins = 1 if space == 2 else 3
-
-    @njit(cache=True)
-    def add_spin_stiffness(
-        cells, targets, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
-        scale, blocks,
-    ):  # fmt: skip
-        """Add what the exact stiffness has beyond the frozen one; return the pieces left out.
-
-        A piece is left out where its rotation is not differentiable (tr(V) I − V singular).
-        """
-        corners = 3 if space == 2 else cells.shape[1]
-        membrane = space == 3 and corners == 3
-        n = np.empty(3)
-        F = np.empty((space, space))
-        V = np.empty((space, space))
-        g = np.empty((corners, space))
-        H = np.empty((spins, spins))
-        X = np.empty((corners, spins, space))
-        Y = np.empty((corners, spins, space))
-        left_out = 0
-        for piece in range(len(cells)):
-            cell = parent[piece]
-            R = rotations[piece]
-            _deformation(cells[piece], gradients[cell], displacement, normals, cell, F)
-            for i in range(corners):
-                for k in range(space):
-                    g[i, k] = 0.0
-                    for l in range(space):
-                        g[i, k] += R[k, l] * gradients[cell, i, l]
-                _spin_row(g[i], X[i])
-            trace = 1.0 - corners
-            for k in range(space):
-                for l in range(space):
-                    V[k, l] = 0.0
-                    for m in range(space):
-                        V[k, l] += F[k, m] * R[l, m]
-                trace += V[k, k]
-            if not _spin_stiffness(V, lam[cell] * trace, mu[cell], H):
-                left_out += 1
-                continue
-            w = scale * volumes[piece]
-            for j in range(corners):
-                for a in range(spins):
-                    for l in range(space):
-                        Y[j, a, l] = 0.0
-                        for b in range(spins):
-                            Y[j, a, l] += w * H[a, b] * X[j, b, l]
-            if membrane:
-                _turned_normal(R, normals, cell, n)
-            for i in range(corners):
-                for j in range(corners):
-                    at = targets[piece, i, j]
-                    dot = 0.0
-                    if membrane:
-                        for k in range(space):
-                            dot += w * mu[cell] * g[i, k] * g[j, k]
-                    for k in range(space):
-                        for l in range(space):
-                            total = dot * n[k] * n[l] if membrane else 0.0
-                            for a in range(spins):
-                                total += X[i, a, k] * Y[j, a, l]
-                            blocks[at, k, l] += total
-        return left_out
-
-    return add_spin_stiffness
-
-
 @cache
 def corotational_kernels(space: int) -> SimpleNamespace:
     """Loops for the plane or for space.
@@ -413,5 +278,5 @@ def corotational_kernels(space: int) -> SimpleNamespace:
         internal_force=_internal_force(space),
         frozen_product=_frozen_product(space),
         add_frozen_stiffness=_add_frozen_stiffness(space),
-        add_spin_stiffness=_add_spin_stiffness(space),
+        add_spin_stiffness=add_spin_stiffness(space),
     )

@@ -57,11 +57,14 @@ class RealTimeEuler:
         # sweeps of the matrix' upper half are all that conjugate gradients need
         self._whole = not isinstance(self.solver, ConjugateGradients)
         self._change = np.zeros(body.shape)  # of the velocity, in this step
-        self._changes = np.zeros((3, *body.shape))  # in the last ones, the last first
-        self._any_fixed = bool(body.fixed.any())
-        self._held = _held_entries(
-            body.pattern.starts, body.pattern.columns, body.pattern.diagonal, body.fixed
-        )
+        self._changes = [np.zeros(body.shape) for _ in range(3)]  # in the last ones, the last first
+        self._supported = np.flatnonzero(body.fixed.any(axis=1))
+        pattern = body.pattern
+        held = _held_entries(pattern.starts, pattern.columns, pattern.diagonal, body.fixed)
+        if not self._whole:
+            row = np.repeat(np.arange(len(body.fixed)), np.diff(pattern.starts))
+            held = held[(pattern.columns >= row)[held // space**2]]
+        self._held = held
         self._driven = np.zeros((len(body.fixed), vector_width(space)))
         self._resisted = np.empty_like(self._driven)
 
@@ -92,7 +95,7 @@ class RealTimeEuler:
         """
         check_state(state, self.body.shape)
         self.linearise(state)
-        if self._any_fixed:
+        if len(self._supported):
             self._support(state)
         try:
             self.solver.factorize(self.blocks)
@@ -116,9 +119,11 @@ class RealTimeEuler:
         as it was (measured with the bodies of the benchmarks).
         """
         if isinstance(self.solver, ConjugateGradients):
-            _extrapolate(self._changes, self._change)
+            last, before, first = self._changes
+            _extrapolate(last, before, first, self._change)
             self.solver.improve(self.load, self._change, self._change)
-            _remember(self._change, self._changes)
+            self._changes.insert(0, self._changes.pop())
+            self._changes[0][:] = self._change
         elif isinstance(self.solver, Cholesky):
             self.solver.solve(self.load, self._change)
         else:
@@ -153,8 +158,9 @@ class RealTimeEuler:
         else:
             where, _ = body.prescribed(state.time + self.step_size)
         driven = _driven_change(
-            body.fixed, where, state.displacement, state.velocity, self.step_size, self._driven
-        )
+            self._supported, body.fixed, where, state.displacement, state.velocity,
+            self.step_size, self._driven,
+        )  # fmt: skip
         if driven:
             pattern = body.pattern
             symmetric_product(
@@ -162,7 +168,10 @@ class RealTimeEuler:
                 self._resisted,
             )  # fmt: skip
             self.load -= self._resisted[:, : self.load.shape[1]]
-        _hold(body.pattern.diagonal, body.fixed, self._held, self._driven, self.blocks, self.load)
+        _hold(
+            body.pattern.diagonal, self._supported, body.fixed, self._held, self._driven,
+            self.blocks, self.load,
+        )  # fmt: skip
 
 
 @njit(cache=True)
@@ -188,10 +197,10 @@ def _held_entries(starts, columns, diagonal, fixed):
 
 
 @njit(cache=True)
-def _driven_change(fixed, where, displacement, velocity, step_size, change):
-    """Write the change of velocity (N, d) that brings supports to their place; whether any does."""
+def _driven_change(supported, fixed, where, displacement, velocity, step_size, change):
+    """Write the change of velocity that brings supported nodes to their place; whether any does."""
     driven = False
-    for i in range(fixed.shape[0]):
+    for i in supported:
         for k in range(fixed.shape[1]):
             change[i, k] = 0.0
             if fixed[i, k]:
@@ -201,12 +210,12 @@ def _driven_change(fixed, where, displacement, velocity, step_size, change):
 
 
 @njit(cache=True)
-def _hold(diagonal, fixed, held, change, blocks, load):
+def _hold(diagonal, supported, fixed, held, change, blocks, load):
     """Decouple fixed components, and let their change be what it is to be."""
     flat = blocks.reshape(-1)
     for at in held:
         flat[at] = 0.0
-    for i in range(fixed.shape[0]):
+    for i in supported:
         for k in range(fixed.shape[1]):
             if fixed[i, k]:
                 if blocks[diagonal[i], k, k] == 0.0:  # a flat membrane
@@ -215,20 +224,11 @@ def _hold(diagonal, fixed, held, change, blocks, load):
 
 
 @njit(cache=True)
-def _extrapolate(last, guess):
-    """Write what a parabola through the last three (3, N, d) gives next."""
+def _extrapolate(last, before, first, guess):
+    """Write what a parabola through three of them (N, d) gives next."""
     for i in range(guess.shape[0]):
         for k in range(guess.shape[1]):
-            guess[i, k] = 3.0 * (last[0, i, k] - last[1, i, k]) + last[2, i, k]
-
-
-@njit(cache=True)
-def _remember(change, last):
-    """Let a change be the first of the last three."""
-    for i in range(change.shape[0]):
-        for k in range(change.shape[1]):
-            last[2, i, k], last[1, i, k] = last[1, i, k], last[0, i, k]
-            last[0, i, k] = change[i, k]
+            guess[i, k] = 3.0 * (last[i, k] - before[i, k]) + first[i, k]
 
 
 @njit(cache=True)
