@@ -41,6 +41,14 @@ BROKEN_LINES = {
     "half a repetition": (["--repetitions", "1.5"], "--repetitions: expected a whole number"),
     "solver": (["--solver", "xfen"], "--solver: no solver 'xfen'; did you mean 'xfem'?"),
     "solver module": (["statics/f1_patch", "--solver", "no_module:S"], "needs 'no_module'"),
+    "parameter": (
+        ["statics/f1_patch", "--set", "xfem.bases=shifted"],
+        "--set: xfem has no parameter 'bases'; did you mean 'basis'?",
+    ),
+    "cluster": (
+        ["statics/f1_patch", "--cluster", "dask.json"],
+        "--cluster: 'dask.json' is neither a scheduler file nor an address like tcp://host:8786",
+    ),
     "both weights": (["--quick", "--heavy"], "--heavy: not allowed with argument --quick"),
     "option": (["--fast"], "unrecognized arguments: --fast"),
 }

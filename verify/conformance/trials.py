@@ -75,7 +75,7 @@ def solve_trials(
     Raises
     ------
     InputError
-        If there is no such solver, or it cannot be loaded.
+        If there is no such solver, it cannot be loaded, or has no such parameter.
     """
     for trial in trials:
         (folder / trial.name).mkdir()
@@ -90,7 +90,7 @@ def solve_trials(
     waiting = [trial.name for trial in trials]
     outcomes: dict[str, Outcome] = {}
     while waiting:
-        child = _start(solver, waiting, folder, f"{label}-{len(waiting)}")
+        child = _start(solver, parameters, waiting, folder / f"{label}-{len(waiting)}")
         why, how = _watch(child, [folder / name for name in waiting], timeout)
         while waiting and (folder / waiting[0] / "outcome.json").is_file():
             name = waiting.pop(0)
@@ -100,10 +100,9 @@ def solve_trials(
     return outcomes
 
 
-def _start(solver: str, names: list[str], folder: Path, label: str) -> Child:
-    batch = folder / f"{label}.json"
-    write_json({"solver": solver, "trials": names}, batch)
-    log = folder / f"{label}.txt"
+def _start(solver: str, parameters: Mapping[str, Any], names: list[str], stem: Path) -> Child:
+    batch, log = stem.with_suffix(".json"), stem.with_suffix(".txt")
+    write_json({"solver": solver, "parameters": list(parameters), "trials": names}, batch)
     return Child("verify.conformance.worker", batch, log, _START_SECONDS, float("inf"))
 
 

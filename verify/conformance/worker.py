@@ -12,7 +12,7 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.runner.childhood import die_with_parent
 from verify.runner.solve import solve_job
-from verify.solvers import find_solver
+from verify.solvers import check_parameters, find_solver
 
 __all__ = ["main"]
 
@@ -24,7 +24,7 @@ def main(batch_file: Path) -> None:
     if ":" in batch["solver"]:
         sys.path.append(os.getcwd())
     try:
-        find_solver(batch["solver"])
+        check_parameters(batch["solver"], find_solver(batch["solver"]), batch["parameters"])
     except InputError as error:
         write_json({"error": str(error)}, batch_file.with_suffix(".refused"))
         return

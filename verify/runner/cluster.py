@@ -6,6 +6,7 @@ comparison stays on the machine of the run.
 """
 
 import logging
+import re
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,9 @@ class ClusterEngine:
                 "--cluster",
             ) from None
         place = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
+        if "address" in place and not re.fullmatch(r"(\w+://)?\S+:\d+", address):
+            text = f"'{address}' is neither a scheduler file nor an address like tcp://host:8786"
+            raise InputError(text, "--cluster")
         for name in ("distributed", "distributed.client"):  # its tracebacks are not for users
             logging.getLogger(name).setLevel(logging.ERROR)
         try:

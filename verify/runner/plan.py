@@ -1,7 +1,7 @@
 """From cases to solves: which solvers, which levels, what they refuse."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import sleep
@@ -66,8 +66,8 @@ def survey_solvers(
     ------
     InputError
         If a scene names something bad (a mesh file), the bundle lacks a scene, or `options`
-        name a solver that does not work here. A solver that only the cases want may be
-        missing: its solves fail, with that reason.
+        name a solver that does not work here, or a parameter that it does not have. A solver
+        that only the cases want may be missing: its solves fail, with that reason.
     RunStoppedError
         If a signal came.
     """
@@ -89,7 +89,10 @@ def survey_solvers(
                 while waiting and len(running) < options.jobs:
                     name = waiting.pop(0)
                     running[name] = _ask(
-                        name, asked[name], Path(folder, str(len(asked) - len(waiting)))
+                        name,
+                        asked[name],
+                        options.parameters.get(name, {}),
+                        Path(folder, str(len(asked) - len(waiting))),
                     )
                 for name, child in list(running.items()):
                     if child.poll() is not None:
@@ -101,6 +104,8 @@ def survey_solvers(
     for name, answer in answers.items():
         if answer["error"] and name in options.solvers:
             raise InputError(answer["error"], "--solver")
+        if bad := answer.get("bad_parameter"):
+            raise InputError(bad, "--set")
         for scene in asked.get(name, []):
             bad = answer.get("cases", {}).get(scene.name, {}).get("bad_input")
             if bad:
@@ -153,10 +158,11 @@ def plan_case(
     return plan
 
 
-def _ask(name: str, scenes: Sequence[Scene], folder: Path) -> Child:
+def _ask(name: str, scenes: Sequence[Scene], parameters: Mapping[str, Any], folder: Path) -> Child:
     folder.mkdir()
     question = folder / "question.json"
-    write_json({"solver": name, "scenes": [scene_content(scene) for scene in scenes]}, question)
+    contents = [scene_content(scene) for scene in scenes]
+    write_json({"solver": name, "scenes": contents, "parameters": list(parameters)}, question)
     return Child(
         "verify.runner.survey", question, folder / "log.txt", _SURVEY_SECONDS, float("inf")
     )

@@ -6,6 +6,7 @@ In a process of its own, because to ask a solver means to import it, and some st
 import inspect
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,20 +22,26 @@ def main(question: Path) -> None:
     """Answer the `question` in the file ``answer.json`` beside it."""
     die_with_parent()
     asked = read_json(question)
-    write_json(survey(asked["solver"], asked["scenes"]), question.parent / "answer.json")
+    write_json(
+        survey(asked["solver"], asked["scenes"], asked["parameters"]),
+        question.parent / "answer.json",
+    )
 
 
-def survey(name: str, scenes: list[dict[str, Any]]) -> dict[str, Any]:
-    """Ask the solver `name` about `scenes`.
+def survey(
+    name: str, scenes: list[dict[str, Any]], parameters: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Ask the solver `name` about `scenes` and the names of `parameters`.
 
     Returns
     -------
     dict
-        ``error`` (why there is no such solver here) or ``source`` (hash of the file that
-        defines it) and ``cases``: by name ``levels``, ``refusal`` and ``bad_input``.
+        ``error`` (why there is no such solver here), ``bad_parameter`` (which it does not have),
+        or ``source`` (hash of the file that defines it) and ``cases``: by name ``levels``,
+        ``refusal`` and ``bad_input``.
     """
     from verify.scene import restore_scene
-    from verify.solvers import find_solver
+    from verify.solvers import check_parameters, find_solver
 
     if ":" in name:
         sys.path.append(os.getcwd())
@@ -42,6 +49,10 @@ def survey(name: str, scenes: list[dict[str, Any]]) -> dict[str, Any]:
         solver = find_solver(name)
     except InputError as error:
         return {"error": str(error)}
+    try:
+        check_parameters(name, solver, parameters)
+    except InputError as error:
+        return {"error": None, "bad_parameter": str(error)}
     cases: dict[str, Any] = {}
     for content in scenes:
         answer: dict[str, Any] = {"levels": 0, "refusal": None, "bad_input": None}

@@ -1,7 +1,9 @@
 """The interface that every solver implements, and how a solver is found by its name."""
 
+from collections.abc import Iterable
 from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import Parameter, signature
 from typing import Any, Protocol
 
 from verify.errors import InputError
@@ -9,7 +11,7 @@ from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Solution
 
-__all__ = ["Solver", "find_solver", "solver_names"]
+__all__ = ["Solver", "check_parameters", "find_solver", "solver_names"]
 
 # module:class, imported only when asked for, so that one solver's missing dependency
 # (FEniCSx, say) does not hinder the others
@@ -95,3 +97,17 @@ def find_solver(name: str) -> Solver:
         raise InputError(f"solver '{name}' needs '{error.name}', which is not installed") from None
     solver: Solver = found(name) if name in _METHODS else found()
     return solver
+
+
+def check_parameters(name: str, solver: Solver, given: Iterable[str]) -> None:
+    """Raise `InputError` if the solver called `name` has no parameter of a name that is `given`.
+
+    One that takes any name (``**parameters``) is not asked.
+    """
+    taken = signature(solver.solve).parameters
+    if any(one.kind is Parameter.VAR_KEYWORD for one in taken.values()):
+        return
+    known = set(taken) - {"scene", "level", "repetitions"}
+    for word in given:
+        if word not in known:
+            raise InputError(f"{name} has no parameter '{word}'{nearest(word, known)}")
