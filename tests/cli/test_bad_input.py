@@ -108,6 +108,14 @@ def test_a_broken_command_line_is_refused(tmp_path, monkeypatch, capsys, fault):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("words", [["no_such_case"], ["statics/f3_inclined", "--solver", "xfen"]])
+def test_a_study_that_cannot_begin_leaves_nothing_behind(tmp_path, monkeypatch, capsys, words):
+    monkeypatch.chdir(tmp_path)
+    code = main(["study", "cost", *words, "--out", "studies"])
+    assert_refused(code, capsys.readouterr(), "no ")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_expression_that_matches_nothing_is_no_error_but_nothing_ran(
     tmp_path, monkeypatch, capsys
 ):

@@ -4,6 +4,7 @@ import argparse
 import json
 import shlex
 import sys
+from contextlib import suppress
 from dataclasses import asdict
 
 __all__ = ["execute"]
@@ -11,14 +12,28 @@ __all__ = ["execute"]
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run a study, write its record and table, render its page."""
+    from verify.errors import InputError
+    from verify.study.record import make_directory
+
+    new = not arguments.out.exists()
+    make_directory(arguments.out)  # before minutes of work
+    try:
+        return _study(arguments)
+    except InputError:
+        if new:
+            with suppress(OSError):  # something is in it
+                arguments.out.rmdir()
+        raise
+
+
+def _study(arguments: argparse.Namespace) -> int:
     from verify.report.study_page import render_study
     from verify.result import Verdict
-    from verify.study.record import make_directory, write_study
+    from verify.study.record import write_study
 
     def announce(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    make_directory(arguments.out)  # before minutes of work
     command = shlex.join(["verify", *sys.argv[1:]])
     if arguments.study in ("cost", "budget", "thesis"):
         from verify.cli import case_studies
