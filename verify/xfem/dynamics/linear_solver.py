@@ -4,7 +4,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.block_pattern import BlockPattern
@@ -34,6 +34,9 @@ class LinearSolver(Protocol):
 class SparseLU:
     """LU factorisation with pivoting, for matrices that are not symmetric.
 
+    Rows and columns are scaled by the diagonal before: those of a sliver are many orders smaller
+    than others, and a pivot among numbers of both sizes would lose them.
+
     Parameters
     ----------
     pattern : BlockPattern
@@ -42,6 +45,7 @@ class SparseLU:
     def __init__(self, pattern: BlockPattern) -> None:
         self._pattern = pattern
         self._factor: SuperLU | None = None
+        self._scale: _Floats | None = None
 
     def factorize(self, blocks: _Floats) -> None:
         """Factorise the matrix with these nodal blocks (B, d, d).
@@ -51,8 +55,12 @@ class SparseLU:
         SingularStiffnessError
             If it is singular or not finite.
         """
+        matrix = self._pattern.matrix(blocks)
+        diagonal = np.abs(matrix.diagonal())
+        self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        scaling = diags_array(self._scale)
         try:
-            self._factor = splu(csc_array(self._pattern.matrix(blocks)))
+            self._factor = splu(csc_array(scaling @ matrix @ scaling))
         except RuntimeError as failure:
             raise SingularStiffnessError(None) from failure
 
@@ -64,9 +72,10 @@ class SparseLU:
         RuntimeError
             If nothing was factorised before.
         """
-        if self._factor is None:
+        if self._factor is None or self._scale is None:
             raise RuntimeError("solve before factorize")
-        return self._factor.solve(load.ravel()).reshape(load.shape)
+        scaled = self._factor.solve(self._scale * load.ravel())
+        return np.asarray(self._scale * scaled).reshape(load.shape)
 
 
 class NearlySymmetric:
