@@ -63,6 +63,11 @@ def _fetch_ahead(batch, batches, corners, slots, constants, quaternions, motion,
         fetch(constants, (11 * (batch + _AHEAD) + entry) * LANES)
     for entry in range(4):
         fetch(quaternions, (4 * (batch + _AHEAD) + entry) * LANES)
+    # places are read here already, a batch before the rest
+    for line in range(0, 6 * LANES, 2 * LANES):
+        fetch(slots, 6 * (start + 2 * _AHEAD * LANES) + line)
+    for line in range(0, 4 * LANES, 2 * LANES):
+        fetch(corners, 4 * (start + 2 * _AHEAD * LANES) + line)
 
 
 @njit(cache=True, inline="always")
