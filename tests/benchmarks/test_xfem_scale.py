@@ -93,7 +93,7 @@ def test_treating_slivers_costs_no_more_than_one_and_a_half_times_cutting(benchm
     assert benchmark.stats.stats.median < 1.5 * cutting
 
 
-def test_an_iteration_s_two_sweeps_run_at_a_third_of_the_memory_bandwidth_or_more(benchmark):
+def test_an_iteration_s_two_sweeps_run_at_four_tenths_of_the_memory_bandwidth_or_more(benchmark):
     """There and back over the half of the matrix above the diagonal, with the inverse blocks."""
     _, pattern, _, blocks, load = system()
     inverse = np.zeros((pattern.node_count, 3, vector_width(3)))
@@ -111,7 +111,7 @@ def test_an_iteration_s_two_sweeps_run_at_a_third_of_the_memory_bandwidth_or_mor
     traffic = 2 * (upper * (9 * 8 + 4) + inverse.nbytes) + 8 * p.nbytes
     share = traffic / benchmark.stats.stats.median / bandwidth()
     benchmark.extra_info["share of the triad's bandwidth"] = round(share, 2)
-    assert share > 0.33
+    assert share > 0.4  # measured: 0.58 to 0.72
 
 
 def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark):
@@ -119,8 +119,8 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark)
 
     Nodes, places, gradients, moduli and vectors read once, rotations read and written, the matrix
     written once (`Linearisation.least_traffic`): 400 bytes for each tetrahedron. A fifth, which was
-    asked for, is not reached: half of the time is arithmetic and adding up, and the blocks below
-    the diagonal cross the memory more than once (docs/xfem-linear-solvers.md).
+    asked for, is what it is at on a quiet machine, and 0.14 to 0.19 when other programs use the
+    memory too (docs/xfem-linear-solvers.md).
     """
     virtual, pattern, force, blocks, _ = system()
     displacement = np.zeros_like(virtual.node_points)
@@ -132,7 +132,7 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark)
     benchmark(action)
     share = force._sweep.least_traffic / benchmark.stats.stats.median / bandwidth()
     benchmark.extra_info["share of the bandwidth bound"] = round(share, 3)
-    assert share > 0.06
+    assert share > 0.1
 
 
 def test_linear_assembly(benchmark):
