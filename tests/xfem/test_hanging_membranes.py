@@ -28,9 +28,9 @@ def area(virtual):
     return float(virtual.volumes.sum())
 
 
-def hang(virtual, poisson, held, prescribed=None, load_steps=1):
+def hang(virtual, poisson, held, prescribed=None, load_steps=1, weight=WEIGHT):
     force = InternalForce(virtual, isotropic(STIFFNESS, poisson, "plane stress"))
-    load = side_wise_mass(virtual, WEIGHT / 9.8).weight([0.0, 0.0, -9.8])
+    load = side_wise_mass(virtual, weight / 9.8).weight([0.0, 0.0, -9.8])
     fixed = np.repeat(held[:, None], 3, axis=1)
     path = None if prescribed is None else lambda share: share * prescribed
     return static_equilibrium(force, fixed, path, load, load_steps)
@@ -73,7 +73,10 @@ def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step(n):
     x, y = bowl.node_points[:, :2].T
     held = (x == 0.0) | (x == 1.0) | (y == 0.0) | (y == 1.0)
     found = hang(bowl, 0.3, held)
-    assert found.iterations[0] < 40
+    # the exact stiffness ends it: a corner of held nodes, across which it is round-off below
+    # zero, had it refused, and 31 corrections were needed, under three times the weight 504
+    assert found.iterations[0] < 16
+    assert hang(bowl, 0.3, held, weight=3.0 * WEIGHT).iterations[0] < 16
     assert found.reactions.sum(axis=0) == pytest.approx([0.0, 0.0, WEIGHT * area(bowl)], abs=1e-7)
     # and the same by another way there
     other = hang(bowl, 0.3, held, load_steps=3)

@@ -10,6 +10,8 @@ from numba import njit
 
 __all__ = ["add_stiffness", "constrain", "linear_force"]
 
+_ROUND_OFF = 1e-14  # of the largest diagonal entry of a node
+
 
 @njit(cache=True)
 def add_stiffness(targets, gradients, normals, parent, volumes, lam, mu, blocks):
@@ -159,7 +161,8 @@ def constrain(starts, columns, fixed, blocks):
     fixed : (N, d) bool array
     blocks : (B, d, d) float array
         Changed in place; the diagonal entries stay, so that scaling stays meaningful, but for
-        zeros (a flat membrane has them), which become one.
+        those that are not positive (zero or its round-off across a flat membrane, less than that
+        across a compressed one), which become one.
     """
     dim = fixed.shape[1]
     constrained = np.zeros(len(fixed), dtype=np.bool_)
@@ -171,9 +174,13 @@ def constrain(starts, columns, fixed, blocks):
             column = columns[at]
             if not (constrained[row] or constrained[column]):
                 continue
+            least = 0.0
+            if row == column:
+                for k in range(dim):
+                    least = max(least, _ROUND_OFF * blocks[at, k, k])
             for k in range(dim):
                 for l in range(dim):
                     if (fixed[row, k] or fixed[column, l]) and not (row == column and k == l):
                         blocks[at, k, l] = 0.0
-                    elif row == column and k == l and fixed[row, k] and blocks[at, k, k] == 0.0:
+                    elif row == column and k == l and fixed[row, k] and blocks[at, k, k] <= least:
                         blocks[at, k, k] = 1.0

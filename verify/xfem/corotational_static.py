@@ -243,8 +243,7 @@ class _Descent(_Newton):
     """Down the potential energy of a membrane, which has next to no stiffness where it is slack.
 
     Tangents, not forces, are those of a tension that is at least so much; it falls as long as full
-    steps lower the energy. The exact stiffness follows where it is positive definite; beside a free
-    edge it may never be, and then iterations halve the residual.
+    steps lower the energy. The exact stiffness follows where it is positive definite.
     """
 
     _least = _TAUT
