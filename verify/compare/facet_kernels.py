@@ -1,7 +1,8 @@
 """Kernels: distance to segments in space, and where a way crosses triangles."""
 
 import numpy as np
-from numba import njit
+
+from verify.compiled import inner, kernel
 
 __all__ = ["crossings", "distance_to_segments"]
 
@@ -9,7 +10,7 @@ __all__ = ["crossings", "distance_to_segments"]
 _EDGE = 1e-9
 
 
-@njit(cache=True)
+@kernel
 def distance_to_segments(points, starts, ends):
     """Distance (n,) of points (n, d) to the nearest segment (k, d)–(k, d)."""
     n, d = points.shape
@@ -31,7 +32,7 @@ def distance_to_segments(points, starts, ends):
     return distance
 
 
-@njit(cache=True)
+@kernel
 def crossings(points, steps, lower, upper, cells, facets):
     """Largest parameter t (n,) in [0, 1] at which points + t steps crosses a triangle, else −∞.
 
@@ -68,7 +69,7 @@ def crossings(points, steps, lower, upper, cells, facets):
     return found
 
 
-@njit(cache=True)
+@inner
 def _crossing(x, step, facet):
     """Parameter in [0, 1] at which a way crosses a triangle, or −∞."""
     det = u = v = t = 0.0

@@ -1,8 +1,9 @@
 """Kernels: find the cell that holds a point, and evaluate a P1 or P2 field in it."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from verify.compiled import inner, kernel
 
 __all__ = [
     "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells", "segment_distance2",
@@ -12,7 +13,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@njit(cache=True)
+@inner
 def _depth(x, normals, corners):
     """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
     d = x.shape[0]
@@ -26,7 +27,7 @@ def _depth(x, normals, corners):
     return depth
 
 
-@njit(cache=True)
+@inner
 def segment_distance2(x, a, b):
     """Squared distance of `x` to the segment ab, in any dimension."""
     along, length2 = 0.0, 0.0
@@ -40,7 +41,7 @@ def segment_distance2(x, a, b):
     return distance2
 
 
-@njit(cache=True)
+@inner
 def _outside_distance2(x, normals, corners):
     """Squared distance to a simplex of a point outside of it."""
     d = x.shape[0]
@@ -60,7 +61,7 @@ def _outside_distance2(x, normals, corners):
     return best
 
 
-@njit(cache=True)
+@inner
 def _is_over(x, height, facet, normals, corners):
     """Whether the foot of `x` on the plane of a facet of a tetrahedron is in the facet."""
     for other in range(4):
@@ -83,7 +84,7 @@ def _is_over(x, height, facet, normals, corners):
     return True
 
 
-@njit(cache=True)
+@inner
 def _containing(x, direction, sided, lower, upper, cells, corners, normals, centres, tolerance):
     """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
     d = x.shape[0]
@@ -126,7 +127,7 @@ def _containing(x, direction, sided, lower, upper, cells, corners, normals, cent
     return best
 
 
-@njit(cache=True)
+@inner
 def _nearest(x, lower, upper, cells, corners, normals):
     """Find the cell nearest to `x`, by branch and bound."""
     leaves = lower.shape[0] // 2
@@ -160,7 +161,7 @@ def _nearest(x, lower, upper, cells, corners, normals):
     return best
 
 
-@njit(cache=True)
+@inner
 def box_distance2(x, lower, upper):
     """Squared distance of `x` to a box, 0 inside."""
     distance2 = 0.0
@@ -171,7 +172,7 @@ def box_distance2(x, lower, upper):
     return distance2
 
 
-@njit(cache=True)
+@kernel
 def find_cells(points, directions, lower, upper, cells, corners, normals, centres, tolerance):
     """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
 
@@ -192,7 +193,7 @@ def find_cells(points, directions, lower, upper, cells, corners, normals, centre
     return found
 
 
-@njit(cache=True)
+@kernel
 def evaluate_linear(points, found, origins, values, slopes):
     """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
     n, d = points.shape
@@ -207,7 +208,7 @@ def evaluate_linear(points, found, origins, values, slopes):
     return result
 
 
-@njit(cache=True)
+@kernel
 def evaluate_quadratic(points, found, nodes, values, corners, gradients):
     """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
     n, d = points.shape

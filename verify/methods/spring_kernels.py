@@ -1,12 +1,13 @@
 """Kernels of springs on the edges of cells."""
 
 import numpy as np
-from numba import njit
+
+from verify.compiled import kernel
 
 __all__ = ["add_spring_stiffness", "spring_force", "spring_product"]
 
 
-@njit(cache=True)
+@kernel
 def spring_force(cells, edges, rest, stiffness, displacement, turning, directions, excess, force):
     """Add the force of all springs to `force` (N, d); return their energy.
 
@@ -45,7 +46,7 @@ def spring_force(cells, edges, rest, stiffness, displacement, turning, direction
     return energy
 
 
-@njit(cache=True)
+@kernel
 def add_spring_stiffness(targets, edges, stiffness, directions, excess, exact, scale, blocks):
     """Add `scale` times the stiffness to nodal blocks (B, d, d).
 
@@ -70,7 +71,7 @@ def add_spring_stiffness(targets, edges, stiffness, directions, excess, exact, s
                     blocks[targets[p, j, i], k, l] -= value
 
 
-@njit(cache=True)
+@kernel
 def spring_product(cells, edges, stiffness, directions, vector, scale, out):
     """Add `scale` k t tᵀ v of all springs to `out` (N, d)."""
     space = vector.shape[1]

@@ -6,14 +6,15 @@ or for a membrane with unit normal n the projection I − n nᵀ on its plane.
 """
 
 import numpy as np
-from numba import njit
+
+from verify.compiled import inner, kernel
 
 __all__ = ["add_stiffness", "constrain", "linear_force"]
 
 _ROUND_OFF = 1e-14  # of the largest diagonal entry of a node
 
 
-@njit(cache=True)
+@kernel
 def add_stiffness(targets, gradients, normals, parent, volumes, lam, mu, blocks):
     """Add the stiffness of all pieces to `blocks` (B, d, d).
 
@@ -61,7 +62,7 @@ def add_stiffness(targets, gradients, normals, parent, volumes, lam, mu, blocks)
                             lower[l, k] += value
 
 
-@njit(cache=True)
+@inner
 def _add_stiffness_of_tetrahedra(targets, gradients, parent, volumes, lam, mu, blocks):
     """Do the same with every length known to the compiler: half of the time."""
     for piece in range(len(targets)):
@@ -104,7 +105,7 @@ def _add_stiffness_of_tetrahedra(targets, gradients, parent, volumes, lam, mu, b
                     blocks[at, 2, 2] += zz
 
 
-@njit(cache=True)
+@kernel
 def linear_force(cells, gradients, normals, parent, volumes, lam, mu, displacement, force):
     """Add the internal force K u (N, d) of the displacement (N, d) to `force`; return ½ uᵀKu."""
     count, corners = cells.shape
@@ -150,7 +151,7 @@ def linear_force(cells, gradients, normals, parent, volumes, lam, mu, displaceme
     return energy
 
 
-@njit(cache=True)
+@kernel
 def constrain(starts, columns, fixed, blocks):
     """Decouple the fixed components: zero their rows and columns but for the diagonal.
 

@@ -9,10 +9,12 @@ Matrices are given by where they begin (`lane_shuffles.address`), columns lie `s
 
 from typing import Any
 
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.core.cgutils import ir  # of llvmlite, which numba comes with
 from numba.extending import intrinsic
+
+from verify.compiled import kernel
 
 __all__ = [
     "COLUMNS",
@@ -33,7 +35,7 @@ _VECTOR = ir.VectorType(_NUMBER, ROWS)
 _FLAGS = ("contract",)  # to fused multiply-adds
 
 
-@njit(cache=True)
+@kernel(staged=True)
 def padded(length):
     """Round a number of rows up to one that vectors fill."""
     return (length + ROWS - 1) // ROWS * ROWS
@@ -96,7 +98,7 @@ _subtract_2: Any = intrinsic(_tile(2))
 _subtract_1: Any = intrinsic(_tile(1))
 
 
-@njit(cache=True)
+@kernel(staged=True)
 def subtract_product(target, at, target_step, factor, left, right, step, rows, columns, depth):
     """Take A Bᵀ from a matrix.
 

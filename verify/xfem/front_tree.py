@@ -1,8 +1,9 @@
 """The tree of fronts: small fronts merged into their parents, and put in postorder."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from verify.compiled import kernel
 
 __all__ = ["levels", "merge_and_order"]
 
@@ -61,7 +62,7 @@ def levels(parent: _Ints, entries: _Ints) -> tuple[_Ints, tuple[int, int]]:
     return level, (int(even), int(odd))
 
 
-@njit(cache=True)
+@kernel
 def _merge(width, parent, below):
     """Front into which each front goes in the end (itself if it stays)."""
     count = len(parent)
@@ -85,7 +86,7 @@ def _merge(width, parent, below):
     return group
 
 
-@njit(cache=True)
+@kernel
 def _postorder(width, parent, group):
     """First place of each front's columns, and the ends of the merged fronts (from 0)."""
     count = len(parent)
@@ -126,7 +127,7 @@ def _postorder(width, parent, group):
     return position, ends[: fronts + 1]
 
 
-@njit(cache=True)
+@kernel
 def _levels(parent, entries):
     count = len(parent)
     level = np.zeros(count, dtype=np.int64)

@@ -10,7 +10,8 @@ deformation gradients in lockstep: one alone leaves the machine waiting for its 
 """
 
 import numpy as np
-from numba import njit
+
+from verify.compiled import inner, kernel
 
 __all__ = [
     "LANES",
@@ -30,7 +31,7 @@ _SMALL_TURN = 1e-16  # square of the last turn: Newton squares it once more, to 
 _JACOBI_SWEEPS = 12
 
 
-@njit(cache=True)
+@kernel(staged=True)
 def rotation_matrix(q, R):
     """Write the matrix of the unit quaternion (w, x, y, z) to R (3, 3)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -45,7 +46,7 @@ def rotation_matrix(q, R):
     R[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(cache=True)
+@inner(staged=True)
 def rotation_in_plane(F, R):
     """Write the rotation nearest to F (2, 2) to R."""
     along, across = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
@@ -58,7 +59,7 @@ def rotation_in_plane(F, R):
     R[1, 0] = sine
 
 
-@njit(cache=True)
+@kernel(staged=True)
 def nearest_rotation(F, R):
     """Write the rotation nearest to F (d, d) to R: of a single one, in space by the eigenvector.
 
@@ -79,7 +80,7 @@ def nearest_rotation(F, R):
     rotation_matrix(q, R)
 
 
-@njit(cache=True)
+@kernel(staged=True)
 def new_lanes():
     """Memory for `LANES` rotations that are sought at once, all at the identity.
 
@@ -93,7 +94,7 @@ def new_lanes():
     return lanes
 
 
-@njit(cache=True)
+@kernel(staged=True)
 def mend_lane(lanes, lane):
     """Where Newton's method has failed, take the eigenvector; apart, to keep the loop short."""
     if lanes[13 * LANES + lane] <= _SMALL_TURN:
@@ -108,7 +109,7 @@ def mend_lane(lanes, lane):
         lanes[(9 + k) * LANES + lane] = q[k]
 
 
-@njit(cache=True)
+@kernel(staged=True)
 def turn_lanes(lanes):
     """Newton's method on SO(3) until each lane has converged or failed; whether none has failed."""
     for lane in range(LANES):
@@ -128,7 +129,7 @@ def turn_lanes(lanes):
     return False
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@inner(staged=True, error_model="numpy", fastmath={"contract"})
 def _newton_step(v):
     """One step for all lanes, without a branch, so that the lanes become those of the machine."""
     for l in range(LANES):
@@ -180,7 +181,7 @@ def _newton_step(v):
         v[12 * LANES + l] = nz * scale if good else z
 
 
-@njit(cache=True)
+@inner(staged=True)
 def _largest_eigenvector(F, q):
     """Write to q the unit eigenvector of the largest eigenvalue of the form tr(R(q)ᵀ F)."""
     form = np.empty((4, 4))

@@ -1,11 +1,11 @@
 """Sorting of the short integer lists that sparsity patterns consist of."""
 
-from numba import njit
+from verify.compiled import inner
 
 __all__ = ["sort_short"]
 
 
-@njit(cache=True)
+@inner
 def sort_short(values):
     """Sort in place by Shell's method; numba's own sort takes seconds to compile."""
     gap = 1

@@ -5,12 +5,13 @@ insertion; this is done anew at every cut.
 """
 
 import numpy as np
-from numba import njit
+
+from verify.compiled import inner, kernel
 
 __all__ = ["assign_slots", "fill_lanes", "order_pieces"]
 
 
-@njit(cache=True)
+@kernel
 def order_pieces(cells, node_count):
     """Sort the corners of each piece by node, and pieces by these rows of nodes.
 
@@ -61,7 +62,7 @@ def order_pieces(cells, node_count):
     return pieces, corner, nodes
 
 
-@njit(cache=True)
+@inner
 def _is_before(p, q, cells, order):
     for k in range(1, cells.shape[1]):
         mine, other = cells[p, order[p, k]], cells[q, order[q, k]]
@@ -70,7 +71,7 @@ def _is_before(p, q, cells, order):
     return False
 
 
-@njit(cache=True)
+@kernel
 def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, constants):
     """Write gradients of three corners, and Lamé parameters times volume, lane by lane.
 
@@ -98,7 +99,7 @@ def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, const
         constants[batch, 10 * lanes + lane] = volumes[p] * mu[cell]
 
 
-@njit(cache=True)
+@kernel
 def assign_slots(pieces, corner, nodes, targets, starts, diagonal, window):
     """Give each block above the diagonal a slot from its first piece until its row is finished.
 

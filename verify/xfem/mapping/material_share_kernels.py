@@ -1,11 +1,11 @@
 """Whether a point of a virtual element lies in its piece's share of the material."""
 
-from numba import njit
+from verify.compiled import inner
 
 __all__ = ["is_material"]
 
 
-@njit(cache=True)
+@inner
 def is_material(piece, cell, at, cells, piece_label, levels):
     """Whether the level sets at barycentric coordinates have the signs of the piece."""
     for cut in range(piece_label.shape[1]):

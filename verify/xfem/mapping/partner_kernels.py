@@ -1,11 +1,11 @@
 """The piece on the other side of a face: the one that moves with the same unknowns there."""
 
-from numba import njit
+from verify.compiled import inner
 
 __all__ = ["partner"]
 
 
-@njit(cache=True)
+@inner
 def partner(piece, cell, opposite, cells, neighbours, piece_cells, first_piece, next_piece):
     """Give the piece across the face of the cell opposite to a corner, -1 if there is none."""
     other = neighbours[cell, opposite]
