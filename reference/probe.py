@@ -56,10 +56,11 @@ def _mpi() -> str:
 
 
 def _forms() -> str:
-    """Compile and assemble a form: needs a C compiler and the headers of Python."""
+    """Compile forms and assemble them: needs a C compiler, Python's headers, PETSc's library."""
     import_dolfinx()
     import ufl
     from dolfinx import fem, mesh
+    from dolfinx.fem.petsc import assemble_matrix  # looks for the library when it is imported
     from mpi4py import MPI
 
     square = mesh.create_unit_square(MPI.COMM_SELF, 2, 2)
@@ -67,6 +68,14 @@ def _forms() -> str:
     value = fem.assemble_scalar(fem.form(6.0 * x[0] * ufl.dx(square)))
     if abs(value - 3.0) > 1e-12:
         raise RuntimeError(f"the integral of 6x over the unit square came out as {value}")
+    V = fem.functionspace(square, ("Lagrange", 1))
+    mass = assemble_matrix(fem.form(ufl.TrialFunction(V) * ufl.TestFunction(V) * ufl.dx))
+    mass.assemble()
+    ones = mass.createVecRight()
+    ones.set(1.0)
+    area = ones.dot(mass * ones)
+    if abs(area - 1.0) > 1e-12:
+        raise RuntimeError(f"the area of the unit square by its mass matrix came out as {area}")
     return "compiled, assembled, right"
 
 
