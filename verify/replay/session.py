@@ -69,6 +69,7 @@ class Session:
         spread: bool = False,
         clock: Callable[[], float] = perf_counter,
     ) -> None:
+        touch_memory()
         self.stage, self._account, self._clock = stage, account, clock
         self._spread, self._led = spread, float("-inf")  # time up to which the blades have been led
         self._work: Pieces | None = None  # what is left to be done of a cut
@@ -93,7 +94,6 @@ class Session:
         self._assemble()
         self.state = self.body.rest()
         self._ledger = EnergyLedger(self.body, self.state)
-        touch_memory()
 
     @property
     def time(self) -> float:

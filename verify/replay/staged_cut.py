@@ -17,12 +17,12 @@ from verify.xfem.cholesky import Cholesky
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody
-from verify.xfem.in_pieces import InPieces
+from verify.xfem.in_pieces import MANY, InPieces
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]
 
-MOST = 32  # elements that a cut whose work is spread may split, but for ties
+MOST = 36  # elements that a cut whose work is spread may split, but for ties
 
 Pieces = Generator[Increment | None, None, "Followed | None"]
 
@@ -100,6 +100,8 @@ class StagedCut:
         if other.is_worn:
             renewing = other.renewing(body.pattern, held_nodes(body))
             other = yield from self._each("assembly", renewing, increment)
+        if len(increment.cells) > MANY:
+            yield increment
         with self.timed("assembly"):
             body.force.prepare(body.pattern)
         yield increment

@@ -6,7 +6,9 @@ that has little time in each of its steps can do one piece in each.
 
 from collections.abc import Generator
 
-__all__ = ["InPieces", "in_one_go"]
+__all__ = ["MANY", "InPieces", "in_one_go"]
+
+MANY = 24  # elements: what a cut through more asks for comes in more pieces
 
 type InPieces[Made] = Generator[None, None, Made]
 

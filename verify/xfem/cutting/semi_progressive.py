@@ -21,7 +21,7 @@ from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.stroke import Stroke
 from verify.xfem.cutting.whole_mesh import whole_mesh
 from verify.xfem.errors import XfemError
-from verify.xfem.in_pieces import InPieces, in_one_go
+from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh
@@ -171,6 +171,8 @@ class SemiProgressiveCutter:
         candidates = np.concatenate([_NONE, *found])
         division = None
         if len(candidates):
+            if len(candidates) > MANY:
+                yield
             division = yield from self.body.looking(candidates, self._cuts_near)
         if division is not None:
             self._fix(division)

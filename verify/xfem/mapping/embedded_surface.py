@@ -22,7 +22,7 @@ from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.point_numbers import FoundPoints, PointNumbers
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
-from verify.xfem.in_pieces import InPieces, in_one_go
+from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.mapping.cut_facet_kernels import divide_facets
 from verify.xfem.mapping.edge_points import EdgePoints
 from verify.xfem.mapping.locate_kernels import (
@@ -132,7 +132,7 @@ class EmbeddedSurface:
         most = max(len(self.points), len(self.facets), len(mesh.points))
         self._place, self._is_moved = np.full(most, -1), np.zeros(len(mesh.cells), dtype=bool)
         nodes = distinct(self.facets)
-        in_one_go(self._replacing(every, nodes, *self._values(nodes)))
+        in_one_go(self._replacing(every, nodes, *self._values(nodes), many=False))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
@@ -152,7 +152,8 @@ class EmbeddedSurface:
             self._place,
         )  # fmt: skip
         if len(concerned):
-            yield from self._replacing(concerned, nodes, numbers, values)
+            many = len(increment.cells) > MANY
+            yield from self._replacing(concerned, nodes, numbers, values, many)
 
     def parts_of(self, given: _Ints) -> _Ints:
         """Facets in use that are parts of some given ones, in the order of these."""
@@ -187,7 +188,7 @@ class EmbeddedSurface:
         return (np.concatenate([[0], np.cumsum(counts)]), facet[order]), (around, cell)
 
     def _replacing(
-        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
+        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats, many: bool
     ) -> InPieces[None]:
         """Put the parts of some facets in the place of what there is of these.
 
@@ -200,6 +201,8 @@ class EmbeddedSurface:
         divided = divide(facets, nodes, numbers, values)
         yield
         ids, source, at, label, whole = self._fragments(facets, numbers, *divided)
+        if many:
+            yield
         # where the corners of a whole facet are is known; only which piece that is may be new
         material, cell, weights, inside = place_parts(
             self.points, self.facets, source, at, whole, *self._corners, *self._around,
