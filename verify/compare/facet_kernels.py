@@ -1,8 +1,7 @@
 """Kernels: distance to segments in space, and where a way crosses triangles."""
 
 import numpy as np
-
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = ["crossings", "distance_to_segments"]
 
@@ -10,7 +9,7 @@ __all__ = ["crossings", "distance_to_segments"]
 _EDGE = 1e-9
 
 
-@kernel
+@njit(cache=True)
 def distance_to_segments(points, starts, ends):
     """Distance (n,) of points (n, d) to the nearest segment (k, d)–(k, d)."""
     n, d = points.shape
@@ -32,7 +31,7 @@ def distance_to_segments(points, starts, ends):
     return distance
 
 
-@kernel
+@njit(cache=True)
 def crossings(points, steps, lower, upper, cells, facets):
     """Largest parameter t (n,) in [0, 1] at which points + t steps crosses a triangle, else −∞.
 
@@ -69,7 +68,7 @@ def crossings(points, steps, lower, upper, cells, facets):
     return found
 
 
-@inner
+@njit(cache=True)
 def _crossing(x, step, facet):
     """Parameter in [0, 1] at which a way crosses a triangle, or −∞."""
     det = u = v = t = 0.0

@@ -1,9 +1,8 @@
 """Kernels: find the cell that holds a point, and evaluate a P1 or P2 field in it."""
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-
-from verify.compiled import inner, kernel
 
 __all__ = [
     "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells", "segment_distance2",
@@ -13,7 +12,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@inner
+@njit(cache=True)
 def _depth(x, normals, corners):
     """Distance of `x` to the nearest facet plane of a simplex, positive inside."""
     d = x.shape[0]
@@ -27,7 +26,7 @@ def _depth(x, normals, corners):
     return depth
 
 
-@inner
+@njit(cache=True)
 def segment_distance2(x, a, b):
     """Squared distance of `x` to the segment ab, in any dimension."""
     along, length2 = 0.0, 0.0
@@ -41,7 +40,7 @@ def segment_distance2(x, a, b):
     return distance2
 
 
-@inner
+@njit(cache=True)
 def _outside_distance2(x, normals, corners):
     """Squared distance to a simplex of a point outside of it."""
     d = x.shape[0]
@@ -61,7 +60,7 @@ def _outside_distance2(x, normals, corners):
     return best
 
 
-@inner
+@njit(cache=True)
 def _is_over(x, height, facet, normals, corners):
     """Whether the foot of `x` on the plane of a facet of a tetrahedron is in the facet."""
     for other in range(4):
@@ -84,7 +83,7 @@ def _is_over(x, height, facet, normals, corners):
     return True
 
 
-@inner
+@njit(cache=True)
 def _containing(x, direction, sided, lower, upper, cells, corners, normals, centres, tolerance):
     """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
     d = x.shape[0]
@@ -127,7 +126,7 @@ def _containing(x, direction, sided, lower, upper, cells, corners, normals, cent
     return best
 
 
-@inner
+@njit(cache=True)
 def _nearest(x, lower, upper, cells, corners, normals):
     """Find the cell nearest to `x`, by branch and bound."""
     leaves = lower.shape[0] // 2
@@ -161,7 +160,7 @@ def _nearest(x, lower, upper, cells, corners, normals):
     return best
 
 
-@inner
+@njit(cache=True)
 def box_distance2(x, lower, upper):
     """Squared distance of `x` to a box, 0 inside."""
     distance2 = 0.0
@@ -172,7 +171,7 @@ def box_distance2(x, lower, upper):
     return distance2
 
 
-@kernel
+@njit(cache=True)
 def find_cells(points, directions, lower, upper, cells, corners, normals, centres, tolerance):
     """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
 
@@ -193,7 +192,7 @@ def find_cells(points, directions, lower, upper, cells, corners, normals, centre
     return found
 
 
-@kernel
+@njit(cache=True)
 def evaluate_linear(points, found, origins, values, slopes):
     """Return value (n, d) of u = u_0 + G (x - x_0), x_0 and u_0 those of the first corner."""
     n, d = points.shape
@@ -208,7 +207,7 @@ def evaluate_linear(points, found, origins, values, slopes):
     return result
 
 
-@kernel
+@njit(cache=True)
 def evaluate_quadratic(points, found, nodes, values, corners, gradients):
     """Return value (n, d) and gradient (n, d, d) of a P2 field on straight-edged simplices."""
     n, d = points.shape

@@ -1,14 +1,14 @@
 """Kernel: the triangle in space that is nearest to a point, on the wanted side of cuts."""
 
 import numpy as np
+from numba import njit
 
 from verify.compare.locate_kernels import box_distance2, segment_distance2
-from verify.compiled import inner, kernel
 
 __all__ = ["nearest_triangles"]
 
 
-@kernel
+@njit(cache=True)
 def nearest_triangles(
     points, directions, wanted, lower, upper, cells, corners, normals, across, centres, sides,
     tolerance,
@@ -43,7 +43,7 @@ def nearest_triangles(
     return found, distance
 
 
-@inner
+@njit(cache=True)
 def _nearest(
     x, direction, sided, wish, lower, upper, cells, corners, normals, across, centres, sides,
     tolerance,
@@ -95,7 +95,7 @@ def _nearest(
     return best, nearest
 
 
-@inner
+@njit(cache=True)
 def _allowed(wish, side):
     allowed = True
     for p in range(wish.shape[0]):
@@ -104,7 +104,7 @@ def _allowed(wish, side):
     return allowed
 
 
-@inner
+@njit(cache=True)
 def _distance_and_depth(x, normals, across, corners):
     """Distance of `x` to a triangle, and of its foot in the plane to the nearest edge, inwards."""
     depth, height = np.inf, 0.0

@@ -1,13 +1,12 @@
 """Kernels of springs on the edges of cells."""
 
 import numpy as np
-
-from verify.compiled import kernel
+from numba import njit
 
 __all__ = ["add_spring_stiffness", "spring_force", "spring_product"]
 
 
-@kernel
+@njit(cache=True)
 def spring_force(cells, edges, rest, stiffness, displacement, turning, directions, excess, force):
     """Add the force of all springs to `force` (N, d); return their energy.
 
@@ -46,7 +45,7 @@ def spring_force(cells, edges, rest, stiffness, displacement, turning, direction
     return energy
 
 
-@kernel
+@njit(cache=True)
 def add_spring_stiffness(targets, edges, stiffness, directions, excess, exact, scale, blocks):
     """Add `scale` times the stiffness to nodal blocks (B, d, d).
 
@@ -71,7 +70,7 @@ def add_spring_stiffness(targets, edges, stiffness, directions, excess, exact, s
                     blocks[targets[p, j, i], k, l] -= value
 
 
-@kernel
+@njit(cache=True)
 def spring_product(cells, edges, stiffness, directions, vector, scale, out):
     """Add `scale` k t tᵀ v of all springs to `out` (N, d)."""
     space = vector.shape[1]

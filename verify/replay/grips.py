@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import kernel
 from verify.replay.stage import Hold, Hook
 from verify.xfem.dynamics import MovingSupports
 from verify.xfem.mesh import SimplexMesh
@@ -56,7 +56,7 @@ def held_facets(mesh: SimplexMesh, nodes: NDArray[np.bool_]) -> NDArray[np.bool_
     return on_held
 
 
-@kernel
+@njit(cache=True)
 def _hold_parts(on_held, cells, parent, piece, barycentric, held):
     """Hold the unknowns of sub-simplices on held facets: all corners but one lie on these."""
     corners = cells.shape[1]

@@ -6,15 +6,14 @@ or for a membrane with unit normal n the projection I − n nᵀ on its plane.
 """
 
 import numpy as np
-
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = ["add_stiffness", "constrain", "linear_force"]
 
 _ROUND_OFF = 1e-14  # of the largest diagonal entry of a node
 
 
-@kernel
+@njit(cache=True)
 def add_stiffness(targets, gradients, normals, parent, volumes, lam, mu, blocks):
     """Add the stiffness of all pieces to `blocks` (B, d, d).
 
@@ -62,7 +61,7 @@ def add_stiffness(targets, gradients, normals, parent, volumes, lam, mu, blocks)
                             lower[l, k] += value
 
 
-@inner
+@njit(cache=True)
 def _add_stiffness_of_tetrahedra(targets, gradients, parent, volumes, lam, mu, blocks):
     """Do the same with every length known to the compiler: half of the time."""
     for piece in range(len(targets)):
@@ -105,7 +104,7 @@ def _add_stiffness_of_tetrahedra(targets, gradients, parent, volumes, lam, mu, b
                     blocks[at, 2, 2] += zz
 
 
-@kernel
+@njit(cache=True)
 def linear_force(cells, gradients, normals, parent, volumes, lam, mu, displacement, force):
     """Add the internal force K u (N, d) of the displacement (N, d) to `force`; return ½ uᵀKu."""
     count, corners = cells.shape
@@ -151,7 +150,7 @@ def linear_force(cells, gradients, normals, parent, volumes, lam, mu, displaceme
     return energy
 
 
-@kernel
+@njit(cache=True)
 def constrain(starts, columns, fixed, blocks):
     """Decouple the fixed components: zero their rows and columns but for the diagonal.
 

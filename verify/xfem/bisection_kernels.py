@@ -1,13 +1,12 @@
 """Bisection at points in a given order; each asks only the simplices around an end of its edge."""
 
 import numpy as np
-
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = ["bisect_along"]
 
 
-@inner
+@njit(cache=True)
 def _list_new(simplex, points, first, entries, used):
     """Enter a simplex into the lists of its vertices; the count of entries."""
     for k in range(points.shape[1]):
@@ -22,7 +21,7 @@ def _list_new(simplex, points, first, entries, used):
     return used
 
 
-@kernel
+@njit(cache=True)
 def bisect_along(count, numbers, ends, r, s, points, barycentric, fraction, source, first):
     """Bisect simplices at points z = s plus + r minus wherever they have that edge.
 

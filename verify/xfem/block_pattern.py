@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
-from verify.compiled import kernel
 from verify.xfem.short_sort import sort_short
 
 __all__ = ["BlockPattern", "block_pattern"]
@@ -67,7 +67,7 @@ def block_pattern(cells: NDArray[np.int64], node_count: int) -> BlockPattern:
     return BlockPattern(starts, columns, targets)
 
 
-@kernel
+@njit(cache=True)
 def _pattern(cells, node_count):
     count, corners = cells.shape
     first = np.zeros(node_count + 1, dtype=np.int64)
@@ -111,7 +111,7 @@ def _pattern(cells, node_count):
     return starts, columns[:used].copy(), targets
 
 
-@kernel
+@njit(cache=True)
 def _diagonal(starts, columns):
     place = np.empty(len(starts) - 1, dtype=np.int32)
     for node in range(len(place)):
@@ -121,7 +121,7 @@ def _diagonal(starts, columns):
     return place
 
 
-@kernel
+@njit(cache=True)
 def _mirror(starts, columns):
     # rows are met in ascending order, so each block is the next one in the row of its column
     following, place = starts[:-1].copy(), np.empty(len(columns), dtype=np.int32)

@@ -8,9 +8,9 @@ scaling, so slivers do not hurt it (Higham 2002, section 10.1).
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import kernel
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.cholesky_kernels import factorise_fronts, solve_fronts
 from verify.xfem.dense_tiles import COLUMNS, ROWS
@@ -232,7 +232,7 @@ def _full(lengths: _Ints, multiple: int) -> _Ints:
     return -(-lengths // multiple) * multiple
 
 
-@kernel
+@njit(cache=True)
 def _coupled(starts, columns, held):
     """Rows without what couples held nodes: starts, columns, and which blocks are left."""
     fewer = np.empty_like(starts)
@@ -248,7 +248,7 @@ def _coupled(starts, columns, held):
     return fewer, left[:count], blocks[:count]
 
 
-@kernel
+@njit(cache=True)
 def _insert(order, bounds, source):
     """Order and bounds of fronts with new nodes after those from which they come."""
     nodes, fronts = len(order), len(bounds) - 1

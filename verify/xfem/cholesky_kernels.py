@@ -8,8 +8,8 @@ until the parent front adds it.
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.dense_tiles import (
     COLUMNS,
     ROWS,
@@ -30,7 +30,7 @@ _BAND = 96  # columns that a product takes at a time: more do not stay in the fi
 _STRIP = 16  # rows: what they hold above the diagonal is for nothing
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _write_block(blocks, at, block, panel, into, height):
     """Write the block whose first number is at `at`, transposed."""
     if block == 3:  # written out: a third of the time
@@ -44,7 +44,7 @@ def _write_block(blocks, at, block, panel, into, height):
             panel[into + a * height + b] = blocks[at + a * block + b]
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _factorise_group(panel, at, step, width, diagonal, factor):
     """Factorise the square of `COLUMNS` columns whose first number is at `at`.
 
@@ -69,7 +69,7 @@ def _factorise_group(panel, at, step, width, diagonal, factor):
     return -1
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _eliminate(panel, at, width, height, diagonal, factor):
     """Factorise the columns of a panel in place, `height` numbers each; the failing one or -1."""
     numbers, coefficients = address(panel), address(factor)
@@ -103,7 +103,7 @@ def _eliminate(panel, at, width, height, diagonal, factor):
     return -1
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _complement(panel, at, width, height, update, into, below):
     """Subtract L Lᵀ of the last `below` rows from an update matrix (lower part)."""
     numbers, others = address(panel), address(update)
@@ -118,7 +118,7 @@ def _complement(panel, at, width, height, update, into, below):
             )  # fmt: skip
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _extend_add(waiting, at, count, runs, first, length, row, panel, panel_at, width, height,
                 update, update_at, below):  # fmt: skip
     """Add the update matrix of a child, in runs of rows that follow each other in this front too.
@@ -144,7 +144,7 @@ def _extend_add(waiting, at, count, runs, first, length, row, panel, panel_at, w
                     add_run(other, into + row[q], source, begin + first[q], length[q])
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _find_runs(relative, columns, top, block, first, length, row):
     """Write the runs of a child's rows, given its places among columns and rows; their number."""
     runs, k = 0, 0
@@ -160,7 +160,7 @@ def _find_runs(relative, columns, top, block, first, length, row):
     return runs
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _write_entries(blocks, block, begin, end, entry_start, entry_block, entry_row, panel, at,
                    height):  # fmt: skip
     """Write the blocks of the columns of a front, nodes `begin` to `end` in the order."""
@@ -175,7 +175,7 @@ def _write_entries(blocks, block, begin, end, entry_start, entry_block, entry_ro
             _write_block(blocks, entry_block[entry] * block * block, block, panel, into, height)
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def factorise_fronts(
     blocks,
     bounds,
@@ -245,7 +245,7 @@ def factorise_fronts(
     return -1
 
 
-@kernel(staged=True, fastmath={"contract"})
+@njit(cache=True, fastmath={"contract"})
 def solve_fronts(bounds, row_start, rows, offset, factor, block, gathered, four, x):
     """Solve L Lᵀ x = b in place; x (N·block,) is in the order of elimination.
 

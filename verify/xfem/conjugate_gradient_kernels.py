@@ -1,8 +1,8 @@
 """Compiled loops of the preconditioned conjugate gradients: no allocation inside."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.symmetric_sweep_kernels import (
     add_lower_product,
     solve_lower,
@@ -17,7 +17,7 @@ __all__ = ["conjugate_gradients", "invert_blocks"]
 _SUMS = {"reassoc", "contract", "nsz"}
 
 
-@inner(staged=True, fastmath=_SUMS)
+@njit(cache=True, fastmath=_SUMS)
 def _curvature(p, t, s, q, u, g):
     """Take q = t + s and u += g, all flat; returns p·q."""
     total = 0.0
@@ -28,7 +28,7 @@ def _curvature(p, t, s, q, u, g):
     return total
 
 
-@inner(staged=True, fastmath=_SUMS)
+@njit(cache=True, fastmath=_SUMS)
 def _advance(alpha, t, q, u, x, r, z):
     """Take the step x += αt, r −= αq, z −= αu, all flat; returns r·z."""
     total = 0.0
@@ -40,7 +40,7 @@ def _advance(alpha, t, q, u, x, r, z):
     return total
 
 
-@inner(staged=True, fastmath=_SUMS)
+@njit(cache=True, fastmath=_SUMS)
 def _square(a):
     total = 0.0
     for i in range(len(a)):
@@ -48,7 +48,7 @@ def _square(a):
     return total
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def invert_blocks(blocks, diagonal, out):
     """Inverses (N, d, d) of the diagonal blocks; the first row that is not definite, or -1.
 
@@ -88,7 +88,7 @@ def invert_blocks(blocks, diagonal, out):
     return -1
 
 
-@inner(staged=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _invert_blocks_3(blocks, diagonal, out):
     for row in range(len(diagonal)):
         at = diagonal[row]
@@ -114,7 +114,7 @@ def _invert_blocks_3(blocks, diagonal, out):
     return -1
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def conjugate_gradients(
     starts, columns, diagonal, blocks, inverse, load, x, is_zero, work, tolerance, limit
 ):

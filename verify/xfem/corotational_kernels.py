@@ -15,8 +15,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import kernel
 from verify.xfem.polar_kernels import (
     LANES,
     mend_lane,
@@ -30,7 +30,7 @@ from verify.xfem.spin_stiffness_kernels import add_spin_stiffness, turned_normal
 __all__ = ["corotational_kernels"]
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def _project(D, n):
     """Take from D what points across the turned plane of a membrane: nothing resists there."""
     for l in range(3):
@@ -41,7 +41,7 @@ def _project(D, n):
             D[k, l] -= n[k] * across
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def _turn_in_plane(cells, gradients, parent, normals, displacement, quaternions, rotations):
     """Update the rotations (p, 2, 2); normals and quaternions are of bodies in space."""
     F = np.empty((2, 2))
@@ -55,7 +55,7 @@ def _turn_in_plane(cells, gradients, parent, normals, displacement, quaternions,
         rotation_in_plane(F, rotations[piece])
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def _turn_in_space(cells, gradients, parent, normals, displacement, quaternions, rotations):
     """Update the rotations (p, 3, 3) of a solid or a membrane, and their quaternions (p, 4)."""
     F, lanes = np.empty((3, 3)), new_lanes()
@@ -92,7 +92,7 @@ def _turn_in_space(cells, gradients, parent, normals, displacement, quaternions,
 
 def _internal_force(space: int) -> Any:
     # the loops below are made for each space, so that innermost ones have a constant length
-    @kernel(staged=True)
+    @njit(cache=True)
     def internal_force(
         cells, gradients, parent, volumes, normals, lam, mu, rotations, displacement, force
     ):
@@ -162,7 +162,7 @@ def _internal_force(space: int) -> Any:
 
 
 def _frozen_product(space: int) -> Any:
-    @kernel(staged=True)
+    @njit(cache=True)
     def frozen_product(
         cells, gradients, parent, volumes, normals, lam, mu, rotations, vector, scale, product
     ):
@@ -216,7 +216,7 @@ def _frozen_product(space: int) -> Any:
 
 
 def _add_frozen_stiffness(space: int) -> Any:
-    @kernel(staged=True)
+    @njit(cache=True)
     def add_frozen_stiffness(
         targets, gradients, parent, volumes, normals, lam, mu, rotations, scale, blocks
     ):

@@ -9,12 +9,10 @@ Matrices are given by where they begin (`lane_shuffles.address`), columns lie `s
 
 from typing import Any
 
-from numba import types
+from numba import njit, types
 from numba.core import cgutils
 from numba.core.cgutils import ir  # of llvmlite, which numba comes with
 from numba.extending import intrinsic
-
-from verify.compiled import kernel
 
 __all__ = [
     "COLUMNS",
@@ -35,7 +33,7 @@ _VECTOR = ir.VectorType(_NUMBER, ROWS)
 _FLAGS = ("contract",)  # to fused multiply-adds
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def padded(length):
     """Round a number of rows up to one that vectors fill."""
     return (length + ROWS - 1) // ROWS * ROWS
@@ -98,7 +96,7 @@ _subtract_2: Any = intrinsic(_tile(2))
 _subtract_1: Any = intrinsic(_tile(1))
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def subtract_product(target, at, target_step, factor, left, right, step, rows, columns, depth):
     """Take A Bᵀ from a matrix.
 

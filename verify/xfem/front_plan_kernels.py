@@ -1,14 +1,14 @@
 """What a multifrontal factorisation needs to know before it sees a value: rows and places."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import kernel
 from verify.xfem.short_sort import sort_short
 
 __all__ = ["assembly_lists", "front_rows"]
 
 
-@kernel
+@njit(cache=True)
 def front_rows(starts, columns, order, bounds, nearest):
     """Rows of each front and the tree of fronts, from the sparsity and the order.
 
@@ -75,7 +75,7 @@ def front_rows(starts, columns, order, bounds, nearest):
     return row_start, rows[:used].copy(), parent
 
 
-@kernel
+@njit(cache=True)
 def assembly_lists(starts, columns, order, bounds, row_start, rows, parent):
     """Where matrix blocks and update matrices of children go in each front.
 

@@ -1,9 +1,8 @@
 """The tree of fronts: small fronts merged into their parents, and put in postorder."""
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-
-from verify.compiled import kernel
 
 __all__ = ["levels", "merge_and_order"]
 
@@ -62,7 +61,7 @@ def levels(parent: _Ints, entries: _Ints) -> tuple[_Ints, tuple[int, int]]:
     return level, (int(even), int(odd))
 
 
-@kernel
+@njit(cache=True)
 def _merge(width, parent, below):
     """Front into which each front goes in the end (itself if it stays)."""
     count = len(parent)
@@ -86,7 +85,7 @@ def _merge(width, parent, below):
     return group
 
 
-@kernel
+@njit(cache=True)
 def _postorder(width, parent, group):
     """First place of each front's columns, and the ends of the merged fronts (from 0)."""
     count = len(parent)
@@ -127,7 +126,7 @@ def _postorder(width, parent, group):
     return position, ends[: fronts + 1]
 
 
-@kernel
+@njit(cache=True)
 def _levels(parent, entries):
     count = len(parent)
     level = np.zeros(count, dtype=np.int64)

@@ -1,14 +1,14 @@
 """Contact of pieces across faces, and the groups of slots that it joins."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.row_numbers import point_on_edge
 
 __all__ = ["join_across_faces", "number_groups", "patch_around"]
 
 
-@kernel
+@njit(cache=True)
 def patch_around(parent, cells, nodes):
     """Cells around the nodes of split cells, and the pieces there.
 
@@ -67,7 +67,7 @@ def patch_around(parent, cells, nodes):
     return patch[:count].copy(), place, piece_cell, starts, pieces
 
 
-@inner
+@njit(cache=True)
 def _root(slot, towards):
     while towards[slot] != slot:
         towards[slot] = towards[towards[slot]]
@@ -75,7 +75,7 @@ def _root(slot, towards):
     return slot
 
 
-@inner
+@njit(cache=True)
 def _fitting(begin, end, pieces, label, side):
     """Give the piece of a cell that has a region of its face: exactly one does, else -1."""
     found = -1
@@ -92,7 +92,7 @@ def _fitting(begin, end, pieces, label, side):
     return found
 
 
-@inner
+@njit(cache=True)
 def _sort_face(stack, top):
     """Order the corners of a region by their numbers."""
     for i in range(1, stack.shape[1]):
@@ -102,7 +102,7 @@ def _sort_face(stack, top):
             k -= 1
 
 
-@inner
+@njit(cache=True)
 def _next_region(top, stack, level, sides, relevant, values, stairs, edges, asked):
     """Divide the region on top of the stack until one is left that no relevant cut crosses.
 
@@ -146,7 +146,7 @@ def _next_region(top, stack, level, sides, relevant, values, stairs, edges, aske
     return top
 
 
-@inner
+@njit(cache=True)
 def _join_face(cell, other, skip, p, q, cells, towards):
     """Join the slots of two pieces at the nodes of a face, given by the corner opposite to it."""
     corners = cells.shape[1]
@@ -162,7 +162,7 @@ def _join_face(cell, other, skip, p, q, cells, towards):
                     towards[first] = second
 
 
-@inner
+@njit(cache=True)
 def _find_relevant(here, there, starts, pieces, label, relevant):
     """Write which cuts divide either of two cells (places in the patch); whether any does."""
     some = False
@@ -175,7 +175,7 @@ def _find_relevant(here, there, starts, pieces, label, relevant):
     return some
 
 
-@kernel
+@njit(cache=True)
 def join_across_faces(
     begin, patch, cells, neighbours, place, starts, pieces, label, values, stairs, edges, towards
 ):
@@ -244,7 +244,7 @@ def join_across_faces(
     return len(patch), asked[:0]
 
 
-@kernel
+@njit(cache=True)
 def number_groups(towards):
     """Give the number (slots,) of the group of each slot, in the order of their first slots."""
     number, count = np.empty(len(towards), dtype=np.int64), 0

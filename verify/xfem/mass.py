@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from verify.compiled import kernel
 from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
 from verify.xfem.virtual import VirtualMesh
@@ -217,7 +217,7 @@ def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     return _SideWiseMass(weights)
 
 
-@kernel
+@njit(cache=True)
 def _add_shares(cells, parent, volumes, densities, weights):
     for piece in range(len(cells)):
         share = volumes[piece] * densities[parent[piece]] / cells.shape[1]

@@ -8,15 +8,14 @@ stiffness of a step keeps no negative mode: a compressed membrane gets nothing.
 """
 
 import numpy as np
-
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = ["add_tension"]
 
 _COLLAPSED = 1e-6  # stretch below which a direction carries no tension that could be meant
 
 
-@inner
+@njit(cache=True)
 def _positive_stress(R, F, lam, mu, normal, least):
     """(α, β) of the positive part α (I − N Nᵀ) + β U of the second Piola–Kirchhoff stress.
 
@@ -45,7 +44,7 @@ def _positive_stress(R, F, lam, mu, normal, least):
     return first - beta * high, beta
 
 
-@kernel
+@njit(cache=True)
 def add_tension(
     cells, targets, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
     vector, share, scale, least, force, blocks,

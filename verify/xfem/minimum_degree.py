@@ -7,9 +7,8 @@ fundamental supernodes.
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-
-from verify.compiled import inner, kernel
 
 __all__ = ["minimum_degree"]
 
@@ -35,7 +34,7 @@ def minimum_degree(starts: NDArray[np.int32], columns: NDArray[np.int32]) -> tup
     return order, bounds
 
 
-@inner
+@njit(cache=True)
 def _unlink(node, degree, head, after, before):
     if before[node] >= 0:
         after[before[node]] = after[node]
@@ -45,7 +44,7 @@ def _unlink(node, degree, head, after, before):
         before[after[node]] = before[node]
 
 
-@inner
+@njit(cache=True)
 def _link(node, degree, head, after, before):
     first = head[degree[node]]
     after[node] = first
@@ -55,7 +54,7 @@ def _link(node, degree, head, after, before):
     head[degree[node]] = node
 
 
-@inner
+@njit(cache=True)
 def _gather(pivot, start, elements, variables, sees, begin, size, members, alive, mark, found):
     """Nodes of the new element: what the pivot sees, directly or through its elements."""
     count = 0
@@ -80,7 +79,7 @@ def _gather(pivot, start, elements, variables, sees, begin, size, members, alive
     return count
 
 
-@inner
+@njit(cache=True)
 def _see_neighbours(starts, columns, sees, variables):
     """Let every node see its neighbours, not itself."""
     for node in range(len(variables)):
@@ -90,7 +89,7 @@ def _see_neighbours(starts, columns, sees, variables):
                 variables[node] += 1
 
 
-@inner
+@njit(cache=True)
 def _count_outside(pivot, found, start, elements, sees, alive, size, seen_by, outside):
     """Nodes of each older element that the new one does not have."""
     for node in found:
@@ -103,7 +102,7 @@ def _count_outside(pivot, found, start, elements, sees, alive, size, seen_by, ou
                 outside[element] -= 1
 
 
-@kernel
+@njit(cache=True)
 def _eliminate_all(starts, columns):
     count = len(starts) - 1
     start = starts[:-1].astype(np.int64)
@@ -176,7 +175,7 @@ def _eliminate_all(starts, columns):
     return order, bounds[: sets + 1]
 
 
-@inner
+@njit(cache=True)
 def _shorten(node, pivot, start, elements, variables, sees, alive, outside, gone, mark):
     """Replace what the new element covers by the element; bound the degree of the rest."""
     begin = start[node]

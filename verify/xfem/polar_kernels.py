@@ -10,8 +10,7 @@ deformation gradients in lockstep: one alone leaves the machine waiting for its 
 """
 
 import numpy as np
-
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = [
     "LANES",
@@ -31,7 +30,7 @@ _SMALL_TURN = 1e-16  # square of the last turn: Newton squares it once more, to 
 _JACOBI_SWEEPS = 12
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def rotation_matrix(q, R):
     """Write the matrix of the unit quaternion (w, x, y, z) to R (3, 3)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -46,7 +45,7 @@ def rotation_matrix(q, R):
     R[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@inner(staged=True)
+@njit(cache=True)
 def rotation_in_plane(F, R):
     """Write the rotation nearest to F (2, 2) to R."""
     along, across = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
@@ -59,7 +58,7 @@ def rotation_in_plane(F, R):
     R[1, 0] = sine
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def nearest_rotation(F, R):
     """Write the rotation nearest to F (d, d) to R: of a single one, in space by the eigenvector.
 
@@ -80,7 +79,7 @@ def nearest_rotation(F, R):
     rotation_matrix(q, R)
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def new_lanes():
     """Memory for `LANES` rotations that are sought at once, all at the identity.
 
@@ -94,7 +93,7 @@ def new_lanes():
     return lanes
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def mend_lane(lanes, lane):
     """Where Newton's method has failed, take the eigenvector; apart, to keep the loop short."""
     if lanes[13 * LANES + lane] <= _SMALL_TURN:
@@ -109,7 +108,7 @@ def mend_lane(lanes, lane):
         lanes[(9 + k) * LANES + lane] = q[k]
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def turn_lanes(lanes):
     """Newton's method on SO(3) until each lane has converged or failed; whether none has failed."""
     for lane in range(LANES):
@@ -129,7 +128,7 @@ def turn_lanes(lanes):
     return False
 
 
-@inner(staged=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _newton_step(v):
     """One step for all lanes, without a branch, so that the lanes become those of the machine."""
     for l in range(LANES):
@@ -181,7 +180,7 @@ def _newton_step(v):
         v[12 * LANES + l] = nz * scale if good else z
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _largest_eigenvector(F, q):
     """Write to q the unit eigenvector of the largest eigenvalue of the form tr(R(q)ᵀ F)."""
     form = np.empty((4, 4))

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import inner, kernel
 from verify.xfem.growing_array import GrowingArray
 
 __all__ = ["EdgeTable", "RowNumbers", "find_row", "number_of_row", "point_on_edge"]
@@ -68,7 +68,7 @@ class EdgeTable(NamedTuple):
     point: _Ints
 
 
-@inner
+@njit(cache=True)
 def _place(row, table, known):
     """Where in the table the row is, or belongs."""
     code = np.uint64(14695981039346656037)  # Fowler, Noll and Vo's numbers
@@ -87,13 +87,13 @@ def _place(row, table, known):
     return at
 
 
-@inner
+@njit(cache=True)
 def find_row(row, table, known):
     """Give the number of a row, -1 if it has none."""
     return table[_place(row, table, known)]
 
 
-@inner
+@njit(cache=True)
 def point_on_edge(cut, plus, minus, edges, row):
     """Give the zero point of a cut on an edge, -1 if nobody has asked for it; writes row (3,)."""
     row[0], row[1], row[2] = cut, plus, minus
@@ -101,7 +101,7 @@ def point_on_edge(cut, plus, minus, edges, row):
     return edges.point[number] if number >= 0 else -1
 
 
-@inner
+@njit(cache=True)
 def number_of_row(row, table, known, count):
     """Give (number of the row, count of rows): a new row gets the next number."""
     at = _place(row, table, known)
@@ -113,14 +113,14 @@ def number_of_row(row, table, known, count):
     return table[at], count
 
 
-@kernel
+@njit(cache=True)
 def _number_rows(rows, table, known, count, numbers):
     for q in range(len(rows)):
         numbers[q], count = number_of_row(rows[q], table, known, count)
     return count
 
 
-@kernel
+@njit(cache=True)
 def _fill(table, known):
     for number in range(len(known)):
         table[_place(known[number], table, known)] = number

@@ -1,11 +1,11 @@
 """Sorting of the short integer lists that sparsity patterns consist of."""
 
-from verify.compiled import inner
+from numba import njit
 
 __all__ = ["sort_short"]
 
 
-@inner
+@njit(cache=True)
 def sort_short(values):
     """Sort in place by Shell's method; numba's own sort takes seconds to compile."""
     gap = 1

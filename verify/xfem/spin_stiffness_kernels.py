@@ -7,15 +7,14 @@ With b_i the material gradient of shape function i, R the rotation of a piece an
 from typing import Any
 
 import numpy as np
-
-from verify.compiled import kernel
+from numba import njit
 
 __all__ = ["add_spin_stiffness", "turned_normal"]
 
 _SINGULAR = 1e-8  # of the trace of the stretch: a spin without stiffness of its own
 
 
-@kernel
+@njit(cache=True)
 def _deformation(nodes, b, displacement, normals, cell, F):
     """Write the deformation gradient of a piece."""
     space = F.shape[0]
@@ -31,7 +30,7 @@ def _deformation(nodes, b, displacement, normals, cell, F):
                 F[k, l] += displacement[node, k] * b[i, l]
 
 
-@kernel
+@njit(cache=True)
 def turned_normal(R, normals, cell, n):
     """Write the normal of a turned membrane to n (3,)."""
     for k in range(3):
@@ -40,7 +39,7 @@ def turned_normal(R, normals, cell, n):
             n[k] += R[k, l] * normals[cell, l]
 
 
-@kernel
+@njit(cache=True)
 def _spin_row(g, out):
     """Write the matrix of u ↦ g × u: (1, 2) in the plane, (3, 3) in space."""
     if len(g) == 2:
@@ -51,7 +50,7 @@ def _spin_row(g, out):
         out[1, 0], out[2, 0], out[2, 1] = g[2], -g[1], g[0]
 
 
-@kernel
+@njit(cache=True)
 def _spin_stiffness(V, lam_trace, mu, H):
     """Write H (1, 1) or (3, 3); without the inverse, and False, where that does not exist."""
     trace = 0.0
@@ -84,7 +83,7 @@ def add_spin_stiffness(space: int) -> Any:
     """Make the loop for the plane or for space, so that innermost ones have a constant length."""
     spins = 1 if space == 2 else 3
 
-    @kernel(staged=True)
+    @njit(cache=True)
     def add(
         cells, targets, gradients, parent, volumes, normals, lam, mu, rotations, displacement,
         scale, blocks,

@@ -1,8 +1,8 @@
 """Division of simplices by a cut: edges that it crosses, and the parts on its two sides."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.row_numbers import number_of_row, point_on_edge
 
 __all__ = [
@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 
-@kernel
+@njit(cache=True)
 def crossed_cells(cells, values):
     """Cells that have corners on both sides of the only cut there is, given (n, 1) level sets."""
     found, count = np.empty(len(cells), dtype=np.int64), 0
@@ -33,7 +33,7 @@ def crossed_cells(cells, values):
     return found[:count].copy()
 
 
-@kernel
+@njit(cache=True)
 def edges_of_cells(chosen, cells, points, values, table, known, edges, size):
     """Give numbers to the edges of cells that the only cut crosses, rows (0, plus, minus).
 
@@ -61,7 +61,7 @@ def edges_of_cells(chosen, cells, points, values, table, known, edges, size):
     return count
 
 
-@kernel
+@njit(cache=True)
 def points_on_edges(edges, points, values):
     """Where the only cut crosses edges, rows (0, plus, minus), and the share of each plus end."""
     places, share = np.empty((len(edges), points.shape[1])), np.empty(len(edges))
@@ -75,7 +75,7 @@ def points_on_edges(edges, points, values):
     return places, share
 
 
-@kernel
+@njit(cache=True)
 def points_of_edges(edges, order, share, places, count):
     """Give points to edges in some order: the plus end where that is on the cut, else a new one.
 
@@ -96,7 +96,7 @@ def points_of_edges(edges, order, share, places, count):
     return point, ends[:new], new_places[:new]
 
 
-@kernel
+@njit(cache=True)
 def gone_through(edges, level, depth, size, reach, at_end, some):
     """Whether the only cut goes through cells, at all of their `edges` (q, e) or at `some`.
 
@@ -124,7 +124,7 @@ def gone_through(edges, level, depth, size, reach, at_end, some):
     return found
 
 
-@kernel
+@njit(cache=True)
 def whole_simplices(chosen, cells):
     """Simplices that are whole cells, as `divide_simplices` takes them, and who is below each."""
     count, corners = len(chosen), cells.shape[1]
@@ -140,7 +140,7 @@ def whole_simplices(chosen, cells):
     return (piece, points, barycentric, np.ones(count), sign), active, below
 
 
-@kernel
+@njit(cache=True)
 def two_sides(cells, piece):
     """Write numbers of the parts of divided cells into `piece`: two by two, that above first.
 
@@ -155,7 +155,7 @@ def two_sides(cells, piece):
     return parent, label
 
 
-@kernel
+@njit(cache=True)
 def first_divided(points, nodes, turn, now):
     """Note at which turn points of simplices that are no nodes were first used."""
     for s in range(points.shape[0]):
@@ -165,7 +165,7 @@ def first_divided(points, nodes, turn, now):
                 turn[zero] = min(turn[zero], now)
 
 
-@kernel
+@njit(cache=True)
 def crossed_edges(points, piece, label, values, cut):
     """Edges (q, 2) from plus to minus, and the piece (q,) of the simplex, where a cut crosses one.
 
@@ -190,7 +190,7 @@ def crossed_edges(points, piece, label, values, cut):
     return ends[:count], owner[:count]
 
 
-@inner
+@njit(cache=True)
 def _pattern(row, values, cut):
     """Sum of 2^k over the corners k on the plus side, as `Staircase` counts."""
     found = 0
@@ -200,7 +200,7 @@ def _pattern(row, values, cut):
     return found
 
 
-@inner
+@njit(cache=True)
 def _in_order(row, order):
     """Write the order in which a row ascends; return the sign of that permutation."""
     sign = 1
@@ -213,7 +213,7 @@ def _in_order(row, order):
     return sign
 
 
-@kernel
+@njit(cache=True)
 def divide_simplices(simplices, values, cut, active, below, stairs, edges):
     """Divide the simplices of active pieces by a cut.
 

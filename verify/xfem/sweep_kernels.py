@@ -1,8 +1,8 @@
 """Level set, depth and travel of a sweep at a point, and at many."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.collision.simplex_kernels import (
     foot_on_facet,
     nearest_on_facet,
@@ -12,7 +12,7 @@ from verify.xfem.collision.simplex_kernels import (
 __all__ = ["probe", "probe_points"]
 
 
-@inner
+@njit(cache=True)
 def probe(x, sweep, room):
     """Give (level set, distance past the rim or 0, travel of the nearest point) at x (s,).
 
@@ -59,7 +59,7 @@ def probe(x, sweep, room):
     return (np.sqrt(best) if along >= 0.0 else -np.sqrt(best)), 0.0, travel
 
 
-@kernel
+@njit(cache=True)
 def probe_points(points, sweep):
     """(n, 3): level set, depth (distance to the rim, negative past it), travel."""
     found = np.empty((len(points), 3))

@@ -5,13 +5,12 @@ insertion; this is done anew at every cut.
 """
 
 import numpy as np
-
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = ["assign_slots", "fill_lanes", "order_pieces"]
 
 
-@kernel
+@njit(cache=True)
 def order_pieces(cells, node_count):
     """Sort the corners of each piece by node, and pieces by these rows of nodes.
 
@@ -62,7 +61,7 @@ def order_pieces(cells, node_count):
     return pieces, corner, nodes
 
 
-@inner
+@njit(cache=True)
 def _is_before(p, q, cells, order):
     for k in range(1, cells.shape[1]):
         mine, other = cells[p, order[p, k]], cells[q, order[q, k]]
@@ -71,7 +70,7 @@ def _is_before(p, q, cells, order):
     return False
 
 
-@kernel
+@njit(cache=True)
 def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, constants):
     """Write gradients of three corners, and Lamé parameters times volume, lane by lane.
 
@@ -99,7 +98,7 @@ def fill_lanes(pieces, corner, parent, gradients, volumes, lam, mu, lanes, const
         constants[batch, 10 * lanes + lane] = volumes[p] * mu[cell]
 
 
-@kernel
+@njit(cache=True)
 def assign_slots(pieces, corner, nodes, targets, starts, diagonal, window):
     """Give each block above the diagonal a slot from its first piece until its row is finished.
 

@@ -8,8 +8,8 @@ diagonal needs, as Σ_j K_ij = 0, is known when its row's turn comes.
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner
 from verify.xfem.lane_shuffles import add_to_records
 from verify.xfem.lane_vectors import load, mean, minus, no_lanes, store, transposed
 from verify.xfem.polar_kernels import LANES
@@ -19,7 +19,7 @@ __all__ = ["RECORD", "add_blocks", "add_forces", "finish_row"]
 RECORD = LANES  #: numbers in the record of a node or a slot: a line of the cache
 
 
-@inner(staged=True)
+@njit(cache=True)
 def add_forces(corners, start, v, at, nodes):
     """Add forces on the corners of `LANES` pieces.
 
@@ -39,7 +39,7 @@ def add_forces(corners, start, v, at, nodes):
         add_to_records(nodes, corners, 4 * start + corner, 4, v, (at + 3 * corner) * LANES, 3)
 
 
-@inner(staged=True)
+@njit(cache=True)
 def add_blocks(slots, start, v, at, waiting, ninths):
     """Add the blocks above the diagonal of `LANES` pieces.
 
@@ -64,7 +64,7 @@ def add_blocks(slots, start, v, at, waiting, ninths):
             ninths[slots[first + 6 * l]] += v[e + 8 * LANES + l]
 
 
-@inner(staged=True)
+@njit(cache=True)
 def finish_row(
     row, starts, diagonal, mirror, whole, slot_of, waiting, ninths, nodes, force, blocks
 ):  # fmt: skip

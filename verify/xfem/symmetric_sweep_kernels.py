@@ -6,7 +6,8 @@ are multiplied row by row in vectors of four numbers, so that vectors over the n
 component, which is zero (`vector_width`); others take general loops.
 """
 
-from verify.compiled import inner, kernel
+from numba import njit
+
 from verify.xfem.lane_shuffles import address
 from verify.xfem.lane_vectors import fetch, minus, plus, store
 from verify.xfem.node_vectors import (
@@ -31,14 +32,14 @@ def vector_width(size: int) -> int:
     return WIDTH if size == 3 else size
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _fetch_row(row, starts, diagonal, blocks):
     """Have the blocks of a row above the diagonal brought to the cache."""
     for place in range(9 * diagonal[row] + 9, 9 * starts[row + 1], _LINE):
         fetch(blocks, place)
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def solve_upper(starts, columns, diagonal, blocks, inverse, p, t, e, u):
     """Find t = (D + Lᵀ)⁻¹ p, with e = Lᵀ t and u = D t = p − e.
 
@@ -73,7 +74,7 @@ def solve_upper(starts, columns, diagonal, blocks, inverse, p, t, e, u):
                 t[row, k] += inverse[row, k, l] * u[row, l]
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _solve_upper_3(rows, starts, columns, diagonal, blocks, inverse, p, t, e, u):
     for row in range(rows - 1, -1, -1):
         if row >= _AHEAD:
@@ -93,7 +94,7 @@ def _solve_upper_3(rows, starts, columns, diagonal, blocks, inverse, p, t, e, u)
         store(t, WIDTH * row, add_rows(no_node(), inverse, 3 * WIDTH * row, WIDTH, rest))
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def solve_lower(starts, columns, diagonal, blocks, inverse, g, s):
     """Find s = (D + L)⁻¹ g; of g only D s is left.
 
@@ -124,7 +125,7 @@ def solve_lower(starts, columns, diagonal, blocks, inverse, g, s):
                     g[columns[at], l] -= blocks[at, k, l] * s[row, k]
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _solve_lower_3(rows, starts, columns, diagonal, blocks, inverse, g, s):
     for row in range(rows):
         if row + _AHEAD < rows:
@@ -139,7 +140,7 @@ def _solve_lower_3(rows, starts, columns, diagonal, blocks, inverse, g, s):
             store(g, other, add_rows(load_node(g, other), blocks, 9 * place, 3, negative))
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def add_lower_product(starts, columns, diagonal, blocks, s, out):
     """Add L s (N, `vector_width`) to `out`."""
     size = blocks.shape[1]
@@ -156,7 +157,7 @@ def add_lower_product(starts, columns, diagonal, blocks, s, out):
                     out[columns[at], l] += blocks[at, k, l] * s[row, k]
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _add_lower_product_3(rows, starts, columns, diagonal, blocks, s, out):
     for row in range(rows):
         if row + _AHEAD < rows:
@@ -168,7 +169,7 @@ def _add_lower_product_3(rows, starts, columns, diagonal, blocks, s, out):
         store(out, WIDTH * row, three(load_node(out, WIDTH * row)))
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def symmetric_product(starts, columns, diagonal, blocks, x, out):
     """Write K x (N, `vector_width`) to `out`."""
     out[:] = 0.0
@@ -187,7 +188,7 @@ def symmetric_product(starts, columns, diagonal, blocks, x, out):
     add_lower_product(starts, columns, diagonal, blocks, x, out)
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _symmetric_product_3(rows, starts, columns, diagonal, blocks, x, out):
     for row in range(rows):
         if row + _AHEAD < rows:

@@ -12,8 +12,8 @@ write one array and read another are not turned into vector instructions.
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.lane_shuffles import address, gather_records
 from verify.xfem.lane_vectors import fetch, load, store
 from verify.xfem.polar_kernels import LANES, mend_lane, rotation_matrix, turn_lanes
@@ -32,7 +32,7 @@ _AHEAD = 2  # batches by which constants are brought to the cache before they ar
 ENTRIES = 125  #: of the memory of the lanes
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _pack(displacement, velocity, implicit, motion):
     """Write displacement and displacement + implicit velocity of each node beside each other."""
     for node in range(len(displacement)):
@@ -42,14 +42,14 @@ def _pack(displacement, velocity, implicit, motion):
             motion[node, 3 + k] = u + implicit * velocity[node, k]
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _gather(corners, start, motion, v):
     for corner in range(4):
         first, at = 4 * start + corner, (_CORNERS + 6 * corner) * LANES
         gather_records(motion, corners, first, 4, v, at, 6)
 
 
-@inner(staged=True)
+@njit(cache=True)
 def _fetch_ahead(batch, batches, corners, slots, constants, quaternions, motion, waiting):
     """Have what comes next brought to the first cache while this batch is computed."""
     start = batch * LANES
@@ -70,7 +70,7 @@ def _fetch_ahead(batch, batches, corners, slots, constants, quaternions, motion,
         fetch(corners, 4 * (start + 2 * _AHEAD * LANES) + line)
 
 
-@inner(staged=True, inline="always")
+@njit(cache=True, inline="always")
 def _gradient_row(v, l, component, into, x, y, z):
     """Write one row of a gradient, from a component at the corners and rows of b_1, b_2, b_3."""
     at = (_CORNERS + component) * LANES + l
@@ -81,7 +81,7 @@ def _gradient_row(v, l, component, into, x, y, z):
     v[(into + 2) * LANES + l] = x[2] * p + y[2] * q + z[2] * r
 
 
-@inner(staged=True, fastmath={"contract"})
+@njit(cache=True, fastmath={"contract"})
 def _deform(v):
     """Write both deformation gradients."""
     for l in range(LANES):
@@ -100,7 +100,7 @@ def _deform(v):
             v[(_MOVED + k) * LANES + l] += 1.0
 
 
-@inner(staged=True, inline="always")
+@njit(cache=True, inline="always")
 def _block(v, at, l, x, y, z, p, q, r, wl, wm, sum_):
     """Write one block, K = w (λ a bᵀ + μ b aᵀ + μ a·b I), a = (x, y, z), b = (p, q, r)."""
     dot = wm * (x * p + y * q + z * r)
@@ -115,7 +115,7 @@ def _block(v, at, l, x, y, z, p, q, r, wl, wm, sum_):
     v[(at + 8) * LANES + l] = sum_ * z * r + dot
 
 
-@inner(staged=True, fastmath={"contract"})
+@njit(cache=True, fastmath={"contract"})
 def _resist(factor, v):
     """Write the forces on the corners and the blocks above the diagonal."""
     for l in range(LANES):
@@ -183,7 +183,7 @@ def _resist(factor, v):
         _block(v, _BLOCKS + 45, l, c0, c1, c2, d0, d1, d2, wl, wm, both)
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def linearise(
     v, corners, slots, constants, quaternions, ends, starts, diagonal, mirror, slot_of,
     displacement, velocity, implicit, turning, whole, factor, motion, waiting, ninths,
@@ -266,7 +266,7 @@ def linearise(
             row += 1
 
 
-@kernel(staged=True)
+@njit(cache=True)
 def unpack_rotations(pieces, quaternions, rotations):
     """Write the rotation matrices (p, 3, 3) of `pieces` (p,) from quaternions packed in lanes."""
     q = np.empty(4)

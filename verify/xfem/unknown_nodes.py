@@ -1,9 +1,9 @@
 """Numbers of the unknown nodes of a cut mesh, and on which side of the cuts each lies."""
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import kernel
 from verify.xfem.joining import PatchSlots
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.split import Partition
@@ -77,7 +77,7 @@ def node_sides(values: _Floats, cells: _Ints, label: NDArray[np.int8]) -> NDArra
     return side
 
 
-@kernel
+@njit(cache=True)
 def _write_sides(values, cells, label, side):
     disagreed = 2
     for p in range(len(cells)):

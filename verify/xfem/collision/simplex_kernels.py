@@ -6,7 +6,7 @@ do not take part, so that a caller can tell face, edge and vertex apart without 
 (regions of a triangle: C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
 """
 
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = [
     "box_gap",
@@ -17,7 +17,7 @@ __all__ = [
 ]
 
 
-@inner
+@njit(cache=True)
 def squared_distance(a, b):
     """Return |a − b|²."""
     total = 0.0
@@ -26,7 +26,7 @@ def squared_distance(a, b):
     return total
 
 
-@kernel
+@njit(cache=True)
 def nearest_on_facet(x, corners, weights):
     """Write the weights (k,) of the point of a facet that is nearest to x."""
     for k in range(len(weights)):
@@ -86,7 +86,7 @@ def nearest_on_facet(x, corners, weights):
     weights[0] = 1.0 - weights[1] - weights[2]
 
 
-@inner
+@njit(cache=True)
 def foot_on_facet(corners, weights, foot):
     """Write the point of a facet with these weights."""
     for i in range(len(foot)):
@@ -95,7 +95,7 @@ def foot_on_facet(corners, weights, foot):
             foot[i] += weights[k] * corners[k, i]
 
 
-@inner
+@njit(cache=True)
 def box_gap(x, low, high):
     """Squared distance of a point from a box, zero inside."""
     total = 0.0
@@ -105,7 +105,7 @@ def box_gap(x, low, high):
     return total
 
 
-@inner
+@njit(cache=True)
 def signed_volume(corners):
     """Give d! times the signed volume of a triangle (3, 2) or tetrahedron (4, 3)."""
     a = corners[0]

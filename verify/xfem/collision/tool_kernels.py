@@ -4,8 +4,8 @@ In numbers, not rows: sums and copies of rows take numba five times as long to c
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.collision.simplex_kernels import (
     foot_on_facet,
     nearest_on_facet,
@@ -18,7 +18,7 @@ __all__ = ["capsule_contacts", "segment_hits"]
 _DEEP = 128  # twice the height of any heap of boxes
 
 
-@inner
+@njit(cache=True)
 def _facets_near(start, end, radius, low, high, order):
     """Facets whose box meets that of a segment, widened by a radius."""
     found, stack = [np.int64(0) for _ in range(0)], np.empty(_DEEP, dtype=np.int64)
@@ -39,13 +39,13 @@ def _facets_near(start, end, radius, low, high, order):
     return found
 
 
-@inner
+@njit(cache=True)
 def _write(x, row, into):
     for i in range(len(x)):
         into[row, i] = x[i]
 
 
-@inner
+@njit(cache=True)
 def _pierce(start, end, corners, weights):
     """Share of the segment at which it pierces a facet, weights written; -1 if it does not."""
     size = len(corners)
@@ -77,7 +77,7 @@ def _pierce(start, end, corners, weights):
     return share
 
 
-@kernel
+@njit(cache=True)
 def segment_hits(start, end, points, facets, low, high, order):
     """Facets (q,) that a segment pierces, the share (q,) of it at each, and weights (q, k)."""
     size, space = facets.shape[1], len(start)
@@ -96,7 +96,7 @@ def segment_hits(start, end, points, facets, low, high, order):
     return found[:count], share[:count], at[:count]
 
 
-@inner
+@njit(cache=True)
 def _nearest_of_segments(p, q, a, b):
     """Shares (s on pq, t on ab) of the nearest points of two segments.
 
@@ -116,7 +116,7 @@ def _nearest_of_segments(p, q, a, b):
     return s, t
 
 
-@inner
+@njit(cache=True)
 def _segment_to_facet(start, end, corners, weights):
     """(distance, share of the segment) of the nearest points; weights on the facet written."""
     size, space = corners.shape
@@ -149,7 +149,7 @@ def _segment_to_facet(start, end, corners, weights):
     return np.sqrt(best), share
 
 
-@kernel
+@njit(cache=True)
 def capsule_contacts(start, end, radius, points, facets, low, high, order):
     """Facets (q,) within a radius of a segment: distance (q,), share (q,), weights (q, k)."""
     size, space = facets.shape[1], len(start)

@@ -5,8 +5,8 @@ is one sort and refitting one backward sweep, without recursion and without allo
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.collision.simplex_kernels import (
     box_gap,
     foot_on_facet,
@@ -27,7 +27,7 @@ __all__ = [
 _DEEP = 128  # deeper than any heap: twice its height is what a depth-first stack needs
 
 
-@kernel
+@njit(cache=True)
 def morton_codes(low, high):
     """Place (n,) of the boxes' centres on the Z-order curve of their common box."""
     count, space = low.shape
@@ -48,7 +48,7 @@ def morton_codes(low, high):
     return codes
 
 
-@kernel
+@njit(cache=True)
 def boxes_of_facets(points, facets, order, low, high):
     """Write the boxes of the facets, in this order, into the leaves of a heap."""
     count = len(order)
@@ -62,7 +62,7 @@ def boxes_of_facets(points, facets, order, low, high):
             low[count + leaf, i], high[count + leaf, i] = smallest, largest
 
 
-@kernel
+@njit(cache=True)
 def merge_boxes(low, high):
     """Make every inner box hold its two children."""
     for node in range(len(low) // 2 - 1, 0, -1):
@@ -71,7 +71,7 @@ def merge_boxes(low, high):
             high[node, i] = max(high[2 * node, i], high[2 * node + 1, i])
 
 
-@inner
+@njit(cache=True)
 def as_array(found):
     """Array (q,) of listed integers: `np.array` of a list takes longer to compile."""
     items = np.empty(len(found), dtype=np.int64)
@@ -80,7 +80,7 @@ def as_array(found):
     return items
 
 
-@kernel
+@njit(cache=True)
 def items_near_plane(low, high, order, box_low, box_high, normal, point, margin):
     """Items whose boxes meet a box, and come within a margin of a plane (normal 0: no plane)."""
     count = len(order)
@@ -105,7 +105,7 @@ def items_near_plane(low, high, order, box_low, box_high, normal, point, margin)
     return as_array(found)
 
 
-@inner
+@njit(cache=True)
 def nearest_facet(x, points, facets, body, wanted, low, high, order, limit, weights):
     """(facet, distance) nearest to x, weights written; -1 if none is nearer than the limit.
 
@@ -144,7 +144,7 @@ def nearest_facet(x, points, facets, body, wanted, low, high, order, limit, weig
     return found, np.sqrt(best)
 
 
-@kernel
+@njit(cache=True)
 def nearest_facets(queries, points, facets, body, wanted, low, high, order, limit):
     """`nearest_facet` of many points: facet (q,), distance (q,), weights (q, k)."""
     found = np.empty(len(queries), dtype=np.int64)

@@ -1,9 +1,8 @@
 """Distinct integers, ascending: a sort, which for a few thousand beats numpy's hashing."""
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-
-from verify.compiled import inner, kernel
 
 __all__ = ["distinct", "distinct_in_lists", "distinct_in_rows", "ranges"]
 
@@ -18,7 +17,7 @@ def distinct(values: _Ints) -> _Ints:
     return ordered[first]
 
 
-@kernel
+@njit(cache=True)
 def ranges(bounds):
     """Integers from the first up to the second bound of each row (k, 2), row after row."""
     count = 0
@@ -32,7 +31,7 @@ def ranges(bounds):
     return found
 
 
-@inner
+@njit(cache=True)
 def _note(item, place, found, count):
     """Write an integer to `found` unless it is there already; how many there are."""
     if place[item] < 0:
@@ -41,7 +40,7 @@ def _note(item, place, found, count):
     return count
 
 
-@inner
+@njit(cache=True)
 def _noted(place, found, count):
     """Return what has been found, and leave `place` as it was before."""
     for k in range(count):
@@ -49,7 +48,7 @@ def _noted(place, found, count):
     return found[:count]
 
 
-@kernel
+@njit(cache=True)
 def distinct_in_rows(table, rows, place):
     """Distinct integers of some rows of a table; `place` is -1 for each integer, and stays so."""
     found = np.empty(len(rows) * table.shape[1], dtype=np.int64)
@@ -60,7 +59,7 @@ def distinct_in_rows(table, rows, place):
     return _noted(place, found, count)
 
 
-@kernel
+@njit(cache=True)
 def distinct_in_lists(starts, items, rows, place):
     """Distinct integers of some lists, of which each begins where the one before ends."""
     room = 0

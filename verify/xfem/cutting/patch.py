@@ -1,9 +1,9 @@
 """A few cells of a mesh as a mesh of its own, so that work on them costs what they are."""
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import kernel
 from verify.xfem.cutting.distinct import distinct_in_lists, distinct_in_rows
 from verify.xfem.mesh import SimplexMesh
 
@@ -77,7 +77,7 @@ class PatchCutter:
         return MeshPatch(self.mesh.points, self.mesh.extent, cells, nodes, local, across)
 
 
-@kernel
+@njit(cache=True)
 def _local(mesh_cells, neighbours, cells, nodes, cell_place, node_place):
     local = np.empty((len(cells), mesh_cells.shape[1]), dtype=np.int64)
     across = np.empty_like(local)

@@ -8,9 +8,9 @@ is; otherwise the edge on which it was found does.
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import inner, kernel
 from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import RowNumbers, find_row, number_of_row
 from verify.xfem.zero_points import ZeroPoints
@@ -123,7 +123,7 @@ class PointNumbers:
         self._still_met.rows = self._still_met.rows[:count]
 
 
-@kernel
+@njit(cache=True)
 def _write_new(numbers, local, nodes, count, found, stores):
     """Write where points with numbers from `count` on are; of equal points the first is taken."""
     positions, ends, cut = found
@@ -139,7 +139,7 @@ def _write_new(numbers, local, nodes, count, found, stores):
         count += 1
 
 
-@inner
+@njit(cache=True)
 def spans(node, point, count, supports):
     """Whether a mesh node is among those that span the simplex of a point; `count` are nodes."""
     if point < count:
@@ -150,7 +150,7 @@ def spans(node, point, count, supports):
     return found
 
 
-@kernel
+@njit(cache=True)
 def _meet_nodes(zero, nodes, cuts, table, known, count, met):
     row = np.empty(2, dtype=np.int64)
     for n in range(len(nodes)):
@@ -166,7 +166,7 @@ def _meet_nodes(zero, nodes, cuts, table, known, count, met):
     return count
 
 
-@inner
+@njit(cache=True)
 def _merge(row, begin, end, value):
     """Insert a value into an ascending list padded with the largest integer."""
     for k in range(begin, end):
@@ -176,7 +176,7 @@ def _merge(row, begin, end, value):
             value, row[k] = row[k], value
 
 
-@inner
+@njit(cache=True)
 def runs_through(cut, node, met, pair):
     """Whether a cut runs exactly through a mesh node; `pair` (2,) is overwritten."""
     table, known, still = met
@@ -185,7 +185,7 @@ def runs_through(cut, node, met, pair):
     return at >= 0 and still[at]
 
 
-@kernel
+@njit(cache=True)
 def _number_points(ends, cut, local, nodes, numbers, supports, met, table, known, count):
     none, start, middle = np.iinfo(np.int64).max, np.int64(0), np.int64(_NODES)
     row = np.empty(_WIDTH, dtype=np.int64)

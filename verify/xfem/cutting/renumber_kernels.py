@@ -1,8 +1,8 @@
 """Pieces and unknowns of a patch before and after a cut: who descends from whom."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.short_sort import sort_short
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
 ]
 
 
-@kernel
+@njit(cache=True)
 def match_pieces(parent, label, side, solid, piece_label, first_piece, next_piece, old, changed):
     """Write the stored piece (p,) of which each piece of a patch is a part.
 
@@ -44,7 +44,7 @@ def match_pieces(parent, label, side, solid, piece_label, first_piece, next_piec
     return orphan
 
 
-@kernel
+@njit(cache=True)
 def slots_before(
     local, changed, patch_cells, patch_nodes, whole_cells, parent, label, values, solid, old,
     first_piece,
@@ -106,7 +106,7 @@ def slots_before(
     return cell, touched, home, every_solid, every_old
 
 
-@inner
+@njit(cache=True)
 def _place_in(ascending, value):
     """Place of the first that is not below a value (`np.searchsorted` takes longer to compile)."""
     low, high = 0, len(ascending)
@@ -119,7 +119,7 @@ def _place_in(ascending, value):
     return low
 
 
-@kernel
+@njit(cache=True)
 def simplices_of(cells, whole_cells, parent, piece, place, fraction):
     """Sub-simplices with a volume in pieces of some cells, cell by cell.
 
@@ -162,7 +162,7 @@ def simplices_of(cells, whole_cells, parent, piece, place, fraction):
     return rows, bounds
 
 
-@kernel
+@njit(cache=True)
 def number_unknowns(
     group, alive, home, touched, old, piece_cells, mesh_nodes, count, number, source
 ):
@@ -214,7 +214,7 @@ def number_unknowns(
     return count
 
 
-@kernel
+@njit(cache=True)
 def write_pieces(
     cell,
     group,
@@ -277,7 +277,7 @@ def write_pieces(
     return count
 
 
-@kernel
+@njit(cache=True)
 def retire(sub_piece, sub_range, cells):
     """Mark the sub-simplices of some cells as no longer in use."""
     for cell in cells:
@@ -285,7 +285,7 @@ def retire(sub_piece, sub_range, cells):
             sub_piece[k] = -1
 
 
-@kernel
+@njit(cache=True)
 def labelled(cells, cut, piece_label, first_piece, next_piece):
     """Whether any piece of each cell has a side of the cut."""
     found = np.zeros(len(cells), dtype=np.bool_)
@@ -297,7 +297,7 @@ def labelled(cells, cut, piece_label, first_piece, next_piece):
     return found
 
 
-@kernel
+@njit(cache=True)
 def separated(cells, label, numbers, cut, piece_label, first_piece, next_piece):
     """Whether a cut has split every stored piece of which each given piece may be a part.
 

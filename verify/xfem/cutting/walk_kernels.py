@@ -6,8 +6,8 @@ point whether it lies on the sweep and whether the blade has passed it. The tole
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.collision.tree_kernels import as_array, items_near_plane
 from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.sweep_kernels import probe
@@ -15,7 +15,7 @@ from verify.xfem.sweep_kernels import probe
 __all__ = ["cells_hit", "walk"]
 
 
-@inner
+@njit(cache=True)
 def _box_between(corners, travel, after, front, floor, ceiling):
     """Write the box of the part of a facet between two travels; whether there is any."""
     some = False
@@ -40,7 +40,7 @@ def _box_between(corners, travel, after, front, floor, ceiling):
     return some
 
 
-@kernel
+@njit(cache=True)
 def cells_hit(sweep, after, front, margin, low, high, order):
     """Items of a tree near what is swept between two travels; may hold doubles."""
     found = [np.int64(0) for _ in range(0)]
@@ -59,7 +59,7 @@ def cells_hit(sweep, after, front, margin, low, high, order):
     return as_array(found)
 
 
-@inner
+@njit(cache=True)
 def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, room):
     """(near the sweep, crossed through, latest travel) of a cell.
 
@@ -98,7 +98,7 @@ def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, roo
     return near, any_zero and through, latest
 
 
-@kernel
+@njit(cache=True)
 def walk(
     seeds,
     front,

@@ -14,8 +14,8 @@ keeps it to the end of the step, so that Newton's method does not alternate betw
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.polar_kernels import nearest_rotation
 
 __all__ = ["averaged_force", "is_moving", "stress"]
@@ -24,7 +24,7 @@ _REGULAR = 1e-6  # smallest pivot of U₀ + U₁ over its trace
 _STILL = 1e-26  # square of a relative change of C that is round-off
 
 
-@inner(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _product(A, B, transposed, out):
     """Write A B, or Aᵀ B, to `out`."""
     size = len(out)
@@ -36,7 +36,7 @@ def _product(A, B, transposed, out):
             out[k, l] = total
 
 
-@inner(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _inner(A, B):
     """Sum of the products of entries."""
     total = 0.0
@@ -46,7 +46,7 @@ def _inner(A, B):
     return total
 
 
-@inner(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _invert(A, out):
     """Write the inverse of the symmetric part of A (3, 3); False if not positive definite."""
     a, b, c = A[0, 0], A[1, 1], A[2, 2]
@@ -67,13 +67,13 @@ def _invert(A, out):
     return True
 
 
-@kernel(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def is_moving(square, size):
     """Whether a change of C, squared, is more than round-off of C, squared."""
     return square > _STILL * size
 
 
-@inner(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _secant_in_plane(R0, R1, t0, t1, T):
     """Write T; whether it is undefined, both traces being zero."""
     total = t0 + t1
@@ -85,7 +85,7 @@ def _secant_in_plane(R0, R1, t0, t1, T):
     return total <= 0.0
 
 
-@inner(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _secant(F0, F1, R0, R1, t0, t1, normal, substituted, work, T):
     """Write T (3, 3); whether it is the substitute. A normal that is not zero: a membrane's."""
     middle, A, B = work[0], work[1], work[2]
@@ -119,7 +119,7 @@ def _secant(F0, F1, R0, R1, t0, t1, normal, substituted, work, T):
     return True
 
 
-@kernel(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def stress(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, P):
     """Write P; whether the substitute was taken."""
     t0, t1 = _inner(R0, F0), _inner(R1, F1)
@@ -134,7 +134,7 @@ def stress(F0, F1, R0, R1, lam, mu, dim, normal, substituted, work, P):
     return taken
 
 
-@inner(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _deformation(nodes, b, displacement, normal, F):
     """Write the deformation gradient; that of a membrane without its normal."""
     for k in range(len(F)):
@@ -146,7 +146,7 @@ def _deformation(nodes, b, displacement, normal, F):
                 F[k, l] += displacement[nodes[i], k] * b[i, l]
 
 
-@kernel(error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def averaged_force(
     cells, gradients, parent, volumes, normals, lam, mu, first, second, start, end,
     substituted, force,

@@ -12,9 +12,9 @@ loops it would be half of the time that all of the solver takes to compile.
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import kernel
 from verify.xfem.dynamics.averaged_stress_kernels import is_moving
 from verify.xfem.polar_kernels import nearest_rotation
 
@@ -180,7 +180,7 @@ def add_averaged_stiffness(
     _add(targets, np.einsum("piklm,pjm->pijkl", half, b, optimize=True), blocks)
 
 
-@kernel
+@njit(cache=True)
 def _add(targets, element, blocks):
     for piece in range(element.shape[0]):
         for i in range(element.shape[1]):

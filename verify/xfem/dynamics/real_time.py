@@ -6,9 +6,9 @@ always has a solution. Nothing is allocated per step with the linear solvers of 
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import kernel
 from verify.xfem.cholesky import Cholesky
 from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.dynamics.body import DynamicBody, MotionState
@@ -174,7 +174,7 @@ class RealTimeEuler:
         )  # fmt: skip
 
 
-@kernel
+@njit(cache=True)
 def _held_entries(starts, columns, diagonal, fixed):
     """Entries of the blocks, flat, in a row or column of a fixed component, but the diagonal's."""
     space = fixed.shape[1]
@@ -196,7 +196,7 @@ def _held_entries(starts, columns, diagonal, fixed):
     return found[:count].copy()
 
 
-@kernel
+@njit(cache=True)
 def _driven_change(supported, fixed, where, displacement, velocity, step_size, change):
     """Write the change of velocity that brings supported nodes to their place; whether any does."""
     driven = False
@@ -209,7 +209,7 @@ def _driven_change(supported, fixed, where, displacement, velocity, step_size, c
     return driven
 
 
-@kernel
+@njit(cache=True)
 def _hold(diagonal, supported, fixed, held, change, blocks, load):
     """Decouple fixed components, and let their change be what it is to be."""
     flat = blocks.reshape(-1)
@@ -223,7 +223,7 @@ def _hold(diagonal, supported, fixed, held, change, blocks, load):
                 load[i, k] = blocks[diagonal[i], k, k] * change[i, k]
 
 
-@kernel
+@njit(cache=True)
 def _extrapolate(last, before, first, guess):
     """Write what a parabola through three of them (N, d) gives next."""
     for i in range(guess.shape[0]):
@@ -231,14 +231,14 @@ def _extrapolate(last, before, first, guess):
             guess[i, k] = 3.0 * (last[i, k] - before[i, k]) + first[i, k]
 
 
-@kernel
+@njit(cache=True)
 def _add_mass(blocks, places, values, scale):
     for entry in range(len(values)):
         for k in range(blocks.shape[1]):
             blocks[places[entry], k, k] += scale * values[entry]
 
 
-@kernel
+@njit(cache=True)
 def _advance(change, step_size, velocity, displacement):
     """Apply the change of velocity unless it is not finite; whether it was."""
     total = 0.0

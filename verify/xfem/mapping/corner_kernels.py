@@ -1,14 +1,14 @@
 """Where corners of facets lie in their elements, and with which nodes of these they move."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import kernel
 from verify.xfem.cutting.point_numbers import spans
 
 __all__ = ["place_corners"]
 
 
-@kernel
+@njit(cache=True)
 def place_corners(ids, at, source, piece, cell, inner, cells, points, supports):
     """Find the corners of parts of facets.
 

@@ -5,15 +5,15 @@ blade meets a hundred facets, and with so few only the number of calls costs.
 """
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.mapping.locate_kernels import cut_at
 from verify.xfem.row_numbers import number_of_row
 
 __all__ = ["divide_facets"]
 
 
-@inner
+@njit(cache=True)
 def _crossed_edges(facets, values):
     """Give ends (z, 2), plus first, of edges that the cut crosses, and those (f, 3) of each facet.
 
@@ -39,7 +39,7 @@ def _crossed_edges(facets, values):
     return known[:found], of_facet
 
 
-@inner
+@njit(cache=True)
 def _points_on_edges(ends, values, points):
     """Positions (z, 3) where the level set is zero, and shares (z, 2) of both ends."""
     share, at = np.empty((len(ends), 2)), np.empty((len(ends), points.shape[1]))
@@ -53,7 +53,7 @@ def _points_on_edges(ends, values, points):
     return at, share
 
 
-@inner
+@njit(cache=True)
 def _write(end, out, f, corners, a, b, c, at, side):
     """Write a part of facet f unless it has a corner twice; give the end.
 
@@ -69,7 +69,7 @@ def _write(end, out, f, corners, a, b, c, at, side):
     return end + 1
 
 
-@inner
+@njit(cache=True)
 def _number_points(edges, place, share, known):
     """Give the points on edges their numbers (z,), new ones from `known` on, and count these.
 
@@ -88,7 +88,7 @@ def _number_points(edges, place, share, known):
     return number, count
 
 
-@inner
+@njit(cache=True)
 def _take_corners(f, facets, of_facet, inside, corners, where):
     """Write the corners of a facet; which edge is not crossed, and whether the others are split."""
     alone, through, crossed = np.int64(0), True, False
@@ -103,7 +103,7 @@ def _take_corners(f, facets, of_facet, inside, corners, where):
     return alone, crossed and through
 
 
-@kernel
+@njit(cache=True)
 def divide_facets(
     facets, values, points, cut, reach, low, high, order, cells, nodes, gradients,
     piece_label, first_piece, next_piece,

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import inner, kernel
 from verify.xfem.cutting.point_numbers import runs_through
 from verify.xfem.row_numbers import find_row, number_of_row
 
@@ -67,13 +67,13 @@ class EdgeRecord(NamedTuple):
     met: tuple[_Ints, _Ints, NDArray[np.bool_]]
 
 
-@inner
+@njit(cache=True)
 def _write_ends(x, y, row):
     """Write the row of the edge between two points, none of which is that of a line."""
     row[0], row[1], row[2], row[_FACE] = -1, min(x, y), max(x, y), _NONE
 
 
-@kernel
+@njit(cache=True)
 def unrecorded(numbers, nodes, recorded):
     """Zero points among some points that have not been recorded, each once; they are from now."""
     found, count = np.empty(len(numbers), dtype=np.int64), 0
@@ -85,7 +85,7 @@ def unrecorded(numbers, nodes, recorded):
     return found[:count]
 
 
-@kernel
+@njit(cache=True)
 def record_points(
     zero, supports, ends, crossed, faced, edge_line, table, known, lines, first, tally, entries,
     used,
@@ -124,7 +124,7 @@ def record_points(
     return lines, used
 
 
-@inner
+@njit(cache=True)
 def _join(number, nodes, supports, row):
     """Insert the mesh nodes of a point into the ascending row[:3]; False if there is no room."""
     for k in range(1 if number < nodes else _NODES):
@@ -139,19 +139,19 @@ def _join(number, nodes, supports, row):
     return True
 
 
-@inner
+@njit(cache=True)
 def _place(number, i, record):
     nodes = len(record.nodes)
     return record.nodes[number, i] if number < nodes else record.positions[number - nodes, i]
 
 
-@inner
+@njit(cache=True)
 def _after(at, number, than, other):
     """Whether a point comes after another on a line; equal places are ordered by number."""
     return at > than or (at == than and number > other)
 
 
-@inner
+@njit(cache=True)
 def _direct(x, y, line, record):
     """Set the direction of a line if it has none, or one from points that nearly coincide.
 
@@ -188,7 +188,7 @@ def _direct(x, y, line, record):
         direction[i] = step if along >= 0.0 else -step
 
 
-@inner
+@njit(cache=True)
 def _between(x, y, line, record):
     """Give (a point of the line's list strictly between x and y or -1, its share from x to y).
 
@@ -220,7 +220,7 @@ def _between(x, y, line, record):
     return -1, 0.0
 
 
-@inner
+@njit(cache=True)
 def _on_cut(number, line, record, row):
     """Whether a point lies on the cut of a line, if that is a line in a face."""
     nodes, cut = len(record.nodes), record.known[line, _FACE]
@@ -234,7 +234,7 @@ def _on_cut(number, line, record, row):
     return found
 
 
-@inner
+@njit(cache=True)
 def _lines(x, y, nodes, supports, faced, edge_line, table, known, tally, row, found):
     """Write the lines on which an edge may lie that have other points than its ends; their count.
 
@@ -272,7 +272,7 @@ def _lines(x, y, nodes, supports, faced, edge_line, table, known, tally, row, fo
     return count
 
 
-@inner
+@njit(cache=True)
 def _copy(ids, places, k, into_ids, into_places, at):
     for a in range(3):
         into_ids[at, a] = ids[k, a]
@@ -280,7 +280,7 @@ def _copy(ids, places, k, into_ids, into_places, at):
             into_places[at, a, i] = places[k, a, i]
 
 
-@inner
+@njit(cache=True)
 def _replace(ids, places, k, begin, end, replaced, z, share):
     """Move a corner of a triangle to a point of its edge; whether it is still a triangle."""
     for i in range(places.shape[2]):
@@ -290,7 +290,7 @@ def _replace(ids, places, k, begin, end, replaced, z, share):
     return ids[k, 0] != ids[k, 1] and ids[k, 1] != ids[k, 2] and ids[k, 2] != ids[k, 0]
 
 
-@kernel
+@njit(cache=True)
 def bisect_facets(facets, at, record, room):
     """Bisect triangles (t, 3) at all recorded points on their edges.
 

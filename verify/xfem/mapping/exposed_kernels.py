@@ -1,14 +1,14 @@
 """Facets of elements and of their sub-simplices that lie on the surface of the material."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.mapping.partner_kernels import partner
 
 __all__ = ["exposed_facets"]
 
 
-@inner
+@njit(cache=True)
 def _same_facet(s, skip, t, other, sub_points):
     """Whether the facets of two simplices opposite to these corners have the same points."""
     corners, same = sub_points.shape[1], True
@@ -20,7 +20,7 @@ def _same_facet(s, skip, t, other, sub_points):
     return same
 
 
-@inner
+@njit(cache=True)
 def _find_facet(s, skip, begin, end, sub_points):
     """Give another simplex from `begin` to `end` with the facet of s opposite to `skip`, or -1."""
     corners, total = sub_points.shape[1], -sub_points[s, skip]
@@ -39,7 +39,7 @@ def _find_facet(s, skip, begin, end, sub_points):
     return -1
 
 
-@inner
+@njit(cache=True)
 def _mark_shared(begin, end, sub_piece, sub_points, sums, shared):
     """Mark the facets (k, d + 1) that two simplices of one piece share; `sums` (k,) is room."""
     corners = sub_points.shape[1]
@@ -61,7 +61,7 @@ def _mark_shared(begin, end, sub_piece, sub_points, sums, shared):
                         shared[s - begin, skip] = shared[t - begin, other] = True
 
 
-@inner
+@njit(cache=True)
 def _face_of(barycentric, skip):
     """Corner opposite to the face of the element in which a facet lies, or -1."""
     for a in range(barycentric.shape[1]):
@@ -73,7 +73,7 @@ def _face_of(barycentric, skip):
     return -1
 
 
-@inner
+@njit(cache=True)
 def _meets(piece, other, cell, across, opposite, cells, piece_cells):
     """Whether pieces of two cells move together at the nodes of the face between these."""
     same = True
@@ -84,7 +84,7 @@ def _meets(piece, other, cell, across, opposite, cells, piece_cells):
     return same
 
 
-@inner
+@njit(cache=True)
 def _is_whole(points, skip, nodes):
     """Whether a facet is a whole face of the element: all its points are nodes."""
     whole = True
@@ -96,7 +96,7 @@ def _is_whole(points, skip, nodes):
     return whole
 
 
-@inner
+@njit(cache=True)
 def _beyond(
     piece, cell, opposite, neighbours, cells, piece_cells, sub_range, sub_piece,
     sub_points, sub_barycentric, sub_sign, orientation, out, count,
@@ -131,7 +131,7 @@ def _beyond(
     return count
 
 
-@inner
+@njit(cache=True)
 def _rows(room, corners):
     """Point numbers, barycentric corners, piece, cell and whether on a cut, not yet written."""
     return (
@@ -143,7 +143,7 @@ def _rows(room, corners):
     )
 
 
-@inner
+@njit(cache=True)
 def _with_room(out, count, more):
     """Give the same rows with room for more, and as many again."""
     new = _rows(2 * (count + more), out[1].shape[2])
@@ -156,7 +156,7 @@ def _with_room(out, count, more):
     return new
 
 
-@kernel
+@njit(cache=True)
 def exposed_facets(
     wanted, split, cells, neighbours, piece_cells, first_piece, next_piece,
     sub_range, sub_piece, sub_points, sub_barycentric, sub_sign, orientation,
@@ -257,7 +257,7 @@ def exposed_facets(
     return ids[:count], at[:count], piece_of[:count], cell_of[:count], inner[:count]
 
 
-@inner
+@njit(cache=True)
 def _turn(ids, at, sign, skipped):
     """Orient the facet opposite to a corner of a simplex of that orientation outwards."""
     if (sign > 0) == (skipped % 2 == 0):

@@ -5,8 +5,7 @@ largest; on a common face several elements tie.
 """
 
 import numpy as np
-
-from verify.compiled import inner, kernel
+from numba import njit
 
 __all__ = [
     "barycentric",
@@ -24,7 +23,7 @@ _INWARDS = 1e-5  # how far from a corner to the centre of its facet its piece is
 _SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on the face
 
 
-@inner
+@njit(cache=True)
 def barycentric(x, cell, cells, points, gradients, out):
     """Write the barycentric coordinates (d + 1,) of x; return the smallest."""
     smallest, origin = np.inf, points[cells[cell, 0]]
@@ -37,7 +36,7 @@ def barycentric(x, cell, cells, points, gradients, out):
     return smallest
 
 
-@inner
+@njit(cache=True)
 def _first_reach(x, reach, low, high, order, stack):
     """Give the reach, doubled until the box of a cell comes within it."""
     least, top = np.inf, 1
@@ -59,7 +58,7 @@ def _first_reach(x, reach, low, high, order, stack):
     return reach
 
 
-@inner
+@njit(cache=True)
 def _cells_about(x, reach, low, high, order, stack, found):
     """Write the cells whose boxes come within reach of x; give their count."""
     count, top = 0, 1
@@ -80,7 +79,7 @@ def _cells_about(x, reach, low, high, order, stack, found):
     return count
 
 
-@inner
+@njit(cache=True)
 def locate(x, reach, low, high, order, cells, points, gradients):
     """Give the cell of x."""
     trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
@@ -108,7 +107,7 @@ def locate(x, reach, low, high, order, cells, points, gradients):
     return at
 
 
-@kernel
+@njit(cache=True)
 def locate_many(places, reach, low, high, order, cells, points, gradients):
     """Cells (q,), barycentric coordinates (q, d + 1)."""
     found = np.empty(len(places), dtype=np.int64)
@@ -119,7 +118,7 @@ def locate_many(places, reach, low, high, order, cells, points, gradients):
     return found, at
 
 
-@kernel
+@njit(cache=True)
 def cut_at(
     places, cut, reach, low, high, order, cells, points, gradients,
     piece_label, first_piece, next_piece,
@@ -147,7 +146,7 @@ def cut_at(
     return found
 
 
-@inner
+@njit(cache=True)
 def _depth(x, cell, least, cells, points, gradients):
     """Give the smallest barycentric coordinate of x, or one that is at most `least`."""
     smallest, origin, a = np.inf, cells[cell, 0], 0
@@ -160,7 +159,7 @@ def _depth(x, cell, least, cells, points, gradients):
     return smallest
 
 
-@inner
+@njit(cache=True)
 def _among(x, reach, some, floor, ceiling, cells, points, gradients):
     """Give the cell of x of some cells, as `locate` does of all; -1 if x is in the box of none."""
     best, at = -np.inf, np.int64(-1)
@@ -178,7 +177,7 @@ def _among(x, reach, some, floor, ceiling, cells, points, gradients):
     return at
 
 
-@kernel
+@njit(cache=True)
 def corner_cells(
     chosen, corners, facet, likely, near_start, near, floor, ceiling,
     reach, low, high, order, cells, points, gradients, found, weights, at,
@@ -226,7 +225,7 @@ def corner_cells(
                 weights[q, k, a] /= total
 
 
-@kernel
+@njit(cache=True)
 def place_parts(
     vertices, facets, source, parts, whole, known_cell, known_weights, known_at,
     near_start, near, floor, ceiling, reach, low, high, order, cells, points, gradients,
@@ -288,7 +287,7 @@ def place_parts(
     return places, cell, weights, at
 
 
-@kernel
+@njit(cache=True)
 def corner_pieces(cell, at, label, levels, cells, piece_label, first_piece, next_piece):
     """Piece (q, k) of each corner of facets, from its cell and the place `at` inside the facet.
 

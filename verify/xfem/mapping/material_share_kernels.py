@@ -1,11 +1,11 @@
 """Whether a point of a virtual element lies in its piece's share of the material."""
 
-from verify.compiled import inner
+from numba import njit
 
 __all__ = ["is_material"]
 
 
-@inner
+@njit(cache=True)
 def is_material(piece, cell, at, cells, piece_label, levels):
     """Whether the level sets at barycentric coordinates have the signs of the piece."""
     for cut in range(piece_label.shape[1]):

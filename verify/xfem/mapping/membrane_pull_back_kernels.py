@@ -1,8 +1,8 @@
 """Where on a membrane the material is that is nearest to a tool: a walk down in distance."""
 
 import numpy as np
+from numba import njit
 
-from verify.compiled import inner, kernel
 from verify.xfem.collision.simplex_kernels import (
     foot_on_facet,
     nearest_on_facet,
@@ -17,7 +17,7 @@ _ON_EDGE = -1e-12  # barycentric coordinates: that far outside is on the edge
 _NEARER = 1.0 - 1e-12  # a neighbour is nearer if its squared distance is less than that share
 
 
-@inner
+@njit(cache=True)
 def _distance(place, piece, cell, displacement, points, cells, piece_cells, simplex, at):
     """Squared distance to the deformed virtual element; writes the weights of its nearest point."""
     for a in range(3):
@@ -29,7 +29,7 @@ def _distance(place, piece, cell, displacement, points, cells, piece_cells, simp
     return squared_distance(place, foot)
 
 
-@inner
+@njit(cache=True)
 def _beyond(place, piece, cell, displacement, points, cells, piece_cells, simplex):
     """Whether the foot of the perpendicular on the plane of an element lies outside of it."""
     for a in range(3):
@@ -52,7 +52,7 @@ def _beyond(place, piece, cell, displacement, points, cells, piece_cells, simple
     return False
 
 
-@inner
+@njit(cache=True)
 def _step(
     place, piece, least, at, trial, simplex, displacement, points, cells, neighbours,
     piece_cells, piece_parent, first_piece, next_piece,
@@ -97,7 +97,7 @@ def _step(
     return -2 if free else -1
 
 
-@kernel
+@njit(cache=True)
 def pull_back_to_membrane(
     places, pieces, displacement, points, cells, neighbours,
     piece_cells, piece_parent, piece_label, first_piece, next_piece, levels,

@@ -7,9 +7,9 @@ gets is the same.
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from verify.compiled import kernel
 from verify.xfem.errors import XfemError
 from verify.xfem.growing_array import GrowingArray
 from verify.xfem.row_numbers import RowNumbers, number_of_row
@@ -187,7 +187,7 @@ class MovingSurface:
         return seen[1]
 
 
-@kernel
+@njit(cache=True)
 def _add(
     point, material, weights, counts, piece, piece_cells, owner, table, known, count,
     begin, places, nodes, shares, facets, bounds,
@@ -219,7 +219,7 @@ def _add(
     return count
 
 
-@kernel
+@njit(cache=True)
 def _interpolate(material, nodes, weights, displacement, out):
     for v in range(len(nodes)):
         for i in range(material.shape[1]):
@@ -229,7 +229,7 @@ def _interpolate(material, nodes, weights, displacement, out):
             out[v, i] = total
 
 
-@kernel
+@njit(cache=True)
 def _spread(nodes, weights, forces, out):
     for v in range(len(nodes)):
         for k in range(nodes.shape[1]):

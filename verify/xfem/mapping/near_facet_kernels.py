@@ -1,13 +1,12 @@
 """Level sets at the vertices of a surface, and which of its facets a cut concerns."""
 
 import numpy as np
-
-from verify.compiled import kernel
+from numba import njit
 
 __all__ = ["concerned_facets", "levels_at"]
 
 
-@kernel
+@njit(cache=True)
 def levels_at(vertices, vertex_cell, vertex_at, cells, nodal, snap):
     """Interpolate a nodal level set at some vertices: zero within `snap`.
 
@@ -27,7 +26,7 @@ def levels_at(vertices, vertex_cell, vertex_at, cells, nodal, snap):
     return values, above and below
 
 
-@kernel
+@njit(cache=True)
 def concerned_facets(near, facets, nodes, values, moved, corner_cell, is_moved, place):
     """Facets that lie on both sides of a cut or touch it, or in cells that have moved apart.
 

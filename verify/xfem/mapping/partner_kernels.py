@@ -1,11 +1,11 @@
 """The piece on the other side of a face: the one that moves with the same unknowns there."""
 
-from verify.compiled import inner
+from numba import njit
 
 __all__ = ["partner"]
 
 
-@inner
+@njit(cache=True)
 def partner(piece, cell, opposite, cells, neighbours, piece_cells, first_piece, next_piece):
     """Give the piece across the face of the cell opposite to a corner, -1 if there is none."""
     other = neighbours[cell, opposite]

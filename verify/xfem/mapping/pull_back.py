@@ -5,9 +5,9 @@ piece through faces whose unknowns they share, so it never passes through a cut.
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from verify.compiled import inner, kernel
 from verify.xfem.collision.simplex_kernels import signed_volume
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
@@ -84,7 +84,7 @@ def pull_back(
     )
 
 
-@inner
+@njit(cache=True)
 def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, simplex, at):
     """Write the barycentric coordinates of a place in the deformed virtual element."""
     corners, space = simplex.shape
@@ -102,7 +102,7 @@ def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, s
     return least
 
 
-@kernel
+@njit(cache=True)
 def _pull_back(
     places, pieces, displacement, points, cells, neighbours,
     piece_cells, piece_parent, piece_label, first_piece, next_piece, levels,
