@@ -27,6 +27,9 @@ __all__ = ["Session"]
 
 _Floats = NDArray[np.float64]
 
+# steps before a hook begins: in these two pieces are done in each, in the last no cut is begun
+_SOON, _LAST = 8, 3
+
 
 class Session:
     """A played scene.
@@ -40,7 +43,8 @@ class Session:
     spread : bool
         Whether what a cut asks for is spread over steps, of which each does one of the pieces of
         `StagedCut`. At most `MOST` elements are split by a cut; the others wait for the next one. A
-        replay is the same on any machine. Until the mechanics follow, new unknowns move as those
+        replay is the same on any machine. Before a hook begins two pieces are done in each step, so
+        that little is left when it does. Until the mechanics follow, new unknowns move as those
         from which they come, so that nothing jumps.
     clock : callable
         What phases are timed by: wall time in s, or `time.thread_time` where other work on the
@@ -139,9 +143,11 @@ class Session:
         if hooks:
             self._finish()
         busy = self._work is not None
-        if self._work is None:
+        if self._work is None and (hooks or not self._hook_is_due(_LAST)):
             self._work = self._cut(self._next_stroke(end))
         busy = self._advance() or busy
+        if self._hook_is_due(_SOON):
+            self._advance()
         if not self._spread:
             self._finish()
         if hooks:
@@ -227,6 +233,12 @@ class Session:
     def _hooks_to_begin(self, time: float) -> list[int]:
         hooks = enumerate(self.stage.hooks)
         return [n for n, hook in hooks if n not in self._start and hook.begin < time]
+
+    def _hook_is_due(self, steps: int) -> bool:
+        """Whether work that is spread must be done soon: a hook finishes it as it begins."""
+        if not self._spread:
+            return False
+        return bool(self._hooks_to_begin(self._end_of_step() + steps * self.stage.time_step))
 
     def _grip(self, hooks: list[int]) -> None:
         """Let hooks grip the body where it is now."""

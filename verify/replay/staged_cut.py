@@ -97,10 +97,11 @@ class StagedCut:
         yield increment
         with self.timed("assembly"):
             other = solver.extended(body.pattern, increment.source, held_nodes(body))
-        if other.is_worn:
+        worn = other.is_worn
+        if worn:
             renewing = other.renewing(body.pattern, held_nodes(body))
             other = yield from self._each("assembly", renewing, increment)
-        if len(increment.cells) > MANY:
+        if worn or len(increment.cells) > MANY:
             yield increment
         with self.timed("assembly"):
             body.force.prepare(body.pattern)
