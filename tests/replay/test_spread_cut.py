@@ -82,6 +82,25 @@ def test_an_element_is_split_within_ten_steps_of_being_crossed(hand) -> None:
         assert all(record.busy for record in session.records[k - 1 : k + 7])
 
 
+def test_nothing_is_left_of_a_cut_when_a_hook_begins_so_its_step_is_no_long_one(hand) -> None:
+    """The stroke goes on: that step splits what was crossed in the three before, no more."""
+    scene = incised(hand)
+    session = Session(scene, account=False, spread=True)
+    begins = scene.hooks[0].begin
+    while session.time + scene.time_step <= begins:
+        session.step()
+    assert session._work is None
+    assert len(session.displacement) == len(session.state.displacement)
+    before = session.records[-1].split
+    session.step()
+    crossed = session.cutter.crossings
+    assert session.records[-1].split > before
+    late = (begins - crossed.leave[before:]) / scene.time_step
+    assert late.max() <= 4.0 * (
+        1.0 + 1e-9
+    )  # the step of the last look, and three in which none began
+
+
 def test_elements_beyond_the_most_of_a_cut_wait_and_are_split_like_the_others(
     hand, played, monkeypatch
 ) -> None:

@@ -18,7 +18,8 @@ def faults() -> int:
 def test_a_step_that_cuts_touches_hardly_a_fresh_page(hand) -> None:
     """Without room made beforehand some steps touch 200 pages and more, 3 to 13 microseconds each.
 
-    What is left is the interpreter's own: it takes room for its small objects in its own way.
+    What is left is the interpreter's own: it takes room for its small objects in its own way. Seen:
+    15 at most in a step, 108 in all, and nothing in a third replay; the bounds lie between.
     """
     Session(slashed(hand), account=False, spread=True).step()  # loads what is compiled
     session = Session(slashed(hand), account=False, spread=True)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from verify.xfem.cutting.distinct import distinct
 from verify.xfem.cutting.patch import MeshPatch
-from verify.xfem.joining import PatchSlots
 from verify.xfem.split import Partition
 
 __all__ = ["Division"]
@@ -34,8 +33,6 @@ class Division:
         Piece of the body from which it comes.
     changed : (q,) bool array
         Whether it is not the same.
-    slots : PatchSlots
-        How the corners of pieces are joined.
     """
 
     patch: MeshPatch
@@ -47,7 +44,6 @@ class Division:
     solid: NDArray[np.bool_]
     old: _Ints
     changed: NDArray[np.bool_]
-    slots: PatchSlots
 
     @cached_property
     def changed_cells(self) -> _Ints:

@@ -265,14 +265,12 @@ class GrowingBody:
             left = np.flatnonzero(orphans & solid)
             if len(left):
                 raise XfemError(f"a cut would join parts of cell {cell[left[0]]} that are separate")
-        slots = join_slots(patch, partition)
-        return Division(
-            patch, partition, numbers, cell, label, fraction, solid, old, changed, slots
-        )
+        return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
 
     def _renumber(self, state: Division) -> _Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
-        patch, partition, slots = state.patch, state.partition, state.slots
+        patch, partition = state.patch, state.partition
+        slots = join_slots(patch, partition)
         cell, touched, home, solid, old = slots_before(
             slots.cells[slots.piece_cell],
             np.searchsorted(patch.whole_cells, state.changed_cells),
