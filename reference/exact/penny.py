@@ -67,24 +67,25 @@ class Penny(ExactSolution):
         return np.column_stack([spread * s[:, 0], spread * s[:, 1], across]) @ self._axes
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, 3, 3); infinite at the front. See `ExactSolution`."""
+        """Displacement gradient (n, 3, 3), nan at the front. See `ExactSolution`."""
         s, z, upper, f = self._evaluate(points, near)
         nu, scale, strain = self._ratio, self._scale, self._tension / self._young
         x, y = s[:, 0], s[:, 1]
         square = x**2 + y**2
-        spread = scale * ((1 - 2 * nu) * f.r_r + z * f.rz_r) - nu * strain
-        # (1/r) ∂_r of f_r/r and f_rz/r, by harmonicity: f_rr = −f_r/r − f_zz, and so for f_z
+        # on the axis 0/0, and at the front ∞ − ∞: the limit depends on the way there
         with np.errstate(divide="ignore", invalid="ignore"):
+            spread = scale * ((1 - 2 * nu) * f.r_r + z * f.rz_r) - nu * strain
+            # (1/r) ∂_r of f_r/r and f_rz/r, by harmonicity: f_rr = −f_r/r − f_zz, and so for f_z
             bend = ((1 - 2 * nu) * (-2 * f.r_r - f.zz) + z * (-2 * f.rz_r - f.zzz)) / square
-        bend = np.where(square > 0.0, scale * bend, 0.0)
-        by_z = scale * ((1 - 2 * nu) * f.rz_r + f.rz_r + z * f.zzr_r) * upper
-        rise_r = scale * (-2 * (1 - nu) * f.rz_r + z * f.zzr_r) * upper
-        rise_z = scale * (-2 * (1 - nu) * f.zz + f.zz + z * f.zzz) + strain
-        gradient = np.empty((len(s), 3, 3))
-        gradient[:, 0] = np.column_stack([spread + bend * x * x, bend * x * y, by_z * x])
-        gradient[:, 1] = np.column_stack([bend * x * y, spread + bend * y * y, by_z * y])
-        gradient[:, 2] = np.column_stack([rise_r * x, rise_r * y, rise_z])
-        turned: Array = self._axes.T @ gradient @ self._axes
+            bend = np.where(square > 0.0, scale * bend, 0.0)
+            by_z = scale * ((1 - 2 * nu) * f.rz_r + f.rz_r + z * f.zzr_r) * upper
+            rise_r = scale * (-2 * (1 - nu) * f.rz_r + z * f.zzr_r) * upper
+            rise_z = scale * (-2 * (1 - nu) * f.zz + f.zz + z * f.zzz) + strain
+            gradient = np.empty((len(s), 3, 3))
+            gradient[:, 0] = np.column_stack([spread + bend * x * x, bend * x * y, by_z * x])
+            gradient[:, 1] = np.column_stack([bend * x * y, spread + bend * y * y, by_z * y])
+            gradient[:, 2] = np.column_stack([rise_r * x, rise_r * y, rise_z])
+            turned: Array = self._axes.T @ gradient @ self._axes
         return turned
 
     def _evaluate(

@@ -58,6 +58,21 @@ def test_the_gradient_is_the_derivative_of_the_displacement(name, material, poin
     assert np.abs(u.gradient(points) - expected).max() < 1e-5 * scale
 
 
+@pytest.mark.parametrize(
+    "name, parameters",
+    [
+        ("tip", {"tip": [1.0, 0.0], "intensity": [1.0, 0.7]}),
+        ("griffith", {"a": 1.0, "stress": [0.0, 1.0, 0.0]}),
+    ],
+)
+def test_at_a_tip_there_is_no_gradient_which_is_said_without_a_warning(name, parameters):
+    u = exact_solution(name, parameters, STRAIN)
+    with np.errstate(all="raise"):
+        gradient = u.gradient(np.array([[1.0, 0.0], [1.0, 1e-12]]))
+    assert np.isnan(gradient[0]).all()
+    assert np.isfinite(gradient[1]).all()
+
+
 @pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])
 @pytest.mark.parametrize("name", SOLUTIONS)
 def test_the_stress_is_in_equilibrium_with_the_body_force(name, material, points):

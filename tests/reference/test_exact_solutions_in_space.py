@@ -114,6 +114,15 @@ def test_a_penny_is_finite_and_continuous_at_its_front():
     assert at == pytest.approx(u.displacement(front + 1e-12 * normal), abs=1e-5)
 
 
+def test_at_its_front_a_penny_has_no_gradient_and_says_so_without_a_warning():
+    u = exact_solution("penny", {"a": 1.0, "tension": 1.0}, SOLID)
+    at_and_beside = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 1e-12]])
+    with np.errstate(all="raise"):
+        gradient = u.gradient(at_and_beside)
+    assert np.isnan(gradient[:2]).all()
+    assert np.isfinite(gradient[2]).all()
+
+
 def test_round_off_across_the_faces_does_not_change_the_side():
     u = solution("penny")
     face, normal = penny_ring(0.2)

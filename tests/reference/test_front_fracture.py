@@ -171,7 +171,8 @@ class TestThePenny:
     INTENSITY = 2 / np.sqrt(np.pi)
     FRONT = CircularFront([0, 0, 0], [0, 0, 1], 1.0)
 
-    def solve(self, level, size=1.0, **changes):
+    @staticmethod
+    def solve(level, size=1.0, **changes):
         from verify.solvers import find_solver
 
         crack = {
@@ -188,8 +189,9 @@ class TestThePenny:
         return find_solver("reference").solve(scene, level, repetitions=0)
 
     @pytest.fixture(scope="class")
-    def fields(self):
-        return [self.solve(level) for level in range(2)]
+    @classmethod
+    def fields(cls):
+        return [cls.solve(level) for level in range(2)]
 
     def test_the_energy_converges_with_order_three_at_the_front(self, fields):
         errors = [field.ledger["strain"][0] / 32.244473884 - 1 for field in fields]

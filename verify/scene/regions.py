@@ -59,6 +59,11 @@ def parse_region(text: str, dimension: int) -> Region:
     ------
     InputError
         If the text is not such an inequality; the message names the part that is not.
+
+    Notes
+    -----
+    A comparison holds at no point where one of its sides is no finite number: 1/x > 10 not at
+    x = 0, sqrt(x - 0.5) >= 0 not at x < 0.5. Such a number without x, y, z is an error.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval").body
@@ -70,7 +75,7 @@ def parse_region(text: str, dimension: int) -> Region:
         raise InputError(f"the inequality is nested too deep; expected {_MEANING}") from None
 
     def region(points: Array) -> NDArray[np.bool_]:
-        with np.errstate(all="ignore"):  # sqrt of a negative number is nan, which is not < 1
+        with np.errstate(all="ignore"):
             values = _condition(tree, np.asarray(points, dtype=float))
         return np.broadcast_to(values, (len(points),)).astype(bool)
 
@@ -93,8 +98,22 @@ def _check_condition(node: ast.AST, text: str, dimension: int) -> None:
         ):
             for value in (left, *comparators):
                 _check_number(value, text, dimension)
+                _check_constants(value, text)
         case _:
             raise _reject(node, text)
+
+
+def _check_constants(node: ast.AST, text: str) -> None:
+    """Refuse 1/0, sqrt(-1), 10**999: what holds no coordinate must be a finite number."""
+    if any(isinstance(part, ast.Name) and part.id in _COORDINATES for part in ast.walk(node)):
+        for part in node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node):
+            if isinstance(part, ast.expr):
+                _check_constants(part, text)
+        return
+    with np.errstate(all="ignore"):
+        finite = np.isfinite(_number(node, np.empty((0, 0))))
+    if not finite:
+        raise InputError(f"'{ast.unparse(node)}' in '{text}' is no finite number")
 
 
 def _check_number(node: ast.AST, text: str, dimension: int) -> None:
@@ -129,7 +148,8 @@ def _condition(node: ast.AST, points: Array) -> NDArray[np.bool_]:
         case ast.Compare(left=left, ops=ops, comparators=comparators):
             terms = [_number(value, points) for value in (left, *comparators)]
             steps = zip(ops, terms[:-1], terms[1:], strict=True)
-            return reduce(np.logical_and, (_COMPARISONS[type(op)](a, b) for op, a, b in steps))
+            holds = [_COMPARISONS[type(op)](a, b) for op, a, b in steps]
+            return reduce(np.logical_and, holds + [np.isfinite(term) for term in terms])
     raise AssertionError(ast.dump(node))  # _check_condition lets nothing else through
 
 
