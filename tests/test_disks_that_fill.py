@@ -21,7 +21,7 @@ from verify.report.markdown import PICTURES, markdown
 from verify.result import CaseResult, write_result
 from verify.runner.error_field import write_error_field
 from verify.solution import Solution, write_solution
-from verify.xfem.tool_path import ToolPath
+from verify.xfem.cuts import ToolPath
 
 NOISE = np.random.default_rng(1).integers(0, 256, (3, 96, 96, 3), dtype=np.uint8)
 THESIS = Path(__file__).parent.parent / "cases" / "thesis"

@@ -31,10 +31,8 @@ from verify.compare.simplices import simplices
 from verify.replay.session import Session
 from verify.replay.stage import Stage
 from verify.threads import ONE_THREAD
-from verify.xfem.conjugate_gradients import ConjugateGradients
-from verify.xfem.corotational import InternalForce
-from verify.xfem.corotational_static import static_equilibrium
-from verify.xfem.cuts import Plane
+from verify.xfem.corotation import InternalForce
+from verify.xfem.cuts import Plane, ToolPath
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -48,10 +46,10 @@ from verify.xfem.mapping.pull_back import pull_back
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.static import solve_static
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.xfem.statics import solve_static, static_equilibrium
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["STAGES", "CompileTimes", "FirstUse", "FirstUseError", "compile_all", "compile_here"]

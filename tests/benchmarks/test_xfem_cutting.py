@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from verify.xfem.collision.surface_collider import SurfaceCollider
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mapping.body_surface import BodySurface
 from verify.xfem.mapping.embedded_surface import EmbeddedSurface
 from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.tool_path import ToolPath
 
 pytestmark = pytest.mark.timing
 

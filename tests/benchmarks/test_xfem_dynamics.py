@@ -9,12 +9,12 @@ from time import process_time
 import numpy as np
 import pytest
 
-from verify.xfem.conjugate_gradients import ConjugateGradients
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

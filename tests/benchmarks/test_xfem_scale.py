@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from numba import njit
 
-from verify.xfem.block_pattern import block_pattern
-from verify.xfem.conjugate_gradient_kernels import invert_blocks
-from verify.xfem.conjugate_gradients import ConjugateGradients
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.slivers import treat_slivers
+from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.sparse.conjugate_gradient_kernels import invert_blocks
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.xfem.sparse.symmetric_sweep_kernels import solve_lower, solve_upper, vector_width
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.symmetric_sweep_kernels import solve_lower, solve_upper, vector_width
 from verify.xfem.virtual import cut_mesh
 
 pytestmark = [pytest.mark.timing, pytest.mark.benchmark(timer=process_time)]
@@ -167,9 +167,9 @@ def test_a_hundred_thousand_tetrahedra_stay_under_500_megabytes():
 from pathlib import Path
 import numpy as np
 import test_xfem_scale as scale
-from verify.xfem.conjugate_gradients import ConjugateGradients
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
 from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.symmetric_sweep_kernels import solve_lower, solve_upper
+from verify.xfem.sparse.symmetric_sweep_kernels import solve_lower, solve_upper
 
 def peak():
     lines = Path("/proc/self/status").read_text().splitlines()

@@ -5,7 +5,7 @@ import numpy as np
 from verify.methods.catalogue import METHODS, cut_by
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.supports import Supports
 
 SPLITTING = [name for name in METHODS if name not in ("uncut", "removal", "removal_refined")]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from verify.methods.counting import count_incisions, growing_incisions
+from verify.xfem.cuts import Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
 from verify.xfem.structured_meshes import rectangle_mesh
 
 

@@ -5,10 +5,9 @@ import pytest
 from method_bodies import CUTTING, MATERIAL, at_places, hang, held_at
 
 from verify.methods.opened_mesh import OpenedMesh
-from verify.xfem.cuts import Plane
+from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.loads import body_force
-from verify.xfem.polyline import Polyline
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 

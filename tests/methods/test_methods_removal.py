@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from verify.methods.catalogue import cut_by
 from verify.methods.refinement import bisect_cells
-from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.errors import XfemError
-from verify.xfem.polyline import Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 FEW = settings(max_examples=30, deadline=None, derandomize=True)

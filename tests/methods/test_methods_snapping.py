@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from verify.methods.catalogue import cut_by
 from verify.methods.snapped_mesh import snap_nodes, take_near_nodes
-from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.errors import XfemError
-from verify.xfem.polyline import Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 number = st.floats(-1.0, 1.0)

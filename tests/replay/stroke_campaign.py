@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from verify.replay import Hook, Session, Stage, quality_of
+from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
-from verify.xfem.tool_path import ToolPath
 
 __all__ = ["play_random_strokes"]
 

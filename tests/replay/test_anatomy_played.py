@@ -9,7 +9,7 @@ from thesis_stages import CASES
 from verify.anatomy.store import patch_file
 from verify.replay import Session, quality_of, stage_of
 from verify.scene import load_scene
-from verify.xfem.tool_path import ToolPath
+from verify.xfem.cuts import ToolPath
 
 ROUND_OFF = 1e-12
 

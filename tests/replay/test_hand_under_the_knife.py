@@ -9,7 +9,7 @@ import pytest
 from verify.calibration import kernel_seconds
 from verify.replay import PHASES, Session, StepRecord, quality_of
 from verify.replay.timings import timings_of
-from verify.xfem.tool_path import ToolPath
+from verify.xfem.cuts import ToolPath
 
 ROUND_OFF = 1e-12
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from verify.replay import Session, quality_of
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.in_pieces import in_one_go
-from verify.xfem.tool_path import ToolPath
 
 ROUND_OFF = 1e-12
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.clipping import staircase
+from verify.xfem.splitting.clipping import staircase
 
 __all__ = ["bisected", "crossed", "divided", "joined"]
 

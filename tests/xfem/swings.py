@@ -4,12 +4,12 @@ import numpy as np
 from cut_bodies import DENSITY, material
 from test_sliver_policies import shaken
 
-from verify.xfem.block_pattern import block_pattern
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import CentralDifferences, DynamicBody
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

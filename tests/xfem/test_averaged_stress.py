@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from verify.xfem.corotation.polar_kernels import nearest_rotation
 from verify.xfem.dynamics.averaged_stress_kernels import stress
 from verify.xfem.dynamics.averaged_stress_tangent import stress_slope
-from verify.xfem.polar_kernels import nearest_rotation
 
 LAM, MU = 1.3, 0.7
 

@@ -12,11 +12,10 @@ from verify.xfem.bases import (
     transformation,
     transformed_matrix,
 )
-from verify.xfem.cuts import Plane
+from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
-from verify.xfem.polyline import Polyline
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.thesis_blocks import shifted_stiffness

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from xfem_bodies import zero_modes
 
-from verify.xfem.cuts import Plane, PolygonPatch
-from verify.xfem.polyline import Polyline
+from verify.xfem.cuts import Plane, PolygonPatch, Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from verify.xfem.polar_kernels import (
-    LANES,
+from verify.xfem.corotation.polar_kernels import (
     mend_lane,
     nearest_rotation,
     new_lanes,
     rotation_matrix,
     turn_lanes,
 )
+from verify.xfem.lanes.vectors import LANES
 
 
 def _rotation(F, start=None):

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from cut_bodies import boundary_nodes, cut_cube, cut_square, material, rotation
 
-from verify.xfem import corotational_static
-from verify.xfem.cholesky import SingularStiffnessError
-from verify.xfem.conjugate_gradients import ConjugateGradients
-from verify.xfem.corotational import InternalForce
-from verify.xfem.corotational_static import NotInEquilibriumError, static_equilibrium
+from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.errors import XfemError
+from verify.xfem.sparse.cholesky import SingularStiffnessError
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.xfem.statics import NotInEquilibriumError, finite_rotation, static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -154,9 +153,9 @@ def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(monke
     fixed = np.repeat(ends[:, None], 3, axis=1)
     force = InternalForce(v, material(3))
     direct = static_equilibrium(force, fixed, twisted, load_steps=2)
-    monkeypatch.setattr(corotational_static, "ITERATE_FROM", 0)
+    monkeypatch.setattr(finite_rotation, "ITERATE_FROM", 0)
     monkeypatch.setattr(
-        corotational_static, "ConjugateGradients", lambda *of: ConjugateGradients(*of, limit=limit)
+        finite_rotation, "ConjugateGradients", lambda *of: ConjugateGradients(*of, limit=limit)
     )
     iterated = static_equilibrium(force, fixed, twisted, load_steps=2)
     # both to 1e-10 of the forces

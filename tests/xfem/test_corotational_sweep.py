@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from cut_bodies import SOFT, cut_body, cut_membrane, cut_square, material
 
-from verify.xfem.block_pattern import block_pattern
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import consistent_mass
+from verify.xfem.sparse.block_pattern import block_pattern
 
 
 def _moving(virtual, size, seed=4):

@@ -5,10 +5,10 @@ import pytest
 import xfem_exact_fields as exact
 from xfem_bodies import boundary_nodes
 
+from verify.xfem.cuts import Polyline
 from verify.xfem.elasticity import isotropic
-from verify.xfem.polyline import Polyline
 from verify.xfem.quadrature import simplex_rule
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports

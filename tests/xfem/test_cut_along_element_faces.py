@@ -7,7 +7,7 @@ from verify.xfem.cuts import ImplicitCut, Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

@@ -5,10 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from verify.xfem.cuts import Plane, PolygonPatch
+from verify.xfem.cuts import Plane, PolygonPatch, Polyline, TriangulatedSurface
 from verify.xfem.errors import XfemError
-from verify.xfem.polyline import Polyline
-from verify.xfem.surface_cut import TriangulatedSurface
 
 COORDINATE = st.floats(-3.0, 3.0)
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from cut_comparison import assert_same_cut
 
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import cut_mesh
 
 PLANE_STROKES = [

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from verify.xfem.dense_tiles import (
+from verify.xfem.lanes.shuffles import address
+from verify.xfem.sparse.dense_tiles import (
     COLUMNS,
     ROWS,
     add_run,
@@ -14,7 +15,6 @@ from verify.xfem.dense_tiles import (
     subtract_columns,
     subtract_product,
 )
-from verify.xfem.lane_shuffles import address
 
 ROUND_OFF = 1e-13  # of sums of some fifty products of numbers of size one
 

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from cut_bodies import material
 
-from verify.xfem.cholesky import Cholesky
-from verify.xfem.corotational import InternalForce
-from verify.xfem.cuts import Plane
+from verify.xfem.corotation import InternalForce
+from verify.xfem.cuts import Plane, ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.split import split_cells
+from verify.xfem.sparse.cholesky import Cholesky
+from verify.xfem.splitting.split import split_cells
+from verify.xfem.splitting.unknown_nodes import node_sides
 from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.tool_path import ToolPath
-from verify.xfem.unknown_nodes import node_sides
 
 ROUND_OFF = 1e-10  # relative residual: thousands of operations on numbers within 1e4 of each other
 

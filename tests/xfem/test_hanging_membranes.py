@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from verify.xfem.corotational import InternalForce
-from verify.xfem.corotational_static import static_equilibrium
+from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.statics import static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 

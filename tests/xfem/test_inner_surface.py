@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from surface_measures import enclosed_by_body, loose_edges, pinched_edges, volume_by_body
 
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mapping.body_surface import BodySurface
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.tool_path import ToolPath
 
 THROUGH = [
     ToolPath.of_tip([[-0.1, -0.2, 0.48], [1.1, -0.2, 0.55]], [0.0, 1.0], [0.0, 1.4, 0.05]),

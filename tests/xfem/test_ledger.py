@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_body, cut_cube, cut_square, material, rotation
 
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import critical_step
 from verify.xfem.dynamics import (
     CentralDifferences,
@@ -19,7 +19,7 @@ from verify.xfem.dynamics import (
     SymplecticEuler,
     Trapezoidal,
 )
-from verify.xfem.energy_ledger import run
+from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.stiffness import LinearStiffness

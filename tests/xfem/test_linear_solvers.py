@@ -5,10 +5,10 @@ import pytest
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
-from verify.xfem.block_pattern import block_pattern
-from verify.xfem.cholesky import Cholesky, SingularStiffnessError
-from verify.xfem.conjugate_gradients import ConjugateGradients, NotConvergedError
-from verify.xfem.minimum_degree import minimum_degree
+from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
+from verify.xfem.sparse.minimum_degree import minimum_degree
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 

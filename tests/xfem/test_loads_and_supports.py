@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from xfem_bodies import boundary_nodes
 
-from verify.xfem.cuts import Plane
+from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
 from verify.xfem.quadrature import simplex_rule
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports, UnsupportedBodyError
 from verify.xfem.virtual import cut_mesh

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from surface_measures import loose_edges
 
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
 from verify.xfem.mapping.alternative_mesh import virtual_elements
@@ -13,7 +14,6 @@ from verify.xfem.mapping.body_surface import BodySurface
 from verify.xfem.mapping.embedded_surface import EmbeddedSurface
 from verify.xfem.mapping.pull_back import pull_back
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.tool_path import ToolPath
 
 PATHS = [
     ToolPath.of_tip([[-0.1, -0.2, 0.48], [1.1, -0.2, 0.55]], [0.0, 1.0], [0.0, 1.4, 0.05]),

@@ -5,13 +5,13 @@ import pytest
 from cut_bodies import rotation
 
 from verify.xfem.collision.surface_collider import SurfaceCollider
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
 from verify.xfem.mapping.body_surface import BodySurface
 from verify.xfem.mapping.pull_back import pull_back
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.tool_path import ToolPath
 
 BLADE = [0.0, 0.0, 3.0]
 INSIDE = ToolPath.of_tip([[0.15, 0.43, -1.0], [0.85, 0.55, -1.0]], [0.0, 1.0], BLADE)

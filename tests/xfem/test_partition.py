@@ -5,12 +5,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from verify.xfem.clipping import staircase
-from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
-from verify.xfem.split import split_cells
+from verify.xfem.splitting.clipping import staircase
+from verify.xfem.splitting.split import split_cells
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh

@@ -5,9 +5,9 @@ import pytest
 from degenerate_strokes import body, strokes
 from partition_twins import bisected, crossed, divided, joined
 
-from verify.xfem import bisection, split
-from verify.xfem.joining import join_slots
-from verify.xfem.split import split_cells
+from verify.xfem.splitting import bisection, split
+from verify.xfem.splitting.joining import join_slots
+from verify.xfem.splitting.split import split_cells
 
 # products of the same factors, taken in another order: a few ulp
 ROUND_OFF = 4e-15

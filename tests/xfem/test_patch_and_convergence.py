@@ -5,12 +5,11 @@ import pytest
 import xfem_exact_fields as exact
 from xfem_bodies import boundary_nodes, relative_l2_error
 
-from verify.xfem.conjugate_gradients import NotConvergedError
-from verify.xfem.cuts import Plane
+from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
-from verify.xfem.polyline import Polyline
-from verify.xfem.static import solve_static
+from verify.xfem.sparse.conjugate_gradients import NotConvergedError
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_cube, material
 
-from verify.xfem.block_pattern import block_pattern
-from verify.xfem.cholesky import Cholesky
-from verify.xfem.conjugate_gradient_kernels import invert_blocks
-from verify.xfem.conjugate_gradients import ConjugateGradients
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import DynamicBody, MovingSupports, RealTimeEuler, treat_moving_body
 from verify.xfem.dynamics.integrator import StepFailedError
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
-from verify.xfem.symmetric_sweep_kernels import (
+from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.sparse.cholesky import Cholesky
+from verify.xfem.sparse.conjugate_gradient_kernels import invert_blocks
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.xfem.sparse.symmetric_sweep_kernels import (
     add_lower_product,
     solve_lower,
     solve_upper,
     symmetric_product,
     vector_width,
 )
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
 
 STEP = 2e-3
 

@@ -8,7 +8,7 @@ import pytest
 from cut_bodies import DENSITY, material
 from swings import cube, let_go, plate, stretched
 
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import element_critical_steps
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (

@@ -15,7 +15,7 @@ from verify.xfem.loads import body_force, traction
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import DEFAULT_POLICY, DEFAULT_THRESHOLD, treat_slivers
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, material
 
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (
     DynamicBody,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, material
 
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,

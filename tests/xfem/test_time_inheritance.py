@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, material, rotation
 
-from verify.xfem.corotational import InternalForce
-from verify.xfem.cuts import Plane, PolygonPatch
+from verify.xfem.corotation import InternalForce
+from verify.xfem.cuts import Plane, PolygonPatch, Polyline
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -16,11 +16,10 @@ from verify.xfem.dynamics import (
     ancestors,
     inherit_state,
 )
-from verify.xfem.energy_ledger import EnergyLedger
+from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import side_wise_mass

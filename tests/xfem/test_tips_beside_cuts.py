@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from test_sliver_policies import shaken
 
-from verify.xfem.cuts import PolygonPatch
-from verify.xfem.polyline import Polyline
+from verify.xfem.cuts import PolygonPatch, Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
+from verify.xfem.cuts import Polyline, ToolPath, TriangulatedSurface
 from verify.xfem.errors import XfemError
-from verify.xfem.polyline import Polyline
-from verify.xfem.surface_cut import TriangulatedSurface
-from verify.xfem.tool_path import ToolPath
 
 
 def test_a_sweep_in_the_plane_has_the_level_set_of_its_polyline() -> None:

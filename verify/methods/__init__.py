@@ -24,7 +24,7 @@ Sources and limits of each: ``docs/methods.md``.
 Example
 -------
 >>> from verify.methods.catalogue import cut_by
->>> from verify.xfem.polyline import Polyline
+>>> from verify.xfem.cuts import Polyline
 >>> from verify.xfem.structured_meshes import rectangle_mesh
 >>> body = cut_by("snapping", rectangle_mesh((8, 8)), [Polyline([[-1.0, 0.45], [0.5, 0.45]])])
 >>> body.counts.nodes - body.counts.nodes_before

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from verify.methods.catalogue import cut_by
 from verify.methods.nodal_cut import NodalCut, crossed_edges
-from verify.xfem.cuts import Cut
+from verify.xfem.cuts import Cut, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
 from verify.xfem.virtual import cut_mesh
 
 __all__ = ["IncisionCount", "count_incisions", "growing_incisions"]

@@ -21,8 +21,8 @@ from verify.methods.whole_cells import whole_cells
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.piece_contacts import face_contacts
-from verify.xfem.split import TipRule
+from verify.xfem.slivers.piece_contacts import face_contacts
+from verify.xfem.splitting.split import TipRule
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["removal", "removal_refined"]

@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 
 from verify.methods.spring_fit import Fit, cell_edges, spring_stiffness
 from verify.methods.spring_kernels import add_spring_stiffness, spring_force, spring_product
-from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.corotational import InternalForce, Kinematics, TangentKind
+from verify.xfem.corotation import InternalForce, Kinematics, TangentKind
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["SpringForce"]

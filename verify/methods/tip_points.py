@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cuts import Cut
+from verify.xfem.cuts import Cut, Polyline
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
 
 __all__ = ["add_tip_points"]
 

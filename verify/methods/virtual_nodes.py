@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from verify.methods.cut_body import Change, CutBody, make_body
 from verify.methods.whole_cells import whole_cells
-from verify.xfem.absorption import absorb
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.piece_contacts import sibling_contacts
-from verify.xfem.split import TipRule
+from verify.xfem.slivers.absorption import absorb
+from verify.xfem.slivers.piece_contacts import sibling_contacts
+from verify.xfem.splitting.split import TipRule
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["CopyWeights", "virtual_node", "virtual_node_arbitrary"]
@@ -41,7 +41,7 @@ def virtual_node(
     mesh : SimplexMesh
     cuts : sequence of Cut
     tip : {"inside", "through", "nearest"}
-        See `verify.xfem.split.split_cells`.
+        See `verify.xfem.splitting.split.split_cells`.
     weights : {"share", "whole"}
         Copies resist by their share of the volume, or as whole cells: no sliver is left, but the
         cut cells count several times.

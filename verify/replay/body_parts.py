@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from verify.replay.grips import Grips
 from verify.replay.stage import Stage
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import DynamicBody
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.virtual import VirtualMesh

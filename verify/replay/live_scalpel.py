@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.replay.session import Session
+from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
-from verify.xfem.tool_path import ToolPath
 
 __all__ = ["LiveScalpel"]
 

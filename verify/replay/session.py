@@ -14,13 +14,13 @@ from verify.replay.staged_cut import MOST, Followed, Pieces, StagedCut
 from verify.replay.step_record import PHASES, StepRecord
 from verify.replay.surfaces import Picture, Surfaces
 from verify.replay.touched_memory import touch_memory
-from verify.xfem.cholesky import Cholesky
 from verify.xfem.collision.surface_collider import Contacts, SurfaceCollider
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
-from verify.xfem.energy_ledger import EnergyLedger
-from verify.xfem.tool_path import ToolPath
+from verify.xfem.dynamics.energy_ledger import EnergyLedger
+from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Session"]

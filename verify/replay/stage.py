@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.cuts import ToolPath
 from verify.xfem.dynamics import RayleighDamping
 from verify.xfem.elasticity import Material
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.tool_path import ToolPath
 
 __all__ = ["Hold", "Hook", "Stage"]
 

@@ -12,13 +12,13 @@ from verify.scene import Gravity, Scene, Skin, ToolPathCut
 from verify.scene.parts import on_part
 from verify.scene.replay import Pull
 from verify.solvers.xfem_scene import background_mesh
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.growing_body import GrowingBody
 from verify.xfem.dynamics import RayleighDamping
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mapping.body_surface import BodySurface
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.tool_path import ToolPath
 
 __all__ = ["stage_of"]
 

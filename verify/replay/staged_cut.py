@@ -13,11 +13,11 @@ from typing import NamedTuple
 from verify.replay.body_parts import BodyParts, held_nodes
 from verify.replay.grips import Grips
 from verify.replay.surfaces import Surfaces
-from verify.xfem.cholesky import Cholesky
 from verify.xfem.cutting.growing_body import Increment
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody
 from verify.xfem.in_pieces import MANY, InPieces
+from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]

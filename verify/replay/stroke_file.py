@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from verify.whole_files import write_whole
-from verify.xfem.tool_path import ToolPath
+from verify.xfem.cuts import ToolPath
 
 __all__ = ["stroke_text", "write_stroke"]
 

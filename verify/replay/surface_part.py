@@ -7,9 +7,9 @@ the number of goes is what costs.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.arrays.growing_array import GrowingArray
 from verify.xfem.collision.bounding_tree import BoundingTree
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.growing_array import GrowingArray
 from verify.xfem.mapping.embedded_surface import EmbeddedSurface
 
 __all__ = ["SurfacePart", "embed_together"]

@@ -24,10 +24,10 @@ from verify.solvers.xfem_scene import background_mesh, material_of
 from verify.solvers.xfem_static import in_load_steps
 from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_supports import supports_of
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh
 

@@ -7,7 +7,7 @@ from verify.methods.cut_body import CutBody
 from verify.scene import Equilibrium, Scene
 from verify.solvers.xfem_answer import Answer
 from verify.solvers.xfem_motion import MotionChoice, Mover
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import MotionState
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh

@@ -59,11 +59,12 @@ class XfemSolver:
         Unknowns of the enrichment; all give the same displacements up to round-off. The last two
         are for linear statics.
     tip : {"inside", "through", "nearest"}
-        What happens to an element in which a cut ends; see `verify.xfem.split.split_cells`.
+        What happens to an element in which a cut ends; see
+        `verify.xfem.splitting.split.split_cells`.
     slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
-        `verify.xfem.slivers`. A direct static solve does not mind them, so they are kept. The
-        last is a ghost penalty, of linear statics and of motion with the side-wise mass.
+        `verify.xfem.slivers`. A direct static solve does not mind them, so they are kept. The last
+        is a ghost penalty, of linear statics and of motion with the side-wise mass.
     load_steps : int
         Corotational statics: equal parts in which supports and loads grow; 0: as few as converge.
     scheme : {"newmark", "implicit_euler", "energy_momentum", "central_differences",

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.energy_ledger import Ledger
+from verify.xfem.dynamics.energy_ledger import Ledger
 
 __all__ = ["Account"]
 

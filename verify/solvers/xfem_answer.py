@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from verify.scene import Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
-from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.slivers import SliverReport
+from verify.xfem.slivers import GhostPenalty, SliverReport
 from verify.xfem.subdivision import Subdivision, subdivide
 from verify.xfem.virtual import VirtualMesh
 

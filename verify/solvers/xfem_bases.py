@@ -19,9 +19,9 @@ from verify.xfem.bases import (
     transformation,
     transformed_matrix,
 )
-from verify.xfem.block_pattern import block_pattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import BasisError
+from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh

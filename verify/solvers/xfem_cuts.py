@@ -14,10 +14,7 @@ from verify.scene import (
     SweptCut,
     ToolPathCut,
 )
-from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch
-from verify.xfem.polyline import Polyline
-from verify.xfem.surface_cut import TriangulatedSurface
-from verify.xfem.tool_path import ToolPath
+from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath, TriangulatedSurface
 
 __all__ = ["cuts_of"]
 

@@ -19,7 +19,7 @@ from verify.solvers.xfem_scene import density_of, material_of
 from verify.solvers.xfem_static import in_load_steps
 from verify.solvers.xfem_steps import MASSES, SCHEMES, largest_step
 from verify.solvers.xfem_supports import initial_supports, motion_of_supports
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     DynamicBody,
     Integrator,
@@ -29,13 +29,12 @@ from verify.xfem.dynamics import (
     inherit_state,
     treat_moving_body,
 )
+from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.dynamics.newton import NewtonIntegrator
-from verify.xfem.energy_ledger import EnergyLedger
 from verify.xfem.errors import XfemError
-from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.slivers import SliverReport, treat_slivers
+from verify.xfem.slivers import GhostPenalty, SliverReport, treat_slivers
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 

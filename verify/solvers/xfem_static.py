@@ -15,14 +15,14 @@ from verify.solvers.xfem_bases import solve_in_basis
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_scene import material_of
 from verify.solvers.xfem_supports import supports_of
-from verify.xfem.corotational import InternalForce
-from verify.xfem.corotational_static import (
+from verify.xfem.corotation import InternalForce
+from verify.xfem.slivers import GhostPenalty
+from verify.xfem.statics import (
     NotInEquilibriumError,
     StaticEquilibrium,
+    solve_static,
     static_equilibrium,
 )
-from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.static import solve_static
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh

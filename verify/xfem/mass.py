@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
+from verify.xfem.sparse.block_pattern import BlockPattern, block_pattern
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = [

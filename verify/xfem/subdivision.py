@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from verify.xfem.bisection import Simplices, bisect_at
+from verify.xfem.splitting.bisection import Simplices, bisect_at
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Subdivision", "subdivide"]

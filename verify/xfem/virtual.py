@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.crossing import TipRule
-from verify.xfem.cuts import Cut
-from verify.xfem.joining import PatchSlots, join_slots
+from verify.xfem.cuts.crossing import TipRule
+from verify.xfem.cuts.flat import Cut
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.split import Partition, split_cells
-from verify.xfem.unknown_nodes import node_sides, number_groups
-from verify.xfem.zero_points import ZeroPoints
+from verify.xfem.splitting.joining import PatchSlots, join_slots
+from verify.xfem.splitting.split import Partition, split_cells
+from verify.xfem.splitting.unknown_nodes import node_sides, number_groups
+from verify.xfem.splitting.zero_points import ZeroPoints
 
 __all__ = ["SubCells", "VirtualMesh", "cut_mesh"]
 
@@ -212,7 +212,7 @@ def cut_mesh(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside") ->
     cuts : sequence of Cut
         In any order; they may cross, branch, touch and run through nodes or along faces.
     tip : {"inside", "through", "nearest"}
-        Treatment of elements in which a cut ends; see `verify.xfem.split.split_cells`.
+        Treatment of elements in which a cut ends; see `verify.xfem.splitting.split.split_cells`.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from verify.study.slivers.inversion import swing
 from verify.study.slivers.sweep import sliver_study
 from verify.xfem.dynamics import CentralDifferences, ForwardEuler
 from verify.xfem.loads import body_force
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
 

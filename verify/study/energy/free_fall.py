@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.study.energy.pieces import piece_inertias
-from verify.xfem.block_pattern import block_pattern
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (
@@ -26,10 +25,11 @@ from verify.xfem.dynamics import (
     SymplecticEuler,
     Trapezoidal,
 )
+from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.elasticity import isotropic
-from verify.xfem.energy_ledger import run
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports

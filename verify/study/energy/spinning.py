@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from verify.study.energy.drift import Drift, secular_drift
 from verify.study.energy.pieces import PieceInertia, piece_inertias
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import critical_step
+from verify.xfem.cuts import Polyline
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -26,10 +27,9 @@ from verify.xfem.dynamics import (
     Trapezoidal,
     inherit_state,
 )
+from verify.xfem.dynamics.energy_ledger import EnergyLedger, Ledger
 from verify.xfem.elasticity import isotropic
-from verify.xfem.energy_ledger import EnergyLedger, Ledger
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.polyline import Polyline
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import VirtualMesh, cut_mesh

@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from reference.exact import exact_solution
 from verify.scene import Material as SceneMaterial
 from verify.study.slivers.bodies import POISSON, SweptBody, soft
-from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.quadrature import simplex_rule
-from verify.xfem.static import solve_static
+from verify.xfem.slivers import GhostPenalty
+from verify.xfem.statics import solve_static
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
 

@@ -9,13 +9,12 @@ from scipy.sparse import csr_array, identity
 
 from verify.study.slivers.conforming_peers import PEERS, conforming_peer
 from verify.study.slivers.placements import Placement, placed_cuts
-from verify.xfem.corotational import InternalForce, Kinematics
+from verify.xfem.corotation import InternalForce, Kinematics
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import Material, isotropic
-from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.penalised_force import PenalisedForce
-from verify.xfem.slivers import treat_slivers
+from verify.xfem.slivers import GhostPenalty, treat_slivers
+from verify.xfem.slivers.penalised_force import PenalisedForce
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 

@@ -15,9 +15,9 @@ from scipy.sparse import csr_array, identity, kron
 
 from verify.study.slivers.bodies import SweptBody, soft
 from verify.xfem.bases import transformation
-from verify.xfem.block_pattern import block_pattern
 from verify.xfem.errors import XfemError
 from verify.xfem.loads import body_force
+from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.virtual import VirtualMesh
 

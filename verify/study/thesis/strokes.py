@@ -7,8 +7,8 @@ import numpy as np
 
 from verify.replay import Stage, stage_of
 from verify.scene import Scene, Skin, load_scene
+from verify.xfem.cuts import ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.tool_path import ToolPath
 
 __all__ = ["CutHand", "cut_hand", "hand", "stroke_along"]
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
-from verify.xfem.static import solve_static
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

@@ -11,11 +11,10 @@ from verify.replay import Stage, stage_of
 from verify.scene import load_scene
 from verify.study.thesis.published import published_rows
 from verify.study.thesis.sliver_steps import step_of_body
+from verify.xfem.cuts import Polyline, ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.polyline import Polyline
 from verify.xfem.structured_meshes import rectangle_mesh
-from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import cut_mesh
 
 __all__ = ["THRESHOLDS", "FaceCount", "StripCount", "count_face", "count_strips"]

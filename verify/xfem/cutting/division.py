@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cutting.distinct import distinct
+from verify.xfem.arrays.distinct import distinct
 from verify.xfem.cutting.patch import MeshPatch
-from verify.xfem.split import Partition
+from verify.xfem.splitting.split import Partition
 
 __all__ = ["Division"]
 

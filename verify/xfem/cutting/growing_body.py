@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cuts import Cut
-from verify.xfem.cutting.distinct import distinct
+from verify.xfem.arrays.distinct import distinct
+from verify.xfem.arrays.growing_array import GrowingArray
+from verify.xfem.cuts.flat import Cut
 from verify.xfem.cutting.division import Division
 from verify.xfem.cutting.patch import MeshPatch, PatchCutter
 from verify.xfem.cutting.point_numbers import PointNumbers
@@ -27,11 +28,10 @@ from verify.xfem.cutting.renumber_kernels import (
     write_pieces,
 )
 from verify.xfem.errors import XfemError
-from verify.xfem.growing_array import GrowingArray
 from verify.xfem.in_pieces import InPieces, in_one_go
-from verify.xfem.joining import join_slots
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.split import ROUND_OFF, Held, Partition, split_cells
+from verify.xfem.splitting.joining import join_slots
+from verify.xfem.splitting.split import ROUND_OFF, Held, Partition, split_cells
 
 __all__ = ["CutsNear", "GrowingBody", "Increment"]
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.collision.bounding_tree import BoundingTree
-from verify.xfem.cuts import Cut
+from verify.xfem.cuts.flat import Cut
+from verify.xfem.cuts.tool_path import ToolPath
 from verify.xfem.cutting.division import Division
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
 from verify.xfem.cutting.patch import MeshPatch
@@ -23,7 +24,6 @@ from verify.xfem.cutting.whole_mesh import whole_mesh
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Crossings", "SemiProgressiveCutter"]

@@ -4,19 +4,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.collision.bounding_tree import BoundingTree
-from verify.xfem.crossing import REACH
-from verify.xfem.cuts import Cut
+from verify.xfem.cuts.crossing import REACH
+from verify.xfem.cuts.flat import Cut
+from verify.xfem.cuts.tool_path import Sweep, ToolPath
 from verify.xfem.cutting.patch import MeshPatch
 from verify.xfem.cutting.walk_kernels import cells_hit, walk
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.tool_path import Sweep, ToolPath
 
 __all__ = ["SeenCut", "Stroke"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
-_ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.split`
+_ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.splitting.split`
 
 
 class SeenCut:

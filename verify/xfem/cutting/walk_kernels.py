@@ -2,15 +2,15 @@
 
 For a cell the kernel asks where the zero set of the level set crosses its edges, and of each such
 point whether it lies on the sweep and whether the blade has passed it. The tolerances are those of
-`verify.xfem.split`, so that a cell that the walk calls crossed through is one that is split.
+`verify.xfem.splitting`, so that a cell that the walk calls crossed through is one that is split.
 """
 
 import numpy as np
 from numba import njit
 
 from verify.xfem.collision.tree_kernels import as_array, items_near_plane
-from verify.xfem.crossing import AT_END, REACH
-from verify.xfem.sweep_kernels import probe
+from verify.xfem.cuts.crossing import AT_END, REACH
+from verify.xfem.cuts.sweep_kernels import probe
 
 __all__ = ["cells_hit", "walk"]
 

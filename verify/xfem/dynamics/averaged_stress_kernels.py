@@ -16,7 +16,7 @@ keeps it to the end of the step, so that Newton's method does not alternate betw
 import numpy as np
 from numba import njit
 
-from verify.xfem.polar_kernels import nearest_rotation
+from verify.xfem.corotation.polar_kernels import nearest_rotation
 
 __all__ = ["averaged_force", "is_moving", "stress"]
 

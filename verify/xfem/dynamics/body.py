@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotational import InternalForce
+from verify.xfem.corotation.internal_force import InternalForce
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass
-from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.slivers.penalised_force import PenalisedForce
 from verify.xfem.supports import Supports
 
 __all__ = ["DynamicBody", "MotionState", "MovingSupports", "RayleighDamping"]

@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotational import TangentKind
+from verify.xfem.corotation.internal_force import TangentKind
 from verify.xfem.dynamics.averaged_stress_kernels import averaged_force
 from verify.xfem.dynamics.averaged_stress_tangent import add_averaged_stiffness
 from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.dynamics.integrator import StepForces
 from verify.xfem.dynamics.linear_solver import LinearSolver, NearlySymmetric
 from verify.xfem.dynamics.newton import NewtonIntegrator
-from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.slivers.penalised_force import PenalisedForce
 
 __all__ = ["EnergyMomentum", "ImplicitEuler", "Trapezoidal"]
 

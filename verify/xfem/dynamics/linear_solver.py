@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
 
 __all__ = ["LinearSolver", "NearlySymmetric", "SparseLU"]
 

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
-from verify.xfem.cholesky import Cholesky, SingularStiffnessError
-from verify.xfem.corotational import TangentKind
+from verify.xfem.corotation.internal_force import TangentKind
 from verify.xfem.dynamics.body import DynamicBody, MotionState
 from verify.xfem.dynamics.integrator import (
     StepFailedError,
@@ -16,6 +15,7 @@ from verify.xfem.dynamics.integrator import (
     check_step,
 )
 from verify.xfem.dynamics.linear_solver import LinearSolver
+from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
 
 __all__ = ["NewtonIntegrator"]
 

@@ -9,8 +9,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.cholesky import Cholesky
-from verify.xfem.conjugate_gradients import ConjugateGradients
 from verify.xfem.dynamics.body import DynamicBody, MotionState
 from verify.xfem.dynamics.integrator import (
     StepFailedError,
@@ -20,8 +18,10 @@ from verify.xfem.dynamics.integrator import (
 )
 from verify.xfem.dynamics.linear_solver import LinearSolver
 from verify.xfem.errors import XfemError
+from verify.xfem.sparse.cholesky import Cholesky
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.xfem.sparse.symmetric_sweep_kernels import symmetric_product, vector_width
 from verify.xfem.supports import Supports
-from verify.xfem.symmetric_sweep_kernels import symmetric_product, vector_width
 
 __all__ = ["RealTimeEuler"]
 

@@ -1,7 +1,7 @@
 """From a cut mesh to what moves, with one choice of what becomes of its slivers.
 
 Three policies change the mesh (`verify.xfem.slivers`); the fourth leaves it as it is and penalises
-jumps of the gradient beside the cut (`verify.xfem.ghost_penalty`), in the stiffness and, which is
+jumps of the gradient beside the cut (its module `ghost_penalty`), in the stiffness and, which is
 what keeps the explicit step, in the mass.
 """
 
@@ -11,13 +11,18 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotational import InternalForce, Kinematics
+from verify.xfem.corotation.internal_force import InternalForce, Kinematics
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
-from verify.xfem.ghost_penalty import DEFAULT_FACTOR, GhostPenalty
 from verify.xfem.mass import Mass, side_wise_mass
-from verify.xfem.penalised_force import PenalisedForce
-from verify.xfem.slivers import DEFAULT_POLICY, DEFAULT_THRESHOLD, SliverReport, treat_slivers
+from verify.xfem.slivers.ghost_penalty import DEFAULT_FACTOR, GhostPenalty
+from verify.xfem.slivers.penalised_force import PenalisedForce
+from verify.xfem.slivers.policies import (
+    DEFAULT_POLICY,
+    DEFAULT_THRESHOLD,
+    SliverReport,
+    treat_slivers,
+)
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MotionPolicy", "TreatedBody", "treat_moving_body"]

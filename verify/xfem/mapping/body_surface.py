@@ -9,7 +9,7 @@ with two new rims along a cut instead of inner facets.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cutting.distinct import ranges
+from verify.xfem.arrays.distinct import ranges
 from verify.xfem.cutting.growing_body import GrowingBody, Increment
 from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.mapping.corner_kernels import place_corners

@@ -9,9 +9,10 @@ record is by these.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.arrays.growing_array import GrowingArray
+from verify.xfem.arrays.row_numbers import RowNumbers
 from verify.xfem.cutting.point_numbers import PointNumbers
 from verify.xfem.errors import XfemError
-from verify.xfem.growing_array import GrowingArray
 from verify.xfem.mapping.edge_kernels import (
     CUTS,
     LINE,
@@ -20,7 +21,6 @@ from verify.xfem.mapping.edge_kernels import (
     record_points,
     unrecorded,
 )
-from verify.xfem.row_numbers import RowNumbers
 
 __all__ = ["EdgePoints"]
 

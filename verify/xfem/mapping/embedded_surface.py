@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.cutting.distinct import (
+from verify.xfem.arrays.distinct import (
     distinct,
     distinct_in_lists,
     distinct_in_rows,
@@ -34,7 +34,7 @@ from verify.xfem.mapping.locate_kernels import (
 )
 from verify.xfem.mapping.moving_surface import MovingSurface
 from verify.xfem.mapping.near_facet_kernels import concerned_facets, levels_at
-from verify.xfem.split import ROUND_OFF, split_cells
+from verify.xfem.splitting.split import ROUND_OFF, split_cells
 
 __all__ = ["EmbeddedSurface"]
 

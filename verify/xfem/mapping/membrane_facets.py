@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cutting.distinct import ranges
+from verify.xfem.arrays.distinct import ranges
 from verify.xfem.cutting.growing_body import GrowingBody
 from verify.xfem.mapping.moving_surface import MovingSurface
 

@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.xfem.arrays.growing_array import GrowingArray
+from verify.xfem.arrays.row_numbers import RowNumbers, number_of_row
 from verify.xfem.errors import XfemError
-from verify.xfem.growing_array import GrowingArray
-from verify.xfem.row_numbers import RowNumbers, number_of_row
 
 __all__ = ["MovingSurface"]
 

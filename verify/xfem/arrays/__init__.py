@@ -1,0 +1,1 @@
+"""Arrays of integers: rows that are numbered, lists that are sorted, arrays that grow."""

@@ -1,0 +1,315 @@
+"""Corotational elasticity of a cut body: one polar rotation per piece (2.42, 2.66-70).
+
+The potential is W = μ‖U − I‖² + ½λ tr²(U − I) with F = R U: with polar rotations (and with no
+others) the corotational force is its gradient. Pieces turn on their own, so the parts of a cut
+cell need not agree on a rotation. A collapsed or inverted piece has a rotation of determinant +1;
+U then has a negative eigenvalue, which is what the potential pulls back.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.corotation.corotational_kernels import corotational_kernels
+from verify.xfem.corotation.linearisation import Linearisation
+from verify.xfem.corotation.membrane_tension import add_tension
+from verify.xfem.elasticity import Material
+from verify.xfem.errors import XfemError
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["InternalForce", "Kinematics", "TangentKind"]
+
+_Floats = NDArray[np.float64]
+Kinematics = Literal["corotational", "linear"]
+TangentKind = Literal["frozen", "tensioned", "exact"]
+
+
+class InternalForce:
+    """Internal force, strain energy and stiffness of a cut body.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+        Triangles in the plane, tetrahedra, or triangles in space (membranes without bending
+        stiffness; their material is in plane stress times the thickness, its unit N/m).
+    material : Material
+    kinematics : {"corotational", "linear"}
+        Linear keeps every rotation at the identity.
+
+    Attributes
+    ----------
+    left_out : int
+        Pieces whose rotation was not differentiable at the last exact `add_stiffness`, and
+        which therefore entered with a frozen one.
+
+    Raises
+    ------
+    XfemError
+        If the material fits neither () nor (m,), the kinematics is unknown, or a membrane is to
+        be linear (it would resist rotation across its plane).
+    """
+
+    def __init__(
+        self, virtual: VirtualMesh, material: Material, kinematics: Kinematics = "corotational"
+    ) -> None:
+        mesh = virtual.mesh
+        if kinematics not in ("corotational", "linear"):
+            raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
+        if mesh.dim < mesh.space and kinematics == "linear":
+            raise XfemError("linear kinematics of a membrane in space; expected corotational")
+        count = len(mesh.cells)
+        for name, values in (("λ", material.lam), ("μ", material.mu)):
+            if np.shape(values) not in ((), (count,)):
+                raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
+        self.virtual, self.kinematics = virtual, kinematics
+        self.lam = np.broadcast_to(material.lam, count).astype(float)
+        self.mu = np.broadcast_to(material.mu, count).astype(float)
+        self.left_out = 0
+        pieces, space = len(virtual.cells), mesh.space
+        self._rotations = np.zeros((pieces, space, space))
+        self._rotations[:, range(space), range(space)] = 1.0
+        self._quaternions = np.zeros((pieces, 4))
+        self._quaternions[:, 0] = 1.0
+        self._kernels = corotational_kernels(space)
+        self._gradients = np.ascontiguousarray(mesh.gradients)
+        self._normals = _unit_normals(virtual)
+        self._shape = (virtual.node_count, space)
+        self._sweep: Linearisation | None = None
+        self._swept = False  # whether the last rotations are those of the sweep
+
+    @property
+    def rotations(self) -> _Floats:
+        """(p, d, d) rotation of each piece at the last evaluation."""
+        if self._swept and self._sweep is not None:
+            self._sweep.write_rotations(self._rotations)
+            self._swept = False
+        return self._rotations
+
+    @property
+    def turning(self) -> bool:
+        """Whether pieces have rotations of their own."""
+        return self.kinematics == "corotational"
+
+    @property
+    def is_membrane(self) -> bool:
+        """Whether the body is of triangles in space."""
+        return self.virtual.mesh.dim < self.virtual.mesh.space
+
+    @property
+    def geometry(self) -> tuple[_Floats, NDArray[np.int64], _Floats, _Floats, _Floats, _Floats]:
+        """(gradients, parent, volumes, normals, λ, μ): what every kernel reads."""
+        v = self.virtual
+        return self._gradients, v.parent, v.volumes, self._normals, self.lam, self.mu
+
+    def evaluate(
+        self,
+        displacement: _Floats,
+        out: _Floats | None = None,
+        velocity: _Floats | None = None,
+        scale: float = 0.0,
+    ) -> tuple[_Floats, float]:
+        """Return internal force (N, d) in newtons and strain energy in joules; update rotations.
+
+        Parameters
+        ----------
+        displacement : (N, d) float array
+            Of the unknown nodes, in metres.
+        out : (N, d) float array, optional
+            Overwritten with the force.
+        velocity : (N, d) float array, optional
+            With a scale in seconds: `scale` K v, K with frozen rotations, is added to the force.
+
+        Raises
+        ------
+        XfemError
+            If the displacement has a wrong shape.
+        """
+        if displacement.shape != self._shape:
+            raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
+        force = np.empty(self._shape) if out is None else out
+        force[:] = 0.0
+        v = self.virtual
+        if self.turning:
+            self._kernels.turn(
+                v.cells, self._gradients, v.parent, self._normals, displacement,
+                self._quaternions, self._rotations,
+            )  # fmt: skip
+            self._swept = False
+        energy = self._kernels.internal_force(
+            v.cells, *self.geometry, self._rotations, displacement, force
+        )
+        if velocity is not None and scale != 0.0:
+            self._kernels.frozen_product(
+                v.cells, *self.geometry, self._rotations, velocity, scale, force
+            )
+        return force, float(energy)
+
+    def prepare(self, pattern: BlockPattern) -> None:
+        """Do what `linearise` does otherwise when it is first called with a sparsity."""
+        if self.virtual.mesh.dim == 3:
+            self._sweep = self._sweep_over(pattern)
+
+    def _sweep_over(self, pattern: BlockPattern) -> Linearisation:
+        if self._sweep is not None and self._sweep.pattern is pattern:
+            return self._sweep
+        return Linearisation(self.virtual, self.lam, self.mu, pattern, self.turning)
+
+    def linearise(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats,
+        velocity: _Floats,
+        implicit: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+    ) -> None:
+        """Overwrite force and stiffness as a semi-implicit step wants them; update rotations.
+
+        Tetrahedra are swept once, which takes half of the time of `evaluate` and `add_stiffness`.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Its first cells must be those of the body.
+        displacement, velocity : (N, d) float array
+        implicit : float
+            In seconds; the force is f_int(u) + `implicit` K v, K with frozen rotations.
+        scale : float
+            Of the stiffness in the blocks.
+        force : (N, d) float array
+            Overwritten.
+        blocks : (B, d, d) float array
+            Overwritten.
+        whole : bool
+            Without it what is below the diagonal may be anything.
+        """
+        mesh = self.virtual.mesh
+        if mesh.dim < 3:
+            self.evaluate(displacement, force, velocity, implicit)
+            blocks[:] = 0.0
+            self.add_stiffness(pattern, blocks, scale)
+            return
+        self._sweep = self._sweep_over(pattern)
+        self._sweep(displacement, velocity, implicit, scale, force, blocks, whole)
+        self._swept = self.turning
+
+    def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` K v (N, d), K with the rotations of the last `evaluate`, to `out`."""
+        self._kernels.frozen_product(
+            self.virtual.cells, *self.geometry, self.rotations, vector, scale, out
+        )
+
+    def add_stiffness(
+        self,
+        pattern: BlockPattern,
+        blocks: _Floats,
+        scale: float = 1.0,
+        kind: TangentKind = "frozen",
+        displacement: _Floats | None = None,
+    ) -> None:
+        """Add `scale` times the stiffness at the last `evaluate` to the nodal blocks.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Its first cells must be those of the body.
+        blocks : (B, d, d) float array
+        kind : {"frozen", "tensioned", "exact"}
+            Rotations held; the same and what tension gives membranes across their plane, which
+            has no negative mode either; or the second derivative of the potential.
+        displacement : (N, d) float array, optional
+            That of the last `evaluate`; needed for all but the frozen stiffness.
+
+        Raises
+        ------
+        XfemError
+            If the kind is unknown or needs a displacement that is not given.
+        """
+        if kind not in ("frozen", "tensioned", "exact"):
+            raise XfemError(f"stiffness '{kind}'; expected frozen, tensioned or exact")
+        targets = pattern.targets[: len(self.virtual.cells)]
+        self._kernels.add_frozen_stiffness(targets, *self.geometry, self.rotations, scale, blocks)
+        if kind == "frozen" or not self.turning:
+            return
+        if displacement is None:
+            raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
+        if kind == "tensioned":
+            if self.is_membrane:
+                nothing = np.zeros(self._shape)
+                self.add_tension(pattern, displacement, nothing, 0.0, scale, nothing, blocks)
+            return
+        self.left_out = self._kernels.add_spin_stiffness(
+            self.virtual.cells, targets, *self.geometry, self.rotations, displacement, scale, blocks
+        )
+
+    def add_tension(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats,
+        vector: _Floats,
+        share: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        least: float = 0.0,
+    ) -> None:
+        """Add the stiffness of a membrane across its plane, at the last evaluation.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+        displacement : (N, 3) float array
+            That of the last evaluation.
+        vector : (N, 3) float array
+        share : float
+            Times the stiffness times the vector is added to `force` (N, 3).
+        scale : float
+            Times the stiffness is added to `blocks` (B, 3, 3).
+        least : float
+            Tension over μ that every direction is taken to have at least: without it what is slack
+            has no stiffness across its plane.
+
+        Raises
+        ------
+        XfemError
+            If the body is no membrane.
+        """
+        if not self.is_membrane:
+            raise XfemError("stiffness from tension of a solid; expected a membrane in space")
+        add_tension(
+            self.virtual.cells, pattern.targets[: len(self.virtual.cells)], *self.geometry,
+            self.rotations, displacement, vector, share, scale, least, force, blocks,
+        )  # fmt: skip
+
+    def stiffness(
+        self, pattern: BlockPattern, displacement: _Floats, kind: TangentKind = "exact"
+    ) -> _Floats:
+        """(B, d, d) nodal blocks of the stiffness at a displacement, in N/m."""
+        self.evaluate(displacement)
+        space = self._shape[1]
+        blocks = np.zeros((len(pattern.columns), space, space))
+        self.add_stiffness(pattern, blocks, 1.0, kind, displacement)
+        return blocks
+
+    def inverted(self, displacement: _Floats) -> NDArray[np.int64]:
+        """Pieces whose deformation gradient has a negative determinant (solids only)."""
+        v = self.virtual
+        if v.mesh.dim < v.mesh.space:
+            raise XfemError("inversion of a membrane in space is not defined")
+        F = np.eye(v.mesh.dim) + np.einsum(
+            "pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent]
+        )
+        return np.flatnonzero(np.linalg.det(F) < 0.0)
+
+
+def _unit_normals(virtual: VirtualMesh) -> _Floats:
+    mesh = virtual.mesh
+    if mesh.dim == mesh.space:
+        return np.zeros((1, 3))
+    edges = mesh.edge_vectors
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)

@@ -1,0 +1,203 @@
+"""A tool's path and the surface that its blade sweeps: a cut that grows with time.
+
+The blade is a polyline (in the plane: a point) with a position at each time. Between two positions
+every point of it moves along a straight line; the sweep is made of the segments (2D) or triangles
+(3D) in between. How far the blade has come is measured by the *travel*: the length of the path, of
+the fastest point of the blade.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.cuts.polyline import Polyline
+from verify.xfem.cuts.sweep_kernels import probe_points
+from verify.xfem.cuts.sweep_surface import STILL, SweepSurface, sweep_surface
+from verify.xfem.errors import XfemError
+
+__all__ = ["PartOfSweep", "Sweep", "ToolPath"]
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ToolPath:
+    """Positions of a blade in time, in the material frame.
+
+    Parameters
+    ----------
+    blades : (k, b, s) array_like
+        Points of the blade at each time, in metres: b = 1 in the plane, b ≥ 2 in space.
+    times : (k,) array_like
+        In seconds, never decreasing.
+
+    Raises
+    ------
+    XfemError
+        If shapes do not match, a number is not finite, time runs backwards, the blade turns back
+        on its path, or a path in the plane intersects itself (begin a new stroke instead).
+    """
+
+    blades: _Floats
+    times: _Floats
+
+    def __init__(self, blades: ArrayLike, times: ArrayLike) -> None:
+        positions = np.asarray(blades, dtype=float)
+        moments = np.asarray(times, dtype=float)
+        _check(positions, moments)
+        object.__setattr__(self, "blades", positions)
+        object.__setattr__(self, "times", moments)
+        if self.length > 0.0:
+            if positions.shape[2] == 2:
+                moves = np.flatnonzero(np.diff(self.travel, prepend=-np.inf) > STILL * self.length)
+                Polyline(positions[moves, 0])  # raises if it turns back or intersects itself
+            _ = self.surface
+
+    @classmethod
+    def of_tip(
+        cls, tips: ArrayLike, times: ArrayLike, depth: ArrayLike | None = None
+    ) -> "ToolPath":
+        """Path of a straight blade: tip points (k, s), and in space the blade from tip to edge.
+
+        Parameters
+        ----------
+        tips : (k, s) array_like
+            In metres.
+        times : (k,) array_like
+            In seconds.
+        depth : (3,) or (k, 3) array_like, optional
+            Vector from the tip to the other end of the blade, in metres; none in the plane.
+        """
+        points = np.asarray(tips, dtype=float)
+        if points.ndim != 2:
+            raise XfemError(f"tip points of shape {points.shape}; expected (k, 2) or (k, 3)")
+        if depth is None:
+            return cls(points[:, None], times)
+        vector = np.asarray(depth, dtype=float)
+        if vector.shape not in ((points.shape[1],), points.shape):
+            raise XfemError(f"depth of shape {vector.shape}; expected (3,) or {points.shape}")
+        return cls(np.stack([points, points + vector], axis=1), times)
+
+    @cached_property
+    def travel(self) -> _Floats:
+        """(k,) length of the path up to each position, in metres."""
+        steps = np.linalg.norm(np.diff(self.blades, axis=0), axis=2).max(axis=1, initial=0.0)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def length(self) -> float:
+        """Length of the whole path, in metres; zero if the blade does not move."""
+        return float(self.travel[-1])
+
+    @property
+    def sweeps(self) -> bool:
+        """Whether it sweeps anything: a blade may stay, or move along itself."""
+        return self.length > 0.0 and len(self.surface.facets) > 0
+
+    @cached_property
+    def surface(self) -> SweepSurface:
+        """The swept segments or triangles."""
+        return sweep_surface(self.blades, self.travel)
+
+    @property
+    def sweep(self) -> "Sweep":
+        """The whole swept cut, as `verify.xfem.virtual.cut_mesh` takes it."""
+        return Sweep(self)
+
+    def travel_at(self, time: float) -> float:
+        """How far the blade has come at a time, in metres; negative before the first."""
+        if time < self.times[0]:
+            return -1.0
+        return float(np.interp(time, self.times, self.travel))
+
+    def time_at(self, travel: ArrayLike) -> _Floats:
+        """When the blade first comes that far, in seconds."""
+        wanted = np.clip(np.asarray(travel, dtype=float), 0.0, self.length)
+        # 'left': a blade that waits has been there since it arrived
+        end = np.clip(np.searchsorted(self.travel, wanted, side="left"), 1, len(self.times) - 1)
+        start = end - 1
+        step = self.travel[end] - self.travel[start]
+        share = np.where(step > 0.0, (wanted - self.travel[start]) / np.where(step, step, 1.0), 0.0)
+        return self.times[start] + share * (self.times[end] - self.times[start])
+
+    def extended(self, blades: ArrayLike, times: ArrayLike) -> "ToolPath":
+        """Append positions (k, b, s): for a tool that moves as one looks."""
+        more = np.asarray(blades, dtype=float)
+        if more.ndim != 3 or more.shape[1:] != self.blades.shape[1:]:
+            raise XfemError(
+                f"further blades of shape {more.shape}; expected (k, *{self.blades.shape[1:]})"
+            )
+        return ToolPath(
+            np.concatenate([self.blades, more]),
+            np.concatenate([self.times, np.atleast_1d(np.asarray(times, dtype=float))]),
+        )
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The surface swept by a path, as a cut.
+
+    The side of a point is told by the angle-weighted normal of the nearest face, edge or vertex;
+    past the rim the level set is that of the tangent plane there. In the plane the positive side
+    is on the left of the path, in space it is that of (direction of motion) × (blade).
+    """
+
+    path: ToolPath
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Signed distance (n,) to the sweep, to its tangent plane past the rim, in metres."""
+        return self._probe(points)[:, 0]
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Distance (n,) to the rim, negative past it, in metres."""
+        return self._probe(points)[:, 1]
+
+    def travel(self, points: _Floats) -> _Floats:
+        """How far (n,) the blade has come when it passes a point of the sweep, in metres."""
+        return self._probe(points)[:, 2]
+
+    def until(self, travel: float) -> "PartOfSweep":
+        """Keep the part that is swept when the blade has come so far."""
+        return PartOfSweep(self, travel)
+
+    def _probe(self, points: _Floats) -> _Floats:
+        if not self.path.sweeps:
+            # nothing is swept: one side everywhere, and no point of the cut anywhere
+            return np.tile([1.0, -np.inf, 0.0], (len(points), 1))
+        return probe_points(np.ascontiguousarray(points, dtype=float), self.path.surface.arrays)
+
+
+@dataclass(frozen=True)
+class PartOfSweep:
+    """A sweep under way: the level set of the whole, ending where the blade is."""
+
+    sweep: Sweep
+    front: float
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """`Sweep.level_set` of the whole path: what is cut does not move as the cut grows."""
+        return self.sweep.level_set(points)
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Distance to the rim or, along the path, to the blade; negative past either."""
+        probed = self.sweep._probe(points)
+        return np.minimum(probed[:, 1], self.front - probed[:, 2])
+
+
+def _check(blades: _Floats, times: _Floats) -> None:
+    if blades.ndim != 3 or blades.shape[2] not in (2, 3) or len(blades) == 0:
+        raise XfemError(f"blades of shape {blades.shape}; expected (k, b, 2) or (k, b, 3)")
+    if blades.shape[2] == 2 and blades.shape[1] != 1:
+        raise XfemError(f"blade of {blades.shape[1]} points in the plane; expected one, its tip")
+    if blades.shape[2] == 3 and blades.shape[1] < 2:
+        raise XfemError("blade of one point in space; expected two or more (give its depth)")
+    if times.shape != (len(blades),):
+        raise XfemError(f"times of shape {times.shape}; expected ({len(blades)},)")
+    if not np.isfinite(blades).all() or not np.isfinite(times).all():
+        raise XfemError("tool path with a position or time that is not finite")
+    if (np.diff(times) < 0.0).any():
+        raise XfemError(f"time runs backwards after position {int(np.diff(times).argmin())}")
+    if (np.linalg.norm(np.diff(blades, axis=1), axis=2) == 0.0).any():
+        raise XfemError("blade with two neighbouring points in one place; expected a length")

@@ -1,0 +1,173 @@
+"""Where the energy of a motion goes, step by step, for any integration scheme.
+
+A step is M Δv = h (f_ext − f_int − f_visc + r) with the reactions r at the supports. Multiplied
+by Δu this is an identity, whatever scheme has chosen the forces:
+
+    ΔT + ΔW − Δu·f_ext − Δu·r + Δu·f_visc + D = − Δu·(residual at free components),
+
+    D = (Δu/h − v̄)·M Δv + (Δu·f_int − ΔW),   v̄ = ½ (v₀ + v₁).
+
+D is what the scheme itself dissipates (negative: produces). The right-hand side is what the step
+leaves unsolved; if it is not round-off, the forces are not those of the motion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.dynamics.body import DynamicBody, MotionState
+from verify.xfem.dynamics.integrator import Integrator, StepForces
+from verify.xfem.slivers.penalised_force import PenalisedForce
+
+__all__ = ["EnergyLedger", "Ledger", "run"]
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Energies and momenta at the instants 0…n, all (n + 1,) or (n + 1, components).
+
+    Attributes
+    ----------
+    time : in s
+    kinetic, strain : in J
+    gravity : potential −weight·u of the dead load, in J
+    load_work, support_work : done on the body since the start, in J
+    damping, algorithmic : dissipated since the start by C, and by the scheme, in J
+    unbalanced : work of what the steps have left unsolved, since the start, in J
+    momentum : (n + 1, d) linear momentum, in kg m/s
+    angular_momentum : (n + 1, 1 or 3), about the origin, in kg m²/s
+    impulse : (n + 1, d) of external, viscous and support forces since the start, in N s
+    penalty : share of a ghost penalty in the strain energy, in J
+    """
+
+    time: _Floats
+    kinetic: _Floats
+    strain: _Floats
+    gravity: _Floats
+    load_work: _Floats
+    support_work: _Floats
+    damping: _Floats
+    algorithmic: _Floats
+    unbalanced: _Floats
+    momentum: _Floats
+    angular_momentum: _Floats
+    impulse: _Floats
+    penalty: _Floats
+
+    @property
+    def mechanical(self) -> _Floats:
+        """Kinetic, strain and gravity energy: constant in a conservative motion."""
+        return self.kinetic + self.strain + self.gravity
+
+    @property
+    def balance(self) -> _Floats:
+        """All columns together: constant up to `unbalanced` and round-off, for every scheme."""
+        return (
+            self.mechanical - self.load_work - self.support_work + self.damping + self.algorithmic
+        )
+
+    @property
+    def drift(self) -> float:
+        """Largest change of the mechanical energy over the largest energy in play."""
+        scale = max(self.kinetic.max(), np.ptp(self.strain), np.ptp(self.gravity))
+        if scale == 0.0:
+            return 0.0
+        return float(np.abs(self.mechanical - self.mechanical[0]).max() / scale)
+
+
+class EnergyLedger:
+    """Keeps the account of a body in motion.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    state : MotionState
+        Where the account starts.
+    """
+
+    def __init__(self, body: DynamicBody, state: MotionState) -> None:
+        self.body = body
+        self._last = state.copy()
+        self._strain, self._penalty = self._stored(state)
+        space = body.shape[1]
+        self._work = np.zeros(5)  # load, support, damping, algorithmic, unbalanced
+        self._impulse = np.zeros(space)
+        self._rows = [self._row(state)]
+
+    def record(self, state: MotionState, forces: StepForces) -> None:
+        """Enter one step, from the state of the last entry to this one."""
+        body, last = self.body, self._last
+        h = state.time - last.time
+        change = state.displacement - last.displacement
+        inertia = body.mass.apply(state.velocity - last.velocity)
+        residual = inertia / h - forces.external + forces.internal + forces.viscous
+        reaction = np.where(body.fixed, residual, 0.0)
+        strain, self._penalty = self._stored(state)
+        slip = change / h - 0.5 * (last.velocity + state.velocity)
+        assert body.weight is not None
+        self._work += [
+            np.sum(change * (forces.external - body.weight)),
+            np.sum(change * reaction),
+            np.sum(change * forces.viscous),
+            np.sum(slip * inertia) + np.sum(change * forces.internal) - (strain - self._strain),
+            np.sum(change * (residual - reaction)),
+        ]
+        self._impulse = self._impulse + h * (forces.external - forces.viscous + reaction).sum(
+            axis=0
+        )
+        self._last, self._strain = state.copy(), strain
+        self._rows.append(self._row(state))
+
+    def _stored(self, state: MotionState) -> tuple[float, float]:
+        """Strain energy, and the share of a ghost penalty in it."""
+        force = self.body.force
+        _, strain = force.evaluate(state.displacement)
+        return strain, force.penalty_energy if isinstance(force, PenalisedForce) else 0.0
+
+    def _row(self, state: MotionState) -> _Floats:
+        body = self.body
+        assert body.weight is not None
+        momenta = body.mass.apply(state.velocity)
+        position = body.force.virtual.node_points + state.displacement
+        energies = [
+            state.time,
+            0.5 * np.sum(state.velocity * momenta),
+            self._strain,
+            -np.sum(body.weight * state.displacement),
+        ]
+        turning = _cross(position, momenta)
+        vectors = (momenta.sum(axis=0), turning, self._impulse)
+        return np.concatenate([energies, self._work, *vectors, [self._penalty]])
+
+    def close(self) -> Ledger:
+        """Return the account so far."""
+        table = np.array(self._rows).T
+        space = self.body.shape[1]
+        turns = 1 if space == 2 else 3
+        momentum, turning, impulse = np.split(table[9:-1].T, [space, space + turns], axis=1)
+        return Ledger(*[*table[:9], momentum, turning, impulse, table[-1]])
+
+
+def _cross(position: _Floats, momenta: _Floats) -> _Floats:
+    if position.shape[1] == 2:
+        turning = position[:, 0] * momenta[:, 1] - position[:, 1] * momenta[:, 0]
+        return np.array([turning.sum()])
+    return np.cross(position, momenta).sum(axis=0)
+
+
+def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: int) -> Ledger:
+    """Take a number of steps and return their account; the state is changed in place.
+
+    Raises
+    ------
+    StepFailedError
+        From the step that failed; the state is that of the last good one.
+    """
+    ledger = EnergyLedger(body, state)
+    for _ in range(steps):
+        forces = integrator.step(state)
+        ledger.record(state, forces)
+    return ledger.close()

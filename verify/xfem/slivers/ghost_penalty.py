@@ -1,0 +1,146 @@
+"""Ghost penalty: jumps of the gradient across the faces of cut cells cost energy (Burman 2010).
+
+Each side is penalised on its own, so that the halves stay separate. The penalty vanishes for
+linear fields, hence for rigid motion, even of finite rotation, and needs no rotations of its own.
+It bounds the stiffness of slivers from below, which an explicit step pays for unless the mass
+grows alike: `GhostPenalty.mass`.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from verify.xfem.elasticity import Material
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import Mass, cell_densities, coupled_pattern, pattern_places
+from verify.xfem.slivers.piece_contacts import face_contacts
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["DEFAULT_FACTOR", "GhostPenalty"]
+
+DEFAULT_FACTOR = 0.01  # least accuracy lost for a bounded condition number: see the docs on slivers
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class GhostPenalty:
+    """½ γ Σ (λ + 2μ) h A |⟦∂u/∂n⟧|² over the faces between pieces of which one is cut.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    material : Material
+    factor : float
+        γ; dimensionless.
+
+    Attributes
+    ----------
+    jumps : (f, N) csr_array
+        ⟦∂N_i/∂n⟧ on each face, in 1/m.
+    weights : (f,) float array
+        h A, with h the mean height of both cells over the face, in m^d.
+    modulus : (f,) float array
+        (λ + 2μ) of the stiffer cell, in pascal.
+    couplings : (f, 2) int array
+        Unknown nodes on either side of each face that only the penalty couples.
+
+    Raises
+    ------
+    XfemError
+        If the factor is not positive, or the body is a membrane in space: across its creases
+        the gradient of a rigid turn jumps, so that turning would cost energy.
+    """
+
+    def __init__(
+        self, virtual: VirtualMesh, material: Material, factor: float = DEFAULT_FACTOR
+    ) -> None:
+        if not (np.isfinite(factor) and factor > 0.0):
+            raise XfemError(f"ghost penalty with factor {factor:g}; expected a positive one")
+        if virtual.mesh.dim < virtual.mesh.space:
+            raise XfemError("ghost penalty of a membrane in space; expected a body that fills it")
+        self.virtual, self.factor = virtual, factor
+        pieces = np.stack(face_contacts(virtual, near=True))
+        pieces = pieces[:, virtual.split[pieces].any(axis=0)]
+        mesh, cells = virtual.mesh, virtual.parent[pieces]
+        local = (mesh.neighbours[cells[0]] == cells[1][:, None]).argmax(axis=1)
+        there = (mesh.neighbours[cells[1]] == cells[0][:, None]).argmax(axis=1)
+        faces = np.arange(len(local))
+        slope = mesh.gradients[cells[0], local]
+        steepness = np.linalg.norm(slope, axis=1)
+        height = 1.0 / steepness
+        across = 1.0 / np.linalg.norm(mesh.gradients[cells[1], there], axis=1)
+        area = mesh.measures[cells[0]] * mesh.dim * steepness
+        normal = -slope / steepness[:, None]
+        values = [np.einsum("fij,fj->fi", mesh.gradients[c], normal) for c in cells]
+        columns = np.concatenate([virtual.cells[p] for p in pieces], axis=1)
+        rows = np.broadcast_to(faces[:, None], columns.shape)
+        jump = np.concatenate([values[0], -values[1]], axis=1)
+        self.jumps = csr_array(
+            coo_array(
+                (jump.ravel(), (rows.ravel(), columns.ravel())),
+                shape=(len(faces), virtual.node_count),
+            )
+        )
+        self.weights = 0.5 * (height + across) * area
+        self._heights = 0.5 * (height + across)
+        self._cells = cells
+        self.modulus = self._of_faces(material.lam + 2.0 * material.mu)
+        self.couplings: _Ints = np.stack(
+            [virtual.cells[pieces[0], local], virtual.cells[pieces[1], there]], axis=1
+        )
+        self._places: tuple[BlockPattern, _Ints] | None = None
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """(N, N) the penalty's stiffness, the same for every component, in N/m."""
+        weights = self.factor * self.modulus * self.weights
+        return csr_array(self.jumps.T @ (self.jumps * weights[:, None]))
+
+    def pattern(self) -> BlockPattern:
+        """Sparsity of stiffness and penalty; its first cells are those of the body."""
+        return coupled_pattern(self.virtual, self.couplings)
+
+    def add_stiffness(self, pattern: BlockPattern, blocks: _Floats, scale: float = 1.0) -> None:
+        """Add `scale` times the penalty to nodal blocks (B, d, d) of a pattern.
+
+        Raises
+        ------
+        XfemError
+            If the pattern lacks couplings of the penalty.
+        """
+        rows, columns, values = self._entries
+        if self._places is None or self._places[0] is not pattern:
+            self._places = (pattern, pattern_places(pattern, rows, columns))
+        at = self._places[1]
+        for axis in range(blocks.shape[1]):
+            blocks[at, axis, axis] += scale * values
+
+    @cached_property
+    def _entries(self) -> tuple[_Ints, _Ints, _Floats]:
+        entries = self.matrix.tocoo()
+        return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
+
+    def force(self, displacement: _Floats) -> tuple[_Floats, float]:
+        """Force (N, d) of the penalty, in newtons, and its energy."""
+        force = self.matrix @ displacement
+        return force, 0.5 * float((force * displacement).sum())
+
+    def mass(self, mass: Mass, density: _Floats | float) -> Mass:
+        """Mass with the counterpart γ Σ ρ h³ A |⟦∂v/∂n⟧|²; not diagonal any more.
+
+        It does not act on rigid motion: total mass, weight and momenta stay.
+        """
+        rho = self._of_faces(cell_densities(self.virtual, density))
+        weights = self.factor * rho * self._heights**2 * self.weights
+        extra = self.jumps.T @ (self.jumps * weights[:, None])
+        return Mass(csr_array(mass.matrix + extra), None, mass.weights)
+
+    def _of_faces(self, values: NDArray) -> _Floats:
+        """Larger of the values of both cells at each face."""
+        each = np.broadcast_to(values, len(self.virtual.mesh.cells))
+        larger: _Floats = each[self._cells].max(axis=0)
+        return larger

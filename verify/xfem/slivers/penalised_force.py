@@ -1,0 +1,109 @@
+"""Internal force of a cut body with a ghost penalty: what moves if slivers are penalised.
+
+The penalty is a quadratic potential of its own, the same for every component, so that it needs no
+rotations: its force and stiffness join those of the material in everything that a scheme asks for.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.corotation.internal_force import InternalForce, Kinematics, TangentKind
+from verify.xfem.elasticity import Material
+from verify.xfem.errors import XfemError
+from verify.xfem.slivers.ghost_penalty import GhostPenalty
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["PenalisedForce"]
+
+_Floats = NDArray[np.float64]
+
+
+class PenalisedForce(InternalForce):
+    """Internal force with a ghost penalty.
+
+    Parameters
+    ----------
+    virtual, material, kinematics
+        As for `InternalForce`.
+    ghost : GhostPenalty
+        Of the same body.
+
+    Attributes
+    ----------
+    penalty_energy : float
+        Share of the penalty in the energy that the last `evaluate` returned, in joules.
+
+    Raises
+    ------
+    XfemError
+        If the penalty belongs to another body, or as `InternalForce`.
+    """
+
+    def __init__(
+        self,
+        virtual: VirtualMesh,
+        material: Material,
+        ghost: GhostPenalty,
+        kinematics: Kinematics = "corotational",
+    ) -> None:
+        super().__init__(virtual, material, kinematics)
+        if ghost.virtual is not virtual:
+            raise XfemError("the ghost penalty belongs to another body; expected one of this one")
+        self.ghost = ghost
+        self.penalty_energy = 0.0
+
+    def evaluate(
+        self,
+        displacement: _Floats,
+        out: _Floats | None = None,
+        velocity: _Floats | None = None,
+        scale: float = 0.0,
+    ) -> tuple[_Floats, float]:
+        """Return force and energy of material and penalty together; see `InternalForce`."""
+        force, energy = super().evaluate(displacement, out, velocity, scale)
+        penalty, self.penalty_energy = self.ghost.force(displacement)
+        force += penalty
+        if velocity is not None and scale != 0.0:
+            self.add_penalty(velocity, scale, force)
+        return force, energy + self.penalty_energy
+
+    def add_penalty(self, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` times the penalty's stiffness times a vector (N, d) to `out`."""
+        out += scale * (self.ghost.matrix @ vector)
+
+    def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` K v (N, d) to `out`, the penalty's stiffness included."""
+        super().add_frozen_product(vector, scale, out)
+        self.add_penalty(vector, scale, out)
+
+    def add_stiffness(
+        self,
+        pattern: BlockPattern,
+        blocks: _Floats,
+        scale: float = 1.0,
+        kind: TangentKind = "frozen",
+        displacement: _Floats | None = None,
+    ) -> None:
+        """Add `scale` times the stiffness of material and penalty to the nodal blocks."""
+        super().add_stiffness(pattern, blocks, scale, kind, displacement)
+        self.ghost.add_stiffness(pattern, blocks, scale)
+
+    def linearise(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats,
+        velocity: _Floats,
+        implicit: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+    ) -> None:
+        """Overwrite force and stiffness of a semi-implicit step, the penalty's included."""
+        if self.virtual.mesh.dim < 3:  # the material calls `evaluate` and `add_stiffness` of here
+            super().linearise(pattern, displacement, velocity, implicit, scale, force, blocks)
+            return
+        super().linearise(pattern, displacement, velocity, implicit, scale, force, blocks, whole)
+        self.add_penalty(displacement + implicit * velocity, 1.0, force)
+        self.ghost.add_stiffness(pattern, blocks, scale)

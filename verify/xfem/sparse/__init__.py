@@ -1,0 +1,1 @@
+"""Sparse matrices of nodal blocks: pattern, Cholesky factorisation, conjugate gradients."""

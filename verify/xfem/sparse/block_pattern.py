@@ -1,0 +1,131 @@
+"""The sparsity of nodal blocks, and where each element block goes: no triplets, no sorting."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array
+
+from verify.xfem.arrays.short_sort import sort_short
+
+__all__ = ["BlockPattern", "block_pattern"]
+
+_Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class BlockPattern:
+    """Compressed rows of nodal blocks.
+
+    Attributes
+    ----------
+    starts : (N + 1,) int array
+        First block of each row.
+    columns : (B,) int array
+        Column of each block, ascending in a row.
+    targets : (p, c, c) int array
+        Block to which the pair (row corner, column corner) of each cell adds.
+    """
+
+    starts: _Ints
+    columns: _Ints
+    targets: _Ints
+
+    @property
+    def node_count(self) -> int:
+        """Number of block rows."""
+        return len(self.starts) - 1
+
+    @cached_property
+    def diagonal(self) -> _Ints:
+        """(N,) the block on the diagonal of each row."""
+        return _diagonal(self.starts, self.columns)
+
+    @cached_property
+    def mirror(self) -> _Ints:
+        """(B,) of each block (i, j), the place of (j, i)."""
+        return _mirror(self.starts, self.columns)
+
+    def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
+        """Return the matrix of the given blocks (B, d, d), without a copy."""
+        size = self.node_count * blocks.shape[1]
+        return bsr_array((blocks, self.columns, self.starts), shape=(size, size))
+
+
+def block_pattern(cells: NDArray[np.int64], node_count: int) -> BlockPattern:
+    """Sparsity of a mesh: nodes are coupled when a cell contains both.
+
+    Parameters
+    ----------
+    cells : (p, c) int array
+    node_count : int
+        Every node must belong to a cell.
+    """
+    starts, columns, targets = _pattern(np.ascontiguousarray(cells), node_count)
+    return BlockPattern(starts, columns, targets)
+
+
+@njit(cache=True)
+def _pattern(cells, node_count):
+    count, corners = cells.shape
+    first = np.zeros(node_count + 1, dtype=np.int64)
+    for cell in range(count):
+        for a in range(corners):
+            first[cells[cell, a] + 1] += 1
+    for node in range(node_count):
+        first[node + 1] += first[node]
+    around = np.empty(first[node_count], dtype=np.int64)
+    fill = first[:-1].copy()
+    for cell in range(count):
+        for a in range(corners):
+            around[fill[cells[cell, a]]] = cell
+            fill[cells[cell, a]] += 1
+
+    starts = np.zeros(node_count + 1, dtype=np.int32)
+    mark = np.full(node_count, -1, dtype=np.int64)
+    columns = np.empty(corners * corners * count, dtype=np.int32)
+    place = np.empty(node_count, dtype=np.int32)
+    targets = np.empty((count, corners, corners), dtype=np.int32)
+    used = 0
+    for node in range(node_count):
+        begin = used
+        for k in range(first[node], first[node + 1]):
+            for b in range(corners):
+                other = cells[around[k], b]
+                if mark[other] != node:
+                    mark[other] = node
+                    columns[used] = other
+                    used += 1
+        sort_short(columns[begin:used])
+        starts[node + 1] = used
+        for k in range(begin, used):
+            place[columns[k]] = k
+        for k in range(first[node], first[node + 1]):
+            cell = around[k]
+            for a in range(corners):
+                if cells[cell, a] == node:
+                    for b in range(corners):
+                        targets[cell, a, b] = place[cells[cell, b]]
+    return starts, columns[:used].copy(), targets
+
+
+@njit(cache=True)
+def _diagonal(starts, columns):
+    place = np.empty(len(starts) - 1, dtype=np.int32)
+    for node in range(len(place)):
+        for k in range(starts[node], starts[node + 1]):
+            if columns[k] == node:
+                place[node] = k
+    return place
+
+
+@njit(cache=True)
+def _mirror(starts, columns):
+    # rows are met in ascending order, so each block is the next one in the row of its column
+    following, place = starts[:-1].copy(), np.empty(len(columns), dtype=np.int32)
+    for k in range(len(columns)):
+        place[k] = following[columns[k]]
+        following[columns[k]] += 1
+    return place

@@ -1,0 +1,273 @@
+"""Sparse Cholesky factorisation of nodal blocks, with the symbolic analysis kept.
+
+A multifrontal method (Duff & Reid 1983), ordered by minimum degree on nodes. Everything that
+depends on the sparsity only (order, fronts, where each block goes) is found once per topology;
+`Cholesky.factorize` then runs over values alone. No pivoting: the stiffness of a supported body
+is positive definite, and the error of a Cholesky factorisation does not depend on diagonal
+scaling, so slivers do not hurt it (Higham 2002, section 10.1).
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.xfem.errors import XfemError
+from verify.xfem.in_pieces import InPieces, in_one_go
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.sparse.cholesky_kernels import factorise_fronts, solve_fronts
+from verify.xfem.sparse.dense_tiles import COLUMNS, ROWS
+from verify.xfem.sparse.front_plan_kernels import assembly_lists, front_rows
+from verify.xfem.sparse.front_tree import levels, merge_and_order
+from verify.xfem.sparse.minimum_degree import minimum_degree
+
+__all__ = ["Cholesky", "SingularStiffnessError"]
+
+_Ints = NDArray[np.int64]
+
+_ANYWHERE = np.empty(0, dtype=np.int64)
+_WORN = 1.25  # operations per unknown, over those when the order was found
+
+
+class SingularStiffnessError(XfemError):
+    """The matrix is not positive definite: something moves freely, or a sign is wrong.
+
+    Attributes
+    ----------
+    node : int or None
+        Unknown node at which the factorisation stopped, where it is known.
+    """
+
+    def __init__(self, node: int | None) -> None:
+        self.node = node
+        where = "" if node is None else f" (at unknown node {node})"
+        super().__init__(
+            f"the stiffness is not positive definite{where}: a free piece without support, "
+            "or a wrong sign"
+        )
+
+
+class Cholesky:
+    """Solver of K x = b for symmetric positive definite K in nodal blocks.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+    held : (N,) bool array, optional
+        Nodes of which every component is held: the matrix couples them to no other, and whatever
+        stands in these blocks is not read.
+    """
+
+    def __init__(
+        self, pattern: BlockPattern, block: int, held: NDArray[np.bool_] | None = None
+    ) -> None:
+        self._block = block
+        self._held = np.zeros(pattern.node_count, dtype=bool) if held is None else held
+        self._factor = self._diagonal = self._gathered = np.empty(0)
+        self._stacks = (np.empty(0), np.empty(0))
+        self._runs = np.empty((3, 0), dtype=np.int64)
+        self._tile = np.empty(COLUMNS * (COLUMNS + 1) // 2)
+        in_one_go(self._finding_order(pattern))
+
+    @property
+    def _free(self) -> int:
+        return max(1, int(np.count_nonzero(~self._held)))
+
+    def _finding_order(self, pattern: BlockPattern) -> InPieces[None]:
+        starts, columns, _ = coupled = _coupled(pattern.starts, pattern.columns, self._held)
+        order, bounds = minimum_degree(starts, columns)
+        yield
+        row_start, _, parent = front_rows(starts, columns, order, bounds, _ANYWHERE)
+        order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
+        self._plan(coupled, order, bounds, _ANYWHERE)
+        self._ordered = (self._work, self._free)
+
+    def extended(
+        self, pattern: BlockPattern, source: _Ints, held: NDArray[np.bool_] | None = None
+    ) -> "Cholesky":
+        """Solver for this body cut further, in the order of this one: no search for another.
+
+        A new unknown has some of the neighbours of the one from which it comes, and is eliminated
+        with it. Takes the memory of this solver, whose factors are lost with those of the other.
+        Only where one that is free was held, or comes from one that was, is another order sought.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Of more unknowns: old ones keep their numbers and are coupled, through themselves or
+            through what has come from them, to none that were not coupled before.
+        source : (k,) int array
+            Unknown before from which each new one comes.
+        held : (N,) bool array, optional
+            As for a new solver.
+        """
+        other = self._with_held(pattern, held)
+        was_held = np.concatenate([self._held, self._held[source]])
+        if (was_held & ~other._held).any():
+            in_one_go(other._finding_order(pattern))
+            return other
+        order, bounds = _insert(self._order, self._bounds, source)
+        coupled = _coupled(pattern.starts, pattern.columns, other._held)
+        other._plan(coupled, order, bounds, self._parent)
+        return other
+
+    def renewing(
+        self, pattern: BlockPattern, held: NDArray[np.bool_] | None = None
+    ) -> "InPieces[Cholesky]":
+        """Make a solver for any pattern, in an order found anew, with the memory of this one."""
+        other = self._with_held(pattern, held)
+        yield from other._finding_order(pattern)
+        return other
+
+    def _with_held(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> "Cholesky":
+        """Copy that has the memory of this solver."""
+        other = object.__new__(Cholesky)
+        other.__dict__.update(self.__dict__)
+        other._held = np.zeros(pattern.node_count, dtype=bool) if held is None else held
+        return other
+
+    @property
+    def is_worn(self) -> bool:
+        """Whether extensions have made the order so bad that a new one would pay."""
+        work, nodes = self._ordered
+        return self._work > _WORN * work * (self._free / nodes)
+
+    def _plan(
+        self, coupled: tuple[_Ints, _Ints, _Ints], order: _Ints, bounds: _Ints, nearest: _Ints
+    ) -> None:
+        """Find fronts and room for an order, and where each block goes."""
+        starts, columns, blocks = coupled
+        row_start, rows, parent = front_rows(starts, columns, order, bounds, nearest)
+        lists = assembly_lists(starts, columns, order, bounds, row_start, rows, parent)
+        self._order, self._bounds = order, bounds
+        self._row_start, self._rows, self._parent = row_start, rows, parent
+        self._relative, self._entry_start, self._entry_block, self._entry_row = lists
+        self._entry_block = blocks.take(self._entry_block)
+        width = np.diff(bounds) * self._block
+        below = np.diff(row_start) * self._block
+        self._work = float(width @ (width + below) ** 2)  # about the operations of a factorisation
+        self._entries = int((width * (width + below) - width * (width - 1) // 2).sum())
+        below = _full(below, ROWS)
+        height = _full(width, ROWS) + below
+        self._offset = np.concatenate([[0], np.cumsum(_full(width, COLUMNS) * height)])
+        self._level, depths = levels(parent, below**2)
+        self._factor = _room(self._factor, int(self._offset[-1]))
+        even, odd = self._stacks
+        self._stacks = (_room(even, depths[0]), _room(odd, depths[1]))
+        most = int(height.max(initial=0))
+        self._diagonal, self._gathered = _room(self._diagonal, most), _room(self._gathered, most)
+        if self._runs.shape[1] < most:
+            self._runs = np.empty((3, most), dtype=np.int64)
+        self._permuted = np.empty((len(order), self._block))
+
+    @property
+    def factor_entries(self) -> int:
+        """Stored entries of the factor."""
+        return self._entries
+
+    def factorize(self, blocks: NDArray[np.float64]) -> None:
+        """Factorise the matrix with these blocks (B, block, block).
+
+        Raises
+        ------
+        SingularStiffnessError
+            If a pivot is not positive beyond round-off.
+        """
+        failed = factorise_fronts(
+            np.ascontiguousarray(blocks),
+            self._bounds,
+            self._row_start,
+            self._relative,
+            self._parent,
+            self._level,
+            self._entry_start,
+            self._entry_block,
+            self._entry_row,
+            self._offset,
+            self._factor,
+            self._stacks,
+            self._runs,
+            self._diagonal,
+            self._tile,
+        )
+        if failed >= 0:
+            raise SingularStiffnessError(int(self._order[failed // self._block]))
+
+    def solve(
+        self, load: NDArray[np.float64], out: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """Solution (N, block) for a right-hand side (N, block), in `out` if that is given."""
+        solution = np.empty(load.shape) if out is None else out
+        np.take(load, self._order, axis=0, out=self._permuted, mode="clip")
+        solve_fronts(
+            self._bounds,
+            self._row_start,
+            self._rows,
+            self._offset,
+            self._factor,
+            self._block,
+            self._gathered,
+            self._tile,
+            self._permuted.reshape(-1),
+        )
+        solution[self._order] = self._permuted
+        return solution
+
+
+def _room(store: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Array of at least that size: the given one, or a larger one with room to grow.
+
+    It begins with a line of the cache, so that no vector in it spans two.
+    """
+    if len(store) >= size:
+        return store
+    size += size // 4
+    room = np.empty(size + ROWS)
+    skipped = -room.ctypes.data % (8 * ROWS) // 8
+    return room[skipped : skipped + size]
+
+
+def _full(lengths: _Ints, multiple: int) -> _Ints:
+    return -(-lengths // multiple) * multiple
+
+
+@njit(cache=True)
+def _coupled(starts, columns, held):
+    """Rows without what couples held nodes: starts, columns, and which blocks are left."""
+    fewer = np.empty_like(starts)
+    left, blocks = np.empty_like(columns), np.empty(len(columns), dtype=np.int64)
+    count = 0
+    fewer[0] = 0
+    for i in range(len(starts) - 1):
+        for k in range(starts[i], starts[i + 1]):
+            if columns[k] == i or not (held[i] or held[columns[k]]):
+                left[count], blocks[count] = columns[k], k
+                count += 1
+        fewer[i + 1] = count
+    return fewer, left[:count], blocks[:count]
+
+
+@njit(cache=True)
+def _insert(order, bounds, source):
+    """Order and bounds of fronts with new nodes after those from which they come."""
+    nodes, fronts = len(order), len(bounds) - 1
+    # of each node the last new one that comes from it, and of each new one that before
+    newest, earlier = np.full(nodes, -1, dtype=np.int64), np.empty(len(source), dtype=np.int64)
+    for k in range(len(source)):
+        earlier[k] = newest[source[k]]
+        newest[source[k]] = k
+    grown = np.empty(nodes + len(source), dtype=np.int64)
+    ends = np.zeros(fronts + 1, dtype=np.int64)
+    count = 0
+    for s in range(fronts):
+        for k in range(bounds[s], bounds[s + 1]):
+            grown[count] = order[k]
+            count += 1
+            new = newest[order[k]]
+            while new >= 0:
+                grown[count] = nodes + new
+                count += 1
+                new = earlier[new]
+        ends[s + 1] = count
+    return grown, ends

@@ -1,0 +1,105 @@
+"""Conjugate gradients preconditioned by symmetric Gauß–Seidel on nodal blocks, with a warm start.
+
+Scaling by nodal blocks bounds the condition number of the side-wise unknowns whatever the size of
+the slivers. Gauß–Seidel does not depend on such a scaling, so the number of iterations does not see
+them either.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.errors import XfemError
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.sparse.cholesky import SingularStiffnessError
+from verify.xfem.sparse.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
+from verify.xfem.sparse.symmetric_sweep_kernels import vector_width
+
+__all__ = ["ConjugateGradients", "NotConvergedError"]
+
+_Floats = NDArray[np.float64]
+
+
+class NotConvergedError(XfemError):
+    """The iterations ran out before the residual was small enough."""
+
+
+class ConjugateGradients:
+    """Iterative solver of K x = b for symmetric positive definite K in nodal blocks.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+    tolerance : float
+        Of the residual relative to the right-hand side, 2-norm.
+    limit : int
+        Most iterations.
+
+    Attributes
+    ----------
+    iterations : int
+        Of the last solve.
+    """
+
+    def __init__(
+        self, pattern: BlockPattern, block: int, tolerance: float = 1e-10, limit: int = 10_000
+    ) -> None:
+        if not 0.0 < tolerance < 1.0 or limit < 1:
+            raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
+        self._pattern, self._tolerance, self._limit = pattern, tolerance, limit
+        width = vector_width(block)
+        self._inverse = np.zeros((pattern.node_count, block, width))
+        self._work = np.zeros((8, pattern.node_count, width))
+        self._blocks = np.zeros((0, block, block))
+        self.iterations = 0
+
+    def factorize(self, blocks: _Floats) -> None:
+        """Take the matrix with these blocks (B, d, d), kept by reference.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If a nodal block is not positive definite.
+        """
+        failed = invert_blocks(blocks, self._pattern.diagonal, self._inverse)
+        if failed >= 0:
+            raise SingularStiffnessError(failed)
+        self._blocks = blocks
+
+    def solve(self, load: _Floats, start: _Floats | None = None) -> _Floats:
+        """Solution (N, d) for a right-hand side (N, d), from a first guess.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If the matrix turns out not to be positive definite.
+        NotConvergedError
+            If the iterations run out.
+        """
+        x = np.empty(load.shape)
+        self.improve(load, x, start)
+        return x
+
+    def improve(self, load: _Floats, x: _Floats, start: _Floats | None = None) -> None:
+        """Overwrite x (N, d) with the solution, from a first guess (x itself, or by default 0).
+
+        Nothing is allocated. Errors are those of `solve`.
+        """
+        if start is None:
+            x[:] = 0.0
+        elif start is not x:
+            x[:] = start
+        pattern = self._pattern
+        iterations, residual = conjugate_gradients(
+            pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._inverse,
+            np.ascontiguousarray(load), x, start is None, self._work, self._tolerance, self._limit,
+        )  # fmt: skip
+        if iterations < 0:
+            raise SingularStiffnessError(None)
+        if residual > self._tolerance:
+            raise NotConvergedError(
+                f"conjugate gradients: residual {residual:.3g} after {iterations} iterations; "
+                f"expected {self._tolerance:g}"
+            )
+        self.iterations = iterations
