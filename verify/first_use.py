@@ -2,8 +2,7 @@
 
 numba compiles a kernel when it is first called and keeps it in `NUMBA_CACHE_DIR` (by default beside
 the source). `STAGES` call the kernels of one kind of scene after another; `compile_all` runs them
-in two processes that share the cache. Seconds are processor time and exclusive: a kernel compiled
-while another is being compiled counts for itself only.
+in two processes that share the cache.
 
 ``python -m verify.first_use [STAGE …]`` runs stages in this process and prints JSON.
 """
@@ -18,16 +17,15 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from time import perf_counter, process_time
-from typing import Any
+from time import perf_counter
 
 import numpy as np
-from numba.core import event
 
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.facet_kernels import crossings, distance_to_segments
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
 from verify.compare.simplices import simplices
+from verify.compile_times import compile_times
 from verify.replay.session import Session
 from verify.replay.stage import Stage
 from verify.threads import ONE_THREAD
@@ -52,44 +50,13 @@ from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
-__all__ = ["STAGES", "CompileTimes", "FirstUse", "FirstUseError", "compile_all", "compile_here"]
+__all__ = ["STAGES", "FirstUse", "FirstUseError", "compile_all", "compile_here"]
 
 _SECONDS = 1200.0  # ten times what a slow core takes
 
 
 class FirstUseError(RuntimeError):
     """A kernel could not be compiled or run."""
-
-
-class CompileTimes(event.Listener):
-    """Processor seconds of compilation by kernel, each without what it had compiled.
-
-    Attributes
-    ----------
-    seconds : dict
-        By ``module:kernel``, over all argument types that were compiled.
-    kernels : int
-        Compilations.
-    """
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = defaultdict(float)
-        self.kernels = 0
-        self._open: list[list[float]] = []
-
-    def on_start(self, event_: Any) -> None:
-        """Begin a kernel."""
-        self._open.append([process_time(), 0.0])
-
-    def on_end(self, event_: Any) -> None:
-        """End the kernel that was begun last."""
-        start, inner = self._open.pop()
-        whole = process_time() - start
-        kernel = event_.data["dispatcher"].py_func
-        self.seconds[f"{kernel.__module__}:{kernel.__name__}"] += whole - inner
-        self.kernels += 1
-        if self._open:
-            self._open[-1][1] += whole
 
 
 def _plane() -> tuple[VirtualMesh, State]:
@@ -234,11 +201,11 @@ def compile_here(stages: list[str]) -> FirstUse:
     stages : list of str
         Of `STAGES`.
     """
-    begun, times, spent = perf_counter(), CompileTimes(), {}
+    begun, spent = perf_counter(), {}
     collecting = gc.isenabled()
     gc.disable()  # the compiler makes millions of objects that live on: 8 % of its time
     try:
-        with event.install_listener("numba:compile", times):
+        with compile_times() as times:
             for stage in stages:
                 before = sum(times.seconds.values())
                 STAGES[stage]()

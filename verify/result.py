@@ -14,6 +14,7 @@ from verify.errors import InputError
 from verify.json_files import plain, write_json
 
 __all__ = [
+    "COMPILING",
     "SCHEMA_VERSION",
     "CaseResult",
     "Metric",
@@ -27,6 +28,7 @@ __all__ = [
 ]
 
 SCHEMA_VERSION = 1
+COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
 
 
 class Status(StrEnum):
@@ -84,7 +86,8 @@ class SolveRecord:
     """One solve: one solver on one mesh level of one case.
 
     `timings` are wall seconds by phase: median and the list of repetitions. `unknowns`,
-    `size` and the rest are as in `verify.solution.Solution`.
+    `size` and the rest are as in `verify.solution.Solution`. Of `notes`, `COMPILING` says how much
+    of `wall` went to compiling kernels, which is kept for later runs.
     """
 
     case: str

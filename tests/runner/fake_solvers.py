@@ -54,6 +54,21 @@ class Instant:
         )
 
 
+class Compiling(Instant):
+    """Has its kernels compiled, as the compact solver at its first use."""
+
+    def refuses(self, scene):
+        import numba
+
+        self.compiler = numba.njit
+
+    def solve(self, scene, level, repetitions=1, **parameters):
+        start = time.process_time()
+        while time.process_time() < start + 1.0:
+            self.compiler(lambda x: x + 1.0)(1.0)
+        return super().solve(scene, level, repetitions)
+
+
 class Other(Instant):
     name = "other"
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import Any, Protocol, TextIO
 
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import COMPILING, CaseResult, SolveRecord, Status
 from verify.runner import Progress
 
 __all__ = ["ClosableProgress", "progress_on"]
@@ -33,6 +33,8 @@ def _solve_text(label: str, record: SolveRecord, reused: bool) -> str:
     if reused:
         return f"{label}: taken over"
     took = f" in {record.wall:.1f} s" if record.wall is not None else ""
+    if took and COMPILING in record.notes:
+        took += f", of them {record.notes[COMPILING]} compiling kernels (first use)"
     if record.status is Status.SOLVED:
         return f"{label}: solved, {record.unknowns} unknowns{took}"
     return f"{label}: {record.status}{took}: {record.reason}"

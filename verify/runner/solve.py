@@ -15,7 +15,7 @@ from typing import Any
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.json_files import read_json, write_json
-from verify.result import Status
+from verify.result import COMPILING, Status
 from verify.runner.childhood import die_with_parent, peak_memory
 from verify.runner.ranks import give_up, world
 
@@ -67,6 +67,7 @@ def solve_job(job: dict[str, Any], folder: Path, store: bool = True) -> dict[str
 
 def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
     from verify.calibration import calibration_note
+    from verify.compile_times import compile_times
     from verify.scene import restore_scene
     from verify.solution import write_solution
     from verify.solvers import find_solver
@@ -77,9 +78,10 @@ def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
     solver = find_solver(job["solver"])
     if refusal := solver.refuses(scene):
         raise UnsupportedSceneError(refusal)
-    solution = solver.solve(
-        scene, job["level"], repetitions=job["repetitions"], **job["parameters"]
-    )
+    with compile_times() as compiled:
+        solution = solver.solve(
+            scene, job["level"], repetitions=job["repetitions"], **job["parameters"]
+        )
     if store:
         write_solution(solution, folder / "solution")
     return {
@@ -90,7 +92,11 @@ def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
         "timings": solution.timings,
         "iterations": solution.iterations,
         "regularisations": [vars(entry) for entry in solution.regularisations],
-        "notes": {**solution.notes, "calibration": calibration_note()},
+        "notes": {
+            **solution.notes,
+            "calibration": calibration_note(),
+            **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > 0.5 else {}),
+        },
     }
 
 
