@@ -97,7 +97,10 @@ def bisected(order, ends, r, s, nodes, points, barycentric, fraction):
 
 
 def _regions(nodes, cutting, values, find):
-    """Divide faces (f, d) by the cuts that matter to their cells: face (q,) and sides (q, cuts)."""
+    """Divide faces (f, d) by the cuts that matter to their cells.
+
+    Face (q,), sides (q, cuts) and corners (q, d) of each region.
+    """
     face, sides = np.arange(len(nodes)), np.zeros(cutting.shape, dtype=np.int8)
     stairs = staircase(nodes.shape[1])
     for cut in range(cutting.shape[1]):
@@ -114,7 +117,7 @@ def _regions(nodes, cutting, values, find):
         nodes = np.concatenate([nodes[~mixed], parts])
         face = np.concatenate([face[~mixed], face[mixed][local]])
         sides = np.concatenate([sides[~mixed], part_sides])
-    return face, sides
+    return face, sides, nodes
 
 
 def joined(mesh, partition):
@@ -136,11 +139,13 @@ def joined(mesh, partition):
     relevant = np.zeros((len(mesh.cells), label.shape[1]), dtype=bool)
     np.logical_or.at(relevant, piece_cell, label != 0)
     points = partition.points
-    face, sides = _regions(
+    face, sides, region = _regions(
         nodes, relevant[cell] | relevant[other], lambda: points.values, points.find
     )
     first, second = [], []
-    for f, side in zip(face, sides, strict=True):
+    for f, side, corners_of in zip(face, sides, region, strict=True):
+        if len(set(corners_of)) < len(corners_of):
+            continue  # no area: contact in a corner or an edge only
         pair = []
         for c in (cell[f], other[f]):
             mine = np.flatnonzero(piece_cell == c)

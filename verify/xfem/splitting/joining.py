@@ -1,9 +1,11 @@
 """Which pieces share their unknowns: identity by contact across faces, not by sign vectors.
 
 A *slot* is a piece together with a node of its cell. Two slots at one node are the same unknown
-when the pieces, in cells that share a face with that node, touch across the face. Tips, mouths,
-parallel, crossing and branching cuts, cuts through nodes and along faces all follow from this one
-rule (formulation: "one set of node values per piece of material connected inside the element").
+when the pieces, in cells that share a face with that node, touch across the face, in an area (2D:
+a length): what touches in a corner or an edge only is apart, as parts that turn about a hinge are
+no body. Tips, mouths, parallel, crossing and branching cuts, cuts through nodes and along faces all
+follow from this one rule (formulation: "one set of node values per piece of material connected
+inside the element").
 """
 
 from dataclasses import dataclass

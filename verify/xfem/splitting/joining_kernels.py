@@ -103,6 +103,16 @@ def _sort_face(stack, top):
 
 
 @njit(cache=True)
+def _is_flat(stack, top):
+    """Whether a region has no area (2D: length): a zero point that is a corner comes twice."""
+    for i in range(1, stack.shape[1]):
+        for k in range(i):
+            if stack[top, i] == stack[top, k]:
+                return True
+    return False
+
+
+@njit(cache=True)
 def _next_region(top, stack, level, sides, relevant, values, stairs, edges, asked):
     """Divide the region on top of the stack until one is left that no relevant cut crosses.
 
@@ -235,6 +245,9 @@ def join_across_faces(
                 )
                 if top < 0:
                     return here, asked
+                if _is_flat(stack, top):
+                    top -= 1
+                    continue
                 p = _fitting(starts[here], starts[here + 1], pieces, label, sides[top])
                 q = _fitting(starts[there], starts[there + 1], pieces, label, sides[top])
                 if p < 0 or q < 0:

@@ -4,7 +4,8 @@ A cut splits a piece only when it goes through: when the zero points on its edge
 extent of the cut. So tips end on element edges (2D) or faces (3D), and a branch splits only the
 piece that it crosses. |φ| below round-off is exactly zero, and zero counts as the plus side: the
 cut is in effect moved a little to its minus side, the same at every node. Pieces that have no
-volume then still take part in the connectivity and are left out afterwards.
+volume then still take their place at the face in which they lie, so that nothing else is joined
+across it, and are left out afterwards.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,0 +1,105 @@
+"""Parts that a cut leaves touching in a corner or an edge only are bodies of their own."""
+
+import numpy as np
+import pytest
+from cut_comparison import assert_same_cut
+from scipy.spatial import Delaunay
+from xfem_bodies import zero_modes
+
+from verify.xfem.cuts.flat import Cut, Plane, PolygonPatch
+from verify.xfem.cuts.polyline import Polyline
+from verify.xfem.cuts.tool_path import ToolPath
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.virtual import cut_mesh
+
+
+def without_a_quarter(mesh):
+    """Leave out x < ½ < y: a re-entrant corner, in space a re-entrant edge, remains."""
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    cells = mesh.cells[~((centre[:, 0] < 0.5) & (centre[:, 1] > 0.5))]
+    used, numbers = np.unique(cells, return_inverse=True)
+    return SimplexMesh(mesh.points[used], numbers.reshape(cells.shape))
+
+
+def angle_body(dim):
+    return without_a_quarter(rectangle_mesh((4, 4)) if dim == 2 else box_mesh((2, 2, 2)))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("slope", [1.0, 0.6, 1.7])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_cut_through_a_re_entrant_corner_leaves_no_hinge(dim, slope, side):
+    """Above the line are two parts that meet in the corner only, whichever side is called plus."""
+    mesh = angle_body(dim)
+    normal = side * np.array([-slope, 1.0, 0.0])[:dim]
+    virtual = cut_mesh(mesh, [Plane([0.5] * dim, normal)])
+    assert virtual.bodies.max() + 1 == 3
+    assert zero_modes(virtual)[0] == 3 * (3 if dim == 2 else 6)
+    above = virtual.mesh.points[:, 1] - 0.5 - slope * (virtual.mesh.points[:, 0] - 0.5)
+    assert len(np.unique(virtual.bodies[: len(mesh.points)][above > 1e-9])) == 2
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("back", [False, True])
+def test_a_tool_through_a_re_entrant_corner_leaves_no_hinge(dim, back):
+    mesh = angle_body(dim)
+    tips = np.array([[-0.5, -0.5, -0.5], [1.5, 1.5, -0.5]])[:, :dim]
+    depth = [0.0, 0.0, 2.0] if dim == 3 else None
+    path = ToolPath.of_tip(tips[::-1] if back else tips, [0.0, 1.0], depth)
+    cutter = SemiProgressiveCutter(mesh)
+    cutter.begin(path)
+    for time in np.linspace(0.1, 1.0, 4):
+        cutter.advance(time)
+    virtual = cutter.virtual_mesh()
+    assert virtual.bodies.max() + 1 == 3
+    assert_same_cut(virtual, cut_mesh(mesh, [path.sweep]))
+
+
+def _scattered(rng, dim):
+    """Delaunay mesh of random points, without flat elements: nothing is structured or convex."""
+    points = rng.random((14, dim))
+    cells = Delaunay(points).simplices
+    edges = points[cells][:, 1:] - points[cells][:, :1]
+    cells = cells[np.abs(np.linalg.det(edges)) > 1e-3]
+    used, numbers = np.unique(cells, return_inverse=True)
+    return SimplexMesh(points[used], numbers.reshape(cells.shape))
+
+
+def _cuts(rng, mesh, turned):
+    """Three cuts along edges and faces of elements, some with an end in a node, or turned round."""
+    cuts: list[Cut] = []
+    for corners in mesh.points[mesh.cells[rng.integers(len(mesh.cells), size=3)]]:
+        a, b = corners[0], corners[1]
+        if mesh.dim == 2:
+            along = Polyline([a - rng.choice([0.0, 3.0]) * (b - a), b + 3.0 * (b - a)])
+            cuts.append(Polyline(along.vertices[::-1]) if turned else along)
+        else:
+            c = corners[2]
+            normal = np.cross(b - a, c - a)
+            if rng.random() < 0.5:
+                cuts.append(Plane(a, -normal if turned else normal))
+            else:  # its rim runs along two edges
+                rim = [a, b + 9.0 * (b - a), c + 9.0 * (c - a)]
+                cuts.append(PolygonPatch(rim[::-1] if turned else rim))
+    return cuts
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_exactly_degenerate_cuts_do_not_know_which_side_is_called_plus(dim):
+    """Nodes on a cut count as its plus side: nothing but the names of the sides may follow."""
+    for seed in range(60):
+        found = []
+        for turned in (False, True):
+            rng = np.random.default_rng([dim, seed])
+            mesh = _scattered(rng, dim)
+            virtual = cut_mesh(mesh, _cuts(rng, mesh, turned))
+            body = virtual.bodies[virtual.cells[:, 0]]
+            volumes = np.sort(np.bincount(body, virtual.volumes))
+            found.append((virtual.node_count, virtual.parent, volumes))
+        (nodes, parent, volumes), (turned_nodes, turned_parent, turned_volumes) = found
+        assert nodes == turned_nodes, seed
+        assert np.array_equal(parent, turned_parent), seed
+        # sums of some hundred pieces, each good to a few ulp
+        np.testing.assert_allclose(volumes, turned_volumes, rtol=1e-12, atol=1e-15)
