@@ -72,6 +72,9 @@ def solver_title(name: str) -> str:
     return _SOLVERS.get(name, name)
 
 
+_MOST_DIGITS = 7  # of the ends of an interval
+
+
 def _decimal(value: float, digits: int) -> tuple[str, int | None]:
     """Split `value` into its written mantissa and, if it needs one, a power of ten."""
     if value == 0:
@@ -110,8 +113,11 @@ def with_interval(value: float | None, low: float | None, high: float | None) ->
     if low is None or high is None or low == high or not all(map(math.isfinite, (low, high))):
         return number(value)
     digits = 4
-    while digits < 10 and _decimal(low, digits) == _decimal(high, digits):
+    while digits < _MOST_DIGITS and _decimal(low, digits) == _decimal(high, digits):
         digits += 1
+    if digits == _MOST_DIGITS:  # nobody compares more: the width says it
+        width = tag("span", "± ", number((high - low) / 2.0, 1), class_="interval")
+        return joined(number(value), gap(), width)
     interval = tag(
         "span", "[", number(low, digits), ", ", number(high, digits), "]", class_="interval"
     )
