@@ -23,6 +23,7 @@ MAP_STYLE = """
 table.map { width: auto; } table.map td, table.map th { padding: 3px 8px; text-align: center; }
 table.map th[scope=row] { text-align: left; font-weight: 400; white-space: nowrap; }
 table.map td { border: 1px solid #fff; min-width: 4.2em; }
+table.map tbody tr:last-child > * { border-bottom: 1.5px solid var(--ink); }
 table.map td.bad { color: #fff; }
 .panels figure { margin: 8px 0; } .time { max-width: 440px; width: 100%; height: auto; }
 """
