@@ -3,6 +3,7 @@
 For a cell the kernel asks where the zero set of the level set crosses its edges, and of each such
 point whether it lies on the sweep and whether the blade has passed it. The tolerances are those of
 `verify.xfem.splitting`, so that a cell that the walk calls crossed through is one that is split.
+A sweep comes as its `arrays`, `verify.xfem.cuts.sweep_surface.SweepArrays`.
 """
 
 import numpy as np

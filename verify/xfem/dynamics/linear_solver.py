@@ -9,6 +9,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.sparse.system_shapes import check_blocks, checked_load
 
 __all__ = ["LinearSolver", "NearlySymmetric", "SparseLU"]
 
@@ -46,6 +47,7 @@ class SparseLU:
         self._pattern = pattern
         self._factor: SuperLU | None = None
         self._scale: _Floats | None = None
+        self._block = 0
 
     def factorize(self, blocks: _Floats) -> None:
         """Factorise the matrix with these nodal blocks (B, d, d).
@@ -54,7 +56,11 @@ class SparseLU:
         ------
         SingularStiffnessError
             If it is singular or not finite.
+        XfemError
+            If the blocks are not those of the pattern.
         """
+        check_blocks(blocks, len(self._pattern.columns), blocks.shape[-1])
+        self._block = blocks.shape[-1]
         matrix = self._pattern.matrix(blocks)
         diagonal = np.abs(matrix.diagonal())
         self._scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
@@ -69,11 +75,14 @@ class SparseLU:
 
         Raises
         ------
+        XfemError
+            If the right-hand side has another shape or is not finite.
         RuntimeError
             If nothing was factorised before.
         """
         if self._factor is None or self._scale is None:
             raise RuntimeError("solve before factorize")
+        load = checked_load(load, self._pattern.node_count, self._block)
         scaled = self._factor.solve(self._scale * load.ravel())
         return np.asarray(self._scale * scaled).reshape(load.shape)
 
@@ -97,7 +106,7 @@ class NearlySymmetric:
     """
 
     def __init__(self, pattern: BlockPattern, block: int) -> None:
-        self._pattern = pattern
+        self._pattern, self._block = pattern, block
         self._symmetric = Cholesky(pattern, block)
         self._general = SparseLU(pattern)
         self._blocks: _Floats | None = None
@@ -112,7 +121,10 @@ class NearlySymmetric:
         ------
         SingularStiffnessError
             If it is singular or not finite.
+        XfemError
+            If the blocks are not those of the pattern.
         """
+        check_blocks(blocks, len(self._pattern.columns), self._block)
         self._blocks, self._is_general = blocks, False
         if self._respite > 0:
             self._respite -= 1
@@ -138,11 +150,14 @@ class NearlySymmetric:
         ------
         SingularStiffnessError
             If it is singular.
+        XfemError
+            If the right-hand side has another shape or is not finite.
         RuntimeError
             If nothing was factorised before.
         """
         if self._blocks is None:
             raise RuntimeError("solve before factorize")
+        load = checked_load(load, self._pattern.node_count, self._block)
         if not self._is_general:
             solution = self._refine(load)
             if solution is not None:

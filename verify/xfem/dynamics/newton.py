@@ -15,6 +15,7 @@ from verify.xfem.dynamics.integrator import (
     check_step,
 )
 from verify.xfem.dynamics.linear_solver import LinearSolver
+from verify.xfem.errors import XfemError
 from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
 
 __all__ = ["NewtonIntegrator"]
@@ -200,7 +201,13 @@ class NewtonIntegrator(ABC):
             except SingularStiffnessError as failure:
                 raise StepFailedError(f"{type(self).__name__}: {failure}") from failure
         self.solves += 1
-        return self._solver.solve(residual)
+        try:
+            return self._solver.solve(residual)
+        except XfemError as failure:
+            raise StepFailedError(
+                f"{type(self).__name__}: step from t = {self._start.time:.6g} s: {failure}. The "
+                "step is too long, or a load is not finite"
+            ) from failure
 
     def _assemble(self, displacement: _Floats, kind: TangentKind) -> None:
         body, h = self.body, self.step_size

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from verify.xfem.arrays.short_sort import sort_short
+from verify.xfem.errors import XfemError
 
 __all__ = ["BlockPattern", "block_pattern"]
 
@@ -62,8 +63,22 @@ def block_pattern(cells: NDArray[np.int64], node_count: int) -> BlockPattern:
     cells : (p, c) int array
     node_count : int
         Every node must belong to a cell.
+
+    Raises
+    ------
+    XfemError
+        If cells are no rows of integers, have a node that does not exist, or leave one out.
     """
+    if cells.ndim != 2 or not np.issubdtype(cells.dtype, np.integer):
+        raise XfemError(
+            f"cells: {cells.dtype} array of shape {cells.shape}; expected integers, (p, c)"
+        )
+    if cells.size and not 0 <= cells.min() <= cells.max() < node_count:
+        raise XfemError(f"a cell has a node outside 0..{node_count - 1}")
     starts, columns, targets = _pattern(np.ascontiguousarray(cells), node_count)
+    empty = np.flatnonzero(starts[1:] == starts[:-1])
+    if len(empty):
+        raise XfemError(f"node {empty[0]} belongs to no cell")
     return BlockPattern(starts, columns, targets)
 
 

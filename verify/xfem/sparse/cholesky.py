@@ -19,6 +19,7 @@ from verify.xfem.sparse.dense_tiles import COLUMNS, ROWS
 from verify.xfem.sparse.front_plan_kernels import assembly_lists, front_rows
 from verify.xfem.sparse.front_tree import levels, merge_and_order
 from verify.xfem.sparse.minimum_degree import minimum_degree
+from verify.xfem.sparse.system_shapes import check_blocks, checked_load
 
 __all__ = ["Cholesky", "SingularStiffnessError"]
 
@@ -57,18 +58,33 @@ class Cholesky:
     held : (N,) bool array, optional
         Nodes of which every component is held: the matrix couples them to no other, and whatever
         stands in these blocks is not read.
+
+    Raises
+    ------
+    XfemError
+        If the held nodes are not one bool for each node of the pattern.
     """
 
     def __init__(
         self, pattern: BlockPattern, block: int, held: NDArray[np.bool_] | None = None
     ) -> None:
         self._block = block
-        self._held = np.zeros(pattern.node_count, dtype=bool) if held is None else held
+        self._take(pattern, held)
         self._factor = self._diagonal = self._gathered = np.empty(0)
         self._stacks = (np.empty(0), np.empty(0))
         self._runs = np.empty((3, 0), dtype=np.int64)
         self._tile = np.empty(COLUMNS * (COLUMNS + 1) // 2)
         in_one_go(self._finding_order(pattern))
+
+    def _take(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> None:
+        nodes = pattern.node_count
+        self._held = np.zeros(nodes, dtype=bool) if held is None else held
+        if self._held.shape != (nodes,) or self._held.dtype != bool:
+            raise XfemError(
+                f"held nodes: {self._held.dtype} array of shape {self._held.shape}; expected bool "
+                f"and ({nodes},)"
+            )
+        self._block_count, self._is_factorised = len(pattern.columns), False
 
     @property
     def _free(self) -> int:
@@ -124,7 +140,7 @@ class Cholesky:
         """Copy that has the memory of this solver."""
         other = object.__new__(Cholesky)
         other.__dict__.update(self.__dict__)
-        other._held = np.zeros(pattern.node_count, dtype=bool) if held is None else held
+        other._take(pattern, held)
         return other
 
     @property
@@ -173,7 +189,11 @@ class Cholesky:
         ------
         SingularStiffnessError
             If a pivot is not positive beyond round-off.
+        XfemError
+            If the blocks are not those of the pattern.
         """
+        check_blocks(blocks, self._block_count, self._block)
+        self._is_factorised = False
         failed = factorise_fronts(
             np.ascontiguousarray(blocks),
             self._bounds,
@@ -193,11 +213,23 @@ class Cholesky:
         )
         if failed >= 0:
             raise SingularStiffnessError(int(self._order[failed // self._block]))
+        self._is_factorised = True
 
     def solve(
         self, load: NDArray[np.float64], out: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Solution (N, block) for a right-hand side (N, block), in `out` if that is given."""
+        """Solution (N, block) for a right-hand side (N, block), in `out` if that is given.
+
+        Raises
+        ------
+        XfemError
+            If the right-hand side has another shape or is not finite.
+        RuntimeError
+            If nothing was factorised before.
+        """
+        if not self._is_factorised:
+            raise RuntimeError("solve before factorize")
+        load = checked_load(load, len(self._order), self._block)
         solution = np.empty(load.shape) if out is None else out
         np.take(load, self._order, axis=0, out=self._permuted, mode="clip")
         solve_fronts(

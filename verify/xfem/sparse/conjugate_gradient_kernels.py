@@ -182,12 +182,14 @@ def conjugate_gradients(
             return -1, np.sqrt(norm / size)
         old = rho
         rho = _advance(rho / curvature, flat_t, flat_q, flat_u, flat_y, flat_r, flat_z)
-        if rho <= promise or iteration == limit:
+        # round-off may leave a rho that is no square: the iteration has broken down
+        broken = not rho > 0.0
+        if rho <= promise or iteration == limit or broken:
             for i in range(len(flat_z)):  # not a slice: numba would compile its words for a misfit
                 flat_t[i] = flat_z[i]
             add_lower_product(starts, columns, diagonal, blocks, r, t)
             norm = _square(flat_t)
-            if norm <= target or iteration == limit:
+            if norm <= target or iteration == limit or broken:
                 for row in range(x.shape[0]):
                     for k in range(x.shape[1]):
                         x[row, k] = y[row, k]

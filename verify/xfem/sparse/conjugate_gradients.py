@@ -13,10 +13,20 @@ from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.sparse.cholesky import SingularStiffnessError
 from verify.xfem.sparse.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
 from verify.xfem.sparse.symmetric_sweep_kernels import vector_width
+from verify.xfem.sparse.system_shapes import (
+    check_blocks,
+    checked_load,
+    checked_start,
+    largest_entry,
+)
 
 __all__ = ["ConjugateGradients", "NotConvergedError"]
 
 _Floats = NDArray[np.float64]
+
+_SQUARABLE = (
+    1e100  # sums of squares of numbers up to that, and down to its inverse, are exact enough
+)
 
 
 class NotConvergedError(XfemError):
@@ -51,7 +61,8 @@ class ConjugateGradients:
         width = vector_width(block)
         self._inverse = np.zeros((pattern.node_count, block, width))
         self._work = np.zeros((8, pattern.node_count, width))
-        self._blocks = np.zeros((0, block, block))
+        self._block = block
+        self._blocks: _Floats | None = None
         self.iterations = 0
 
     def factorize(self, blocks: _Floats) -> None:
@@ -61,11 +72,14 @@ class ConjugateGradients:
         ------
         SingularStiffnessError
             If a nodal block is not positive definite.
+        XfemError
+            If the blocks are not those of the pattern.
         """
+        check_blocks(blocks, len(self._pattern.columns), self._block)
         failed = invert_blocks(blocks, self._pattern.diagonal, self._inverse)
         if failed >= 0:
             raise SingularStiffnessError(failed)
-        self._blocks = blocks
+        self._blocks = np.ascontiguousarray(blocks)
 
     def solve(self, load: _Floats, start: _Floats | None = None) -> _Floats:
         """Solution (N, d) for a right-hand side (N, d), from a first guess.
@@ -76,8 +90,12 @@ class ConjugateGradients:
             If the matrix turns out not to be positive definite.
         NotConvergedError
             If the iterations run out.
+        XfemError
+            If a shape is wrong or a number is not finite.
+        RuntimeError
+            If nothing was factorised before.
         """
-        x = np.empty(load.shape)
+        x = np.empty(np.shape(load))
         self.improve(load, x, start)
         return x
 
@@ -86,14 +104,23 @@ class ConjugateGradients:
 
         Nothing is allocated. Errors are those of `solve`.
         """
+        if self._blocks is None:
+            raise RuntimeError("solve before factorize")
+        pattern, nodes = self._pattern, self._pattern.node_count
+        load = checked_load(load, nodes, self._block)
         if start is None:
             x[:] = 0.0
-        elif start is not x:
-            x[:] = start
-        pattern = self._pattern
+        else:
+            x[:] = checked_start(start, nodes, self._block)
+        largest = largest_entry(load)
+        if largest > 0.0 and not 1.0 / _SQUARABLE < largest < _SQUARABLE:
+            scale = 2.0 ** -np.frexp(largest)[1]
+            self.improve(scale * load, x, scale * x)
+            x /= scale
+            return
         iterations, residual = conjugate_gradients(
             pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._inverse,
-            np.ascontiguousarray(load), x, start is None, self._work, self._tolerance, self._limit,
+            load, x, start is None, self._work, self._tolerance, self._limit,
         )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)

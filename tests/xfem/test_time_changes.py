@@ -1,0 +1,111 @@
+"""What is changed during a motion counts from the next step on, as if the scheme began there."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, cut_body, cut_membrane, material
+
+from verify.xfem.corotation import InternalForce
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    ForwardEuler,
+    ImplicitEuler,
+    RayleighDamping,
+    RealTimeEuler,
+    SymplecticEuler,
+    Trapezoidal,
+)
+from verify.xfem.mass import side_wise_mass
+
+SCHEMES = [
+    CentralDifferences,
+    SymplecticEuler,
+    ForwardEuler,
+    RealTimeEuler,
+    ImplicitEuler,
+    Trapezoidal,
+    EnergyMomentum,
+]
+
+
+def _replace_load(body, scheme):
+    body.load = lambda t: np.full(body.shape, 5.0)
+
+
+def _replace_weight(body, scheme):
+    body.weight = np.full(body.shape, 2.0)
+
+
+def _rewrite_weight(body, scheme):
+    body.weight[:] = 2.0
+
+
+def _damp(body, scheme):
+    body.damping = RayleighDamping(2.0, 1e-3)
+
+
+def _shorten(body, scheme):
+    scheme.step_size *= 0.5
+
+
+CHANGES = [_replace_load, _replace_weight, _rewrite_weight, _damp, _shorten]
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("kind", SCHEMES)
+def test_a_change_during_the_motion_counts_from_the_next_step_on(kind, change):
+    """Central differences went on with the force of the load that was there before."""
+    v = cut_body(2)
+    ends = []
+    for begins_anew in (False, True):
+        body = DynamicBody(InternalForce(v, material(2)), side_wise_mass(v, DENSITY))
+        state, scheme = body.rest(), kind(body, 0.003)
+        state.velocity[:, 0] = v.node_points[:, 1] ** 2
+        for _ in range(3):
+            scheme.step(state)
+        before = state.displacement.copy()
+        change(body, scheme)
+        if begins_anew:
+            scheme = kind(body, scheme.step_size)
+        for _ in range(3):
+            scheme.step(state)
+        ends.append(state.displacement - before)
+    # Newton's methods end within a tolerance of 1e-10 of the forces
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9 * np.abs(ends[1]).max())
+
+
+@pytest.mark.parametrize("v", [cut_body(2), cut_body(3), cut_membrane()], ids=["2D", "3D", "sheet"])
+@pytest.mark.parametrize("kind", SCHEMES)
+def test_an_observer_who_moves_along_sees_the_same_deformation(kind, v):
+    """Galilei: 60 m/s added to the velocity change nothing but the place."""
+    dim = v.mesh.space
+    body = DynamicBody(InternalForce(v, material(v.mesh.dim)), side_wise_mass(v, DENSITY))
+    drift, step, steps = np.array([50.0, -30.0, 20.0])[:dim], 0.002, 20
+    ends = []
+    for speed in (0.0 * drift, drift):
+        state, scheme = body.rest(), kind(body, step)
+        state.displacement[:, 0] = 0.05 * np.sin(2.0 * v.node_points[:, 1])
+        state.velocity[:] = 0.3 * np.cos(3.0 * v.node_points) + speed
+        for _ in range(steps):
+            scheme.step(state)
+        ends.append(state.displacement - steps * step * speed)
+    # Newton's methods end within 1e-10 of the forces; the others were within 1e-14
+    assert np.abs(ends[1] - ends[0]).max() < 1e-10
+
+
+@pytest.mark.parametrize("v", [cut_body(2), cut_body(3), cut_membrane()], ids=["2D", "3D", "sheet"])
+@pytest.mark.parametrize("kind", [CentralDifferences, Trapezoidal, EnergyMomentum])
+def test_schemes_that_look_the_same_backwards_return_to_their_start(kind, v):
+    """Velocities reversed, a symmetric scheme retraces its steps to round-off."""
+    body = DynamicBody(InternalForce(v, material(v.mesh.dim)), side_wise_mass(v, DENSITY))
+    state, scheme = body.rest(), kind(body, 0.002)
+    state.displacement[:, 0] = 0.05 * np.sin(2.0 * v.node_points[:, 1])
+    state.velocity[:] = 0.3 * np.cos(3.0 * v.node_points)
+    start = state.copy()
+    for _ in range(2):
+        for _ in range(30):
+            scheme.step(state)
+        state.velocity *= -1.0
+    assert np.abs(state.displacement - start.displacement).max() < 1e-12
+    assert np.abs(state.velocity - start.velocity).max() < 1e-9
