@@ -8,12 +8,12 @@ modes whose angles sum to 2π, and any four. No three do while ω_max h < √3, 
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import bsr_array, csc_array, csr_array, kron
+from scipy.sparse import bsr_array, csc_array, csr_array, issparse, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
-from verify.xfem.mass import Mass
+from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["RESONANCE_FREE", "critical_step", "element_critical_steps"]
@@ -53,16 +53,24 @@ def critical_step(
     XfemError
         If sizes do not match or everything is fixed.
     """
+    if not (issparse(stiffness) or isinstance(stiffness, np.ndarray)):
+        raise XfemError(f"stiffness of type {type(stiffness).__name__}; expected a sparse array")
     K = csr_array(stiffness)
+    if not np.isfinite(K.data).all():
+        raise XfemError("stiffness with an entry that is not finite")
     nodes = mass.matrix.shape[0]
-    if K.shape[0] % nodes or K.shape[0] != K.shape[1]:
+    if K.shape[0] == 0 or K.shape[0] % nodes or K.shape[0] != K.shape[1]:
         raise XfemError(f"stiffness of shape {K.shape} with a mass of {nodes} unknown nodes")
     block = np.eye(K.shape[0] // nodes)
     free = np.arange(K.shape[0])
     if fixed is not None:
-        if fixed.size != K.shape[0]:
-            raise XfemError(f"supports of shape {fixed.shape} on {K.shape[0]} components")
-        free = np.flatnonzero(~fixed.ravel())
+        held = np.asarray(fixed)
+        if held.size != K.shape[0] or held.dtype != bool:
+            raise XfemError(
+                f"supports of shape {held.shape} and type {held.dtype}; expected one bool for each "
+                f"of {K.shape[0]} components"
+            )
+        free = np.flatnonzero(~held.ravel())
         if len(free) == 0:
             raise XfemError("every component is fixed: no step is critical")
     M = csr_array(kron(mass.matrix, block))
@@ -122,15 +130,18 @@ def element_critical_steps(
     Raises
     ------
     XfemError
-        If the strain is outside 0…2, where the largest factor is that of equal stretches.
+        If the strain is outside 0…2, where the largest factor is that of equal stretches, the
+        density is not positive and finite, or there are not as many values as cells.
     """
     if not 0.0 <= strain <= 2.0:
         raise XfemError(f"strain {strain!r} in reach; expected 0 to 2")
     b = mesh.gradients
     space = mesh.space
     count = len(mesh.cells)
-    lam = np.broadcast_to(material.lam, count)[:, None, None, None, None]
-    mu = np.broadcast_to(material.mu, count)[:, None, None, None, None]
+    densities = cell_densities(mesh, density)
+    first, second = material.of_cells(count)
+    lam = first[:, None, None, None, None]
+    mu = second[:, None, None, None, None]
     # unknowns scaled by a unit mass: K_ij (d + 1)/(ρ V)
     eye = np.eye(space)
     dots = np.einsum("eik,ejk->eij", b, b)
@@ -140,7 +151,7 @@ def element_critical_steps(
     K += _against_rotation(mesh, lam, mu, strain) * 0.5 * (diagonal - turned)
     size = (mesh.dim + 1) * space
     largest = np.linalg.eigvalsh(K.reshape(count, size, size))[:, -1]
-    return 2.0 / np.sqrt(largest * (mesh.dim + 1) / np.broadcast_to(density, count))
+    return 2.0 / np.sqrt(largest * (mesh.dim + 1) / densities)
 
 
 def _against_rotation(mesh: SimplexMesh, lam: NDArray, mu: NDArray, strain: float) -> NDArray:

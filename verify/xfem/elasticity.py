@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import real_array
 
 __all__ = ["Material", "State", "isotropic"]
 
@@ -26,6 +27,20 @@ class Material:
     lam: NDArray[np.float64]
     mu: NDArray[np.float64]
 
+    def of_cells(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """λ and μ (m,) of so many cells of the uncut mesh, in pascal.
+
+        Raises
+        ------
+        XfemError
+            If there is neither one value nor one for each.
+        """
+        for name, values in (("λ", self.lam), ("μ", self.mu)):
+            if np.shape(values) not in ((), (count,)):
+                raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
+        lam, mu = (np.broadcast_to(values, count).astype(float) for values in (self.lam, self.mu))
+        return lam, mu
+
 
 def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
     """Lamé parameters from Young's modulus and Poisson's ratio.
@@ -44,7 +59,7 @@ def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
     XfemError
         If a parameter is outside its bounds or the state is unknown.
     """
-    E, nu = np.asarray(young, dtype=float), np.asarray(poisson, dtype=float)
+    E, nu = real_array(young, "Young's modulus"), real_array(poisson, "Poisson's ratio")
     if state not in ("plane strain", "plane stress", "solid"):
         raise XfemError(f"state '{state}'; expected plane strain, plane stress or solid")
     if not (np.isfinite(E).all() and (E > 0.0).all()):
@@ -53,6 +68,8 @@ def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
     if not ((nu > -1.0) & (nu < bound)).all():
         worst = nu.flat[int(np.argmax(np.abs(nu)))]
         raise XfemError(f"Poisson's ratio {worst:g}; expected within (-1, {bound:g}) in {state}")
+    if E.shape != nu.shape and () not in (E.shape, nu.shape):
+        raise XfemError(f"Young's modulus of shape {E.shape}, Poisson's ratio of {nu.shape}")
     mu = E / (2.0 * (1.0 + nu))
     if state == "plane stress":
         return Material(E * nu / (1.0 - nu**2), mu)

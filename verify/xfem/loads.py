@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import index_array, real_array
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.virtual import VirtualMesh
 
@@ -68,10 +69,14 @@ def traction(
     Raises
     ------
     XfemError
-        If a facet does not exist.
+        If a facet does not exist, or the density or the degree makes no sense.
     """
-    chosen = np.asarray(facets, dtype=np.int64).reshape(-1, 2)
+    chosen = index_array(facets, "loaded facets")
     mesh = virtual.mesh
+    if chosen.size == 0:
+        chosen = chosen.reshape(0, 2)
+    if chosen.ndim != 2 or chosen.shape[1] != 2:
+        raise XfemError(f"loaded facets of shape {chosen.shape}; expected (b, 2)")
     if chosen.size and (
         chosen.min() < 0 or chosen[:, 0].max() >= len(mesh.cells) or chosen[:, 1].max() > mesh.dim
     ):
@@ -86,7 +91,7 @@ def traction(
 
 
 def _vector(density: ArrayLike, dim: int) -> _Floats:
-    force = np.asarray(density, dtype=float)
+    force = real_array(density, "load density")
     if force.shape != (dim,) or not np.isfinite(force).all():
         raise XfemError(f"load density {density!r}; expected {dim} finite components")
     return force
@@ -131,12 +136,15 @@ def _integrate(
     """Add ∫ N_i f over simplices given by barycentric corners (q, k, d + 1) to the load."""
     if len(piece) == 0:
         return
+    if not isinstance(degree, int | np.integer) or degree < 0:
+        raise XfemError(f"quadrature of degree {degree!r}; expected an integer, 0 or more")
     rule, weights = simplex_rule(corners.shape[1] - 1, degree)
     nodes = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
     sides = virtual.piece_side[piece]
     for point, weight in zip(rule, weights, strict=True):
         shape = np.einsum("k,qki->qi", point, corners)
-        force = np.asarray(density(np.einsum("qi,qij->qj", shape, nodes), sides), dtype=float)
+        given = density(np.einsum("qi,qij->qj", shape, nodes), sides)
+        force = real_array(given, "load density")
         if force.shape != (len(piece), load.shape[1]) or not np.isfinite(force).all():
             raise XfemError(
                 f"load density of shape {force.shape} or not finite; expected "

@@ -16,6 +16,8 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import real_array
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.sparse.block_pattern import BlockPattern, block_pattern
 from verify.xfem.virtual import VirtualMesh
 
@@ -84,8 +86,17 @@ class Mass:
         return splu(csc_array(self.matrix))
 
     def weight(self, gravity: ArrayLike) -> _Floats:
-        """(N, d) dead weight of the unknowns in a field of gravity (d,), in newtons."""
-        return self.weights[:, None] * np.asarray(gravity, dtype=float)
+        """(N, d) dead weight of the unknowns in a field of gravity (d,), in newtons.
+
+        Raises
+        ------
+        XfemError
+            If gravity is not a finite vector.
+        """
+        field = real_array(gravity, "gravity")
+        if field.ndim != 1 or not np.isfinite(field).all():
+            raise XfemError(f"gravity {gravity!r}; expected a finite vector")
+        return self.weights[:, None] * field
 
     def pattern(self, virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockPattern:
         """Sparsity of stiffness and mass together; its first cells are those of the body.
@@ -160,7 +171,7 @@ def _uncoupled(virtual: VirtualMesh, pairs: _Ints) -> NDArray[np.bool_]:
     return ~found
 
 
-def cell_densities(virtual: VirtualMesh, density: ArrayLike) -> _Floats:
+def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> _Floats:
     """(m,) density of the uncut cells.
 
     Raises
@@ -168,8 +179,8 @@ def cell_densities(virtual: VirtualMesh, density: ArrayLike) -> _Floats:
     XfemError
         If it is not positive and finite, or neither one value nor one per cell.
     """
-    count = len(virtual.mesh.cells)
-    values = np.asarray(density, dtype=float)
+    count = len(mesh.cells)
+    values = real_array(density, "density")
     if values.shape not in ((), (count,)):
         raise XfemError(f"density of shape {values.shape}; expected () or ({count},)")
     if not (np.isfinite(values).all() and (values > 0.0).all()):
@@ -211,7 +222,7 @@ def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     density : float or (m,) array_like
         In kg/m³; for membranes times the thickness.
     """
-    densities = np.ascontiguousarray(cell_densities(virtual, density))
+    densities = np.ascontiguousarray(cell_densities(virtual.mesh, density))
     weights = np.zeros(virtual.node_count)
     _add_shares(virtual.cells, virtual.parent, virtual.volumes, densities, weights)
     return _SideWiseMass(weights)
@@ -252,7 +263,7 @@ def consistent_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     Its explicit step vanishes with the smallest piece.
     """
     moments = second_moments(virtual)
-    moments *= cell_densities(virtual, density)[virtual.parent][:, None, None]
+    moments *= cell_densities(virtual.mesh, density)[virtual.parent][:, None, None]
     rows = np.broadcast_to(virtual.cells[:, :, None], moments.shape)
     columns = np.broadcast_to(virtual.cells[:, None, :], moments.shape)
     count = virtual.node_count

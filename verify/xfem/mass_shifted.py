@@ -82,7 +82,7 @@ def _enriched_mass(
         return side_wise.weights[nodes:]
     enriched = virtual.cells >= nodes
     moments = second_moments(virtual)
-    moments *= cell_densities(virtual, density)[virtual.parent][:, None, None]
+    moments *= cell_densities(virtual.mesh, density)[virtual.parent][:, None, None]
     # ψ_i ψ_j is 1 where both nodes lie across the cut from the piece, and 0 elsewhere
     moments *= enriched[:, :, None] & enriched[:, None, :]
     share = moments.sum(axis=2)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import real_array
 
 __all__ = ["SimplexMesh"]
 
@@ -34,16 +35,17 @@ class SimplexMesh:
     Raises
     ------
     XfemError
-        If shapes or indices are wrong, a coordinate is not finite, a cell is degenerate, a node
-        belongs to no cell, or a facet is shared by more than two cells.
+        If shapes or indices are wrong, a coordinate is not finite, a cell is degenerate, or a node
+        belongs to no cell; when neighbours are first asked for, if a facet is shared by more than
+        two cells or a cell is given twice.
     """
 
     points: NDArray[np.float64]
     cells: NDArray[np.int64]
 
     def __init__(self, points: ArrayLike, cells: ArrayLike) -> None:
-        coordinates = np.ascontiguousarray(points, dtype=np.float64)
-        nodes = np.ascontiguousarray(cells)
+        coordinates = np.ascontiguousarray(real_array(points, "mesh points"))
+        nodes = np.ascontiguousarray(_rows(cells))
         _check(coordinates, nodes)
         object.__setattr__(self, "points", coordinates)
         object.__setattr__(self, "cells", nodes.astype(np.int64, copy=False))
@@ -115,6 +117,13 @@ class SimplexMesh:
         return float(max(np.abs(self.points).max(), box.max()))
 
 
+def _rows(cells: ArrayLike) -> NDArray:
+    try:
+        return np.asarray(cells)
+    except ValueError:
+        raise XfemError("cells with different numbers of nodes; expected one kind") from None
+
+
 def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise XfemError(f"points of shape {points.shape}; expected (n, 2) or (n, 3)")
@@ -149,4 +158,10 @@ def _neighbours(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     first, second = order[:-1][same], order[1:][same]
     across = np.full(len(facets), -1, dtype=np.int64)
     across[first], across[second] = second // corners, first // corners
-    return across.reshape(cells.shape)
+    neighbours = across.reshape(cells.shape)
+    # two cells that share two facets have all nodes in common
+    twice = (neighbours[:, 0] >= 0) & (neighbours[:, 0] == neighbours[:, 1])
+    if twice.any():
+        cell = int(np.argmax(twice))
+        raise XfemError(f"cells {cell} and {neighbours[cell, 0]} have the same nodes")
+    return neighbours

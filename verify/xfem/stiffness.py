@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import add_stiffness, linear_force
 from verify.xfem.elasticity import Material
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.virtual import VirtualMesh
@@ -42,14 +41,11 @@ class LinearStiffness:
 
     def __init__(self, virtual: VirtualMesh, material: Material) -> None:
         mesh = virtual.mesh
-        count = len(mesh.cells)
-        for name, values in (("λ", material.lam), ("μ", material.mu)):
-            if np.shape(values) not in ((), (count,)):
-                raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
+        lam, mu = material.of_cells(len(mesh.cells))
         object.__setattr__(self, "virtual", virtual)
         object.__setattr__(self, "normals", _unit_normals(mesh))
-        object.__setattr__(self, "lam", np.broadcast_to(material.lam, count).astype(float))
-        object.__setattr__(self, "mu", np.broadcast_to(material.mu, count).astype(float))
+        object.__setattr__(self, "lam", lam)
+        object.__setattr__(self, "mu", mu)
 
     def assemble(self, pattern: BlockPattern, out: _Floats | None = None) -> _Floats:
         """(B, d, d) nodal blocks of the stiffness, in N/m (per metre of thickness in 2D).

@@ -1,12 +1,13 @@
 """Prescribed displacements on unknown nodes, each on its own side of the cuts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import index_array, real_array
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Supports", "UnsupportedBodyError", "check_bodies"]
@@ -64,21 +65,27 @@ class Supports:
         Raises
         ------
         XfemError
-            If nodes or components do not exist, or values have a wrong shape or are not finite.
+            If these supports are of another body, nodes or components do not exist, or values
+            have a wrong shape or are not finite.
         """
         count, dim = len(virtual.mesh.points), self.fixed.shape[1]
+        if self.fixed.shape != virtual.node_points.shape:
+            raise XfemError(
+                f"supports of shape {self.fixed.shape} on a body with unknowns of shape "
+                f"{virtual.node_points.shape}"
+            )
         chosen = np.asarray(nodes)
         if chosen.dtype == bool and chosen.shape != (count,):
             raise XfemError(f"node mask of shape {chosen.shape}; expected ({count},)")
         if chosen.dtype != bool:
-            chosen = chosen.astype(np.int64)
+            chosen = index_array(nodes, "supported nodes")
             if chosen.size and (chosen.min() < 0 or chosen.max() >= count):
                 raise XfemError(f"supported node outside 0..{count - 1}")
         mark = np.zeros(count, dtype=bool)
         mark[chosen] = True
         at = np.flatnonzero(mark[virtual.node_parent])
         axes = range(dim) if components is None else components
-        if any(axis not in range(dim) for axis in axes):
+        if not isinstance(axes, Sequence) or any(axis not in range(dim) for axis in axes):
             raise XfemError(f"components {components}; expected some of 0..{dim - 1}")
         if len(at) == 0:
             return self
@@ -86,7 +93,9 @@ class Supports:
             values(virtual.node_points[at], virtual.node_side[at]) if callable(values) else values
         )
         try:
-            given = np.broadcast_to(np.asarray(field, dtype=float), (len(at), dim))
+            given = np.broadcast_to(real_array(field, "prescribed values"), (len(at), dim))
+        except XfemError:
+            raise
         except ValueError:
             raise XfemError(
                 f"prescribed values of shape {np.shape(field)}; expected ({len(at)}, {dim})"

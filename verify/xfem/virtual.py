@@ -217,7 +217,8 @@ def cut_mesh(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside") ->
     Raises
     ------
     XfemError
-        If a level set is not finite or the tip rule is unknown.
+        If the cuts are no sequence, one is in another space than the mesh, a level set is not
+        finite, a depth is NaN, or the tip rule is unknown.
 
     Notes
     -----

@@ -59,13 +59,8 @@ class InternalForce:
             raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
         if mesh.dim < mesh.space and kinematics == "linear":
             raise XfemError("linear kinematics of a membrane in space; expected corotational")
-        count = len(mesh.cells)
-        for name, values in (("λ", material.lam), ("μ", material.mu)):
-            if np.shape(values) not in ((), (count,)):
-                raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
         self.virtual, self.kinematics = virtual, kinematics
-        self.lam = np.broadcast_to(material.lam, count).astype(float)
-        self.mu = np.broadcast_to(material.mu, count).astype(float)
+        self.lam, self.mu = material.of_cells(len(mesh.cells))
         self.left_out = 0
         pieces, space = len(virtual.cells), mesh.space
         self._rotations = np.zeros((pieces, space, space))

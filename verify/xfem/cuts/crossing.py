@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.cuts.flat import Cut
+from verify.xfem.errors import XfemError
 
-__all__ = ["AT_END", "REACH", "Crossing", "TipRule", "crossed_through"]
+__all__ = ["AT_END", "REACH", "Crossing", "TipRule", "crossed_through", "level_and_depth"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -38,6 +39,26 @@ class Crossing(NamedTuple):
     pieces: int
 
 
+def level_and_depth(cut: Cut, points: _Floats) -> tuple[_Floats, _Floats]:
+    """Level set (n,) and depth (n,) of a cut at points (n, d), in metres.
+
+    Raises
+    ------
+    XfemError
+        If the cut gives arrays of another shape, or NaN.
+    """
+    found = []
+    for name, function in (("level set", cut.level_set), ("depth", cut.depth)):
+        values = np.asarray(function(points), dtype=float)
+        if values.shape != (len(points),) or np.isnan(values).any():
+            what = type(cut).__name__
+            raise XfemError(
+                f"{what}: {name} of shape {values.shape} or NaN; expected ({len(points)},)"
+            )
+        found.append(values)
+    return found[0], found[1]
+
+
 def crossed_through(
     cut: Cut, positions: _Floats, crossing: Crossing, tip: TipRule
 ) -> NDArray[np.bool_]:
@@ -49,10 +70,10 @@ def crossed_through(
     mark[zero] = True
     wanted = np.flatnonzero(mark)
     place = np.cumsum(mark) - 1
-    level, depth = np.abs(cut.level_set(positions[wanted])), cut.depth(positions[wanted])
+    level, depth = level_and_depth(cut, positions[wanted])
     at = place[zero]
     margin = 1.0 if tip == "through" else -1.0
-    inside = (level[at] <= REACH * size) & (depth[at] >= margin * AT_END * size)
+    inside = (np.abs(level[at]) <= REACH * size) & (depth[at] >= margin * AT_END * size)
     found = np.zeros(pieces, dtype=bool)
     if tip == "through":
         found[piece[inside]] = True
@@ -71,8 +92,8 @@ def _mostly_crossed(cut: Cut, positions: _Floats, crossing: Crossing) -> NDArray
     centres = np.stack(sums, axis=1)[found] / count[found, None]
     size = np.zeros(crossing.pieces)
     size[pairs[0]] = crossing.size[first]
-    inside = np.abs(cut.level_set(centres)) <= REACH * size[found]
-    inside &= cut.depth(centres) >= -AT_END * size[found]
+    level, depth = level_and_depth(cut, centres)
+    inside = (np.abs(level) <= REACH * size[found]) & (depth >= -AT_END * size[found])
     mostly = np.zeros(crossing.pieces, dtype=bool)
     mostly[found] = inside
     return mostly

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import places, real_array
 
 __all__ = ["Cut", "ImplicitCut", "Plane", "PolygonPatch"]
 
@@ -60,7 +61,7 @@ class Plane:
     normal: _Floats
 
     def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
-        origin, direction = np.asarray(point, dtype=float), np.asarray(normal, dtype=float)
+        origin, direction = real_array(point, "plane at"), real_array(normal, "plane with normal")
         if origin.shape != direction.shape or origin.shape not in ((2,), (3,)):
             raise XfemError(f"plane with point {origin.tolist()}, normal {direction.tolist()}")
         length = np.linalg.norm(direction)
@@ -71,7 +72,9 @@ class Plane:
 
     def level_set(self, points: _Floats) -> _Floats:
         """Signed distance to the plane."""
-        return (points - self.point) @ self.normal
+        at = places(points, len(self.point), "plane")
+        distance: _Floats = (at - self.point) @ self.normal
+        return distance
 
     def depth(self, points: _Floats) -> _Floats:
         """Infinite: a plane has no end."""
@@ -116,16 +119,26 @@ class PolygonPatch:
     Raises
     ------
     XfemError
-        If there are fewer than three corners, no area, or the corners are not in one plane.
+        If there are fewer than three corners, no area, two neighbouring corners in one place, or
+        the corners are not in one plane.
     """
 
     corners: _Floats
     plane: Plane
 
     def __init__(self, corners: ArrayLike) -> None:
-        polygon = np.asarray(corners, dtype=float)
+        polygon = real_array(corners, "polygon with corners")
         if polygon.ndim != 2 or polygon.shape[1] != 3 or len(polygon) < 3:
             raise XfemError(f"polygon of shape {polygon.shape}; expected (k, 3) with k ≥ 3")
+        if not np.isfinite(polygon).all():
+            raise XfemError("polygon with a corner that is not finite")
+        sides = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
+        if not (sides > 0.0).all():
+            one = int(sides.argmin())
+            raise XfemError(
+                f"corners {one} and {(one + 1) % len(polygon)} of the polygon are in one place; "
+                "expected each once (the last is joined to the first)"
+            )
         spokes = polygon - polygon[0]
         normal = np.cross(spokes[1:-1], spokes[2:]).sum(axis=0)
         size = np.linalg.norm(spokes, axis=1).max()
@@ -146,7 +159,8 @@ class PolygonPatch:
         """Distance to the outline in the plane, negative outside."""
         first, second = _tangents(self.plane.normal)
         axes = np.stack([first, second], axis=1)
-        return _outline_depth((points - self.plane.point) @ axes, self._outline(axes))
+        at = places(points, 3, "polygon")
+        return _outline_depth((at - self.plane.point) @ axes, self._outline(axes))
 
     def _outline(self, axes: _Floats) -> _Floats:
         return (self.corners - self.plane.point) @ axes

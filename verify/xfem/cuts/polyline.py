@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import places, real_array
 
 __all__ = ["Polyline"]
 
@@ -40,7 +41,7 @@ class Polyline:
     closed: bool
 
     def __init__(self, vertices: ArrayLike, closed: bool = False) -> None:
-        corners = np.asarray(vertices, dtype=float)
+        corners = real_array(vertices, "polyline with vertices")
         fewest = 3 if closed else 2
         if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < fewest:
             raise XfemError(f"polyline of shape {corners.shape}; expected (k, 2) with k ≥ {fewest}")
@@ -96,7 +97,7 @@ class Polyline:
 
     def _nearest(self, points: _Floats) -> tuple[NDArray[np.int64], _Floats, _Floats]:
         """Nearest segment, place on it in [0, 1], and the offset from there to the point."""
-        points = np.asarray(points, dtype=float)
+        points = places(points, 2, "polyline")
         chunk = max(1, _PAIRS_AT_ONCE // len(self._starts))
         parts = [self._nearest_of(points[i : i + chunk]) for i in range(0, len(points), chunk)]
         if not parts:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import index_array, places, real_array
 
 __all__ = ["TriangulatedSurface"]
 
@@ -14,6 +15,7 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 _PAIRS_AT_ONCE = 500_000  # points × triangles in one sweep
+_FLAT = 1e-12  # area over squared edge below which a triangle has none
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class TriangulatedSurface:
     triangles: _Ints
 
     def __init__(self, points: ArrayLike, triangles: ArrayLike) -> None:
-        vertices, faces = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+        vertices = real_array(points, "surface points")
+        faces = index_array(triangles, "surface triangles")
         if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
             raise XfemError(f"surface points of shape {vertices.shape}; expected finite (n, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
@@ -52,8 +55,10 @@ class TriangulatedSurface:
         object.__setattr__(self, "points", vertices)
         object.__setattr__(self, "triangles", faces)
         areas = np.linalg.norm(self._area_vectors, axis=1)
-        if not (areas > 0.0).all():
-            raise XfemError(f"surface triangle {int(areas.argmin())} has no area")
+        longest = np.linalg.norm(vertices[faces] - np.roll(vertices[faces], 1, axis=1), axis=2)
+        flat = ~(areas > _FLAT * longest.max(axis=1) ** 2)
+        if flat.any():
+            raise XfemError(f"surface triangle {int(flat.argmax())} has no area")
         edges = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
         if len(np.unique(edges, axis=0)) < len(edges):
             raise XfemError("the triangles of the surface are not consistently oriented")
@@ -121,6 +126,7 @@ class TriangulatedSurface:
         self, points: _Floats
     ) -> tuple[_Floats, _Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         """Nearest point, its normal, whether it is on the rim, whether inside a face."""
+        points = places(points, 3, "surface")
         chunk = max(1, _PAIRS_AT_ONCE // len(self.triangles))
         face = np.zeros(len(points), dtype=np.int64)
         weights = np.zeros((len(points), 3))

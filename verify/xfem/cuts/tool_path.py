@@ -16,6 +16,7 @@ from verify.xfem.cuts.polyline import Polyline
 from verify.xfem.cuts.sweep_kernels import probe_points
 from verify.xfem.cuts.sweep_surface import STILL, SweepSurface, sweep_surface
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import places, real_array
 
 __all__ = ["PartOfSweep", "Sweep", "ToolPath"]
 
@@ -44,8 +45,8 @@ class ToolPath:
     times: _Floats
 
     def __init__(self, blades: ArrayLike, times: ArrayLike) -> None:
-        positions = np.asarray(blades, dtype=float)
-        moments = np.asarray(times, dtype=float)
+        positions = real_array(blades, "blades")
+        moments = real_array(times, "times")
         _check(positions, moments)
         object.__setattr__(self, "blades", positions)
         object.__setattr__(self, "times", moments)
@@ -70,12 +71,12 @@ class ToolPath:
         depth : (3,) or (k, 3) array_like, optional
             Vector from the tip to the other end of the blade, in metres; none in the plane.
         """
-        points = np.asarray(tips, dtype=float)
+        points = real_array(tips, "tip points")
         if points.ndim != 2:
             raise XfemError(f"tip points of shape {points.shape}; expected (k, 2) or (k, 3)")
         if depth is None:
             return cls(points[:, None], times)
-        vector = np.asarray(depth, dtype=float)
+        vector = real_array(depth, "depth")
         if vector.shape not in ((points.shape[1],), points.shape):
             raise XfemError(f"depth of shape {vector.shape}; expected (3,) or {points.shape}")
         return cls(np.stack([points, points + vector], axis=1), times)
@@ -124,14 +125,14 @@ class ToolPath:
 
     def extended(self, blades: ArrayLike, times: ArrayLike) -> "ToolPath":
         """Append positions (k, b, s): for a tool that moves as one looks."""
-        more = np.asarray(blades, dtype=float)
+        more = real_array(blades, "further blades")
         if more.ndim != 3 or more.shape[1:] != self.blades.shape[1:]:
             raise XfemError(
                 f"further blades of shape {more.shape}; expected (k, *{self.blades.shape[1:]})"
             )
         return ToolPath(
             np.concatenate([self.blades, more]),
-            np.concatenate([self.times, np.atleast_1d(np.asarray(times, dtype=float))]),
+            np.concatenate([self.times, np.atleast_1d(real_array(times, "further times"))]),
         )
 
 
@@ -163,6 +164,7 @@ class Sweep:
         return PartOfSweep(self, travel)
 
     def _probe(self, points: _Floats) -> _Floats:
+        points = places(points, self.path.blades.shape[2], "sweep")
         if not self.path.sweeps:
             # nothing is swept: one side everywhere, and no point of the cut anywhere
             return np.tile([1.0, -np.inf, 0.0], (len(points), 1))

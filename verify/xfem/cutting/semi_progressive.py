@@ -129,6 +129,11 @@ class SemiProgressiveCutter:
         -------
         Increment or None
             None if no element was split.
+
+        Raises
+        ------
+        XfemError
+            If the time is no number.
         """
         division = in_one_go(self.looking(time))
         return None if division is None else self.divide(division, time)
@@ -151,6 +156,8 @@ class SemiProgressiveCutter:
         Division or None
             For `divide`, with which the body must be divided before it is looked at again.
         """
+        if np.ndim(time) != 0 or not isinstance(time, int | float | np.number) or np.isnan(time):
+            raise XfemError(f"time {time!r}; expected a number of seconds")
         for stroke in self.strokes:
             stroke.hold()
         try:

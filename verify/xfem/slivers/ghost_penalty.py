@@ -58,10 +58,11 @@ class GhostPenalty:
     def __init__(
         self, virtual: VirtualMesh, material: Material, factor: float = DEFAULT_FACTOR
     ) -> None:
-        if not (np.isfinite(factor) and factor > 0.0):
-            raise XfemError(f"ghost penalty with factor {factor:g}; expected a positive one")
+        if not (isinstance(factor, int | float | np.floating) and 0.0 < factor < np.inf):
+            raise XfemError(f"ghost penalty with factor {factor!r}; expected a positive one")
         if virtual.mesh.dim < virtual.mesh.space:
             raise XfemError("ghost penalty of a membrane in space; expected a body that fills it")
+        lam, mu = material.of_cells(len(virtual.mesh.cells))
         self.virtual, self.factor = virtual, factor
         pieces = np.stack(face_contacts(virtual, near=True))
         pieces = pieces[:, virtual.split[pieces].any(axis=0)]
@@ -88,7 +89,7 @@ class GhostPenalty:
         self.weights = 0.5 * (height + across) * area
         self._heights = 0.5 * (height + across)
         self._cells = cells
-        self.modulus = self._of_faces(material.lam + 2.0 * material.mu)
+        self.modulus = self._of_faces(lam + 2.0 * mu)
         self.couplings: _Ints = np.stack(
             [virtual.cells[pieces[0], local], virtual.cells[pieces[1], there]], axis=1
         )
@@ -134,7 +135,7 @@ class GhostPenalty:
 
         It does not act on rigid motion: total mass, weight and momenta stay.
         """
-        rho = self._of_faces(cell_densities(self.virtual, density))
+        rho = self._of_faces(cell_densities(self.virtual.mesh, density))
         weights = self.factor * rho * self._heights**2 * self.weights
         extra = self.jumps.T @ (self.jumps * weights[:, None])
         return Mass(csr_array(mass.matrix + extra), None, mass.weights)

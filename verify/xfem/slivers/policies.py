@@ -92,8 +92,8 @@ def treat_slivers(
     """
     if policy not in ("keep", "drop", "merge"):
         raise XfemError(f"sliver policy '{policy}'; expected keep, drop or merge")
-    if not 0.0 < threshold < 0.5:
-        raise XfemError(f"sliver threshold {threshold:g}; expected a volume fraction in (0, 0.5)")
+    if not (isinstance(threshold, float | np.floating) and 0.0 < threshold < 0.5):
+        raise XfemError(f"sliver threshold {threshold!r}; expected a volume fraction in (0, 0.5)")
     small = virtual.fraction < threshold
     # a cell of many pieces keeps its largest one whatever its size
     small[_largest_siblings(virtual)] = False

@@ -15,9 +15,17 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cuts.crossing import AT_END, REACH, Crossing, TipRule, crossed_through
+from verify.xfem.cuts.crossing import (
+    AT_END,
+    REACH,
+    Crossing,
+    TipRule,
+    crossed_through,
+    level_and_depth,
+)
 from verify.xfem.cuts.flat import Cut
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import real_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.bisection import Simplices, bisect_at
 from verify.xfem.splitting.clipping import staircase
@@ -132,10 +140,13 @@ def split_cells(
     Raises
     ------
     XfemError
-        If a level set is not finite or has a wrong shape, or the tip rule is unknown.
+        If the cuts are no sequence, a level set is not finite, a depth is NaN, either has a wrong
+        shape, or the tip rule is unknown.
     """
     if tip not in get_args(TipRule):
         raise XfemError(f"tip rule '{tip}'; expected inside, through or nearest")
+    if not isinstance(cuts, Sequence):
+        raise XfemError(f"cuts of type {type(cuts).__name__}; expected a list of cuts")
     values, snapped = _nodal_values(mesh, cuts)
     snap = ROUND_OFF * mesh.extent
     if len(cuts) == 1 and tip != "nearest":
@@ -182,7 +193,7 @@ def _split_by_one(
     active = np.zeros(len(crossed), dtype=bool)
     if len(crossed):
         margin = AT_END if tip == "through" else -AT_END
-        level, depth = cut.level_set(places), cut.depth(places)
+        level, depth = level_and_depth(cut, places)
         active = gone_through(edges, level, depth, size, REACH, margin, tip == "through")
     if held is not None and not active.all():
         doubtful = np.flatnonzero(~active)
@@ -201,7 +212,12 @@ def _split_by_one(
 def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
     values = np.empty((len(mesh.points), len(cuts)))
     for index, cut in enumerate(cuts):
-        column = np.asarray(cut.level_set(mesh.points))
+        if not hasattr(cut, "level_set"):
+            raise XfemError(f"cut {index} of type {type(cut).__name__}; expected a cut")
+        try:
+            column = real_array(cut.level_set(mesh.points), "level set")
+        except XfemError as error:
+            raise XfemError(f"cut {index}: {error}") from None
         if column.shape != (len(mesh.points),) or not np.isfinite(column).all():
             raise XfemError(f"cut {index}: level set of shape {column.shape} or not finite")
         values[:, index] = column

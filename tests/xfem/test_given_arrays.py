@@ -1,0 +1,141 @@
+"""Whatever a user gives, one error says what it was: kernels have no bounds checks of their own."""
+
+# mypy: disable-error-code="arg-type, list-item, return-value"
+
+import numpy as np
+import pytest
+
+from verify.xfem.critical_step import critical_step, element_critical_steps
+from verify.xfem.cuts import (
+    ImplicitCut,
+    Plane,
+    PolygonPatch,
+    Polyline,
+    ToolPath,
+    TriangulatedSurface,
+)
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import XfemError
+from verify.xfem.loads import body_force, traction
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.slivers.ghost_penalty import GhostPenalty
+from verify.xfem.slivers.policies import treat_slivers
+from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+PLATE, BLOCK = rectangle_mesh((4, 4)), box_mesh((2, 2, 2))
+CUT = cut_mesh(PLATE, [Plane([0.5, 0.53], [0.0, 1.0])])
+SOFT = isotropic(1e4, 0.3, "plane strain")
+SWEEP = ToolPath.of_tip([[0.0, 0.4], [1.0, 0.4]], [0.0, 1.0]).sweep
+BLADE = ToolPath.of_tip([[0.0, 0.4, 0.0], [1.0, 0.4, 0.0]], [0.0, 1.0], [0.0, 0.0, 1.0]).sweep
+RIM = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+NAN = np.nan
+
+
+def to_the_left(extent):
+    return ImplicitCut(lambda x: x[:, 0] - 0.4, extent)
+
+
+def stiffness():
+    pattern = block_pattern(CUT.cells, CUT.node_count)
+    return pattern.matrix(LinearStiffness(CUT, SOFT).assemble(pattern))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        # a kernel would read past the end of its arrays
+        (lambda: cut_mesh(PLATE, [BLADE]), r"cut 0: sweep at points of shape \(25, 2\)"),
+        (lambda: cut_mesh(BLOCK, [SWEEP]), r"expected \(n, 2\)"),
+        (lambda: SWEEP.depth(np.zeros(2)), r"sweep at points of shape \(2,\)"),
+        (lambda: cut_mesh(PLATE, [to_the_left(lambda x: np.ones(1))]), r"depth of shape \(1,\)"),
+        (lambda: cut_mesh(PLATE, [to_the_left(lambda x: 1.0)]), r"depth of shape \(\)"),
+        # nothing would be cut, and nothing said
+        (lambda: cut_mesh(PLATE, [to_the_left(lambda x: np.full(len(x), NAN))]), "or NaN"),
+        (lambda: PolygonPatch([*RIM, RIM[0]]), "corners 3 and 0 of the polygon are in one place"),
+        (lambda: PolygonPatch([*RIM, [NAN, 1.0, 0.0]]), "not finite"),
+        (lambda: SemiProgressiveCutter(PLATE).advance(NAN), "time nan; expected a number"),
+        (lambda: SemiProgressiveCutter(PLATE).advance("soon"), "expected a number of seconds"),
+        # a cut of another space, or none
+        (lambda: cut_mesh(PLATE, [Plane([0, 0, 0], [1, 0, 0])]), r"cut 0: plane at points"),
+        (lambda: cut_mesh(BLOCK, [Polyline([[0, 0], [1, 1]])]), r"cut 0: polyline at points"),
+        (lambda: cut_mesh(PLATE, [PolygonPatch(RIM)]), r"cut 0: plane at points"),
+        (lambda: cut_mesh(PLATE, [TriangulatedSurface(RIM, [[0, 1, 2]])]), "cut 0: surface at"),
+        (lambda: cut_mesh(PLATE, Plane([0, 0], [1, 0])), "cuts of type Plane; expected a list"),
+        (lambda: cut_mesh(PLATE, [None]), "cut 0 of type NoneType"),
+        (lambda: cut_mesh(PLATE, [ImplicitCut(lambda x: None)]), "cut 0: level set"),
+        # numbers that are none, rows that differ, indices that are no integers
+        (lambda: SimplexMesh("abc", [[0, 1, 2]]), "mesh points 'abc'; expected real numbers"),
+        (lambda: SimplexMesh([[0, 0], [1], [0, 1]], [[0, 1, 2]]), "mesh points"),
+        (lambda: SimplexMesh([[0, 0], [1j, 0], [0, 1]], [[0, 1, 2]]), "expected real numbers"),
+        (lambda: SimplexMesh(PLATE.points, [[0, 1, 2], [0, 1]]), "different numbers of nodes"),
+        (lambda: Plane("ab", [0, 1]), "plane at 'ab'"),
+        (lambda: Polyline("ab"), "polyline with vertices 'ab'"),
+        (lambda: ToolPath.of_tip([[0, 0], [1]], [0, 1]), "tip points"),
+        (lambda: TriangulatedSurface(RIM, [[0.0, 1.0, 2.7]]), "surface triangles"),
+        (lambda: TriangulatedSurface([[0, 0, 0], [1, 0, 0], [0.5, 1e-13, 0]], [[0, 1, 2]]), "area"),
+        (lambda: side_wise_mass(CUT, "heavy"), "density 'heavy'"),
+        (lambda: side_wise_mass(CUT, 1.0).weight(9.8), "expected a finite vector"),
+        (lambda: isotropic(np.ones(3), np.full(4, 0.3), "solid"), r"shape \(3,\), Poisson"),
+        (lambda: GhostPenalty(CUT, isotropic(np.ones(3), 0.3, "plane strain")), r"expected \(\)"),
+        (lambda: GhostPenalty(CUT, SOFT, "some"), "factor 'some'"),
+        (lambda: treat_slivers(CUT, "merge", "some"), "threshold 'some'"),
+        (lambda: Supports.none(CUT).prescribe(CUT, [0.7, 1.2]), "supported nodes"),
+        (lambda: Supports.none(CUT).prescribe(CUT, [0], components=0), "components 0"),
+        (lambda: Supports.none(cut_mesh(BLOCK, [])).prescribe(CUT, [0]), r"supports of shape"),
+        (lambda: traction(CUT, [[0.7, 1.2]], [1.0, 0.0]), "loaded facets"),
+        (lambda: traction(CUT, [0, 1, 2], [1.0, 0.0]), r"shape \(3,\); expected \(b, 2\)"),
+        (lambda: body_force(CUT, lambda x, s: x, -1), "degree -1"),
+        (lambda: body_force(CUT, lambda x, s: None), "load density"),
+        # an infinite or missing step
+        (lambda: element_critical_steps(PLATE, SOFT, -1.0), "density -1"),
+        (lambda: element_critical_steps(PLATE, SOFT, [1.0, 2.0]), r"density of shape \(2,\)"),
+        (lambda: critical_step(stiffness() * NAN, side_wise_mass(CUT, 1.0)), "not finite"),
+        (lambda: critical_step(stiffness(), side_wise_mass(CUT, 1.0), [0.0] * 70), "one bool"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_one_sentence(make, message):
+    with pytest.raises(XfemError, match=message) as raised:
+        make()
+    assert "\n" not in str(raised.value)
+
+
+def test_a_cell_given_twice_is_refused():
+    mesh = SimplexMesh([[0, 0], [1, 0], [0, 1]], [[0, 1, 2], [2, 0, 1]])
+    with pytest.raises(XfemError, match="cells 0 and 1 have the same nodes"):
+        cut_mesh(mesh, [Plane([0.3, 0.3], [1.0, 0.0])])
+
+
+def read_only(array):
+    array.flags.writeable = False
+    return array
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        lambda a: read_only(a.copy()),
+        np.asfortranarray,
+        lambda a: np.repeat(a, 2, axis=0)[::2],
+        lambda a: a.astype(np.int32) if a.dtype.kind == "i" else a.astype(np.longdouble),
+        lambda a: a.tolist(),
+    ],
+    ids=["read-only", "Fortran order", "strided", "other numbers", "lists"],
+)
+def test_the_layout_in_memory_of_what_is_given_does_not_matter(given):
+    mesh = SimplexMesh(given(BLOCK.points), given(BLOCK.cells))
+    cut = Plane(given(np.array([0.5, 0.5, 0.4])), given(np.array([1.0, 2.0, 3.0])))
+    want = cut_mesh(BLOCK, [Plane([0.5, 0.5, 0.4], [1.0, 2.0, 3.0])])
+    found = cut_mesh(mesh, [cut])
+    assert np.array_equal(found.cells, want.cells)
+    assert np.array_equal(found.fraction, want.fraction)
+    density = given(np.linspace(1.0, 2.0, len(mesh.cells)))
+    weights = side_wise_mass(found, density).weights
+    np.testing.assert_array_equal(
+        weights, side_wise_mass(want, np.linspace(1.0, 2.0, len(mesh.cells))).weights
+    )

@@ -1,0 +1,61 @@
+"""Arrays as a user gives them: real numbers or indices, else one error that says what was given."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+
+__all__ = ["index_array", "places", "real_array"]
+
+
+def real_array(given: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Real numbers of any shape.
+
+    Raises
+    ------
+    XfemError
+        If there is text, None or a complex number among them, or rows differ in length.
+    """
+    try:
+        raw = np.asarray(given)
+        if not np.iscomplexobj(raw):
+            return np.asarray(raw, dtype=np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise XfemError(f"{what} {_shown(given)}; expected real numbers, in rows of one length")
+
+
+def index_array(given: ArrayLike, what: str) -> NDArray[np.int64]:
+    """Whole numbers of any shape; an empty list has none, and so may be of any type.
+
+    Raises
+    ------
+    XfemError
+        If they are not of an integer type: 0.7 is not taken as 0.
+    """
+    try:
+        raw = np.asarray(given)
+    except ValueError:
+        raw = np.array(None)
+    if raw.size and not np.issubdtype(raw.dtype, np.integer):
+        raise XfemError(f"{what} {_shown(given)}; expected integers, in rows of one length")
+    return raw.astype(np.int64)
+
+
+def places(given: ArrayLike, space: int, what: str) -> NDArray[np.float64]:
+    """Positions (n, space) at which something in so many dimensions is asked for, in metres.
+
+    Raises
+    ------
+    XfemError
+        If they have another shape.
+    """
+    points = real_array(given, f"{what}: points")
+    if points.ndim != 2 or points.shape[1] != space:
+        raise XfemError(f"{what} at points of shape {points.shape}; expected (n, {space})")
+    return points
+
+
+def _shown(given: ArrayLike) -> str:
+    text = " ".join(repr(given).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
