@@ -8,7 +8,7 @@ F, so that its mean stress is that of F̄, the mean of both deformation gradient
 
     s₁ − s₀ = D : (F₁ − F₀),   D F̄ᵀ symmetric,
 
-which leaves the stress 2 μ F̄ + (½ λ (s₀ + s₁ − 2 d) − 2 μ) D. In the plane s² = q = tr C + 2 det F
+which leaves the stress 2 μ (F̄ − D) + ½ λ (s₀ + s₁ − 2 d) D. In the plane s² = q = tr C + 2 det F
 is quadratic and blind to rotations: D = ∂q/∂F(F̄) / (s₀ + s₁). In space U₁² − U₀² =
 Ū (U₁ − U₀) + (U₁ − U₀) Ū with the mean stretch Ū = ½ (U₀ + U₁), so that D = F̄ Ū⁻¹: exact, not 0/0
 at rest, and without a quadrature over the step. It asks for a regular Ū: a cell that is pressed
@@ -34,7 +34,7 @@ from reference.nodal_algebra import (
 )
 from reference.polar_stretch import PolarStretch
 from reference.space import ConformingSpace, SharedUnknowns
-from reference.strain_energies import corotated, corotated_value
+from reference.strain_energies import corotated, virtual_work
 from verify.scene import Material
 
 __all__ = ["CorotatedLaw", "Law", "LinearLaw", "MixedLaw", "law_of"]
@@ -205,13 +205,13 @@ class CorotatedLaw:
         polar = MembraneStretch if space.mesh.cell_dimension < space.dimension else PolarStretch
         first, last = (polar(u, degree) for u in (self._before, self._after))
         self._first, self._last, dx = first, last, last.measure
-        force = last.derivative(corotated(last, lam, mu) * dx, v)
-        share = lam / 2 * (first.s + last.s - 2 * last.stretches) - 2 * mu
-        stress = mu * (first.F + last.F) + share * _mean_turn(first, last)
+        force = virtual_work("corotated", last, lam, mu, v)
+        turn, away = _mean_turn(first, last)
+        stress = 2 * mu * away + lam / 2 * (first.trace + last.trace) * turn
         averaged = ufl.inner(stress, ufl.grad(v)) * dx
         viscous = _turned_work(last.R, ufl.grad(self._velocity), ufl.grad(v), lam, mu) * dx
         damping = _turned_work(last.R, ufl.grad(w), ufl.grad(v), lam, mu) * dx
-        self._energy = fem.form(corotated_value(last, lam, mu) * dx)
+        self._energy = fem.form(corotated(last, lam, mu) * dx)
         self._force = fem.form(force)
         self._averaged, self._viscous = fem.form(averaged), fem.form(viscous)
         self._tangent = fem.form(last.derivative(force, w))
@@ -271,18 +271,23 @@ def law_of(
     return (MixedLaw if pressure else LinearLaw)(material, space)
 
 
-def _mean_turn(first: PolarStretch | MembraneStretch, last: PolarStretch | MembraneStretch) -> Any:
-    """D of the module: a discrete gradient of tr U."""
+def _mean_turn(
+    first: PolarStretch | MembraneStretch, last: PolarStretch | MembraneStretch
+) -> tuple[Any, Any]:
+    """D of the module, a discrete gradient of tr U; and F̄ − D without cancellation."""
     import ufl
 
     mean = 0.5 * (first.F + last.F)
     if len(mean[0, :]) == 2:
-        return 2 * (mean + ufl.cofac(mean)) / (first.s + last.s)
-    stretches = [ufl.sym(state.R.T * state.F) for state in (first, last)]
-    stretch = 0.5 * (stretches[0] + stretches[1])
-    if isinstance(last, MembraneStretch):  # across the tangent plane nothing is stretched
-        stretch += last.normal
-    return mean * ufl.inv(stretch)
+        H = 0.5 * (first.H + last.H)
+        both = first.trace + last.trace
+        along, skew = 2 * ufl.tr(H) - both, 2 * (H[0, 1] - H[1, 0])
+        turn = ufl.as_tensor([[along, skew], [-skew, along]]) / (4 + both)  # D − I
+        return ufl.Identity(2) + turn, H - turn
+    # Ū − I, or within the tangent plane of a membrane Ū less its identity
+    strain = 0.5 * sum(ufl.sym(state.R.T * state.away) for state in (first, last))
+    turn = mean * ufl.inv(ufl.Identity(3) + strain)
+    return turn, turn * strain
 
 
 def _turned_work(turn: Any, rate: Any, test: Any, lam: Any, mu: Any) -> Any:

@@ -27,7 +27,8 @@ class MixedStretch(PolarStretch):
         super().__init__(solution, degree)
         self.p = solution[solution.function_space.mesh.geometry.dim]
 
-    def _gradient(self, of: Any) -> Any:
+    def gradient(self, of: Any) -> Any:
+        """Gradient of the displacement in a function or argument of both."""
         import ufl
 
         # not that of a part split off: UFL does not differentiate it along its own direction

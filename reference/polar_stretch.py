@@ -12,6 +12,10 @@ to the rotation next to F, and the least stretch is negative). Differentiated, i
 whose denominator is twice the product of all sums of two principal stretches. So the numbers s at
 the quadrature points, found by Newton's method, and this rational formula do for a form and, by the
 chain rule, for its derivative.
+
+All of it is written in H = F − I, with what is 1 or I at rest taken out by hand: strains and forces
+are right to round-off of H, and not of F, so that a load of 1e-12 of Young's modulus is solved as
+well as any other.
 """
 
 from typing import Any
@@ -19,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PolarStretch", "stretch_sum"]
+__all__ = ["PolarStretch", "stretch_trace"]
 
 Array = NDArray[np.float64]
 _MOST_ITERATIONS = 80  # a double root (an inverted cell without a nearest rotation) halves errors
@@ -37,83 +41,123 @@ class PolarStretch:
 
     Attributes
     ----------
-    F, R : ufl expressions (d, d)
+    F, H, R : ufl expressions (d, d)
+        H = F − I.
+    away : ufl expression (d, d)
+        F − R = R (U − I).
     J : ufl expression
         det F.
-    s : ufl expression
-        tr U; less than the sum of the singular values of F where det F < 0.
-    stretches : int
-        Number of principal stretches: d.
+    trace : ufl expression
+        tr(U − I); where det F < 0 the least stretch is negative.
     measure : ufl.Measure
         dx with the quadrature of `degree`.
     """
 
     def __init__(self, solution: Any, degree: int) -> None:
+        import ufl
+
+        mesh = solution.function_space.mesh
+        d = mesh.geometry.dim
+        self._solution = solution
+        self._trace: Any = None
+        self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
+        self.H = self.gradient(solution)
+        self.F = ufl.Identity(d) + self.H
+        self.J = ufl.det(self.F)
+        turn = self._in_plane() if d == 2 else self._in_space(mesh, degree)
+        self.R, self.away = ufl.Identity(d) + turn, self.H - turn
+        self.update()
+
+    def _in_plane(self) -> Any:
+        """Set the trace; give R − I."""
+        import ufl
+
+        H, widening = self.H, ufl.tr(self.H)
+        skew = H[0, 1] - H[1, 0]
+        s = ufl.sqrt((2 + widening) ** 2 + skew**2)
+        self.trace = (widening * (4 + widening) + skew**2) / (s + 2)
+        along = widening - self.trace
+        return ufl.as_tensor([[along, skew], [-skew, along]]) / s
+
+    def _in_space(self, mesh: Any, degree: int) -> Any:
+        """Make the trace a function at the quadrature points; give R − I."""
         import basix
         import basix.ufl
         import ufl
         from dolfinx import fem
 
-        mesh = solution.function_space.mesh
-        d = mesh.geometry.dim
-        self._solution = solution
-        self._stretch: Any = None
-        self.measure = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": degree})
-        F = self.F = ufl.Identity(d) + self._gradient(solution)
-        self.J, self.stretches = ufl.det(F), d
-        if d == 2:
-            self.s = ufl.sqrt((F[0, 0] + F[1, 1]) ** 2 + (F[0, 1] - F[1, 0]) ** 2)
-            self.R = (F + ufl.cofac(F)) / self.s
-            return
         element = basix.ufl.quadrature_element("tetrahedron", value_shape=(), degree=degree)
         space = fem.functionspace(mesh, element)
-        self._stretch = self.s = fem.Function(space)
+        self._trace = self.trace = e = fem.Function(space)
         points, _ = basix.make_quadrature(basix.CellType.tetrahedron, degree)
-        self._deformation = fem.Expression(F, np.array(points, dtype=float))
+        self._deformation = fem.Expression(self.H, np.array(points, dtype=float))
         cells = mesh.topology.index_map(3)
         self._cells = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
         self._dofs = np.asarray(space.dofmap.list).ravel()
-        C = F.T * F
-        above = (self.s**2 + ufl.tr(C)) * F + 2 * self.s * ufl.cofac(F) - 2 * F * C
-        self.R = above / (self.s**3 - ufl.tr(C) * self.s - 2 * ufl.det(F))
-        self.update()
+        # numerator and denominator of R are 16 I and 16 at rest
+        H, identity = self.H, ufl.Identity(3)
+        G = H + H.T + H.T * H  # C − I
+        cofactors = ufl.tr(H) * identity - H.T + ufl.cofac(H)  # cof F − I
+        swelling = ufl.tr(H) + ufl.tr(ufl.cofac(H)) + ufl.det(H)  # J − 1
+        g = ufl.tr(G)
+        above = 12 * H + (6 * e + e**2 + g) * self.F + 6 * cofactors
+        above += 2 * e * (identity + cofactors) - 2 * (H + G + H * G)
+        below = 24 * e + 9 * e**2 + e**3 - (3 + e) * g - 2 * swelling
+        return (above - below * identity) / (16 + below)
 
     def update(self) -> None:
         """Follow the displacement; before a form is assembled."""
-        if self._stretch is not None:
-            mesh = self._stretch.function_space.mesh
+        if self._trace is not None:
+            mesh = self._trace.function_space.mesh
             gradients = np.asarray(self._deformation.eval(mesh, self._cells), dtype=float)
-            self._stretch.x.array[self._dofs] = stretch_sum(gradients.reshape(-1, 3, 3))
+            self._trace.x.array[self._dofs] = stretch_trace(gradients.reshape(-1, 3, 3))
 
     def derivative(self, form: Any, direction: Any) -> Any:
-        """Differentiate a form by the solution: R is the derivative of s."""
+        """Differentiate a form by the solution: R is the derivative of the trace."""
         import ufl
 
         total = ufl.derivative(form, self._solution, direction)
-        if self._stretch is None:
+        if self._trace is None:
             return total
-        along = ufl.inner(self.R, self._gradient(direction))
-        return total + ufl.derivative(form, self._stretch, along)
+        along = ufl.inner(self.R, self.gradient(direction))
+        return total + ufl.derivative(form, self._trace, along)
 
-    def _gradient(self, of: Any) -> Any:
+    def gradient(self, of: Any) -> Any:
         """Gradient of the displacement in a function or argument of the solution's space."""
         import ufl
 
         return ufl.grad(of)
 
 
-def stretch_sum(F: Array) -> Array:
-    """Find tr(Rᵀ F) with the rotation R next to each F.
+def stretch_trace(H: Array) -> Array:
+    """Find tr(Rᵀ F − I) of F = I + H with the rotation R next to each F.
 
     Parameters
     ----------
-    F : (n, 3, 3) array
+    H : (n, 3, 3) array
 
     Returns
     -------
     (n,) array
-        Sum of the singular values, the least one with the sign of det F.
+        Sum of the singular values of F, the least one with the sign of det F, less 3; right to
+        round-off of H.
     """
+    e = _stretch_sum(np.eye(3) + H) - 3
+    # one more of Newton's steps, on the quartic in e = s − 3: there nothing cancels. The slope is
+    # 64 at rest; where it is small H is not
+    G = H + H.swapaxes(1, 2) + np.einsum("nki,nkj->nij", H, H)
+    g, h = np.einsum("nii->n", G), np.einsum("nii->n", H)
+    second = 0.5 * (h**2 - np.einsum("nij,nji->n", H, H))
+    j = h + second + np.linalg.det(H)  # J − 1
+    k = 0.5 * (g**2 - np.einsum("nij,nij->n", G, G))
+    value = 64 * e + 48 * e**2 + 12 * e**3 + e**4
+    value += g**2 - 4 * k - 20 * g - 24 * j - 12 * g * e - 2 * g * e**2 - 8 * j * e
+    slope = 64 + 96 * e + 36 * e**2 + 4 * e**3 - 12 * g - 4 * g * e - 8 * j
+    return e - np.divide(value, slope, out=np.zeros_like(e), where=slope > 1.0)
+
+
+def _stretch_sum(F: Array) -> Array:
+    """Sum (n,) of the singular values of F (n, 3, 3), the least one with the sign of det F."""
     C = np.einsum("nki,nkj->nij", F, F)
     one = np.einsum("nii->n", C)
     two = 0.5 * (one**2 - np.einsum("nij,nij->n", C, C))

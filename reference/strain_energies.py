@@ -4,13 +4,13 @@ from typing import Any
 
 __all__ = [
     "ENERGIES",
-    "VALUES",
     "corotated",
     "corotated_mixed",
-    "corotated_value",
+    "corotated_stress",
     "neo_hookean",
     "neo_hookean_mixed",
     "st_venant_kirchhoff",
+    "virtual_work",
 ]
 
 
@@ -27,23 +27,16 @@ def corotated(polar: Any, lam: Any, mu: Any) -> Any:
     """
     import ufl
 
-    d = polar.stretches
-    return mu * (ufl.inner(polar.F, polar.F) - 2 * polar.s + d) + lam / 2 * (polar.s - d) ** 2
+    return mu * ufl.inner(polar.away, polar.away) + lam / 2 * polar.trace**2
 
 
-def corotated_value(polar: Any, lam: Any, mu: Any) -> Any:
-    """Give the same energy as squares: right to round-off also where strains are small.
-
-    `corotated` is a difference of numbers of size μ, but quicker to differentiate.
-    """
-    import ufl
-
-    d, away = polar.stretches, polar.F - polar.R
-    return mu * ufl.inner(away, away) + lam / 2 * (polar.s - d) ** 2
+def corotated_stress(polar: Any, lam: Any, mu: Any) -> Any:
+    """Give its derivative by F, 2μ (F − R) + λ tr(U−I) R: quicker than differentiated."""
+    return 2 * mu * polar.away + lam * polar.trace * polar.R
 
 
 def corotated_mixed(state: Any, lam: Any, mu: Any) -> Any:
-    """μ‖U−I‖² + p (tr U − d) − p² / 2λ: the same where the pressure is p = λ tr(U−I).
+    """Give the same energy of a pressure p = λ tr(U−I), p² / 2λ being its share.
 
     Parameters
     ----------
@@ -53,17 +46,7 @@ def corotated_mixed(state: Any, lam: Any, mu: Any) -> Any:
     """
     import ufl
 
-    d = state.stretches
-    shear = mu * (ufl.inner(state.F, state.F) - 2 * state.s + d)
-    return shear + state.p * (state.s - d) - state.p**2 / (2 * lam)
-
-
-def corotated_mixed_value(state: Any, lam: Any, mu: Any) -> Any:
-    """Give the stored energy as squares, by the equation of the pressure: p² / 2λ is its share."""
-    import ufl
-
-    away = state.F - state.R
-    return mu * ufl.inner(away, away) + state.p**2 / (2 * lam)
+    return mu * ufl.inner(state.away, state.away) + state.p**2 / (2 * lam)
 
 
 def neo_hookean(polar: Any, lam: Any, mu: Any) -> Any:
@@ -94,8 +77,40 @@ def st_venant_kirchhoff(polar: Any, lam: Any, mu: Any) -> Any:
     """μ E:E + ½λ tr² E with E = ½ (C − I); softens when pressed, and has no barrier at J = 0."""
     import ufl
 
-    E = 0.5 * (polar.F.T * polar.F - ufl.Identity(len(polar.F[0, :])))
+    E = 0.5 * (polar.H + polar.H.T + polar.H.T * polar.H)
     return mu * ufl.inner(E, E) + lam / 2 * ufl.tr(E) ** 2
+
+
+def virtual_work(energy: str, state: Any, lam: Any, mu: Any, test: Any) -> Any:
+    """First variation of an energy, for a residual whose derivative is the tangent.
+
+    Parameters
+    ----------
+    energy : str
+        A name in `ENERGIES`.
+    state : PolarStretch, MembraneStretch, MixedStretch or MixedDeformation
+    lam, mu : ufl expressions
+        Lamé constants, Pa.
+    test : ufl argument
+        In the space of the solution that `state` is of.
+
+    Returns
+    -------
+    ufl form
+        Measured by ``state.measure``. With a pressure it is that of the saddle point
+        μ‖U−I‖² + p tr(U−I) − p² / 2λ, or of `neo_hookean_mixed`.
+    """
+    import ufl
+
+    if energy == "corotated":
+        stress = corotated_stress(state, lam, mu)
+        return ufl.inner(stress, state.gradient(test)) * state.measure
+    if energy == "corotated_mixed":
+        stress = 2 * mu * state.away + state.p * state.R
+        work = ufl.inner(stress, state.gradient(test))
+        work += (state.trace - state.p / lam) * test[len(state.F[0, :])]
+        return work * state.measure
+    return state.derivative(ENERGIES[energy](state, lam, mu) * state.measure, test)
 
 
 ENERGIES = {
@@ -104,10 +119,4 @@ ENERGIES = {
     "neo_hookean": neo_hookean,
     "neo_hookean_mixed": neo_hookean_mixed,
     "st_venant_kirchhoff": st_venant_kirchhoff,
-}
-# densities to evaluate, where they are not those to differentiate
-VALUES = {
-    **ENERGIES,
-    "corotated": corotated_value,
-    "corotated_mixed": corotated_mixed_value,
 }

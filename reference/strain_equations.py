@@ -13,7 +13,7 @@ from reference.mixed_space import MixedDeformation, mixed_space
 from reference.mixed_stretch import MixedStretch
 from reference.polar_stretch import PolarStretch
 from reference.space import ConformingSpace, SharedUnknowns
-from reference.strain_energies import ENERGIES, VALUES
+from reference.strain_energies import ENERGIES, virtual_work
 from verify.errors import InputError
 from verify.scene import Material
 
@@ -87,12 +87,11 @@ class StrainEquations:
         kind = MembraneStretch if membrane else kinds.get(energy, PolarStretch)
         self._polar = polar = kind(self.solution, 4 * space.degree - 2)
         thickness = fem.Constant(V.mesh, material.thickness or 1.0)
-        total = thickness * ENERGIES[energy](polar, lam, mu) * polar.measure
         v = ufl.TestFunction(V)
-        residual = polar.derivative(total, v)
+        residual = virtual_work(energy, polar, thickness * lam, thickness * mu, v)
         if load is not None:
             residual -= self._factor * load(v if mixed is None else ufl.split(v)[0])
-        self._energy = fem.form(thickness * VALUES[energy](polar, lam, mu) * polar.measure)
+        self._energy = fem.form(thickness * ENERGIES[energy](polar, lam, mu) * polar.measure)
         self._residual = fem.form(residual)
         tangent = polar.derivative(residual, ufl.TrialFunction(V))
         self._tension: Any = None

@@ -45,7 +45,7 @@ def turn(degrees, axis=(1.0, 2.0, -1.0)):
 
 
 def test_the_sum_of_stretches_is_that_of_the_singular_values_with_the_sign_of_the_volume():
-    from reference.polar_stretch import stretch_sum
+    from reference.polar_stretch import stretch_trace
 
     random = np.random.default_rng(0)
     F = random.standard_normal((2000, 3, 3))
@@ -56,8 +56,21 @@ def test_the_sum_of_stretches_is_that_of_the_singular_values_with_the_sign_of_th
     values[:, 2] *= np.sign(np.linalg.det(F))
     # a root of a quartic from its coefficients: round-off over its distance from the others
     apart = 1e-30 + (values[:, 1] + values[:, 2]) / np.maximum(values[:, 0], 1e-300)
-    error = np.abs(stretch_sum(F) - values.sum(axis=1)) / np.maximum(values[:, 0], 1e-300)
+    error = np.abs(stretch_trace(F - np.eye(3)) + 3 - values.sum(axis=1))
+    error /= np.maximum(values[:, 0], 1e-300)
     assert (error <= np.minimum(1e-13 / apart, 1e-6)).all()
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-8, 1e-15, 1e-200])
+def test_small_strains_keep_their_digits(size):
+    """tr(U − I) = tr H + |w|² to the third order, w the axial vector of the rotation."""
+    from reference.polar_stretch import stretch_trace
+
+    H = size * np.random.default_rng(3).standard_normal((200, 3, 3))
+    w = 0.5 * np.linalg.norm([H[:, 2, 1] - H[:, 1, 2], H[:, 0, 2] - H[:, 2, 0],
+                              H[:, 1, 0] - H[:, 0, 1]], axis=0)  # fmt: skip
+    error = np.abs(stretch_trace(H) - np.einsum("nii->n", H) - w**2)
+    assert (error < 50 * size**3 + 1e-14 * size).all()
 
 
 def test_a_turn_by_120_degrees_stores_nothing_and_pulls_nowhere():
@@ -65,7 +78,6 @@ def test_a_turn_by_120_degrees_stores_nothing_and_pulls_nowhere():
     x = space.node_points
     turned = (x @ turn(120).T - x).ravel()
     mechanics = law(space)
-    # the density of the energy is a difference of numbers of size μ
     assert abs(mechanics.energy(turned)) < 1e-14
     assert np.abs(mechanics.force(turned)).max() < 1e-15
 
@@ -110,14 +122,14 @@ def test_force_and_tangent_are_the_derivatives_of_the_energy(energy):
     from dolfinx.fem import petsc
 
     from reference.polar_stretch import PolarStretch
-    from reference.strain_energies import ENERGIES
+    from reference.strain_energies import ENERGIES, virtual_work
 
     space = body(2, (1, 1, 1))
     V = space.function_space
     u = fem.Function(V)
     polar = PolarStretch(u, 6)
     total = ENERGIES[energy](polar, LAM, MU) * polar.measure
-    force = polar.derivative(total, ufl.TestFunction(V))
+    force = virtual_work(energy, polar, LAM, MU, ufl.TestFunction(V))
     forms = [fem.form(f) for f in (total, force, polar.derivative(force, ufl.TrialFunction(V)))]
     random = np.random.default_rng(1)
     start, way = 0.03 * random.standard_normal((2, u.x.array.size))
