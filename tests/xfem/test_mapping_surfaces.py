@@ -83,6 +83,43 @@ def test_a_surface_outside_the_body_moves_with_the_nearest_element() -> None:
     np.testing.assert_allclose(moved, embedded.surface.material.rows @ rotation.T, atol=1e-12)
 
 
+def _upright(start, end):
+    """The path of a blade that reaches through a unit cube, from above."""
+    return ToolPath.of_tip([[*start, -0.2], [*end, -0.2]], [0.0, 1.0], [0.0, 0.0, 1.4])
+
+
+@pytest.mark.parametrize("outside", [0.06, 0.9])
+@pytest.mark.parametrize(
+    "paths",
+    [
+        [_upright([-0.1, 0.5], [1.1, 0.5]), _upright([0.5, -0.1], [0.5, 1.1])],
+        [
+            _upright([-0.1, 0.5], [0.5, 0.5]),
+            _upright([0.5, 0.5], [1.1, 0.9]),
+            _upright([0.5, 0.5], [1.1, 0.1]),
+        ],
+        [_upright([-0.1, 0.47], [0.6, 0.47]), _upright([0.3, -0.1], [0.3, 0.8])],
+    ],
+    ids=["crossing along faces", "branching", "partial"],
+)
+def test_a_surface_outside_the_body_that_has_followed_cuts_is_the_one_begun_after_them(
+    paths, outside
+) -> None:
+    """Vertices there went on with nodes of elements that a later cut had divided."""
+    mesh = box_mesh((4, 4, 4))
+    if outside < 0.5:  # like a smooth skin over a coarse mesh
+        facets = _own_boundary(mesh)
+        points = 0.5 + (1.0 + outside) * (mesh.points - 0.5)
+    else:
+        points, facets = _sphere(2, 0.5, outside)
+    cutter, _, followed = _cut(mesh, paths, points, facets)
+    begun = EmbeddedSurface(cutter, points, facets)
+    displacement = np.random.default_rng(3).normal(size=(cutter.body.node_count, 3))
+    there, here = (_facets_in_any_order(s.surface, displacement) for s in (begun, followed))
+    assert there.shape == here.shape
+    np.testing.assert_allclose(here, there, atol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("mesh", "paths"),
     [

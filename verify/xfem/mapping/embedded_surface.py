@@ -118,9 +118,9 @@ class EmbeddedSurface:
         self._vertex_cell, self._vertex_at = locate_many(self.points, *self._elements)
         self._numbers = PointNumbers(len(self.points), mesh.space)
         self._edges = EdgePoints(self.points, self._numbers)
-        self._near, self._around = self._facets_near_cells()
         leaf, count = np.argsort(tree.order), len(tree.order)
         self._boxes = tree.low[count + leaf], tree.high[count + leaf]
+        self._near, self._around = self._facets_near_cells()
         every = np.arange(len(self.facets))
         own, corners = self._vertex_cell[self.facets], (*self.facets.shape, mesh.dim + 1)
         self._corners = np.empty_like(own), np.empty(corners), np.empty(corners)
@@ -170,14 +170,18 @@ class EmbeddedSurface:
     def _facets_near_cells(self) -> tuple[tuple[_Ints, _Ints], tuple[_Ints, _Ints]]:
         """Facets near each cell, and cells near each facet, as (first of each, all).
 
-        They are near if their boxes meet, or if a vertex of the facet belongs to the cell.
+        They are near if their boxes meet, or if a vertex of the facet belongs to the cell. Outside
+        the mesh `locate` looks up to twice as far as it is to the next box: so does this.
         """
-        tree, slack = self._cutter.interior, self._elements.reach
+        tree = self._cutter.interior
         cells, facets = [], []
         corners = self.points[self.facets]
+        floor, ceiling = (box[self._vertex_cell] for box in self._boxes)
+        outside = np.maximum(floor - self.points, self.points - ceiling).max(axis=1, initial=0.0)
+        reach = self._elements.reach + 2.0 * outside[self.facets].max(axis=1)
         for f, (low, high) in enumerate(zip(corners.min(axis=1), corners.max(axis=1), strict=True)):
             near = np.union1d(
-                tree.meeting_box(low - slack, high + slack), self._vertex_cell[self.facets[f]]
+                tree.meeting_box(low - reach[f], high + reach[f]), self._vertex_cell[self.facets[f]]
             )
             cells.append(near)
             facets.append(np.full(len(near), f))
