@@ -142,6 +142,8 @@ def joined(mesh, partition):
     face, sides, region = _regions(
         nodes, relevant[cell] | relevant[other], lambda: points.values, points.find
     )
+    alive = np.ones(len(piece_cell), dtype=bool)
+    alive[: len(partition.parent)] = partition.fraction > 0.0
     first, second = [], []
     for f, side, corners_of in zip(face, sides, region, strict=True):
         if len(set(corners_of)) < len(corners_of):
@@ -152,8 +154,9 @@ def joined(mesh, partition):
             fits = ((label[mine] == 0) | (label[mine] == side)).all(axis=1)
             (piece,) = mine[fits]
             pair.append(piece * corners + (mesh.cells[c] == nodes[f][:, None]).argmax(axis=1))
-        first.append(pair[0])
-        second.append(pair[1])
+        if all(alive[slots[0] // corners] for slots in pair):  # others join nothing
+            first.append(pair[0])
+            second.append(pair[1])
     size = len(piece_cell) * corners
     a, b = np.concatenate(first), np.concatenate(second)
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(size, size))

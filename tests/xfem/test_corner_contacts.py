@@ -57,6 +57,33 @@ def test_a_tool_through_a_re_entrant_corner_leaves_no_hinge(dim, back):
     assert_same_cut(virtual, cut_mesh(mesh, [path.sweep]))
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("tip", ["inside", "through", "nearest"])
+def test_a_branch_from_a_stem_along_edges_or_faces_comes_off(side, way, tip):
+    """Pieces without volume beside the stem must not hold the two sides of the branch together."""
+    end = 0.5 + 3.0 * way
+    plate = rectangle_mesh((4, 4))
+    branches = [Polyline([[0.47, 0.5], [0.6, end]]), Polyline([[0.6, end], [0.47, 0.5]])]
+    for branch in branches:
+        stem = Plane([0.5, 0.5], [0.0, side])
+        for cuts in ([stem, branch], [branch, stem]):
+            assert cut_mesh(plate, cuts, tip).bodies.max() + 1 == 3
+    path = ToolPath.of_tip([[0.6, end], [0.47, 0.5]], [2.0, 3.0])
+    cutter = SemiProgressiveCutter(plate)
+    for stroke in (ToolPath.of_tip([[0.5 - side, 0.5], [0.5 + side, 0.5]], [0.0, 1.0]), path):
+        cutter.begin(stroke)
+        cutter.advance(stroke.times[-1])
+    assert cutter.virtual_mesh().bodies.max() + 1 == 3
+
+    block = box_mesh((2, 2, 2))
+    rim = [[0.45, -1.0, 0.5], [0.45, 2.0, 0.5], [0.55, 2.0, end], [0.55, -1.0, end]]
+    for outline in (rim, rim[::-1]):
+        cuts = [Plane([0.5] * 3, [0.0, 0.0, side]), PolygonPatch(outline)]
+        virtual = cut_mesh(block, cuts, tip)
+        assert virtual.bodies.max() + 1 == 3
+
+
 def _scattered(rng, dim):
     """Delaunay mesh of random points, without flat elements: nothing is structured or convex."""
     points = rng.random((14, dim))

@@ -226,9 +226,9 @@ def cut_mesh(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside") ->
     given one by O(h²): let the branch start a little behind its stem.
     """
     partition = split_cells(mesh, cuts, tip)
-    slots = join_slots(mesh, partition)
     fraction = partition.fraction
     solid = fraction > 0.0
+    slots = join_slots(mesh, partition, solid)
     group_node, numbering = number_groups(mesh, partition, slots, solid)
     return _virtual_mesh(mesh, partition, slots, solid, fraction, group_node, numbering)
 

@@ -270,7 +270,7 @@ class GrowingBody:
     def _renumber(self, state: Division) -> _Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
         patch, partition = state.patch, state.partition
-        slots = join_slots(patch, partition)
+        slots = join_slots(patch, partition, state.solid)
         cell, touched, home, solid, old = slots_before(
             slots.cells[slots.piece_cell],
             np.searchsorted(patch.whole_cells, state.changed_cells),

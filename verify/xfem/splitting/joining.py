@@ -3,9 +3,9 @@
 A *slot* is a piece together with a node of its cell. Two slots at one node are the same unknown
 when the pieces, in cells that share a face with that node, touch across the face, in an area (2D:
 a length): what touches in a corner or an edge only is apart, as parts that turn about a hinge are
-no body. Tips, mouths, parallel, crossing and branching cuts, cuts through nodes and along faces all
-follow from this one rule (formulation: "one set of node values per piece of material connected
-inside the element").
+no body, and a piece without volume joins nothing. Tips, mouths, parallel, crossing and branching
+cuts, cuts through nodes and along faces all follow from this one rule (formulation: "one set of
+node values per piece of material connected inside the element").
 """
 
 from dataclasses import dataclass
@@ -43,8 +43,16 @@ class PatchSlots:
     group: _Ints
 
 
-def join_slots(mesh: SimplexMesh, partition: Partition) -> PatchSlots:
-    """Join the slots of all pieces that touch, around the nodes of split cells."""
+def join_slots(mesh: SimplexMesh, partition: Partition, solid: NDArray[np.bool_]) -> PatchSlots:
+    """Join the slots of all pieces that touch, around the nodes of split cells.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    partition : Partition
+    solid : (q,) bool array
+        Pieces that have a volume; the others join nothing.
+    """
     patch, place, piece_cell, starts, pieces = patch_around(
         partition.parent, mesh.cells, len(mesh.points)
     )
@@ -62,6 +70,7 @@ def join_slots(mesh: SimplexMesh, partition: Partition) -> PatchSlots:
             starts,
             pieces,
             partition.label,
+            solid,
             points.values,
             staircase(mesh.dim),
             points.table,

@@ -187,7 +187,19 @@ def _find_relevant(here, there, starts, pieces, label, relevant):
 
 @njit(cache=True)
 def join_across_faces(
-    begin, patch, cells, neighbours, place, starts, pieces, label, values, stairs, edges, towards
+    begin,
+    patch,
+    cells,
+    neighbours,
+    place,
+    starts,
+    pieces,
+    label,
+    solid,
+    values,
+    stairs,
+    edges,
+    towards,
 ):
     """Join the slots of pieces that touch across faces, from one cell of a patch on.
 
@@ -200,6 +212,8 @@ def join_across_faces(
     starts, pieces : (c + 1,), (p,) int arrays
         Pieces of each cell of the patch; those past the end of `label` are whole cells.
     label : (q, cuts) int8 array
+    solid : (q,) bool array
+        Whether a piece has a volume; the others join nothing.
     values : (n, cuts) float array
         Level sets at the points.
     stairs : Staircase
@@ -252,7 +266,8 @@ def join_across_faces(
                 q = _fitting(starts[there], starts[there + 1], pieces, label, sides[top])
                 if p < 0 or q < 0:
                     raise RuntimeError("the pieces of a cell do not partition the plane of a face")
-                _join_face(cell, across, skip, p, q, cells, towards)
+                if (p >= len(label) or solid[p]) and (q >= len(label) or solid[q]):
+                    _join_face(cell, across, skip, p, q, cells, towards)
                 top -= 1
     return len(patch), asked[:0]
 
