@@ -9,7 +9,7 @@ from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.statics import static_equilibrium
+from verify.xfem.statics import NotInEquilibriumError, static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -81,3 +81,16 @@ def test_a_cut_bowl_finds_its_equilibrium_in_one_load_step(n):
     # and the same by another way there
     other = hang(bowl, 0.3, held, load_steps=3)
     assert other.energy == pytest.approx(found.energy, rel=1e-10)
+
+
+def test_under_ten_times_its_weight_a_piece_of_the_bowl_is_named_that_has_narrowed_to_nothing():
+    """It is stretched by more than 1 + 1/ν = 4.33; with a smaller ν the bowl finds its place."""
+    n = 24
+    bowl = sheet([n, n], lambda x, y: -3.0 * x * (1 - x) * y * (1 - y),
+                 [Plane([0.52, 0.5, 0.0], [1.0, -0.04, 0.0])])  # fmt: skip
+    x, y = bowl.node_points[:, :2].T
+    held = (x == 0.0) | (x == 1.0) | (y == 0.0) | (y == 1.0)
+    for poisson in (0.0, 0.1, 0.2):
+        assert hang(bowl, poisson, held, weight=10.0 * WEIGHT).iterations[0] < 16
+    with pytest.raises(NotInEquilibriumError, match="1 of 1199 pieces have collapsed"):
+        hang(bowl, 0.3, held, weight=10.0 * WEIGHT)

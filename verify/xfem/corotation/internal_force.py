@@ -300,6 +300,32 @@ class InternalForce:
         )
         return np.flatnonzero(np.linalg.det(F) < 0.0)
 
+    def collapsed(self, displacement: _Floats, ratio: float) -> NDArray[np.int64]:
+        """Pieces whose rotation, and with it the force, is not unique, or nearly so.
+
+        That is where the two principal stretches of a plane piece cancel (of an inverted piece the
+        smallest is negative), where the two smallest do in space, and where a membrane has shrunk
+        to a line.
+
+        Parameters
+        ----------
+        displacement : (N, d) float array
+        ratio : float
+            Of what is left to the largest stretch, below which a piece counts.
+        """
+        v, space = self.virtual, self._shape[1]
+        F = np.einsum("pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent])
+        if self.is_membrane:
+            normals = self._normals[v.parent]
+            F += np.eye(space) - np.einsum("pk,pl->pkl", normals, normals)
+            stretches = np.linalg.svd(F, compute_uv=False)
+            left = stretches[:, 1]
+        else:
+            F += np.eye(space)
+            stretches = np.linalg.svd(F, compute_uv=False)
+            left = np.abs(stretches[:, -2] + np.sign(np.linalg.det(F)) * stretches[:, -1])
+        return np.flatnonzero(left <= ratio * stretches[:, 0])
+
 
 def _unit_normals(virtual: VirtualMesh) -> _Floats:
     mesh = virtual.mesh

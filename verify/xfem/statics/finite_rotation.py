@@ -24,6 +24,9 @@ _ROUND_OFF = 256.0 * np.finfo(float).eps
 # of membranes, tensions over μ: at first, below which the exact stiffness is tried, and the least
 _TAUT, _SLACK, _LEAST, _FALL = 1.0, 1e-3, 1e-6, 0.1
 _ENOUGH = 1e-4  # of the fall of the energy that its slope promises
+# of what turning adds to the stiffness, the shares that are tried until it is positive definite
+_TURNS = (1.0, 0.5, 0.25, 0.125, 0.0)
+_COLLAPSED = 1e-3  # of the largest stretch
 _UNSEEN = 1e-12  # of the energy
 _INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
 
@@ -44,7 +47,7 @@ class StaticEquilibrium(NamedTuple):
     reactions : (N, d) float array
         Forces of the supports in newtons; zero at free components.
     iterations : tuple of int
-        Linear solves of each load step.
+        Corrections of each load step.
     """
 
     displacement: _Floats
@@ -64,6 +67,11 @@ def static_equilibrium(
     start: _Floats | None = None,
 ) -> StaticEquilibrium:
     """Displacement with f_int(u) = load, u given on the fixed components.
+
+    Newton's method; where a correction does not make the residual smaller, or the exact stiffness
+    is not positive definite, it goes down the potential energy instead, along corrections by as
+    much of the stiffness of turning as leaves it positive definite. Past a limit point (a column
+    that buckles, an arch that snaps through) that ends in an equilibrium beyond.
 
     Parameters
     ----------
@@ -86,36 +94,48 @@ def static_equilibrium(
     Raises
     ------
     NotInEquilibriumError
-        If a load step does not converge.
+        If a load step does not converge. Where pieces have collapsed on the way, it says so: the
+        force is not continuous there, and there may be none that balances the load.
     SingularStiffnessError
         If something is not held.
     XfemError
-        If a shape is wrong or the number of load steps is not positive.
+        If a shape is wrong, a number not finite, or tolerance, load steps or iterations are not
+        positive.
     """
     virtual = force.virtual
     shape = (virtual.node_count, virtual.mesh.space)
-    if fixed.shape != shape:
-        raise XfemError(f"supports of shape {fixed.shape}; expected {shape}")
-    if load is not None and load.shape != shape:
-        raise XfemError(f"load of shape {load.shape}; expected {shape}")
-    if load_steps < 1:
-        raise XfemError(f"{load_steps} load steps; expected at least one")
-    full_load = np.zeros(shape) if load is None else load
+    if fixed.shape != shape or fixed.dtype != bool:
+        raise XfemError(f"supports of shape {fixed.shape}, {fixed.dtype}; expected {shape}, bool")
+    if load_steps < 1 or iterations < 1 or not tolerance > 0.0:
+        raise XfemError(
+            f"{load_steps} load steps, {iterations} iterations, tolerance {tolerance:g}; expected "
+            "at least one, at least one, and more than zero"
+        )
+    full_load = np.zeros(shape) if load is None else _checked("load", load, shape)
     method = _Descent if force.is_membrane else _Newton
     newton = method(force, fixed, tolerance, iterations)
-    displacement = np.zeros(shape) if start is None else start.copy()
+    displacement = np.zeros(shape) if start is None else _checked("start", start, shape).copy()
     counts = []
     for k in range(1, load_steps + 1):
         share = k / load_steps
-        wanted = np.zeros(shape) if prescribed is None else prescribed(share)
-        if wanted.shape != shape:
-            raise XfemError(f"prescribed displacement of shape {wanted.shape}; expected {shape}")
+        wanted = np.zeros(shape)
+        if prescribed is not None:
+            given = prescribed(share)
+            if given.shape == shape:  # what is not fixed may be anything
+                given = np.where(fixed, given, 0.0)
+            wanted = _checked("prescribed displacement", given, shape)
         change = np.where(fixed, wanted - displacement, 0.0)
         displacement, count = newton.solve(displacement, change, share * full_load)
         counts.append(count)
     internal, energy = force.evaluate(displacement)
     reactions = np.where(fixed, internal - full_load, 0.0)
     return StaticEquilibrium(displacement, energy, reactions, tuple(counts))
+
+
+def _checked(name: str, values: _Floats, shape: tuple[int, int]) -> _Floats:
+    if values.shape != shape or not np.isfinite(values).all():
+        raise XfemError(f"{name} of shape {values.shape}; expected finite {shape}")
+    return values
 
 
 class _Place(NamedTuple):
@@ -149,16 +169,27 @@ class _Newton:
         """Equilibrium after a change of the fixed components, and the solves that it took."""
         start = self._place(displacement, load)
         place = self._place(displacement + self._spread(start, change), load)
-        for count in range(1, self._iterations):
-            if self._is_small(place):
-                return place.displacement, count
+        count = 1
+        while not self._is_small(place):
+            if count == self._iterations or not np.isfinite(place.norm):
+                raise NotInEquilibriumError(
+                    f"residual {place.norm:.3g} N against forces of {place.scale:.3g} N after "
+                    f"{count} iterations; expected {self._tolerance:g} of them. "
+                    f"{self._why(place)}"
+                )
             place = self._next(place, load)
-            if not np.isfinite(place.norm):
-                break
-        raise NotInEquilibriumError(
-            f"residual {place.norm:.3g} N against forces of {place.scale:.3g} N after "
-            f"{self._iterations} iterations; expected {self._tolerance:g} of them. More load steps "
-            "may help"
+            count += 1
+        return place.displacement, count
+
+    def _why(self, place: _Place) -> str:
+        """Say what stood in the way, as far as it can be seen."""
+        collapsed = self._force.collapsed(place.displacement, _COLLAPSED)
+        if len(collapsed) == 0:
+            return "More load steps may help"
+        return (
+            f"{len(collapsed)} of {len(self._force.virtual.cells)} pieces have collapsed, the "
+            f"first number {collapsed[0]}: the force is not continuous there (a strip is so thin "
+            "at a stretch of 1 + 1/ν), so that there may be no equilibrium"
         )
 
     def _spread(self, start: _Place, change: _Floats) -> _Floats:
@@ -166,14 +197,35 @@ class _Newton:
         return self._correct(start.displacement, start.residual, change)
 
     def _next(self, place: _Place, load: _Floats) -> _Place:
-        """Place after a correction."""
-        correction = self._correct(place.displacement, place.residual, None)
+        """Place with a smaller residual; if that is not a correction away, one further down."""
+        for turning in _TURNS:
+            try:
+                correction = self._solve(place.displacement, place.residual, None, turning)
+            except SingularStiffnessError:
+                if turning == 0.0:
+                    raise
+                continue
+            if turning == 1.0:
+                trial = self._place(place.displacement + correction, load)
+                if trial.norm < place.norm:
+                    return trial
+            share = self._share_downhill(place, correction, load)
+            if share > 0.0:
+                return self._place(place.displacement + share * correction, load)
+        return place
+
+    def _share_downhill(self, place: _Place, correction: _Floats, load: _Floats) -> float:
+        """Share of a correction that lowers the potential energy as its slope says; 0 if none."""
+        fall = float(np.vdot(place.residual, correction))
         for halving in range(_HALVINGS):
-            trial = self._place(place.displacement + 0.5**halving * correction, load)
-            if trial.norm < place.norm:
-                break
-        # a residual that must rise first is let rise: the energy may still fall
-        return trial
+            share = 0.5**halving
+            trial = self._place(place.displacement + share * correction, load)
+            # below the round-off of the energy
+            unseen = share * fall < _UNSEEN * abs(place.energy)
+            falls = trial.energy <= place.energy - _ENOUGH * share * fall
+            if falls or (unseen and trial.norm < place.norm):
+                return share
+        return 0.0
 
     def _is_small(self, place: _Place) -> bool:
         """Whether a residual is within the tolerance, or what round-off of positions leaves."""
@@ -190,25 +242,31 @@ class _Newton:
 
     def _correct(self, displacement: _Floats, residual: _Floats, change: _Floats | None) -> _Floats:
         try:
-            return self._solve(displacement, residual, change, exact=True)
+            return self._solve(displacement, residual, change, 1.0)
         except SingularStiffnessError:
-            return self._solve(displacement, residual, change, exact=False)
+            return self._solve(displacement, residual, change, 0.0)
 
     def _solve(
         self,
         displacement: _Floats,
         residual: _Floats,
         change: _Floats | None,
-        exact: bool,
+        turning: float,
         least: float = 0.0,
     ) -> _Floats:
+        """Solve for a change of the fixed components, or for the residual.
+
+        `turning` is the share of what turning pieces add to the stiffness. Without it membranes
+        have the stiffness of their tension, taken to be `least` at least.
+        """
         pattern, blocks = self._pattern, self._blocks
         blocks[:] = 0.0
         self._force.evaluate(displacement)
-        self._force.add_stiffness(
-            pattern, blocks, 1.0, "exact" if exact else "frozen", displacement
-        )
-        if not exact and self._force.is_membrane:
+        if turning > 0.0:
+            self._force.add_stiffness(pattern, blocks, turning, "exact", displacement)
+        if turning < 1.0:
+            self._force.add_stiffness(pattern, blocks, 1.0 - turning)
+        if turning == 0.0 and self._force.is_membrane:
             nothing = np.zeros_like(displacement)
             self._force.add_tension(
                 pattern, displacement, nothing, 0.0, 1.0, nothing, blocks, least
@@ -251,31 +309,23 @@ class _Descent(_Newton):
     def _spread(self, start: _Place, change: _Floats) -> _Floats:
         """Let what is prescribed happen; how far the rest goes with it, the energy says later."""
         self._least = _TAUT
-        return self._solve(
-            start.displacement, start.residual, change, exact=False, least=self._least
-        )
+        return self._solve(start.displacement, start.residual, change, 0.0, least=self._least)
 
     def _next(self, place: _Place, load: _Floats) -> _Place:
         """Place further down; the same one with more tension if no way leads there."""
         correction = self._downhill(place.displacement, place.residual, self._least)
-        fall = float(np.vdot(place.residual, correction))
-        for halving in range(_HALVINGS):
-            share = 0.5**halving
-            trial = self._place(place.displacement + share * correction, load)
-            # below the round-off of the energy
-            unseen = share * fall < _UNSEEN * abs(place.energy)
-            falls = trial.energy <= place.energy - _ENOUGH * share * fall
-            if falls or (unseen and trial.norm < place.norm):
-                self._least *= _FALL if halving == 0 else 1.0
-                return trial
-        self._least = max(self._least, _SLACK) / _FALL
-        return place
+        share = self._share_downhill(place, correction, load)
+        if share == 0.0:
+            self._least = max(self._least, _SLACK) / _FALL
+            return place
+        self._least *= _FALL if share == 1.0 else 1.0
+        return self._place(place.displacement + share * correction, load)
 
     def _downhill(self, displacement: _Floats, residual: _Floats, least: float) -> _Floats:
         """Correction along which the energy falls."""
         if least < _SLACK:
             try:
-                return self._solve(displacement, residual, None, exact=True)
+                return self._solve(displacement, residual, None, 1.0)
             except SingularStiffnessError:
                 pass
-        return self._solve(displacement, residual, None, exact=False, least=max(least, _LEAST))
+        return self._solve(displacement, residual, None, 0.0, least=max(least, _LEAST))

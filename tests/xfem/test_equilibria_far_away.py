@@ -1,0 +1,157 @@
+"""Equilibria far from where the search begins: buckled, snapped through, or none at all."""
+
+import numpy as np
+import pytest
+from cut_bodies import cut_cube, cut_square, material
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+from verify.xfem.corotation import InternalForce
+from verify.xfem.cuts import Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.statics import static_equilibrium
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.virtual import cut_mesh
+
+YOUNG = 1e4
+
+
+def column(rows, thickness=0.05):
+    mesh = rectangle_mesh((16 * rows, rows), (0.0, 0.0), (1.0, thickness), "crossed")
+    return cut_mesh(mesh, [])
+
+
+def elastica(ratio):
+    """Fall and sway of the tip of a clamped column of length 1 under that many critical loads."""
+    modulus = brentq(lambda m: (2.0 / np.pi * ellipk(m)) ** 2 - ratio, 1e-9, 1.0 - 1e-9)
+    return 2.0 - 2.0 * ellipe(modulus) / ellipk(modulus), 2.0 * np.sqrt(modulus) / ellipk(modulus)
+
+
+def press(virtual, force, load_steps):
+    """Load on the tip of a column, with 1e-4 of it across."""
+    X = virtual.node_points
+    fixed = np.repeat(X[:, :1] == 0.0, 2, axis=1)
+    end = X[:, 0] == 1.0
+    load = np.zeros_like(X)
+    load[end] = np.array([-force, 1e-4 * force]) / end.sum()
+    internal = InternalForce(virtual, isotropic(YOUNG, 0.0, "plane strain"))
+    found = static_equilibrium(internal, fixed, None, load, load_steps)
+    return found, found.displacement[end].mean(axis=0)
+
+
+def test_a_column_buckles_in_one_load_step_as_far_as_the_elastica() -> None:
+    """Twice its critical load; halving the residual ended at 80 % of the forces."""
+    thickness = 0.05
+    critical = np.pi**2 / 4.0 * YOUNG * thickness**3 / 12.0
+    fall, sway = elastica(2.0)
+    errors = []
+    for rows in (4, 8):
+        found, tip = press(column(rows), 2.0 * critical, 1)
+        errors.append(np.abs([-tip[0] / fall - 1.0, tip[1] / sway - 1.0]).max())
+    # linear elements are too stiff in bending by O(h²)
+    assert errors[1] < 0.02
+    assert errors[0] / errors[1] > 3.0
+    slowly, _ = press(column(8), 2.0 * critical, 8)
+    assert slowly.energy == pytest.approx(found.energy, rel=1e-9)
+
+
+def test_an_arch_snaps_through_under_a_dead_load_to_where_pushing_it_through_ends() -> None:
+    """Past the limit point Newton's method has no equilibrium nearby to go to."""
+    flat = rectangle_mesh((24, 2), (0.0, 0.0), (1.0, 0.05))
+    x, y = flat.points.T
+    arch = cut_mesh(SimplexMesh(np.column_stack([x, y + 0.6 * x * (1.0 - x)]), flat.cells), [])
+    X = arch.node_points
+    ends = (X[:, 0] == 0.0) | (X[:, 0] == 1.0)
+    middle = np.flatnonzero(np.abs(X[:, 0] - 0.5) < 0.01)
+    load = np.zeros_like(X)
+    load[middle, 1] = -15.0 / len(middle)
+    fixed = np.repeat(ends[:, None], 2, axis=1)
+    force = InternalForce(arch, material(2))
+    for load_steps in (1, 7):
+        snapped = static_equilibrium(force, fixed, None, load, load_steps)
+        assert max(snapped.iterations) < 20
+        assert snapped.displacement[middle, 1].max() < -0.25
+    # push the same nodes there, from the start: the reactions are the load
+    held = fixed.copy()
+    held[middle] = True
+    pushed = static_equilibrium(
+        force, held, lambda s: np.where(held, s * snapped.displacement, 0.0), None, 4
+    )
+    assert pushed.reactions[middle] == pytest.approx(load[middle], abs=1e-6)
+
+
+def test_a_cut_cube_is_pressed_to_a_fifth_of_its_height_in_one_load_step() -> None:
+    """Most pieces are inside out on the way; no load step was small enough before."""
+    v = cut_mesh(box_mesh((4, 4, 4)), [Plane((0.5, 0.5, 0.5), (1.0, 0.1, 0.05))])
+    X = v.node_points
+    fixed = np.repeat((X[:, 2:] == 0.0) | (X[:, 2:] == 1.0), 3, axis=1)
+
+    def pressed(share):
+        return np.where(X[:, 2:] == 1.0, [0.0, 0.0, -0.8 * share], 0.0)
+
+    found = static_equilibrium(InternalForce(v, material(3)), fixed, pressed)
+    assert np.abs(found.reactions.sum(axis=0)).max() < 1e-6 * np.abs(found.reactions).max()
+
+
+@pytest.mark.parametrize("stretch", [4.2, 4.5])
+def test_a_strip_is_as_wide_as_hooke_says_until_nothing_is_left_of_its_width(stretch) -> None:
+    """Stress is linear in the stretch s: the width is 1 − ν (s − 1), nothing at s = 1 + 1/ν."""
+    flat = rectangle_mesh((3, 2))
+    v = cut_mesh(SimplexMesh(np.pad(flat.points, ((0, 0), (0, 1))), flat.cells), [])
+    X = v.node_points
+    fixed = np.zeros(X.shape, dtype=bool)
+    fixed[:, 2], fixed[:, 0] = True, (X[:, 0] == 0.0) | (X[:, 0] == 1.0)
+    fixed[0] = True
+
+    def pulled(share):
+        return share * (stretch - 1.0) * X[:, :1] * np.array([1.0, 0.0, 0.0])
+
+    stuff = isotropic(YOUNG, 0.3, "plane stress")
+    force = InternalForce(v, stuff)
+    found = static_equilibrium(force, fixed, pulled)
+    left = max(1.0 - 0.3 * (stretch - 1.0), 0.0)
+    strains = np.array([stretch - 1.0, left - 1.0])
+    energy = stuff.mu * (strains**2).sum() + 0.5 * stuff.lam * strains.sum() ** 2
+    assert found.energy == pytest.approx(float(energy), rel=1e-9)
+    assert np.ptp(found.displacement[:, 1] + X[:, 1]) == pytest.approx(left, abs=1e-6)
+    assert len(force.collapsed(found.displacement, 1e-3)) == (0 if left else len(v.cells))
+
+
+@pytest.mark.parametrize("v", [cut_square(2), cut_cube(1)], ids=["2D", "3D"])
+def test_pieces_whose_rotation_is_not_unique_are_found(v) -> None:
+    dim = v.mesh.dim
+    force, X = InternalForce(v, material(dim)), v.node_points
+    every = np.arange(len(v.cells))
+    for stretches, expected in (
+        ([2.0, 0.5, 0.5], []),
+        ([2.0, -0.5, 0.4], []),
+        ([2.0, 0.5, -0.5], [3]),  # a reflection, and half a turn about any axis in its plane
+        ([0.5, -0.5, 3.0], [2, 3]),
+        ([2.0, 0.0, 0.0], [3]),
+    ):
+        F = np.diag(stretches[:dim])
+        found = force.collapsed(X @ F.T - X, 1e-6)
+        np.testing.assert_array_equal(found, every if dim in expected else [])
+
+
+def test_statics_refuses_what_makes_no_sense_in_one_sentence() -> None:
+    v = cut_square(2)
+    force, fixed = InternalForce(v, material(2)), v.node_points == 0.0
+    nothing = np.zeros(v.node_points.shape)
+    for options, message in (
+        ({"load": nothing + np.nan}, "load of shape"),
+        ({"start": nothing[:2]}, "start of shape"),
+        ({"prescribed": lambda s: nothing + np.inf}, "prescribed displacement of shape"),
+        ({"prescribed": lambda s: nothing[:, 0]}, "prescribed displacement of shape"),
+        ({"iterations": 0}, "0 iterations"),
+        ({"tolerance": 0.0}, "tolerance 0"),
+        ({"tolerance": np.nan}, "tolerance nan"),
+    ):
+        with pytest.raises(XfemError, match=message):
+            static_equilibrium(force, fixed, **options)
+    with pytest.raises(XfemError, match=r"int64; expected .* bool"):
+        static_equilibrium(force, fixed.astype(int))
+    # at rest already: nothing to correct
+    assert static_equilibrium(force, fixed, iterations=1).iterations == (1,)
