@@ -136,3 +136,9 @@ def test_a_reader_that_stops_reading_is_no_error():
     command = f"{sys.executable} -m verify schema | head -1; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_standard_output_that_is_closed_is_no_error():
+    command = f"{sys.executable} -m verify list >&-"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

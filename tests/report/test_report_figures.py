@@ -11,7 +11,7 @@ from verify.report import load_run
 from verify.report.axes import Axis, Panel, log_range
 from verify.report.curves import duration, error_curves
 from verify.report.figures_convergence import convergence_figure, error_range, required_slope
-from verify.report.marks import slope_triangle
+from verify.report.marks import band, slope_triangle
 from verify.result import SolveRecord, Status
 
 
@@ -35,6 +35,23 @@ def test_every_axis_has_at_least_two_and_at_most_nine_labels_inside(span):
     labelled, _ = Axis(low, high, 0, 100).ticks()
     assert 2 <= len(labelled) <= 9
     assert all(low * 0.999 <= value <= high * 1.001 for value in labelled)
+
+
+@pytest.mark.parametrize("ends", [(1e-3, 1e-1), (1e-1, 1e-3), (1e-2, 1e-2)])
+def test_the_name_of_the_band_stands_below_its_edge(ends):
+    panel = Panel((0.1, 10.0), (1e-4, 1.0), "h", "error")
+    markup = str(band(panel, list(zip((0.2, 5.0), ends, strict=True))))
+    x, y = (float(re.search(rf'<text[^>]* {k}="([0-9.]+)"', markup).group(1)) for k in "xy")
+    # letters of 11 pixels: about 27 of half their size, 8 above the line they stand on
+    reach = x - 27 * 5.0 if 'text-anchor="end"' in markup else x + 27 * 5.0
+
+    def edge(pixel):
+        share = (pixel - panel.x.at(0.2)) / (panel.x.at(5.0) - panel.x.at(0.2))
+        share = min(max(share, 0.0), 1.0)
+        return panel.y.at(ends[0] ** (1 - share) * ends[1] ** share)
+
+    assert y - 8 >= max(edge(x), edge(reach))
+    assert y <= panel.y.start
 
 
 @pytest.mark.parametrize("slope", [0.5, 0.98, 1.95, 2.0])

@@ -5,6 +5,8 @@ import re
 import pytest
 
 from verify.report.notation import with_interval
+from verify.report.summary import check_row
+from verify.result import Verdict, VerdictRecord
 
 
 @pytest.mark.parametrize(
@@ -23,3 +25,12 @@ def test_an_interval_is_written_with_the_digits_that_tell_its_ends_apart(value, 
     for power, small in (("−4", "⁻⁴"), ("−11", "⁻¹¹")):
         raised = raised.replace(f"<sup>{power}</sup>", small)
     assert re.sub(r"<[^>]+>", "", raised) == written
+
+
+def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
+    """8.079 beside 8.078757937 ± 1e-05 would look like a failure."""
+    found = VerdictRecord(
+        "value", "reference", "strain_energy", Verdict.PASS, 8.0787592969, 8.0787592969,
+        8.0787592969, "8.078757937 ± 1e-05 (relative)", "",
+    )  # fmt: skip
+    assert "8.078759297<" in str(check_row(found))

@@ -124,3 +124,10 @@ def test_a_directory_is_refused(tmp_path):
     (tmp_path / "a.toml").mkdir()
     with pytest.raises(InputError, match="cannot be read"):
         load_scene(tmp_path / "a.toml")
+
+
+def test_links_in_a_circle_are_no_case(tmp_path):
+    (tmp_path / "a.toml").symlink_to(tmp_path / "b.toml")
+    (tmp_path / "b.toml").symlink_to(tmp_path / "a.toml")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_scene(tmp_path / "a.toml")

@@ -120,13 +120,16 @@ def test_time_at_equal_error_is_that_of_the_power_laws():
 
 
 @pytest.mark.parametrize(("repetitions", "said"), [(1, 1), (2, 0)])
-def test_times_without_repetition_are_not_called_certain(repetitions, said):
-    once = {"meshing": [1.0], "solve": [2.0] * repetitions}
+def test_times_without_repetition_rank_nobody_before_another(repetitions, said):
     solves = [solve("a", "x", 0, 0.1), solve("a", "y", 0, 0.1)]
-    for one in solves:
-        one.timings.update(once)
-    notes = rank_solvers([case_of("a", solves)])["contended"]
-    assert sum("timed once" in note for note in notes) == said
+    for one, seconds in zip(solves, (2.0, 3.0), strict=True):
+        one.timings.update({"meshing": [1.0], "solve": [seconds] * repetitions})
+    ranking = rank_solvers([case_of("a", solves)])
+    assert sum("timed once" in note for note in ranking["contended"]) == said
+    _, by = compared(ranking, "cost", view="time at equal error")
+    assert by["y"]["value"] == pytest.approx(4 / 3)
+    assert (by["x"]["rank"], by["y"]["rank"]) == (1, 1 if said else 2)
+    assert by["x"]["tied"] == by["y"]["tied"] == bool(said)
 
 
 def test_a_solver_without_an_error_in_common_is_not_timed_against_the_others():

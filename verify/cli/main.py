@@ -18,7 +18,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = build_parser().parse_args(argv)
     try:
         code: int = arguments.command(arguments)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # closed by `>&-`
+            sys.stdout.flush()
     except (InputError, UnsupportedSceneError) as error:
         return _fail(str(error), 2)
     except ModuleNotFoundError as error:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from verify.report.axes import Panel, text
 from verify.report.curves import Curve, Point
@@ -9,6 +10,8 @@ from verify.report.markup import Markup, joined, tag
 from verify.report.notation import number_text
 
 __all__ = ["Style", "abandoned", "band", "curve_names", "drawn_curve", "slope_triangle", "style_of"]
+
+_NAME_OF_BAND = 140  # pixels that the name of the band takes, and some more
 
 # Okabe and Ito's palette, darkened to stay legible as text; markers differ as well
 _FIRST = {
@@ -113,16 +116,25 @@ def band(panel: Panel, floor: Sequence[tuple[float, float]]) -> Markup:
     inside = [(panel.x.at(x), panel.y.at(u)) for x, u in sorted(floor)]
     nodes = [(panel.x.start, inside[0][1]), *inside, (panel.x.end, inside[-1][1])]
     line = "L".join(f"{x:.1f} {y:.1f}" for x, y in nodes)
-    # the name stands where the band is higher, if it is high enough for it
+    # the name stands where the band is higher, below all of its edge that it reaches
     left = inside[0][1] <= inside[-1][1]
-    top = inside[0][1] if left else inside[-1][1]
     x, anchor = (panel.x.start + 5, "start") if left else (panel.x.end - 4, "end")
+    reach = x + _NAME_OF_BAND if left else x - _NAME_OF_BAND
+    top = max([_edge(nodes, reach), *(y for at, y in nodes if (at <= reach) == left)])
     name = text(x, top + 12, "uncertainty of the comparison", class_="note", text_anchor=anchor)
     return joined(
         tag("path", d=f"M{line}V{panel.y.start}H{panel.x.start}Z", class_="floor"),
         tag("path", d=f"M{line}", class_="floor-edge"),
         name if panel.y.start - top > 14 else None,
     )
+
+
+def _edge(nodes: Sequence[tuple[float, float]], x: float) -> float:
+    """Height of a polyline at `x`, in pixels."""
+    for (x0, y0), (x1, y1) in pairwise(nodes):
+        if x0 <= x <= x1 and x1 > x0:
+            return y0 + (y1 - y0) * (x - x0) / (x1 - x0)
+    return nodes[-1][1]
 
 
 def slope_triangle(

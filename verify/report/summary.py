@@ -3,11 +3,11 @@
 from collections import Counter
 
 from verify.report.markup import Markup, joined, tag
-from verify.report.notation import error_title, metric_title, solver_title, with_interval
+from verify.report.notation import error_title, metric_title, number, solver_title, with_interval
 from verify.report.run_directory import CaseEntry, Run
 from verify.result import Status, Verdict, VerdictRecord
 
-__all__ = ["anchor", "badge", "check_text", "summary", "verdict_of", "verdict_table"]
+__all__ = ["anchor", "badge", "check_row", "check_text", "summary", "verdict_of", "verdict_table"]
 
 _SIGNS = {
     Verdict.PASS: "✓",
@@ -94,7 +94,7 @@ def verdict_table(run: Run) -> Markup:
         )
         verdict = tag("td", badge(verdict_of(entry)), class_="worst")
         rows = [tag("tr", head, verdict, class_="case-row")]
-        rows += [_check_row(record) for record in entry.result.verdicts] if entry.result else []
+        rows += [check_row(record) for record in entry.result.verdicts] if entry.result else []
         groups.append(tag("tbody", rows))
     titles = ["check", "observed [interval]", "limit", "verdict"]
     head_row = tag("tr", [tag("th", title, scope="col") for title in titles])
@@ -104,8 +104,11 @@ def verdict_table(run: Run) -> Markup:
     return tag("div", whole, class_="scroll", tabindex="0", role="region", aria_label="Verdicts")
 
 
-def _check_row(record: VerdictRecord) -> Markup:
+def check_row(record: VerdictRecord) -> Markup:
+    """Return the row of one check."""
     observed = with_interval(record.observed, record.low, record.high)
+    if record.check == "value":  # as many digits as the limit has beside it
+        observed = number(record.observed, 10)
     return tag(
         "tr",
         tag("td", check_text(record)),

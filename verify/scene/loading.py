@@ -67,8 +67,6 @@ def load_scene(source: str | Path) -> Scene:
         if text not in known:
             raise InputError(f"no case '{text}'{nearest(text, known)}")
         name, path = text, known[text]
-    elif path.resolve().is_relative_to(case_folder().resolve()):
-        name = path.resolve().relative_to(case_folder().resolve()).with_suffix("").as_posix()
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
@@ -77,11 +75,14 @@ def load_scene(source: str | Path) -> Scene:
         raise InputError(f"cannot be read ({error})", str(path)) from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"not valid TOML: {error}", str(path)) from None
+    file, cases = path.resolve(), case_folder().resolve()
+    if file.is_relative_to(cases):
+        name = file.relative_to(cases).with_suffix("").as_posix()
     try:
         scene = Scene.model_validate(content)
     except ValidationError as error:
         raise InputError(first_fault(error, content, scene_schema()), str(path)) from None
-    scene._file, scene._name = path.resolve(), name
+    scene._file, scene._name = file, name
     if isinstance(scene.geometry, MeshFile) and not mesh_path(scene).is_file():
         raise InputError(f"geometry.file: no mesh file '{scene.geometry.file}'", str(path))
     return scene

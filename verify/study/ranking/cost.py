@@ -1,22 +1,26 @@
 """Who is cheapest at equal error."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from verify.ranking import Comparison, LeftOut
+from verify.ranking import Comparison, LeftOut, Standing
 from verify.result import CaseResult
 from verify.study.cost.work import WorkPoint, time_at, work_points
 from verify.study.ranking.standing import Item, compared_by_mean
 from verify.study.rates import ROUND_OFF
 from verify.verdict import Interval
 
-__all__ = ["common_error", "cost_comparisons"]
+__all__ = ["any_timed_once", "common_error", "cost_comparisons"]
 
 _METRICS = ("displacement_l2", "energy_norm")
 
 
 def cost_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
-    """Compare the time that each new cut costs, at the error that `common_error` finds."""
-    comparisons = []
+    """Compare the time that each new cut costs, at the error that `common_error` finds.
+
+    Where a solve was timed once nobody is certainly faster: all are tied.
+    """
+    comparisons, uncertain = [], any_timed_once(results, solvers)
     for metric in _METRICS:
         items, left_out = [], []
         for result in results:
@@ -28,9 +32,25 @@ def cost_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> l
             else:
                 items.append(item)
         found = compared_by_mean(metric, "time at equal error", solvers, items, left_out)
+        if found is not None and uncertain:
+            found = replace(found, standings=_tied(found.standings))
         if found is not None:
             comparisons.append(found)
     return comparisons
+
+
+def any_timed_once(results: Sequence[CaseResult], solvers: Sequence[str]) -> bool:
+    """Whether there is a time without a repetition, and so without an interval."""
+    timed = [s.timings for r in results for s in r.solves if s.solver in solvers and s.timings]
+    return any(max(map(len, each.values())) == 1 for each in timed)
+
+
+def _tied(standings: Sequence[Standing]) -> list[Standing]:
+    ranked = sum(s.rank is not None for s in standings)
+    return [
+        s if s.rank is None else replace(s, rank=1, tied=ranked > 1, low=None, high=None)
+        for s in standings
+    ]
 
 
 def common_error(points: Mapping[str, Sequence[WorkPoint]]) -> tuple[float, list[str]] | None:
