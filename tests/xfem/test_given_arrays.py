@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from verify.xfem.bases import from_sidewise, sidewise_from
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import (
     ImplicitCut,
@@ -90,6 +91,8 @@ def stiffness():
         (lambda: traction(CUT, [0, 1, 2], [1.0, 0.0]), r"shape \(3,\); expected \(b, 2\)"),
         (lambda: body_force(CUT, lambda x, s: x, -1), "degree -1"),
         (lambda: body_force(CUT, lambda x, s: None), "load density"),
+        (lambda: sidewise_from(CUT, "shifted", np.zeros((3, 2))), r"unknowns of shape \(3, 2\)"),
+        (lambda: from_sidewise(CUT, "shifted", np.zeros((99, 2))), r"displacements of shape"),
         # an infinite or missing step
         (lambda: element_critical_steps(PLATE, SOFT, -1.0), "density -1"),
         (lambda: element_critical_steps(PLATE, SOFT, [1.0, 2.0]), r"density of shape \(2,\)"),
@@ -107,6 +110,26 @@ def test_a_cell_given_twice_is_refused():
     mesh = SimplexMesh([[0, 0], [1, 0], [0, 1]], [[0, 1, 2], [2, 0, 1]])
     with pytest.raises(XfemError, match="cells 0 and 1 have the same nodes"):
         cut_mesh(mesh, [Plane([0.3, 0.3], [1.0, 0.0])])
+
+
+def test_what_is_made_of_an_array_does_not_change_with_it():
+    """A program that moves a tool may well use one array again and again."""
+    points, cells, blades = BLOCK.points.copy(), BLOCK.cells.copy(), np.array(RIM)[:, None, :2]
+    given = [np.array(RIM), np.array([[0, 1, 2]]), np.array([0.0, 1.0, 2.0]), np.ones(3)]
+    mesh, path = SimplexMesh(points, cells), ToolPath(blades, given[2])
+    plane, patch = Plane(given[3], given[3]), PolygonPatch(given[0])
+    line = Polyline(given[0][:, :2])
+    surface = TriangulatedSurface(given[0], given[1])
+    for array in (points, cells, blades, *given):
+        array[:] = 0
+    assert np.array_equal(mesh.points, BLOCK.points)
+    assert np.array_equal(mesh.cells, BLOCK.cells)
+    assert path.length == pytest.approx(1.0 + np.sqrt(2.0))
+    assert path.times[-1] == 2.0
+    assert plane.point.tolist() == [1.0, 1.0, 1.0]
+    for kept in (patch.corners, surface.points, np.pad(line.vertices, [(0, 0), (0, 1)])):
+        assert np.array_equal(kept, RIM)
+    assert surface.triangles.tolist() == [[0, 1, 2]]
 
 
 def read_only(array):

@@ -52,11 +52,14 @@ def transformation(virtual: VirtualMesh, basis: Basis) -> csr_array:
 
 def sidewise_from(virtual: VirtualMesh, basis: Basis, unknowns: _Floats) -> _Floats:
     """Side-wise displacement (N, d) from the unknowns (n + enriched, d) of another basis."""
-    return np.asarray(transformation(virtual, basis) @ unknowns)
+    T = transformation(virtual, basis)
+    _check_count(unknowns, T.shape[1], "unknowns")
+    return np.asarray(T @ unknowns)
 
 
 def from_sidewise(virtual: VirtualMesh, basis: Basis, displacement: _Floats) -> _Floats:
     """Unknowns (n + enriched, d) of another basis from the side-wise displacement (N, d)."""
+    _check_count(displacement, virtual.node_count, "displacements")
     own, other, sign = _pairs(virtual)
     nodes = len(virtual.mesh.points)
     jump = sign[:, None] * (displacement[own] - displacement[other])
@@ -74,6 +77,11 @@ def transformed_matrix(virtual: VirtualMesh, basis: Basis, matrix: csr_array) ->
     dim = matrix.shape[0] // virtual.node_count
     full = kron(transformation(virtual, basis), identity(dim), format="csr")
     return csr_array(full.T @ matrix @ full)
+
+
+def _check_count(values: _Floats, count: int, what: str) -> None:
+    if np.ndim(values) == 0 or len(values) != count:
+        raise XfemError(f"{what} of shape {np.shape(values)}; expected ({count}, d)")
 
 
 def _pairs(virtual: VirtualMesh) -> tuple[_Ints, _Ints, _Floats]:

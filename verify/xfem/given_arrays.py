@@ -9,24 +9,18 @@ __all__ = ["index_array", "places", "real_array"]
 
 
 def real_array(given: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Real numbers of any shape.
+    """Real numbers of any shape: a copy, so that what is made of them stays when they change.
 
     Raises
     ------
     XfemError
         If there is text, None or a complex number among them, or rows differ in length.
     """
-    try:
-        raw = np.asarray(given)
-        if not np.iscomplexobj(raw):
-            return np.asarray(raw, dtype=np.float64)
-    except (TypeError, ValueError):
-        pass
-    raise XfemError(f"{what} {_shown(given)}; expected real numbers, in rows of one length")
+    return np.array(_as_real(given, what))
 
 
 def index_array(given: ArrayLike, what: str) -> NDArray[np.int64]:
-    """Whole numbers of any shape; an empty list has none, and so may be of any type.
+    """Whole numbers of any shape, a copy; an empty list has none, and so may be of any type.
 
     Raises
     ------
@@ -50,10 +44,20 @@ def places(given: ArrayLike, space: int, what: str) -> NDArray[np.float64]:
     XfemError
         If they have another shape.
     """
-    points = real_array(given, f"{what}: points")
+    points = _as_real(given, f"{what}: points")
     if points.ndim != 2 or points.shape[1] != space:
         raise XfemError(f"{what} at points of shape {points.shape}; expected (n, {space})")
     return points
+
+
+def _as_real(given: ArrayLike, what: str) -> NDArray[np.float64]:
+    try:
+        raw = np.asarray(given)
+        if not np.iscomplexobj(raw):
+            return np.asarray(raw, dtype=np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise XfemError(f"{what} {_shown(given)}; expected real numbers, in rows of one length")
 
 
 def _shown(given: ArrayLike) -> str:

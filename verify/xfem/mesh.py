@@ -48,7 +48,7 @@ class SimplexMesh:
         nodes = np.ascontiguousarray(_rows(cells))
         _check(coordinates, nodes)
         object.__setattr__(self, "points", coordinates)
-        object.__setattr__(self, "cells", nodes.astype(np.int64, copy=False))
+        object.__setattr__(self, "cells", nodes.astype(np.int64))
         longest = np.linalg.norm(self.edge_vectors, axis=2).max(axis=1)
         flat = self.measures <= _DEGENERATE * longest**self.dim
         if flat.any():
