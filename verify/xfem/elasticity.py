@@ -33,11 +33,19 @@ class Material:
         Raises
         ------
         XfemError
-            If there is neither one value nor one for each.
+            If there is neither one value nor one for each, one is not finite, or a change of shape
+            or of size in the plane stores no energy (μ ≤ 0, λ ≤ -μ).
         """
         for name, values in (("λ", self.lam), ("μ", self.mu)):
             if np.shape(values) not in ((), (count,)):
                 raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
+            if not np.isfinite(values).all():
+                raise XfemError(f"{name} is not finite; expected Lamé parameters in pascal")
+        if not ((self.mu > 0.0) & (self.lam + self.mu > 0.0)).all():
+            raise XfemError(
+                f"Lamé parameters λ down to {np.min(self.lam):g} and μ down to "
+                f"{np.min(self.mu):g} Pa; expected μ > 0 and λ > -μ"
+            )
         lam, mu = (np.broadcast_to(values, count).astype(float) for values in (self.lam, self.mu))
         return lam, mu
 

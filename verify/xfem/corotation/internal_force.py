@@ -17,6 +17,7 @@ from verify.xfem.corotation.membrane_tension import add_tension
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.sparse.system_shapes import check_blocks
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["InternalForce", "Kinematics", "TangentKind"]
@@ -119,10 +120,13 @@ class InternalForce:
         Raises
         ------
         XfemError
-            If the displacement has a wrong shape.
+            If an array has a wrong shape or type.
         """
-        if displacement.shape != self._shape:
-            raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
+        self._check("displacement", displacement)
+        if out is not None:
+            self._check("force", out)
+        if velocity is not None:
+            self._check("velocity", velocity)
         force = np.empty(self._shape) if out is None else out
         force[:] = 0.0
         v = self.virtual
@@ -140,6 +144,22 @@ class InternalForce:
                 v.cells, *self.geometry, self._rotations, velocity, scale, force
             )
         return force, float(energy)
+
+    def _check(self, name: str, values: _Floats) -> None:
+        """Check an array (N, d) that a compiled loop reads or writes."""
+        kind = getattr(values, "dtype", type(values).__name__)
+        if np.shape(values) != self._shape or kind != np.float64:
+            raise XfemError(
+                f"{name} of shape {np.shape(values)}, {kind}; expected {self._shape}, float64"
+            )
+
+    def _check_blocks(self, pattern: BlockPattern, blocks: _Floats) -> None:
+        check_blocks(blocks, len(pattern.columns), self._shape[1])
+        if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.virtual.cells):
+            raise XfemError(
+                f"pattern of {pattern.node_count} nodes and {len(pattern.targets)} cells; expected "
+                f"that of the body, {self._shape[0]} and {len(self.virtual.cells)}"
+            )
 
     def prepare(self, pattern: BlockPattern) -> None:
         """Do what `linearise` does otherwise when it is first called with a sparsity."""
@@ -181,7 +201,19 @@ class InternalForce:
             Overwritten.
         whole : bool
             Without it what is below the diagonal may be anything.
+
+        Raises
+        ------
+        XfemError
+            If an array is not of the body, or not of the pattern.
         """
+        for name, values in (
+            ("displacement", displacement),
+            ("velocity", velocity),
+            ("force", force),
+        ):
+            self._check(name, values)
+        self._check_blocks(pattern, blocks)
         mesh = self.virtual.mesh
         if mesh.dim < 3:
             self.evaluate(displacement, force, velocity, implicit)
@@ -193,7 +225,15 @@ class InternalForce:
         self._swept = self.turning
 
     def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
-        """Add `scale` K v (N, d), K with the rotations of the last `evaluate`, to `out`."""
+        """Add `scale` K v (N, d), K with the rotations of the last `evaluate`, to `out`.
+
+        Raises
+        ------
+        XfemError
+            If an array has a wrong shape or type.
+        """
+        self._check("vector", vector)
+        self._check("force", out)
         self._kernels.frozen_product(
             self.virtual.cells, *self.geometry, self.rotations, vector, scale, out
         )
@@ -222,8 +262,10 @@ class InternalForce:
         Raises
         ------
         XfemError
-            If the kind is unknown or needs a displacement that is not given.
+            If the kind is unknown or needs a displacement that is not given, or an array is not of
+            the body.
         """
+        self._check_blocks(pattern, blocks)
         if kind not in ("frozen", "tensioned", "exact"):
             raise XfemError(f"stiffness '{kind}'; expected frozen, tensioned or exact")
         targets = pattern.targets[: len(self.virtual.cells)]
@@ -232,6 +274,7 @@ class InternalForce:
             return
         if displacement is None:
             raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
+        self._check("displacement", displacement)
         if kind == "tensioned":
             if self.is_membrane:
                 nothing = np.zeros(self._shape)
@@ -271,10 +314,13 @@ class InternalForce:
         Raises
         ------
         XfemError
-            If the body is no membrane.
+            If the body is no membrane, or an array not of it.
         """
         if not self.is_membrane:
             raise XfemError("stiffness from tension of a solid; expected a membrane in space")
+        for name, values in (("displacement", displacement), ("vector", vector), ("force", force)):
+            self._check(name, values)
+        self._check_blocks(pattern, blocks)
         add_tension(
             self.virtual.cells, pattern.targets[: len(self.virtual.cells)], *self.geometry,
             self.rotations, displacement, vector, share, scale, least, force, blocks,
@@ -295,6 +341,7 @@ class InternalForce:
         v = self.virtual
         if v.mesh.dim < v.mesh.space:
             raise XfemError("inversion of a membrane in space is not defined")
+        self._check("displacement", displacement)
         F = np.eye(v.mesh.dim) + np.einsum(
             "pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent]
         )
@@ -313,6 +360,7 @@ class InternalForce:
         ratio : float
             Of what is left to the largest stretch, below which a piece counts.
         """
+        self._check("displacement", displacement)
         v, space = self.virtual, self._shape[1]
         F = np.einsum("pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent])
         if self.is_membrane:

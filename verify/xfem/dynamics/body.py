@@ -85,7 +85,7 @@ class MovingSupports:
         Raises
         ------
         XfemError
-            If one has a wrong shape.
+            If one has a wrong shape, or is not finite where it is read.
         """
         displacement, velocity = self.motion(time)
         for name, value in (("displacement", displacement), ("velocity", velocity)):
@@ -93,6 +93,8 @@ class MovingSupports:
                 raise XfemError(
                     f"prescribed {name} of shape {np.shape(value)}; expected {self.fixed.shape}"
                 )
+            if not np.isfinite(value[self.fixed]).all():
+                raise XfemError(f"the prescribed {name} is not finite at t={time:g}")
         return displacement, velocity
 
 
@@ -135,14 +137,36 @@ class DynamicBody:
             )
         if self.weight is None:
             self.weight = np.zeros(self.shape)
-        if np.shape(self.weight) != self.shape:
-            raise XfemError(f"weight of shape {np.shape(self.weight)}; expected {self.shape}")
+        if np.shape(self.weight) != self.shape or not np.isfinite(self.weight).all():
+            raise XfemError(
+                f"weight of shape {np.shape(self.weight)}; expected finite {self.shape}"
+            )
+        self.weight = np.asarray(self.weight, dtype=float)
+        if self.load is not None and not callable(self.load):
+            raise XfemError("the load is no function of time; a dead load is a weight")
+        if not isinstance(self.damping, RayleighDamping):
+            raise XfemError(f"damping {self.damping!r}; expected RayleighDamping")
         if self.supports is None:
             self.supports = Supports.none(virtual)
         penalised = self.force if isinstance(self.force, PenalisedForce) else None
         couplings = penalised.ghost.couplings if penalised else None
         self.pattern = self.mass.pattern(virtual, couplings)
         self._hold(self.supports)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Let load, weight and damping be replaced; not what the sparsity and the like come from.
+
+        Raises
+        ------
+        XfemError
+            If supports, force or mass of a finished body are assigned.
+        """
+        if name in ("supports", "force", "mass") and "fixed" in self.__dict__:
+            raise XfemError(
+                f"the {name} of a body cannot be replaced; use held_by for other supports, or make "
+                "another body"
+            )
+        super().__setattr__(name, value)
 
     def held_by(self, supports: Supports | MovingSupports) -> "DynamicBody":
         """Return this body with other supports; the rest, sparsity included, is shared.
@@ -162,7 +186,15 @@ class DynamicBody:
                 f"supports: {supports.fixed.dtype} array of shape {supports.fixed.shape}; "
                 f"expected bool and {self.shape}"
             )
-        self.supports, self.fixed = supports, supports.fixed
+        if isinstance(supports, Supports) and (
+            np.shape(supports.values) != self.shape
+            or not np.isfinite(supports.values[supports.fixed]).all()
+        ):
+            raise XfemError(
+                f"supports: values of shape {np.shape(supports.values)}; expected {self.shape}, "
+                "finite where fixed"
+            )
+        self.__dict__["supports"], self.fixed = supports, supports.fixed
         self.moving = isinstance(supports, MovingSupports)
 
     def rest(self) -> MotionState:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.dynamics.body import DynamicBody, MotionState
 from verify.xfem.dynamics.integrator import Integrator, StepForces
+from verify.xfem.errors import XfemError
 from verify.xfem.slivers.penalised_force import PenalisedForce
 
 __all__ = ["EnergyLedger", "Ledger", "run"]
@@ -101,6 +102,8 @@ class EnergyLedger:
         """Enter one step, from the state of the last entry to this one."""
         body, last = self.body, self._last
         h = state.time - last.time
+        if h == 0.0:
+            raise XfemError(f"no time has passed since the last entry, t = {state.time:g} s")
         change = state.displacement - last.displacement
         inertia = body.mass.apply(state.velocity - last.velocity)
         residual = inertia / h - forces.external + forces.internal + forces.viscous
@@ -165,7 +168,11 @@ def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: in
     ------
     StepFailedError
         From the step that failed; the state is that of the last good one.
+    XfemError
+        If the number of steps is negative.
     """
+    if steps < 0:
+        raise XfemError(f"{steps} steps; expected none or more")
     ledger = EnergyLedger(body, state)
     for _ in range(steps):
         forces = integrator.step(state)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.dynamics.body import MotionState
+from verify.xfem.dynamics.integrator import check_state
 from verify.xfem.errors import XfemError
 from verify.xfem.virtual import VirtualMesh
 
@@ -29,8 +30,9 @@ def inherit_state(old: VirtualMesh, new: VirtualMesh, state: MotionState) -> Mot
     Raises
     ------
     XfemError
-        As `ancestors`.
+        As `ancestors`, or if the state is not one of the old body.
     """
+    check_state(state, old.node_points.shape)
     source = ancestors(old, new)
     return MotionState(state.displacement[source], state.velocity[source], state.time)
 

@@ -77,3 +77,8 @@ def check_state(state: MotionState, shape: tuple[int, int]) -> None:
     for name, value in (("displacement", state.displacement), ("velocity", state.velocity)):
         if np.shape(value) != shape:
             raise XfemError(f"{name} of shape {np.shape(value)}; the body has {shape}")
+        kind = getattr(value, "dtype", type(value).__name__)
+        if kind != np.float64:
+            raise XfemError(f"{name} of type {kind}; expected a float64 array, to be written to")
+    if not np.isfinite(state.time):
+        raise XfemError(f"time {state.time!r} s of a state; expected finite")

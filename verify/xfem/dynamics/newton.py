@@ -59,6 +59,11 @@ class NewtonIntegrator(ABC):
         iterations: int = 30,
         solver: LinearSolver | None = None,
     ) -> None:
+        if not tolerance > 0.0 or iterations < 1:
+            raise XfemError(
+                f"tolerance {tolerance:g}, {iterations} iterations; expected more than zero, and "
+                "at least one"
+            )
         self.body = body
         self.step_size = check_step(step_size)
         self.tolerance, self.iterations = tolerance, iterations

@@ -198,6 +198,7 @@ class _Newton:
 
     def _next(self, place: _Place, load: _Floats) -> _Place:
         """Place with a smaller residual; if that is not a correction away, one further down."""
+        leap = place
         for turning in _TURNS:
             try:
                 correction = self._solve(place.displacement, place.residual, None, turning)
@@ -209,10 +210,11 @@ class _Newton:
                 trial = self._place(place.displacement + correction, load)
                 if trial.norm < place.norm:
                     return trial
+                leap = trial
             share = self._share_downhill(place, correction, load)
             if share > 0.0:
                 return self._place(place.displacement + share * correction, load)
-        return place
+        return leap  # beside a piece whose force jumps, or in round-off
 
     def _share_downhill(self, place: _Place, correction: _Floats, load: _Floats) -> float:
         """Share of a correction that lowers the potential energy as its slope says; 0 if none."""
