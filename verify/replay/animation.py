@@ -107,7 +107,10 @@ def write_animation(frames: Sequence[Frame], view: View, path: Path, per_second:
 
 def _draw(frames: Sequence[Frame], view: View) -> list[NDArray[np.uint8]]:
     import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
 
+    # without a display VTK warns that there is none, and then draws all the same
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     plotter = pyvista.Plotter(off_screen=True, window_size=list(view.size))
     plotter.background_color = pyvista.Color("white")
     images = []
