@@ -24,9 +24,7 @@ __all__ = ["ConjugateGradients", "NotConvergedError"]
 
 _Floats = NDArray[np.float64]
 
-_SQUARABLE = (
-    1e100  # sums of squares of numbers up to that, and down to its inverse, are exact enough
-)
+_SMALLEST, _LARGEST = 1e-200, 1e200  # squares of loads that are solved for as they are
 
 
 class NotConvergedError(XfemError):
@@ -108,14 +106,16 @@ class ConjugateGradients:
             raise RuntimeError("solve before factorize")
         pattern, nodes = self._pattern, self._pattern.node_count
         load = checked_load(load, nodes, self._block)
+        if x.shape != load.shape:
+            raise XfemError(f"room for a solution of shape {x.shape}; expected {load.shape}")
         if start is None:
             x[:] = 0.0
-        else:
+        elif start is not x:
             x[:] = checked_start(start, nodes, self._block)
-        largest = largest_entry(load)
-        if largest > 0.0 and not 1.0 / _SQUARABLE < largest < _SQUARABLE:
-            scale = 2.0 ** -np.frexp(largest)[1]
-            self.improve(scale * load, x, scale * x)
+        if not _SMALLEST < np.vdot(load, load) < _LARGEST and load.any():
+            scale = 2.0 ** -np.frexp(largest_entry(load))[1]
+            x *= scale
+            self.improve(scale * load, x, x)
             x /= scale
             return
         iterations, residual = conjugate_gradients(

@@ -45,7 +45,8 @@ def _checked(values: ArrayLike, name: str, nodes: int, size: int) -> _Floats:
     found = np.ascontiguousarray(values, dtype=float)
     if found.shape != (nodes, size):
         raise XfemError(f"{name} of shape {found.shape}; expected {(nodes, size)}")
-    if not largest_entry(found) < np.inf:
+    # one pass that allocates nothing tells, but of numbers whose squares overflow
+    if not np.vdot(found, found) < np.inf and not largest_entry(found) < np.inf:
         first = int(np.argmin(np.isfinite(found).all(axis=1)))
         raise XfemError(f"the {name} is not finite, first at unknown node {first}")
     return found
