@@ -2,20 +2,15 @@
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reference.exact.field import Array, ExactField
 from verify.errors import InputError
 from verify.scene import Polygon, Rectangle, Scene
 
-if TYPE_CHECKING:
-    from reference.exact.solution import ExactSolution
-
 __all__ = ["boundary_work", "elastic_energy", "outline_of"]
 
-Array = NDArray[np.float64]
 Density = Callable[[Array], Array]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -25,7 +20,7 @@ _MOST_PANELS = 20000
 _INWARD = 1e-7  # of the body's size: how far inside the outline `near` is
 
 
-def outline_of(body: "Array | Scene") -> Array:
+def outline_of(body: Array | Scene) -> Array:
     """Corners (k, 2) of a polygonal body, counter-clockwise.
 
     Raises
@@ -44,7 +39,7 @@ def outline_of(body: "Array | Scene") -> Array:
     return corners if _signed_area(corners) > 0 else corners[::-1]
 
 
-def boundary_work(solution: "ExactSolution", outline: Array) -> float:
+def boundary_work(solution: ExactField, outline: Array) -> float:
     """Half the work of the tractions on a closed polygon (counter-clockwise), J/m.
 
     Faces of cuts are free of traction in all solutions here and do no work.
@@ -63,7 +58,7 @@ def boundary_work(solution: "ExactSolution", outline: Array) -> float:
     return 0.5 * sum(_adaptive(work, panels, _TOLERANCE * scale) for work, _ in densities)
 
 
-def elastic_energy(solution: "ExactSolution", outline: Array) -> float:
+def elastic_energy(solution: ExactField, outline: Array) -> float:
     """Half the integral of stress times strain over a polygon, J/m, for smooth sides.
 
     Each side's polygon is a signed sum of triangles: the field of a side is smooth beyond it.
@@ -83,7 +78,7 @@ def elastic_energy(solution: "ExactSolution", outline: Array) -> float:
 
 
 def _work_density(
-    solution: "ExactSolution", a: Array, b: Array, size: float, direction: Array | None
+    solution: ExactField, a: Array, b: Array, size: float, direction: Array | None
 ) -> tuple[Density, Density]:
     """Give t·u and |t| |u| along the edge from a to b as functions of its parameter in [0, 1].
 
@@ -140,9 +135,7 @@ def _gauss(density: Density, starts: Array, ends: Array) -> Array:
     return values
 
 
-def _fan_energy(
-    solution: "ExactSolution", corners: Array, direction: Array | None, order: int
-) -> float:
+def _fan_energy(solution: ExactField, corners: Array, direction: Array | None, order: int) -> float:
     nodes, weights = np.polynomial.legendre.leggauss(order)
     x, w = 0.5 * (nodes + 1), 0.5 * weights
     # the square collapsed onto the triangle with corners 0, a, b

@@ -1,25 +1,20 @@
 """Strain energy of an exact solution in a box, computed with the accuracy checked."""
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reference.exact.field import Array, ExactField
 from verify.errors import InputError
 from verify.scene import Box, Scene
 
-if TYPE_CHECKING:
-    from reference.exact.solution import ExactSolution
-
 __all__ = ["box_energy", "box_of", "surface_work"]
 
-Array = NDArray[np.float64]
 _ORDERS = (12, 20, 32, 48, 80)
 _TOLERANCE = 1e-11
 
 
-def box_of(body: "Array | Scene") -> Array:
+def box_of(body: Array | Scene) -> Array:
     """Lower and upper corner (2, 3) of a box.
 
     Raises
@@ -39,7 +34,7 @@ def box_of(body: "Array | Scene") -> Array:
     return corners
 
 
-def surface_work(solution: "ExactSolution", corners: Array) -> float:
+def surface_work(solution: ExactField, corners: Array) -> float:
     """Half the work of the tractions on the faces of a box, J, where the field is smooth there."""
     known = None
     for order in _ORDERS:
@@ -58,7 +53,7 @@ def surface_work(solution: "ExactSolution", corners: Array) -> float:
     )
 
 
-def box_energy(solution: "ExactSolution", corners: Array) -> float:
+def box_energy(solution: ExactField, corners: Array) -> float:
     """Half the integral of stress times strain over a box, J, smooth on each side of a plane.
 
     Each side is a signed sum of cones from a point of the plane over its faces: the field of a
@@ -109,7 +104,7 @@ def _square_rule(quad: Array, order: int) -> tuple[Array, Array]:
 
 
 def _cone_energy(
-    solution: "ExactSolution", apex: Array, polygon: Array, towards: Array | None, order: int
+    solution: ExactField, apex: Array, polygon: Array, towards: Array | None, order: int
 ) -> float:
     """Energy in the signed tetrahedra from the apex over a polygon."""
     nodes, weights = np.polynomial.legendre.leggauss(order)

@@ -1,83 +1,15 @@
-"""What every exact solution offers."""
-
-from abc import ABC, abstractmethod
-
-import numpy as np
-from numpy.typing import NDArray
+"""What every exact solution offers: its field, and the energy that it stores in a body."""
 
 from reference.exact.energy import boundary_work, elastic_energy, outline_of
-from reference.exact.hooke import Hooke
+from reference.exact.field import Array, ExactField, Plane
 from reference.exact.solid_energy import box_energy, box_of, surface_work
 from verify.scene import Scene
 
 __all__ = ["Array", "ExactSolution", "Plane"]
 
-Array = NDArray[np.float64]
-Plane = tuple[Array, Array]
 
-
-class ExactSolution(ABC):
-    """A displacement field that solves the equations of linear elasticity exactly.
-
-    Points are (n, d) arrays in metres. `near` (n, d) are points on the wanted side of the cut,
-    close to `points`: a point on the cut, or off it by round-off, belongs to the side on which
-    its `near` lies. Without `near` a point on the cut belongs to the positive (left) side.
-
-    Parameters
-    ----------
-    law : Hooke
-    """
-
-    has_body_force: bool = False
-
-    def __init__(self, law: Hooke) -> None:
-        self.law = law
-
-    @property
-    def dimension(self) -> int:
-        """Space dimension."""
-        return self.law.dimension
-
-    @property
-    def singular_points(self) -> Array:
-        """Points (k, d) near which derivatives are unbounded."""
-        return np.zeros((0, self.dimension))
-
-    @property
-    def cut_plane(self) -> Plane | None:
-        """In space: point and normal of the plane across which the field jumps, if it does."""
-        return None
-
-    @abstractmethod
-    def displacement(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement (n, d), m."""
-
-    @abstractmethod
-    def gradient(self, points: Array, near: Array | None = None) -> Array:
-        """Displacement gradient (n, d, d): entry i, j is ∂u_i/∂x_j."""
-
-    def body_force(self, points: Array, near: Array | None = None) -> Array:
-        """Force per volume (n, d), N/m³, that keeps the field in equilibrium."""
-        return np.zeros_like(points, dtype=float)
-
-    def stress(self, points: Array, near: Array | None = None) -> Array:
-        """Stress (n, d, d), Pa."""
-        return self.law.stress(self.gradient(points, near))
-
-    def smooth_parts(self, outline: Array) -> list[tuple[Array, Array | None]]:
-        """Divide a polygon into parts on which the field is smooth, extended if need be.
-
-        Returns
-        -------
-        list of (corners, direction)
-            Corners (k, 2), counter-clockwise; and the direction (2,) from any point to where
-            the side of this part is, or None if the part's own inside says it.
-        """
-        return [(outline, None)]
-
-    def kinks(self, start: Array, end: Array) -> list[float]:
-        """Parameters in (0, 1) at which the field jumps on the segment from `start` to `end`."""
-        return []
+class ExactSolution(ExactField):
+    """An exact field whose strain energy in a body is computed to round-off; see `ExactField`."""
 
     def strain_energy(self, body: Array | Scene) -> float:
         """Strain energy of a body, J (in the plane per metre of thickness), to 1e-11.

@@ -1,0 +1,77 @@
+"""A displacement field known at every point, with what it takes to integrate it exactly."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.exact.hooke import Hooke
+
+__all__ = ["Array", "ExactField", "Plane"]
+
+Array = NDArray[np.float64]
+Plane = tuple[Array, Array]
+
+
+class ExactField(ABC):
+    """A displacement field that solves the equations of linear elasticity exactly.
+
+    Points are (n, d) arrays in metres. `near` (n, d) are points on the wanted side of the cut,
+    close to `points`: a point on the cut, or off it by round-off, belongs to the side on which
+    its `near` lies. Without `near` a point on the cut belongs to the positive (left) side.
+
+    Parameters
+    ----------
+    law : Hooke
+    """
+
+    has_body_force: bool = False
+
+    def __init__(self, law: Hooke) -> None:
+        self.law = law
+
+    @property
+    def dimension(self) -> int:
+        """Space dimension."""
+        return self.law.dimension
+
+    @property
+    def singular_points(self) -> Array:
+        """Points (k, d) near which derivatives are unbounded."""
+        return np.zeros((0, self.dimension))
+
+    @property
+    def cut_plane(self) -> Plane | None:
+        """In space: point and normal of the plane across which the field jumps, if it does."""
+        return None
+
+    @abstractmethod
+    def displacement(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement (n, d), m."""
+
+    @abstractmethod
+    def gradient(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement gradient (n, d, d): entry i, j is ∂u_i/∂x_j."""
+
+    def body_force(self, points: Array, near: Array | None = None) -> Array:
+        """Force per volume (n, d), N/m³, that keeps the field in equilibrium."""
+        return np.zeros_like(points, dtype=float)
+
+    def stress(self, points: Array, near: Array | None = None) -> Array:
+        """Stress (n, d, d), Pa."""
+        return self.law.stress(self.gradient(points, near))
+
+    def smooth_parts(self, outline: Array) -> list[tuple[Array, Array | None]]:
+        """Divide a polygon into parts on which the field is smooth, extended if need be.
+
+        Returns
+        -------
+        list of (corners, direction)
+            Corners (k, 2), counter-clockwise; and the direction (2,) from any point to where
+            the side of this part is, or None if the part's own inside says it.
+        """
+        return [(outline, None)]
+
+    def kinks(self, start: Array, end: Array) -> list[float]:
+        """Parameters in (0, 1) at which the field jumps on the segment from `start` to `end`."""
+        return []
