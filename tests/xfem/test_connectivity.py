@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from xfem_bodies import zero_modes
 
-from verify.xfem.cuts import Plane, PolygonPatch, Polyline
+from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, Polyline
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh
@@ -108,6 +109,18 @@ def test_turning_a_cut_round_changes_nothing_but_the_name_of_its_sides(x, y, slo
     assert one.bodies.max() == other.bodies.max()
     assert one.volumes.sum() == pytest.approx(other.volumes.sum(), rel=1e-14)
     assert np.allclose(np.sort(one.fraction), np.sort(other.fraction), atol=1e-14)
+
+
+@pytest.mark.parametrize("beside", [[], [Plane([9.0, 9.0], [1.0, 0.0])]], ids=["alone", "of two"])
+def test_whether_a_zero_point_is_near_enough_does_not_depend_on_the_order_of_corners(beside):
+    """The zero points are 0.35 off the cut, half the longest edge is 0.5, of the others 0.25."""
+    obtuse = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.05]])
+    far = ImplicitCut(
+        lambda x: np.where(x[:, 1] > 0.0, 0.5, -0.5) if len(x) == 3 else 0.35 + 0 * x[:, 0]
+    )
+    for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
+        virtual = cut_mesh(SimplexMesh(obtuse, [order]), [far, *beside])
+        assert len(virtual.cells) == 2
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ points, and every formula below holds for any of them.
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from math import factorial
 
 import numpy as np
@@ -49,7 +50,7 @@ class SimplexMesh:
         _check(coordinates, nodes)
         object.__setattr__(self, "points", coordinates)
         object.__setattr__(self, "cells", nodes.astype(np.int64))
-        longest = np.linalg.norm(self.edge_vectors, axis=2).max(axis=1)
+        longest = self.longest_edges(np.arange(len(nodes)))
         flat = self.measures <= _DEGENERATE * longest**self.dim
         if flat.any():
             where = int(np.argmax(flat))
@@ -73,6 +74,15 @@ class SimplexMesh:
         """(m, dim, space) vectors from the first node of a cell to the others."""
         corners = self.points[self.cells]
         return corners[:, 1:] - corners[:, :1]
+
+    def longest_edges(self, chosen: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Length (q,) of the longest edge of some cells (q,), in metres."""
+        corners = self.points[self.cells[chosen]]
+        squared = np.zeros(len(chosen))
+        for a, b in combinations(range(corners.shape[1]), 2):
+            edge = corners[:, a] - corners[:, b]
+            np.maximum(squared, (edge**2).sum(axis=1), out=squared)
+        return np.sqrt(squared)
 
     @cached_property
     def measures(self) -> NDArray[np.float64]:

@@ -83,7 +83,7 @@ class SemiProgressiveCutter:
         self.mesh = mesh
         self.body = GrowingBody(mesh)
         self.strokes: list[Stroke] = []
-        self._size = np.linalg.norm(mesh.edge_vectors, axis=2).max(axis=1)
+        self._size = mesh.longest_edges(np.arange(len(mesh.cells)))
         self.interior = BoundingTree(mesh.points, mesh.cells)
         self._strokes_near = np.zeros(len(mesh.cells), dtype=np.int64)
         self._records: list[_Record] = []

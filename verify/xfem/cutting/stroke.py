@@ -62,7 +62,7 @@ class Stroke:
     strokes_near : (m,) int array
         Shared by all strokes: how many of them came near a cell.
     size : (m,) float array
-        Longest edge from the first node of each cell, in metres.
+        Longest edge of each cell, in metres.
 
     Attributes
     ----------

@@ -168,9 +168,8 @@ def split_cells(
         points=ZeroPoints(mesh.points, values, snap),
         snapped=snapped,
     )
-    size = np.linalg.norm(mesh.edge_vectors[candidates], axis=2).max(axis=1, initial=0.0)
     sizes = np.zeros(len(mesh.cells))
-    sizes[candidates] = size
+    sizes[candidates] = mesh.longest_edges(candidates)
     # a branch given before its stem can split only once the stem has: hence more than one sweep
     for _ in range(max(1, len(cuts))):
         before = len(partition.parent)

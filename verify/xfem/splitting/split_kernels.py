@@ -38,16 +38,17 @@ def edges_of_cells(chosen, cells, points, values, table, known, edges, size):
     """Give numbers to the edges of cells that the only cut crosses, rows (0, plus, minus).
 
     Returns their count. Writes the numbers of those of each cell (q, e), -1 where it has no more,
-    and the length (q,) of the longest edge from its first corner.
+    and the length (q,) of its longest edge.
     """
     count, row, corners = np.int64(0), np.zeros(3, dtype=np.int64), cells.shape[1]
     for q in range(len(chosen)):
         cell, own, longest = chosen[q], 0, 0.0
         for a in range(corners):
-            length = 0.0
-            for i in range(points.shape[1]):
-                length += (points[cells[cell, a], i] - points[cells[cell, 0], i]) ** 2
-            longest = max(longest, length)
+            for b in range(a):
+                length = 0.0
+                for i in range(points.shape[1]):
+                    length += (points[cells[cell, a], i] - points[cells[cell, b], i]) ** 2
+                longest = max(longest, length)
             if values[cells[cell, a], 0] < 0.0:
                 continue
             for b in range(corners):

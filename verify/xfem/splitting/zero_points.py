@@ -101,7 +101,7 @@ class ZeroPoints:
         places : (k, s) float array
             Where each edge is crossed, in metres.
         size : (q,) float array
-            Longest edge from the first corner of each cell, in metres.
+            Longest edge of each cell, in metres.
         """
         corners = cells.shape[1]
         most = (corners // 2) * (corners - corners // 2)
