@@ -132,7 +132,9 @@ def split_cells(
         A branch may come before or after the cut from which it leaves.
     tip : {"inside", "through", "nearest"}
         What to do where a cut ends inside an element: leave the element whole (the rule of the
-        thesis, 3.2.1), split it, or whichever of the two moves the tip less.
+        thesis, 3.2.1), split it, or whichever of the two moves the tip less. With the last two
+        the order of the cuts matters where one ends in an element that another divides: it splits
+        what it finds, the element or a piece.
     held : callable, optional
         For a cut that grows: given the cells and labels of pieces that a cut meets but does not
         go through, and its number, tells which it shall split: those that it split before.
