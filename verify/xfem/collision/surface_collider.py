@@ -124,12 +124,14 @@ class SurfaceCollider:
         Raises
         ------
         XfemError
-            If there are not as many as vertices.
+            If there are not as many as vertices, or one is not finite.
         """
         if positions.shape != self.surface.material.rows.shape:
             raise XfemError(
                 f"positions of shape {positions.shape}; expected {self.surface.material.rows.shape}"
             )
+        if not np.isfinite(positions).all():
+            raise XfemError("positions of a surface that are not finite")
         self.positions = positions
         if self._state != self._now():
             self._rebuild()
@@ -150,10 +152,21 @@ class SurfaceCollider:
             In metres.
         piece_body, body
             Body of each piece, and the only one that counts; all do if it is negative.
+
+        Raises
+        ------
+        XfemError
+            If points are not finite or of another shape, the limit is negative, or pieces are
+            without a body.
         """
         queries = self._check(points)
+        if not limit >= 0.0:
+            raise XfemError(f"limit {limit} m of a distance; expected zero or more")
         facet_body = np.zeros(len(self._numbers), dtype=np.int64)
         if piece_body is not None:
+            most = int(self.surface.facet_piece.rows[self._numbers].max(initial=-1))
+            if len(piece_body) <= most:
+                raise XfemError(f"bodies of {len(piece_body)} pieces; expected {most + 1} or more")
             facet_body = piece_body[self.surface.facet_piece.rows[self._numbers]]
         facet, distance, at = nearest_facets(
             queries, self.positions, self._facets, facet_body, body, self._tree.low,

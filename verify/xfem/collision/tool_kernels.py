@@ -16,6 +16,7 @@ from verify.xfem.collision.simplex_kernels import (
 __all__ = ["capsule_contacts", "segment_hits"]
 
 _DEEP = 128  # twice the height of any heap of boxes
+_ROUND_OFF = 16.0 * np.finfo(float).eps  # of positions: what touches exactly is touched
 
 
 @njit(cache=True)
@@ -154,7 +155,11 @@ def capsule_contacts(start, end, radius, points, facets, low, high, order):
     """Facets (q,) within a radius of a segment: distance (q,), share (q,), weights (q, k)."""
     size, space = facets.shape[1], len(start)
     corners, weights = np.empty((size, space)), np.empty(size)
-    about = _facets_near(start, end, radius, low, high, order)
+    reach = 0.0
+    for i in range(space):
+        reach = max(reach, abs(start[i]), abs(end[i]))
+    reach = radius + _ROUND_OFF * reach
+    about = _facets_near(start, end, reach, low, high, order)
     found, count = np.empty(len(about), dtype=np.int64), 0
     distance, share = np.empty(len(about)), np.empty(len(about))
     at = np.empty((len(about), size))
@@ -162,8 +167,8 @@ def capsule_contacts(start, end, radius, points, facets, low, high, order):
         for k in range(size):
             _write(points[facets[facet, k]], k, corners)
         gap, where = _segment_to_facet(start, end, corners, weights)
-        if gap <= radius:
-            found[count], distance[count], share[count] = facet, gap, where
+        if gap <= reach:
+            found[count], distance[count], share[count] = facet, min(gap, radius), where
             _write(weights, count, at)
             count += 1
     return found[:count], distance[:count], share[:count], at[:count]

@@ -136,17 +136,26 @@ class MovingSurface:
         Raises
         ------
         XfemError
-            If `displacement` has fewer rows than there are unknown nodes.
+            If `displacement` has fewer rows than there are unknown nodes, or an array another shape
+            or type.
         """
         self._check(displacement)
         if out is None:
             out = np.empty_like(self.material.rows)
+        self._check_vertices("positions", out)
         _interpolate(self.material.rows, self.nodes.rows, self.weights.rows, displacement, out)
         return out
 
     def nodal_forces(self, forces: _Floats, out: _Floats) -> _Floats:
-        """Add forces (v, s) on the vertices to those on the unknown nodes, `out` (N, s): Wᵀf."""
+        """Add forces (v, s) on the vertices to those on the unknown nodes, `out` (N, s): Wᵀf.
+
+        Raises
+        ------
+        XfemError
+            If an array has another shape or type.
+        """
         self._check(out)
+        self._check_vertices("forces", forces)
         _spread(self.nodes.rows, self.weights.rows, forces, out)
         return out
 
@@ -161,22 +170,44 @@ class MovingSurface:
         force : (s,) float array
             In newtons.
         out : (N, s) float array
+
+        Raises
+        ------
+        XfemError
+            If there is no such facet (a contact that is none has the number -1), or a shape is
+            wrong.
         """
         self._check(out)
+        if not 0 <= facet < len(self.facets.rows):
+            raise XfemError(f"facet {facet}; expected one of 0..{len(self.facets.rows) - 1}")
         vertices = self.facets.rows[facet]
         if vertices[0] < 0:
             raise XfemError(f"facet {facet} is no longer in use")
+        if np.shape(at) != vertices.shape or np.shape(force) != out.shape[1:]:
+            raise XfemError(
+                f"force of shape {np.shape(force)} at a place of shape {np.shape(at)}; expected "
+                f"{out.shape[1:]} and {vertices.shape}"
+            )
+        at, force = np.asarray(at, dtype=float), np.asarray(force, dtype=float)
         _spread(self.nodes.rows[vertices], self.weights.rows[vertices], at[:, None] * force, out)
         return out
 
     def _check(self, nodal: _Floats) -> None:
-        if nodal.ndim != 2 or nodal.shape[1] != self.material.rows.shape[1]:
+        kind, space = getattr(nodal, "dtype", type(nodal).__name__), self.material.rows.shape[1]
+        if kind != np.float64 or nodal.ndim != 2 or nodal.shape[1] != space:
             raise XfemError(
-                f"nodal values of shape {nodal.shape}; expected (N, {self.material.rows.shape[1]})"
+                f"nodal values of shape {np.shape(nodal)}, {kind}; expected (N, {space}), float64"
             )
         if len(self.nodes) and len(nodal) <= self._largest_node():
             raise XfemError(
                 f"{len(nodal)} nodal values; expected at least {self._largest_node() + 1}"
+            )
+
+    def _check_vertices(self, name: str, values: _Floats) -> None:
+        kind, shape = getattr(values, "dtype", type(values).__name__), self.material.rows.shape
+        if kind != np.float64 or values.shape != shape:
+            raise XfemError(
+                f"{name} of shape {np.shape(values)}, {kind}; expected {shape}, float64"
             )
 
     def _largest_node(self) -> int:

@@ -54,7 +54,7 @@ def pull_back(
     Raises
     ------
     XfemError
-        If shapes do not match or a starting piece does not exist.
+        If shapes do not match, a number is not finite or a starting piece does not exist.
     """
     body = cutter.body
     places = np.ascontiguousarray(points, dtype=float)
@@ -67,6 +67,9 @@ def pull_back(
         )
     if len(pieces) and not 0 <= pieces.min() <= pieces.max() < len(body.piece_cells):
         raise XfemError(f"a starting piece outside 0..{len(body.piece_cells) - 1}")
+    for name, values in (("points", places), ("displacement", displacement)):
+        if not np.isfinite(values).all():
+            raise XfemError(f"{name}: a number is not finite")
     walk = _pull_back if body.mesh.dim == space else pull_back_to_membrane
     return walk(
         places,
@@ -92,10 +95,11 @@ def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, s
         for i in range(space):
             simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
     whole, least = signed_volume(simplex), np.inf
+    is_regular = 0.0 < abs(whole) < np.inf
     for a in range(corners):
         for i in range(space):
             simplex[a, i] = place[i]
-        at[a] = signed_volume(simplex) / whole if whole != 0.0 else -1.0
+        at[a] = signed_volume(simplex) / whole if is_regular else -1.0
         for i in range(space):
             simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
         least = min(least, at[a])
