@@ -5,6 +5,7 @@ import re
 import pytest
 
 from verify.report.notation import with_interval
+from verify.report.stability_map import graded
 from verify.report.summary import check_row
 from verify.result import Verdict, VerdictRecord
 
@@ -34,3 +35,21 @@ def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
         8.0787592969, "8.078757937 ± 1e-05 (relative)", "",
     )  # fmt: skip
     assert "8.078759297<" in str(check_row(found))
+
+
+@pytest.mark.parametrize(
+    ("value", "grade", "written"),
+    [
+        (1.0, "good", "1"),
+        (0.9, "good", "0.9"),
+        (0.8973, "fair", "0.897"),
+        (0.4968, "poor", "0.497"),
+        (0.34, "poor", "0.34"),
+        (0.0996, "bad", "9.96e-02"),
+        (9.7e-13, "bad", "1e-12"),
+        (0.0, "bad", "0e+00"),
+    ],
+)
+def test_a_graded_number_is_not_rounded_up_to_the_grade_that_it_misses(value, grade, written):
+    steps = [(0.9, "good"), (0.5, "fair"), (0.1, "poor")]
+    assert graded(value, steps)[:2] == (grade, written)

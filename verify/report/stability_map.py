@@ -83,13 +83,20 @@ def _cell(cell: Cell | None) -> Markup:
 
 
 def graded(value: float | None, steps: Sequence[tuple[float, str]], reason: str = "") -> Cell:
-    """Grade a value: the first of (least value, grade) that it reaches, or "bad"."""
+    """Grade a value: the first of (least value, grade) that it reaches, or "bad".
+
+    It is written with so many digits that it is not rounded up to what it misses.
+    """
     if value is None:
         return ("none", "", reason)
-    for least, grade in steps:
-        if value >= least:
-            return (grade, f"{value:.2g}", reason)
-    return ("bad", f"{value:.0e}", reason)
+    grade = next((name for least, name in steps if value >= least), "bad")
+    better = [least for least, _ in steps if least > value]
+    form = "e" if grade == "bad" else "g"
+    for digits in range(2 if form == "g" else 0, 9):
+        written = f"{value:.{digits}{form}}"
+        if all(float(written) < least for least in better):
+            break
+    return (grade, written, reason)
 
 
 def listed(records: Sequence[Mapping[str, Any]], **fixed: Any) -> list[Mapping[str, Any]]:
