@@ -37,7 +37,7 @@ class Ledger:
     gravity : potential −weight·u of the dead load, in J
     load_work, support_work : done on the body since the start, in J
     damping, algorithmic : dissipated since the start by C, and by the scheme, in J
-    unbalanced : work of what the steps have left unsolved, since the start, in J
+    unbalanced : energy gained because steps were left unsolved, since the start, in J
     momentum : (n + 1, d) linear momentum, in kg m/s
     angular_momentum : (n + 1, 1 or 3), about the origin, in kg m²/s
     impulse : (n + 1, d) of external, viscous and support forces since the start, in N s
@@ -65,7 +65,7 @@ class Ledger:
 
     @property
     def balance(self) -> _Floats:
-        """All columns together: constant up to `unbalanced` and round-off, for every scheme."""
+        """All other columns together: less `unbalanced`, constant to round-off for every scheme."""
         return (
             self.mechanical - self.load_work - self.support_work + self.damping + self.algorithmic
         )
