@@ -16,12 +16,14 @@ from verify.xfem.cuts import (
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
+from verify.xfem.in_pieces import in_one_go
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
 from verify.xfem.slivers.policies import treat_slivers
 from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.statics import solve_static
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
@@ -33,6 +35,7 @@ SOFT = isotropic(1e4, 0.3, "plane strain")
 SWEEP = ToolPath.of_tip([[0.0, 0.4], [1.0, 0.4]], [0.0, 1.0]).sweep
 BLADE = ToolPath.of_tip([[0.0, 0.4, 0.0], [1.0, 0.4, 0.0]], [0.0, 1.0], [0.0, 0.0, 1.0]).sweep
 RIM = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+ALL = np.ones(CUT.node_points.shape, dtype=bool)
 NAN = np.nan
 
 
@@ -60,6 +63,7 @@ def stiffness():
         (lambda: PolygonPatch([*RIM, [NAN, 1.0, 0.0]]), "not finite"),
         (lambda: SemiProgressiveCutter(PLATE).advance(NAN), "time nan; expected a number"),
         (lambda: SemiProgressiveCutter(PLATE).advance("soon"), "expected a number of seconds"),
+        (lambda: in_one_go(SemiProgressiveCutter(PLATE).looking(1.0, 0)), "at most 0 elements"),
         # a cut of another space, or none
         (lambda: cut_mesh(PLATE, [Plane([0, 0, 0], [1, 0, 0])]), r"cut 0: plane at points"),
         (lambda: cut_mesh(BLOCK, [Polyline([[0, 0], [1, 1]])]), r"cut 0: polyline at points"),
@@ -87,6 +91,9 @@ def stiffness():
         (lambda: Supports.none(CUT).prescribe(CUT, [0.7, 1.2]), "supported nodes"),
         (lambda: Supports.none(CUT).prescribe(CUT, [0], components=0), "components 0"),
         (lambda: Supports.none(cut_mesh(BLOCK, [])).prescribe(CUT, [0]), r"supports of shape"),
+        (lambda: solve_static(CUT, SOFT, Supports(ALL.astype(float), 0.0 * ALL)), "type float64"),
+        (lambda: solve_static(CUT, SOFT, Supports(ALL, np.where(ALL, NAN, 0.0))), "not finite"),
+        (lambda: solve_static(CUT, SOFT, Supports(ALL, np.zeros(2))), r"values of shape \(2,\)"),
         (lambda: traction(CUT, [[0.7, 1.2]], [1.0, 0.0]), "loaded facets"),
         (lambda: traction(CUT, [0, 1, 2], [1.0, 0.0]), r"shape \(3,\); expected \(b, 2\)"),
         (lambda: body_force(CUT, lambda x, s: x, -1), "degree -1"),

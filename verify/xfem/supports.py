@@ -116,7 +116,17 @@ def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
     ------
     UnsupportedBodyError
         Naming the first such piece by its size and position.
+    XfemError
+        If the supports are of another body, not of type bool, or a value is not finite.
     """
+    shape, fixed, values = virtual.node_points.shape, supports.fixed, supports.values
+    if np.shape(fixed) != shape or np.shape(values) != shape or fixed.dtype != bool:
+        raise XfemError(
+            f"supports of shape {np.shape(fixed)} and type {fixed.dtype}, values of shape "
+            f"{np.shape(values)}; expected {shape}, bool"
+        )
+    if not np.isfinite(values).all():
+        raise XfemError("a prescribed displacement is not finite")
     points, dim = virtual.node_points, supports.fixed.shape[1]
     scale = virtual.mesh.extent
     for body in range(virtual.bodies.max() + 1):

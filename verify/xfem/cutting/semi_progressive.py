@@ -155,9 +155,16 @@ class SemiProgressiveCutter:
         -------
         Division or None
             For `divide`, with which the body must be divided before it is looked at again.
+
+        Raises
+        ------
+        XfemError
+            If the time is no number, or `most` is not a positive integer.
         """
         if np.ndim(time) != 0 or not isinstance(time, int | float | np.number) or np.isnan(time):
             raise XfemError(f"time {time!r}; expected a number of seconds")
+        if most is not None and not (isinstance(most, int | np.integer) and most > 0):
+            raise XfemError(f"at most {most!r} elements; expected an integer, 1 or more")
         for stroke in self.strokes:
             stroke.hold()
         try:
