@@ -16,7 +16,9 @@ from verify.xfem.dynamics import (
     SymplecticEuler,
     Trapezoidal,
 )
-from verify.xfem.mass import side_wise_mass
+from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.supports import Supports
 
 SCHEMES = [
     CentralDifferences,
@@ -73,6 +75,36 @@ def test_a_change_during_the_motion_counts_from_the_next_step_on(kind, change):
         ends.append(state.displacement - before)
     # Newton's methods end within a tolerance of 1e-10 of the forces
     assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-9 * np.abs(ends[1]).max())
+
+
+@pytest.mark.parametrize(
+    ("kind", "mass_of"),
+    [(kind, side_wise_mass) for kind in SCHEMES]
+    + [(kind, consistent_mass) for kind in SCHEMES[3:]],
+)
+def test_nodes_that_are_held_in_flight_come_to_rest_and_start_from_rest_when_let_go(kind, mass_of):
+    """With centred schemes their velocity went on changing its sign, and took them along again."""
+    v = cut_body(2)
+    free = DynamicBody(InternalForce(v, material(2)), mass_of(v, DENSITY))
+    state = free.rest()
+    state.velocity[:, 0] = 1.0
+    run(kind(free, 1e-3), free, state, 5)
+    clamp = v.node_points[:, 1] == 0.0
+    fixed = np.repeat(clamp[:, None], 2, axis=1)
+    held = free.held_by(Supports(fixed, np.where(fixed, state.displacement, 0.0)))
+    caught = state.displacement[clamp].copy()
+    account = run(kind(held, 1e-3), held, state, 3)
+    assert np.array_equal(state.displacement[clamp], caught)
+    assert np.abs(state.velocity[clamp]).max() < 1e-30
+    # what stopping them takes is in the account, of energy and of momentum
+    size = account.kinetic[0]
+    assert np.ptp(account.balance - account.unbalanced) < 1e-12 * size
+    assert np.abs(account.unbalanced).max() < 1e-7 * size
+    gained = account.momentum - account.momentum[0]
+    assert np.abs(gained - account.impulse).max() < 1e-8 * np.abs(account.momentum).max()
+    run(kind(free, 1e-6), free, state, 1)
+    # let go they are pulled along by the stress that has built up, in a millionth of a second
+    assert np.abs(state.velocity[clamp]).max() < 1e-3
 
 
 @pytest.mark.parametrize("v", [cut_body(2), cut_body(3), cut_membrane()], ids=["2D", "3D", "sheet"])

@@ -109,8 +109,12 @@ class NewtonIntegrator(ABC):
         return forces
 
     def _velocity(self, displacement: _Floats) -> _Floats:
-        turned = (self.rate / self.step_size) * (displacement - self._start.displacement)
-        return turned - (self.rate - 1.0) * self._start.velocity
+        velocity = (self.rate / self.step_size) * (displacement - self._start.displacement)
+        velocity -= (self.rate - 1.0) * self._start.velocity
+        if not self.body.moving:
+            # nodes that were caught in flight would go on changing the sign of their velocity
+            velocity[self.body.fixed] = 0.0
+        return velocity
 
     def _residual(self, displacement: _Floats) -> tuple[_Floats, float, StepForces, float]:
         """Residual force (N, d), its norm, the forces, and the scale to which it compares.
