@@ -70,7 +70,7 @@ def test_no_array_of_another_shape_or_type_reaches_a_compiled_loop(v):
                 pattern, wrong, good, 1.0, 1.0, good, blocks
             )
     for wrong in (blocks[:-1], blocks.astype("f4"), blocks[:, :, :1]):
-        with pytest.raises(XfemError, match="blocks: float"):
+        with pytest.raises(XfemError, match="blocks of shape"):
             force.add_stiffness(pattern, wrong)
     with pytest.raises(XfemError, match="expected that of the body"):
         force.add_stiffness(other, few)
@@ -121,7 +121,7 @@ def test_states_that_cannot_be_written_and_supports_that_are_nowhere_are_refused
         MotionState(zero.copy(), zero.tolist()),
         MotionState(zero.astype("f4"), zero.copy()),
     ):
-        with pytest.raises(XfemError, match="expected a float64 array"):
+        with pytest.raises(XfemError, match="float64"):
             scheme(body, 0.003).step(wrong)
     with pytest.raises(XfemError, match="time nan s"):
         scheme(body, 0.003).step(MotionState(zero.copy(), zero.copy(), np.nan))

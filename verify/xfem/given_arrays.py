@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
 
-__all__ = ["index_array", "places", "real_array"]
+__all__ = ["check_floats", "index_array", "places", "real_array"]
 
 
 def real_array(given: ArrayLike, what: str) -> NDArray[np.float64]:
@@ -58,6 +58,19 @@ def _as_real(given: ArrayLike, what: str) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         pass
     raise XfemError(f"{what} {_shown(given)}; expected real numbers, in rows of one length")
+
+
+def check_floats(name: str, values: NDArray[np.float64], shape: tuple[int, ...]) -> None:
+    """Check an array that a compiled loop reads or writes as it is: loops check no bounds.
+
+    Raises
+    ------
+    XfemError
+        If it has another shape, or is not of 64-bit floats.
+    """
+    kind = getattr(values, "dtype", type(values).__name__)
+    if kind != np.float64 or values.shape != shape:
+        raise XfemError(f"{name} of shape {np.shape(values)}, {kind}; expected {shape}, float64")
 
 
 def _shown(given: ArrayLike) -> str:

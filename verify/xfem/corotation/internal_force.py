@@ -16,6 +16,7 @@ from verify.xfem.corotation.linearisation import Linearisation
 from verify.xfem.corotation.membrane_tension import add_tension
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_floats
 from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.sparse.system_shapes import check_blocks
 from verify.xfem.virtual import VirtualMesh
@@ -146,12 +147,7 @@ class InternalForce:
         return force, float(energy)
 
     def _check(self, name: str, values: _Floats) -> None:
-        """Check an array (N, d) that a compiled loop reads or writes."""
-        kind = getattr(values, "dtype", type(values).__name__)
-        if np.shape(values) != self._shape or kind != np.float64:
-            raise XfemError(
-                f"{name} of shape {np.shape(values)}, {kind}; expected {self._shape}, float64"
-            )
+        check_floats(name, values, self._shape)
 
     def _check_blocks(self, pattern: BlockPattern, blocks: _Floats) -> None:
         check_blocks(blocks, len(pattern.columns), self._shape[1])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.dynamics.body import MotionState
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_floats
 
 __all__ = ["Integrator", "StepFailedError", "StepForces", "check_state", "check_step"]
 
@@ -75,10 +76,6 @@ def check_state(state: MotionState, shape: tuple[int, int]) -> None:
         If it does not.
     """
     for name, value in (("displacement", state.displacement), ("velocity", state.velocity)):
-        if np.shape(value) != shape:
-            raise XfemError(f"{name} of shape {np.shape(value)}; the body has {shape}")
-        kind = getattr(value, "dtype", type(value).__name__)
-        if kind != np.float64:
-            raise XfemError(f"{name} of type {kind}; expected a float64 array, to be written to")
+        check_floats(name, value, shape)
     if not np.isfinite(state.time):
         raise XfemError(f"time {state.time!r} s of a state; expected finite")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from verify.xfem.arrays.growing_array import GrowingArray
 from verify.xfem.arrays.row_numbers import RowNumbers, number_of_row
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_floats
 
 __all__ = ["MovingSurface"]
 
@@ -142,7 +143,7 @@ class MovingSurface:
         self._check(displacement)
         if out is None:
             out = np.empty_like(self.material.rows)
-        self._check_vertices("positions", out)
+        check_floats("positions", out, self.material.rows.shape)
         _interpolate(self.material.rows, self.nodes.rows, self.weights.rows, displacement, out)
         return out
 
@@ -155,7 +156,7 @@ class MovingSurface:
             If an array has another shape or type.
         """
         self._check(out)
-        self._check_vertices("forces", forces)
+        check_floats("forces", forces, self.material.rows.shape)
         _spread(self.nodes.rows, self.weights.rows, forces, out)
         return out
 
@@ -201,13 +202,6 @@ class MovingSurface:
         if len(self.nodes) and len(nodal) <= self._largest_node():
             raise XfemError(
                 f"{len(nodal)} nodal values; expected at least {self._largest_node() + 1}"
-            )
-
-    def _check_vertices(self, name: str, values: _Floats) -> None:
-        kind, shape = getattr(values, "dtype", type(values).__name__), self.material.rows.shape
-        if kind != np.float64 or values.shape != shape:
-            raise XfemError(
-                f"{name} of shape {np.shape(values)}, {kind}; expected {shape}, float64"
             )
 
     def _largest_node(self) -> int:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_floats
 
 __all__ = ["check_blocks", "checked_load", "checked_start", "largest_entry"]
 
@@ -18,11 +19,7 @@ def check_blocks(blocks: _Floats, count: int, size: int) -> None:
     XfemError
         If their shape or type is another.
     """
-    shape = (count, size, size)
-    if blocks.shape != shape or blocks.dtype != np.float64:
-        raise XfemError(
-            f"blocks: {blocks.dtype} array of shape {blocks.shape}; expected float64 and {shape}"
-        )
+    check_floats("blocks", blocks, (count, size, size))
 
 
 def checked_load(load: ArrayLike, nodes: int, size: int) -> _Floats:
