@@ -207,9 +207,9 @@ def compile_here(stages: list[str]) -> FirstUse:
     try:
         with compile_times() as times:
             for stage in stages:
-                before = sum(times.seconds.values())
+                before = times.whole
                 STAGES[stage]()
-                spent[stage] = sum(times.seconds.values()) - before
+                spent[stage] = times.whole - before
     finally:
         if collecting:
             gc.enable()

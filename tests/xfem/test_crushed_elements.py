@@ -3,32 +3,18 @@
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, material
+from time_schemes import SCHEMES
 
 from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
-    CentralDifferences,
     DynamicBody,
-    EnergyMomentum,
     ForwardEuler,
-    ImplicitEuler,
-    RealTimeEuler,
-    SymplecticEuler,
-    Trapezoidal,
 )
 from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import cut_mesh
 
-SCHEMES = [
-    CentralDifferences,
-    SymplecticEuler,
-    ForwardEuler,
-    RealTimeEuler,
-    ImplicitEuler,
-    Trapezoidal,
-    EnergyMomentum,
-]
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [0.2, 0.9, 0.3], [0.1, 0.2, 0.8]])
 ELEMENTS = {
     "triangle": SimplexMesh(CORNERS[:3, :2], np.array([[0, 1, 2]])),

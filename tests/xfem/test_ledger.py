@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_body, cut_cube, cut_square, material, rotation
+from time_schemes import SCHEMES
 
 from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import critical_step
@@ -24,16 +25,6 @@ from verify.xfem.mass import side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports
-
-SCHEMES = [
-    CentralDifferences,
-    SymplecticEuler,
-    ForwardEuler,
-    RealTimeEuler,
-    ImplicitEuler,
-    Trapezoidal,
-    EnergyMomentum,
-]
 
 
 def _free(v, kinematics="corotational"):

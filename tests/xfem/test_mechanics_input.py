@@ -3,19 +3,15 @@
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane, material
+from time_schemes import SCHEMES
 
 from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
-    EnergyMomentum,
-    ForwardEuler,
     ImplicitEuler,
     MotionState,
     MovingSupports,
-    RealTimeEuler,
-    SymplecticEuler,
-    Trapezoidal,
     inherit_state,
 )
 from verify.xfem.dynamics.energy_ledger import EnergyLedger, run
@@ -24,16 +20,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.supports import Supports
-
-SCHEMES = [
-    CentralDifferences,
-    SymplecticEuler,
-    ForwardEuler,
-    RealTimeEuler,
-    ImplicitEuler,
-    Trapezoidal,
-    EnergyMomentum,
-]
 
 
 def _body(v, **options):

@@ -3,32 +3,19 @@
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane, material
+from time_schemes import SCHEMES
 
 from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
     EnergyMomentum,
-    ForwardEuler,
-    ImplicitEuler,
     RayleighDamping,
-    RealTimeEuler,
-    SymplecticEuler,
     Trapezoidal,
 )
 from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.supports import Supports
-
-SCHEMES = [
-    CentralDifferences,
-    SymplecticEuler,
-    ForwardEuler,
-    RealTimeEuler,
-    ImplicitEuler,
-    Trapezoidal,
-    EnergyMomentum,
-]
 
 
 def _replace_load(body, scheme):

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+
+import numpy as np
 
 from verify.report.axes import Panel, text
 from verify.report.curves import Curve, Point
@@ -120,21 +121,14 @@ def band(panel: Panel, floor: Sequence[tuple[float, float]]) -> Markup:
     left = inside[0][1] <= inside[-1][1]
     x, anchor = (panel.x.start + 5, "start") if left else (panel.x.end - 4, "end")
     reach = x + _NAME_OF_BAND if left else x - _NAME_OF_BAND
-    top = max([_edge(nodes, reach), *(y for at, y in nodes if (at <= reach) == left)])
+    edge = float(np.interp(reach, [at for at, _ in nodes], [y for _, y in nodes]))
+    top = max([edge, *(y for at, y in nodes if (at <= reach) == left)])
     name = text(x, top + 12, "uncertainty of the comparison", class_="note", text_anchor=anchor)
     return joined(
         tag("path", d=f"M{line}V{panel.y.start}H{panel.x.start}Z", class_="floor"),
         tag("path", d=f"M{line}", class_="floor-edge"),
         name if panel.y.start - top > 14 else None,
     )
-
-
-def _edge(nodes: Sequence[tuple[float, float]], x: float) -> float:
-    """Height of a polyline at `x`, in pixels."""
-    for (x0, y0), (x1, y1) in pairwise(nodes):
-        if x0 <= x <= x1 and x1 > x0:
-            return y0 + (y1 - y0) * (x - x0) / (x1 - x0)
-    return nodes[-1][1]
 
 
 def slope_triangle(

@@ -21,6 +21,8 @@ from verify.runner.ranks import give_up, world
 
 __all__ = ["main", "solve_job"]
 
+_WORTH_SAYING = 0.5  # seconds of compilation
+
 
 def main(job_file: Path) -> None:
     """Solve what `job_file` says and write down how it went."""
@@ -95,7 +97,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
         "notes": {
             **solution.notes,
             "calibration": calibration_note(),
-            **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > 0.5 else {}),
+            **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > _WORTH_SAYING else {}),
         },
     }
 

@@ -334,14 +334,9 @@ class InternalForce:
 
     def inverted(self, displacement: _Floats) -> NDArray[np.int64]:
         """Pieces whose deformation gradient has a negative determinant (solids only)."""
-        v = self.virtual
-        if v.mesh.dim < v.mesh.space:
+        if self.is_membrane:
             raise XfemError("inversion of a membrane in space is not defined")
-        self._check("displacement", displacement)
-        F = np.eye(v.mesh.dim) + np.einsum(
-            "pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent]
-        )
-        return np.flatnonzero(np.linalg.det(F) < 0.0)
+        return np.flatnonzero(np.linalg.det(self._deformation(displacement)) < 0.0)
 
     def collapsed(self, displacement: _Floats, ratio: float) -> NDArray[np.int64]:
         """Pieces whose rotation, and with it the force, is not unique, or nearly so.
@@ -356,19 +351,23 @@ class InternalForce:
         ratio : float
             Of what is left to the largest stretch, below which a piece counts.
         """
-        self._check("displacement", displacement)
-        v, space = self.virtual, self._shape[1]
-        F = np.einsum("pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent])
-        if self.is_membrane:
-            normals = self._normals[v.parent]
-            F += np.eye(space) - np.einsum("pk,pl->pkl", normals, normals)
-            stretches = np.linalg.svd(F, compute_uv=False)
-            left = stretches[:, 1]
-        else:
-            F += np.eye(space)
-            stretches = np.linalg.svd(F, compute_uv=False)
+        F = self._deformation(displacement)
+        stretches = np.linalg.svd(F, compute_uv=False)
+        left = stretches[:, 1]
+        if not self.is_membrane:
             left = np.abs(stretches[:, -2] + np.sign(np.linalg.det(F)) * stretches[:, -1])
         return np.flatnonzero(left <= ratio * stretches[:, 0])
+
+    def _deformation(self, displacement: _Floats) -> _Floats:
+        """Deformation gradients (p, d, d) of the pieces; of a membrane zero across its plane."""
+        self._check("displacement", displacement)
+        v = self.virtual
+        F = np.einsum("pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent])
+        F += np.eye(self._shape[1])
+        if self.is_membrane:
+            normals = self._normals[v.parent]
+            F -= np.einsum("pk,pl->pkl", normals, normals)
+        return F
 
 
 def _unit_normals(virtual: VirtualMesh) -> _Floats:

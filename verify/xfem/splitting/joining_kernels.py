@@ -187,20 +187,9 @@ def _find_relevant(here, there, starts, pieces, label, relevant):
 
 @njit(cache=True)
 def join_across_faces(
-    begin,
-    patch,
-    cells,
-    neighbours,
-    place,
-    starts,
-    pieces,
-    label,
-    solid,
-    values,
-    stairs,
-    edges,
+    begin, patch, cells, neighbours, place, starts, pieces, label, solid, values, stairs, edges,
     towards,
-):
+):  # fmt: skip
     """Join the slots of pieces that touch across faces, from one cell of a patch on.
 
     Parameters

@@ -118,13 +118,10 @@ def static_equilibrium(
     counts = []
     for k in range(1, load_steps + 1):
         share = k / load_steps
-        wanted = np.zeros(shape)
-        if prescribed is not None:
-            given = prescribed(share)
-            if given.shape == shape:  # what is not fixed may be anything
-                given = np.where(fixed, given, 0.0)
-            wanted = _checked("prescribed displacement", given, shape)
-        change = np.where(fixed, wanted - displacement, 0.0)
+        wanted = np.zeros(shape) if prescribed is None else prescribed(share)
+        if wanted.shape == shape:  # what is not fixed may be anything
+            wanted = np.where(fixed, wanted, displacement)
+        change = _checked("prescribed displacement", wanted, shape) - displacement
         displacement, count = newton.solve(displacement, change, share * full_load)
         counts.append(count)
     internal, energy = force.evaluate(displacement)

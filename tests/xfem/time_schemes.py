@@ -1,0 +1,21 @@
+"""All time integration schemes of the compact solver, for claims that hold for each."""
+
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    EnergyMomentum,
+    ForwardEuler,
+    ImplicitEuler,
+    RealTimeEuler,
+    SymplecticEuler,
+    Trapezoidal,
+)
+
+SCHEMES = [
+    CentralDifferences,
+    SymplecticEuler,
+    ForwardEuler,
+    RealTimeEuler,
+    ImplicitEuler,
+    Trapezoidal,
+    EnergyMomentum,
+]
