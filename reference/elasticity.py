@@ -18,7 +18,7 @@ from reference.linear_solvers import (
 from reference.space import ConformingSpace, SharedUnknowns
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError
-from verify.scene import BodyForce, Gravity, Material, Scene, Traction
+from verify.scene import BodyForce, Gravity, Material, Scene, Traction, is_uniform
 from verify.scene.parts import on_part
 
 __all__ = [
@@ -217,16 +217,25 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
             force = (
                 _sided_function(space, exact.body_force, (space.dimension,))
                 if load.force == "exact"
-                else fem.Constant(domain, thickness * np.asarray(load.force, dtype=float))
+                else thickness * _density(space, load, load.force)
             )
             form += ufl.inner(force, v) * ufl.dx
         elif load.traction == "exact":
             stress = _sided_function(space, exact.stress, (space.dimension,) * 2)
             form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
         else:
-            traction = fem.Constant(domain, thickness * np.asarray(load.traction, dtype=float))
+            traction = thickness * _density(space, load, load.traction)
             form += ufl.inner(traction, v) * ds(i)
     return form
+
+
+def _density(space: ConformingSpace, load: BodyForce | Traction, given: Any) -> Any:
+    """Give a force per volume or area as a constant, or interpolated if it is a formula."""
+    from dolfinx import fem
+
+    if is_uniform(given):
+        return fem.Constant(space.function_space.mesh, np.asarray(given, dtype=float))
+    return _sided_function(space, lambda points, _near: load.values(points), (space.dimension,))
 
 
 def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> NDArray[np.int32]:

@@ -53,14 +53,17 @@ def load_jumps(scene: Scene, corners: Array) -> NDArray[np.bool_]:
     A symmetric stress wants t₁·n₂ = t₂·n₁ at a corner, and t₁ = t₂ on a straight edge. Else the
     strain grows like the logarithm of the distance.
     """
-    traction = np.zeros_like(corners)
+    following = np.roll(corners, -1, axis=0)
+    traction, at_end = np.zeros_like(corners), np.zeros_like(corners)  # at either end of each edge
     for load in scene.loads:
         if isinstance(load, Traction) and load.traction != "exact":
-            traction[on_edges(scene, load.where, corners)] += np.asarray(load.traction)
-    along = np.roll(corners, -1, axis=0) - corners
+            chosen = on_edges(scene, load.where, corners)
+            traction[chosen] += load.values(corners[chosen])
+            at_end[chosen] += load.values(following[chosen])
+    along = following - corners
     normal = np.column_stack([along[:, 1], -along[:, 0]])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    before, n_before = np.roll(traction, 1, axis=0), np.roll(normal, 1, axis=0)
+    before, n_before = np.roll(at_end, 1, axis=0), np.roll(normal, 1, axis=0)
     mismatch = np.abs(np.sum(before * normal, axis=1) - np.sum(traction * n_before, axis=1))
     straight = np.abs(np.sum(normal * n_before, axis=1)) > 1 - 1e-12
     mismatch[straight] = np.linalg.norm(before - traction, axis=1)[straight]

@@ -25,6 +25,7 @@ from verify.scene import (
     Scene,
     Support,
     Traction,
+    is_uniform,
 )
 from verify.scene.parts import on_part
 from verify.solvers.xfem_scene import background_mesh
@@ -306,14 +307,16 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
     # a membrane's forces per volume and area count times its thickness
     measured = _measures(corners)[:, None] * weights * (scene.material.thickness or 1.0)
     history = getattr(load, "history", None)
-    if not isinstance(given, str):
-        uniform = np.asarray(given, dtype=float)
-        values = np.broadcast_to(uniform, points.shape)
-        return Load(simplices, uniform, points, measured, values, barycentric, history)
+    if isinstance(load, Gravity) or is_uniform(given):
+        constant = np.asarray(given, dtype=float)
+        values = np.broadcast_to(constant, points.shape)
+        return Load(simplices, constant, points, measured, values, barycentric, history)
     # a point of a conforming mesh belongs to the side of its own cell; else to its own
     near = np.repeat(mesh.centroids(cells), len(weights), axis=0) if mesh.conforming else None
     flat = points.reshape(-1, points.shape[2])
-    if isinstance(load, Traction):
+    if given != "exact":
+        values = load.values(flat).reshape(points.shape)
+    elif isinstance(load, Traction):
         stress = exact.stress(flat, near).reshape(*points.shape, points.shape[2])
         normals = _outward_normals(corners, mesh.centroids(cells))
         values = np.einsum("kqij,kj->kqi", stress, normals)

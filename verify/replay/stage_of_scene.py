@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from verify.anatomy.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.errors import InputError, UnsupportedSceneError
 from verify.replay.stage import Hold, Hook, Stage
-from verify.scene import Gravity, Scene, Skin, ToolPathCut
+from verify.scene import Gravity, Scene, Skin, ToolPathCut, is_uniform
 from verify.scene.parts import on_part
 from verify.scene.replay import Pull
 from verify.solvers.xfem_scene import background_mesh
@@ -88,7 +88,8 @@ def _refusal(scene: Scene) -> str | None:
         if not isinstance(load, Gravity):
             return f"loads[{i}]: only gravity and pulls are played, not a {load.kind}"
     for i, support in enumerate(scene.supports):
-        if support.displacement == "exact" or support.history is not None:
+        given = support.displacement
+        if given == "exact" or not is_uniform(given) or support.history is not None:
             return f"supports[{i}]: only constant supports are played"
     for i, cut in enumerate(scene.cuts):
         if not isinstance(cut, ToolPathCut):

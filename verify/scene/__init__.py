@@ -35,8 +35,9 @@ from verify.scene.physics import (
     Rotation,
     Support,
     Traction,
+    is_uniform,
 )
-from verify.scene.regions import Region, parse_region
+from verify.scene.regions import Region, parse_expression, parse_region
 from verify.scene.replay import Pull, Replay
 from verify.scene.scene import Scene
 from verify.scene.skin import Skin
@@ -84,9 +85,11 @@ __all__ = [
     "Traction",
     "ValueCheck",
     "case_folder",
+    "is_uniform",
     "list_cases",
     "load_scene",
     "mesh_path",
+    "parse_expression",
     "parse_region",
     "read_mesh",
     "restore_scene",

@@ -1,5 +1,6 @@
 """Material, supports, loads and the analysis of a scene. SI units."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -7,7 +8,17 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from verify.scene.history import History
-from verify.scene.strict import Count, Finite, NonNegative, Point3, Positive, Strict, Vector
+from verify.scene.regions import parse_expression
+from verify.scene.strict import (
+    Components,
+    Count,
+    Finite,
+    NonNegative,
+    Point3,
+    Positive,
+    Strict,
+    Vector,
+)
 
 __all__ = [
     "Analysis",
@@ -19,11 +30,28 @@ __all__ = [
     "Rotation",
     "Support",
     "Traction",
+    "is_uniform",
 ]
 
 _OUTPUTS = 11
 
-Values = Annotated[list[Finite], Field(min_length=1, max_length=3)]
+
+def is_uniform(components: Sequence[float | str]) -> bool:
+    """Whether all components are numbers, not formulas."""
+    return not any(isinstance(one, str) for one in components)
+
+
+def _field(components: Sequence[float | str], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values (n, components) at points (n, d) of numbers and formulas."""
+    if is_uniform(components):
+        return np.tile(np.asarray(components, dtype=float), (len(points), 1))
+    columns = [
+        parse_expression(one, points.shape[1])(points)
+        if isinstance(one, str)
+        else np.full(len(points), one)
+        for one in components
+    ]
+    return np.column_stack(columns)
 
 
 class Material(Strict):
@@ -67,8 +95,9 @@ class Support(Strict):
     """Prescribed displacement on a part of the boundary."""
 
     where: str = Field(description="name of a boundary part, 'boundary', or an inequality")
-    displacement: Values | Literal["exact"] = Field(
-        description="values in m, one per component held; or 'exact' (see [exact])"
+    displacement: Components | Literal["exact"] = Field(
+        description="m, one number or formula in x, y, z per component held; or 'exact' (see "
+        "[exact])"
     )
     components: list[Literal["x", "y", "z"]] | None = Field(
         default=None, description="which components are held; default all"
@@ -108,8 +137,7 @@ class Support(Strict):
         A history's factor multiplies the displacement and the angle of a rotation.
         """
         assert self.displacement != "exact"
-        shift = factor * np.asarray(self.displacement, dtype=float)
-        moved = np.tile(shift, (len(points), 1))
+        moved = factor * _field(self.displacement, points)
         if self.rotation is not None:
             turn = self.rotation.matrix(factor) - np.eye(points.shape[1])
             moved += (points - np.asarray(self.rotation.centre)) @ turn.T
@@ -118,7 +146,7 @@ class Support(Strict):
     def rates(self, points: NDArray[np.float64], factor: float = 1.0) -> NDArray[np.float64]:
         """Return the derivative (k, held) of `values` by the factor, m."""
         assert self.displacement != "exact"
-        rate = np.tile(np.asarray(self.displacement, dtype=float), (len(points), 1))
+        rate = _field(self.displacement, points)
         if self.rotation is not None:
             turning = self.rotation.matrix_rate(factor)
             rate += (points - np.asarray(self.rotation.centre)) @ turning.T
@@ -133,11 +161,18 @@ class Gravity(Strict):
 
 
 class BodyForce(Strict):
-    """Force per volume, uniform, or that of the exact solution."""
+    """Force per volume, or that of the exact solution."""
 
     kind: Literal["body_force"]
-    force: Vector | Literal["exact"] = Field(description="N/m³, or 'exact'")
+    force: Components | Literal["exact"] = Field(
+        description="N/m³, a number or a formula in x, y, z per component; or 'exact'"
+    )
     history: History | None = None
+
+    def values(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Force per volume (n, d) in N/m³ at points (n, d), unless it is ``"exact"``."""
+        assert self.force != "exact"
+        return _field(self.force, points)
 
 
 class Traction(Strict):
@@ -145,8 +180,15 @@ class Traction(Strict):
 
     kind: Literal["traction"]
     where: str = Field(description="name of a boundary part, 'boundary', or an inequality")
-    traction: Vector | Literal["exact"] = Field(description="Pa, or 'exact'")
+    traction: Components | Literal["exact"] = Field(
+        description="Pa, a number or a formula in x, y, z per component; or 'exact'"
+    )
     history: History | None = None
+
+    def values(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Traction (n, d) in Pa at points (n, d), unless it is ``"exact"``."""
+        assert self.traction != "exact"
+        return _field(self.traction, points)
 
 
 Load = Annotated[Gravity | BodyForce | Traction, Field(discriminator="kind")]

@@ -10,7 +10,7 @@ from verify.scene.geometry import MeshFile, Polygon
 from verify.scene.initial import Moving
 from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, Gravity, Rotation, Traction
-from verify.scene.regions import parse_region
+from verify.scene.regions import parse_expression, parse_region
 from verify.scene.skin import Skin
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def check_placement(scene: "Scene") -> None:
     """Raise ValueError with one clear line if the parts of `scene` do not fit together."""
     _check_dimensions(scene)
     _check_regions(scene)
+    _check_formulas(scene)
     _check_exact(scene)
     _check_names(scene)
     check_parts_act(scene)
@@ -115,6 +116,23 @@ def _check_regions(scene: "Scene") -> None:
             parse_region(where, scene.dimension)
         except ValueError as error:
             raise ValueError(f"{place}: {error}") from None
+
+
+def _check_formulas(scene: "Scene") -> None:
+    """Refuse formulas that cannot be read; where they are no finite number is found on meshes."""
+    given = {f"supports[{i}].displacement": s.displacement for i, s in enumerate(scene.supports)}
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, BodyForce):
+            given[f"loads[{i}].force"] = load.force
+        elif isinstance(load, Traction):
+            given[f"loads[{i}].traction"] = load.traction
+    for place, components in given.items():
+        for text in [] if components == "exact" else components:
+            if isinstance(text, str):
+                try:
+                    parse_expression(text, scene.dimension)
+                except ValueError as error:
+                    raise ValueError(f"{place}: {error}") from None
 
 
 def _check_exact(scene: "Scene") -> None:

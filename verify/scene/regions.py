@@ -1,4 +1,4 @@
-"""Regions of the body said by inequalities, such as ``x < 0.01 and y > 0.5``.
+"""Regions and fields of the body as text: ``x < 0.01 and y > 0.5``, ``1e3 * (y - 0.5)``.
 
 The text is parsed into a syntax tree of which only comparisons, ``and``/``or``/``not``,
 arithmetic and a few functions are accepted; nothing is ever evaluated as Python.
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["Region", "parse_region"]
+__all__ = ["Expression", "Region", "parse_expression", "parse_region"]
 
 Array = NDArray[np.float64]
 Region = Callable[[Array], NDArray[np.bool_]]
+Expression = Callable[[Array], Array]
 
 _COORDINATES = ("x", "y", "z")
 _ARITHMETIC = {
@@ -38,6 +39,7 @@ _MEANING = (
     "an inequality in x, y, z such as 'x < 0.01 and y > 0.5' "
     "(comparisons < <= > >=, and/or/not, + - * / **, abs sqrt sin cos hypot, pi)"
 )
+_FORMULA = "a formula in x, y, z such as '1e3 * (y - 0.5)' (+ - * / **, abs sqrt sin cos hypot, pi)"
 
 
 def parse_region(text: str, dimension: int) -> Region:
@@ -82,8 +84,51 @@ def parse_region(text: str, dimension: int) -> Region:
     return region
 
 
-def _reject(node: ast.AST, text: str) -> InputError:
-    return InputError(f"'{ast.unparse(node)}' in '{text}' is not allowed; expected {_MEANING}")
+def parse_expression(text: str, dimension: int) -> Expression:
+    """Turn a formula into a function of points.
+
+    Parameters
+    ----------
+    text : str
+        The formula; coordinates in metres.
+    dimension : int
+        2 or 3: which of x, y, z may be named.
+
+    Returns
+    -------
+    callable
+        Maps points (n, dimension) to values (n,). It raises InputError where a value is no finite
+        number, and names the place.
+
+    Raises
+    ------
+    InputError
+        If the text is not such a formula; the message names the part that is not.
+    """
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+        _check_number(tree, text, dimension, _FORMULA)
+        _check_constants(tree, text)
+    except InputError:
+        raise
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise InputError(f"'{text}' is not {_FORMULA}") from None
+
+    def expression(points: Array) -> Array:
+        points = np.asarray(points, dtype=float)
+        with np.errstate(all="ignore"):
+            values = np.array(np.broadcast_to(_number(tree, points), (len(points),)))
+        if not np.isfinite(values).all():
+            place = points[np.argmin(np.isfinite(values))]
+            at = ", ".join(f"{x:.4g}" for x in place)
+            raise InputError(f"'{text}' is no finite number at ({at})")
+        return values
+
+    return expression
+
+
+def _reject(node: ast.AST, text: str, meaning: str = _MEANING) -> InputError:
+    return InputError(f"'{ast.unparse(node)}' in '{text}' is not allowed; expected {meaning}")
 
 
 def _check_condition(node: ast.AST, text: str, dimension: int) -> None:
@@ -116,26 +161,26 @@ def _check_constants(node: ast.AST, text: str) -> None:
         raise InputError(f"'{ast.unparse(node)}' in '{text}' is no finite number")
 
 
-def _check_number(node: ast.AST, text: str, dimension: int) -> None:
+def _check_number(node: ast.AST, text: str, dimension: int, meaning: str = _MEANING) -> None:
     match node:
         case ast.Constant(value=bool()):
-            raise _reject(node, text)
+            raise _reject(node, text, meaning)
         case ast.Constant(value=int() | float() as value) if abs(value) <= 1e300:
             pass
         case ast.Name(id=name) if name in (*_COORDINATES[:dimension], "pi"):
             pass
         case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
-            _check_number(operand, text, dimension)
+            _check_number(operand, text, dimension, meaning)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _ARITHMETIC:
-            _check_number(left, text, dimension)
-            _check_number(right, text, dimension)
+            _check_number(left, text, dimension, meaning)
+            _check_number(right, text, dimension, meaning)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if (
             name in _FUNCTIONS and len(arguments) == (2 if name == "hypot" else 1)
         ):
             for argument in arguments:
-                _check_number(argument, text, dimension)
+                _check_number(argument, text, dimension, meaning)
         case _:
-            raise _reject(node, text)
+            raise _reject(node, text, meaning)
 
 
 def _condition(node: ast.AST, points: Array) -> NDArray[np.bool_]:

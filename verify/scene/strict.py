@@ -5,8 +5,10 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 __all__ = [
+    "Components",
     "Count",
     "Finite",
+    "Formula",
     "Line",
     "NonNegative",
     "Point2",
@@ -25,6 +27,9 @@ Line = Annotated[str, Field(min_length=1, pattern=r"^[^\r\n]*$")]
 Point2 = tuple[Finite, Finite]
 Point3 = tuple[Finite, Finite, Finite]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
+# a number, or a formula in x, y, z that `verify.scene.regions.parse_expression` reads
+Formula = Annotated[str, Field(min_length=1, max_length=1000)]
+Components = Annotated[list[Finite | Formula], Field(min_length=1, max_length=3)]
 
 
 class Strict(BaseModel):

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import Gravity, Scene, Traction
+from verify.scene import BodyForce, Gravity, Scene, Traction, is_uniform
 from verify.scene.physics import Load
 from verify.solvers.xfem_boundary import facets_on
 from verify.xfem.loads import Density, body_force, traction
@@ -46,18 +46,25 @@ def nodal_forces(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[NodalFo
             forces = body_force(virtual, weight)
         elif isinstance(entry, Traction):
             facets = facets_on(scene, virtual.mesh, entry.where, f"loads[{i}].where")
-            forces = _traction(virtual, facets, entry.traction, exact)
+            if entry.traction == "exact":
+                forces = _stresses(virtual, facets, exact)
+            else:
+                forces = traction(virtual, facets, _density(entry, entry.traction))
         elif entry.force == "exact":
             forces = body_force(virtual, lambda points, sides: exact.body_force(points))
         else:
-            forces = body_force(virtual, entry.force)
+            forces = body_force(virtual, _density(entry, entry.force))
         found.append(NodalForces(entry, thickness * forces))
     return found
 
 
-def _traction(virtual: VirtualMesh, facets: NDArray[np.int64], given: Any, exact: Any) -> _Floats:
-    if given != "exact":
-        return traction(virtual, facets, given)
+def _density(load: BodyForce | Traction, given: Any) -> Any:
+    """Numbers as they are, which are integrated in closed form; formulas as a function."""
+    return given if is_uniform(given) else lambda points, sides: load.values(points)
+
+
+def _stresses(virtual: VirtualMesh, facets: NDArray[np.int64], exact: Any) -> _Floats:
+    """Nodal forces (N, d) of the exact solution's stress vectors on facets."""
     mesh = virtual.mesh
     normals = -mesh.gradients[facets[:, 0], facets[:, 1]]
     normals /= np.linalg.norm(normals, axis=1)[:, None]

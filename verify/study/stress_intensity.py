@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Scene
+from verify.scene import BodyForce, Gravity, Scene, is_uniform
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.scene.physics import BodyForce, Gravity
 from verify.solution import Solution
 
 __all__ = ["exact_intensity", "solution_intensity"]
@@ -58,7 +57,7 @@ def _body_force(scene: Scene) -> np.ndarray | None:
         if isinstance(load, Gravity):
             total += (scene.material.density or 0.0) * np.asarray(load.acceleration)
         elif isinstance(load, BodyForce):
-            if load.force == "exact":
+            if load.force == "exact" or not is_uniform(load.force):
                 raise UnsupportedSceneError(
                     "stress-intensity factors are measured with uniform body forces only"
                 )

@@ -1,0 +1,77 @@
+"""Loads and supports that vary in space, said by formulas in the case."""
+
+import numpy as np
+import pytest
+
+from verify.errors import InputError
+from verify.scene import Scene, parse_expression
+
+POINTS = np.random.default_rng(3).uniform(-1, 1, (50, 3))
+
+
+@pytest.mark.parametrize(
+    "text, value",
+    [
+        ("2", lambda x, y, z: 2 + 0 * x),
+        ("-x**2 + 3*y*z", lambda x, y, z: -(x**2) + 3 * y * z),
+        ("hypot(x, y) * sin(pi*z)", lambda x, y, z: np.hypot(x, y) * np.sin(np.pi * z)),
+    ],
+)
+def test_a_formula_has_the_value_of_its_arithmetic(text, value):
+    np.testing.assert_allclose(parse_expression(text, 3)(POINTS), value(*POINTS.T), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("x < 1", "'x < 1' in 'x < 1' is not allowed"),
+        ("1e3*(y", "is not a formula"),
+        ("__import__('os')", "is not allowed"),
+        ("z", "'z' in 'z' is not allowed"),
+        ("1/0", "is no finite number"),
+        ("x" + "+x" * 100_000, "is not a formula"),
+    ],
+)
+def test_what_is_no_formula_is_refused_and_named(text, said):
+    with pytest.raises(InputError) as refused:
+        parse_expression(text, 2)
+    assert said in str(refused.value)
+
+
+def test_a_place_without_a_finite_value_is_named():
+    with pytest.raises(InputError, match=r"no finite number at \(0, 0.5\)"):
+        parse_expression("1/x", 2)(np.array([[1.0, 0.0], [0.0, 0.5]]))
+
+
+def content(**changes):
+    return {
+        "title": "a square",
+        "requirement": "none",
+        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
+        "mesh": {"cells": [[4, 4]]},
+        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
+        "supports": [{"where": "left", "displacement": ["0.1*y", 0.0]}],
+    } | changes
+
+
+@pytest.mark.parametrize(
+    "changes, said",
+    [
+        ({"supports": [{"where": "left", "displacement": ["0.1*z", 0]}]}, "supports[0]"),
+        ({"loads": [{"kind": "body_force", "force": [0, "y if x else 1"]}]}, "loads[0].force"),
+        (
+            {"loads": [{"kind": "traction", "where": "right", "traction": ["1/0", 0]}]},
+            "loads[0].traction",
+        ),
+    ],
+)
+def test_a_scene_names_the_formula_that_it_cannot_read(changes, said):
+    with pytest.raises(ValueError, match=said.replace("[", r"\[").replace("]", r"\]")):
+        Scene.model_validate(content(**changes))
+
+
+def test_a_support_moves_by_its_formula_times_the_factor_of_its_history():
+    support = Scene.model_validate(content()).supports[0]
+    points = np.array([[0.0, 0.5], [0.0, 1.0]])
+    np.testing.assert_allclose(support.values(points, 0.5), [[0.025, 0], [0.05, 0]], atol=1e-17)
+    np.testing.assert_allclose(support.rates(points), [[0.05, 0], [0.1, 0]], atol=1e-17)
