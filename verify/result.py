@@ -18,6 +18,8 @@ __all__ = [
     "SCHEMA_VERSION",
     "CaseResult",
     "Metric",
+    "Notice",
+    "NoticeKind",
     "Rate",
     "SolveRecord",
     "Status",
@@ -163,6 +165,34 @@ class VerdictRecord:
     reason: str
 
 
+class NoticeKind(StrEnum):
+    """What a notice is about."""
+
+    WARNING = "warning"  # an answer whose meaning is in doubt, whatever its verdict
+    UNAVAILABLE = "unavailable"  # a quantity that was asked for and cannot be had
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A sentence that a reader of a case must not miss, beside its verdicts.
+
+    Parameters
+    ----------
+    kind : NoticeKind
+    about : str
+        Name of the quantity, or of the cut (``"cut 0"``).
+    solver : str or None
+        Whose answer it is about; None if it holds for every solver.
+    text : str
+        One sentence, with its numbers and their place.
+    """
+
+    kind: NoticeKind
+    about: str
+    solver: str | None
+    text: str
+
+
 @dataclass(frozen=True)
 class CaseResult:
     """All that is known about one case of a run."""
@@ -178,6 +208,7 @@ class CaseResult:
     verdicts: list[VerdictRecord]
     pictures: dict[str, str] = field(default_factory=dict)  # name -> path in the run directory
     provenance: dict[str, Any] = field(default_factory=dict)
+    notices: list[Notice] = field(default_factory=list)
     schema: int = SCHEMA_VERSION
 
     @property
@@ -185,6 +216,11 @@ class CaseResult:
         """The worst verdict of the case (ERROR > FAIL > UNDECIDED > PASS)."""
         order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
         return max((v.verdict for v in self.verdicts), key=order.index, default=Verdict.UNDECIDED)
+
+    @property
+    def warnings(self) -> list[Notice]:
+        """The notices that put an answer in doubt."""
+        return [notice for notice in self.notices if notice.kind is NoticeKind.WARNING]
 
 
 def write_result(result: CaseResult, path: Path) -> None:
@@ -231,6 +267,9 @@ def read_result(path: Path) -> CaseResult:
         record["rates"] = [Rate(**rate) for rate in record["rates"]]
         record["verdicts"] = [
             VerdictRecord(**{**v, "verdict": Verdict(v["verdict"])}) for v in record["verdicts"]
+        ]
+        record["notices"] = [
+            Notice(**{**n, "kind": NoticeKind(n["kind"])}) for n in record.get("notices", [])
         ]
         return CaseResult(**record)
     except (AttributeError, LookupError, TypeError, ValueError) as error:

@@ -52,6 +52,7 @@ def execute(arguments: argparse.Namespace) -> int:
     if arguments.json:
         verdicts = [asdict(record) for record in result.verdicts]
         answer = {"exit": code, "report": str(report), "case": result.case, "verdicts": verdicts}
+        answer["notices"] = [asdict(notice) for notice in result.notices]
         print(json.dumps(answer, indent=2))
         return code
     for line in verdict_lines([result]):

@@ -40,6 +40,12 @@ def _solve_text(label: str, record: SolveRecord, reused: bool) -> str:
     return f"{label}: {record.status}{took}: {record.reason}"
 
 
+def _case_text(result: CaseResult) -> str:
+    count = len(result.warnings)
+    warned = f" ({count} warning{'s' * (count > 1)})" if count else ""
+    return f"{result.case}: {result.verdict if result.verdicts else 'not judged'}{warned}"
+
+
 class _Lines:
     """One line per finished solve and case."""
 
@@ -59,7 +65,7 @@ class _Lines:
         self._say(f"[{self.done}/{self.total}] {_solve_text(label, record, reused)}")
 
     def judged(self, result: CaseResult) -> None:
-        self._say(f"{result.case}: {result.verdict if result.verdicts else 'not judged'}")
+        self._say(_case_text(result))
 
     def close(self) -> None:
         """Nothing is drawn that would have to go."""
@@ -102,7 +108,7 @@ class _Bars:
 
     def judged(self, result: CaseResult) -> None:
         self.running.pop(f"{result.case} · comparison", None)
-        self._say(f"{result.case}: {result.verdict if result.verdicts else 'not judged'}")
+        self._say(_case_text(result))
         self._describe(1)
 
     def close(self) -> None:

@@ -68,6 +68,7 @@ def execute(arguments: argparse.Namespace) -> int:
                 "case": result.case,
                 "verdict": result.verdict,
                 "verdicts": [asdict(record) for record in result.verdicts],
+                "notices": [asdict(notice) for notice in result.notices],
                 "solves": [
                     {"solver": s.solver, "level": s.level, "status": s.status, "reason": s.reason}
                     for s in result.solves

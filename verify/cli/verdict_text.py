@@ -3,25 +3,32 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from verify.result import CaseResult, Status, Verdict, VerdictRecord
+from verify.result import CaseResult, Notice, Status, Verdict, VerdictRecord
 
-__all__ = ["verdict_lines"]
+__all__ = ["notice_text", "verdict_lines"]
 
 
 def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
-    """Yield a line per case, one per check that is not a PASS, one per solve that ended badly."""
+    """Yield a line per case, one per notice, per check that is not a PASS, per bad end."""
     width = max((len(result.case) for result in results), default=0)
     for result in results:
         counts = Counter(record.verdict for record in result.verdicts)
         said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict])
         verdict = result.verdict if result.verdicts else "NOT JUDGED"
         yield f"{result.case:<{width}}  {verdict:<10} {said}"
+        yield from (f"    {notice_text(notice)}" for notice in result.notices)
         for record in result.verdicts:
             if record.verdict is not Verdict.PASS:
                 yield f"    {record.verdict}: {_check(record)}: {record.reason}"
         for solve in result.solves:
             if solve.status is not Status.SOLVED:
                 yield f"    {solve.solver}, level {solve.level}: {solve.status}: {solve.reason}"
+
+
+def notice_text(notice: Notice) -> str:
+    """Return a notice as one line."""
+    whose = f" ({notice.solver})" if notice.solver else ""
+    return f"{notice.kind.upper()}: {notice.about}{whose}: {notice.text}"
 
 
 def _check(record: VerdictRecord) -> str:

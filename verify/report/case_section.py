@@ -7,6 +7,7 @@ from verify.report.figures_cost import time_figure, unknowns_figure
 from verify.report.markup import Markup, joined, tag
 from verify.report.motion_section import motion_section
 from verify.report.notation import error_title, number, number_text
+from verify.report.notices import warning_banner, warning_mark
 from verify.report.pictures import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
 from verify.report.summary import anchor, badge, verdict_of
@@ -34,7 +35,14 @@ def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup
     head = tag(
         "header",
         tag("h2", result.title if result else entry.name),
-        tag("p", badge(verdict_of(entry)), " ", tag("span", entry.name, class_="path")),
+        tag(
+            "p",
+            badge(verdict_of(entry)),
+            " ",
+            warning_mark(result),
+            " ",
+            tag("span", entry.name, class_="path"),
+        ),
         tag("p", result.requirement, class_="requirement") if result else None,
     )
     if result is None:
@@ -52,7 +60,8 @@ def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup
 
 
 def _body(result: CaseResult, pictures: CasePictures) -> Markup:
-    parts: list[Markup | None] = [_pictures(pictures), failures_table(result.solves)]
+    parts: list[Markup | None] = [warning_banner(result)]
+    parts += [_pictures(pictures), failures_table(result.solves)]
     names = metric_names(result)
     if diagrams := [d for name in names if (d := _diagrams(result, name)) is not None]:
         curves = [curve for name in names for curve in error_curves(result, name)]

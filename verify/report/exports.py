@@ -69,13 +69,26 @@ def json_document(run: Run) -> str:
 
 
 def csv_rows(run: Run) -> str:
-    """Return one row per case, solver, level and metric; one without metric for failed solves."""
+    """Return one row per case, solver, level and metric; one without metric for failed solves.
+
+    A notice is a row whose status is its kind, without level and value.
+    """
     buffer = io.StringIO()
     writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
     writer.writeheader()
     for entry in run.entries:
         for solve in entry.result.solves if entry.result else entry.unjudged:
             writer.writerows(_rows(entry, solve))
+        for notice in entry.result.notices if entry.result else []:
+            writer.writerow(
+                {
+                    "case": printable(entry.name),
+                    "solver": printable(notice.solver or ""),
+                    "status": str(notice.kind),
+                    "metric": printable(notice.about),
+                    "reason": printable(notice.text),
+                }
+            )
     return buffer.getvalue()
 
 
@@ -92,6 +105,12 @@ def junit_document(run: Run) -> str:
             for record in entry.result.verdicts:
                 _testcase(suite, entry, _test_name(record), record.verdict, record.reason)
         _count(suite)
+        if entry.result and entry.result.notices:
+            said = "\n".join(
+                f"{n.kind}: {n.about}{f' ({n.solver})' if n.solver else ''}: {n.text}"
+                for n in entry.result.notices
+            )
+            ElementTree.SubElement(suite, "system-out").text = printable(said)
         walls = [
             solve.wall for solve in (entry.result.solves if entry.result else []) if solve.wall
         ]

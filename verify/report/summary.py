@@ -4,6 +4,7 @@ from collections import Counter
 
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import error_title, metric_title, number, solver_title, with_interval
+from verify.report.notices import warning_mark
 from verify.report.run_directory import CaseEntry, Run
 from verify.result import Status, Verdict, VerdictRecord
 
@@ -65,6 +66,15 @@ def summary(run: Run) -> Markup:
     errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
     if errors := list(dict.fromkeys(errors)):
         said.append(joined(tag("b", "Not judged"), ": ", _listed(errors), ". "))
+    doubtful = [
+        f"{e.name} ({w.about}{f' of {solver_title(w.solver)}' if w.solver else ''}): "
+        f"{_clause(w.text)}"
+        for e in run.entries
+        if e.result
+        for w in e.result.warnings
+    ]
+    if doubtful:
+        said.append(joined(tag("b", "Warned of"), ": ", _listed(doubtful), ". "))
     without = [e.name for e in run.entries if e.result and not e.result.verdicts]
     if without:
         said.append(f"No check is stated for {_listed(without)}: nothing was accepted there. ")
@@ -92,7 +102,9 @@ def verdict_table(run: Run) -> Markup:
             colspan=3,
             scope="rowgroup",
         )
-        verdict = tag("td", badge(verdict_of(entry)), class_="worst")
+        verdict = tag(
+            "td", badge(verdict_of(entry)), " ", warning_mark(entry.result), class_="worst"
+        )
         rows = [tag("tr", head, verdict, class_="case-row")]
         rows += [check_row(record) for record in entry.result.verdicts] if entry.result else []
         groups.append(tag("tbody", rows))

@@ -16,6 +16,7 @@ from verify.report.notation import (
     seconds_text,
     solver_title,
 )
+from verify.report.notices import unavailable_rows
 from verify.result import CaseResult, Metric, SolveRecord, Status
 
 __all__ = [
@@ -29,14 +30,23 @@ __all__ = [
 ]
 
 
-def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], caption: str, **marks: str) -> Markup:
-    """Return a table that scrolls sideways where the page is too narrow for it."""
+def table(
+    head: Sequence[Any],
+    rows: Sequence[Sequence[Any]],
+    caption: str,
+    more: Sequence[Markup] = (),
+    **marks: str,
+) -> Markup:
+    """Return a table that scrolls sideways where the page is too narrow for it.
+
+    `more` are rows that are elements already, for the end of the table.
+    """
     cells = [tag("tr", [tag("td", cell) for cell in row]) for row in rows]
     whole = tag(
         "table",
         tag("caption", caption),
         tag("thead", tag("tr", [tag("th", title, scope="col") for title in head])),
-        tag("tbody", cells),
+        tag("tbody", cells, more),
     )
     class_ = f"scroll {marks.get('class_', '')}".strip()
     return tag("div", whole, class_=class_, tabindex="0", role="region", aria_label=caption)
@@ -59,7 +69,8 @@ def numbers_table(result: CaseResult) -> Markup | None:
         ]
         for solve in _ordered(result)
     ]
-    return table(head, rows, "Numbers: value ± uncertainty")
+    more = unavailable_rows(result, len(head))
+    return table(head, rows, "Numbers: value ± uncertainty", more)
 
 
 def times_table(result: CaseResult) -> Markup | None:

@@ -1,0 +1,97 @@
+"""Notices of a case: nobody can miss a warning, and what cannot be had stands with its reason."""
+
+import csv
+import io
+import json
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+from page_parser import parsed
+from synthetic_run import make_run
+
+from verify.cli.verdict_text import verdict_lines
+from verify.report import render
+from verify.result import Notice, NoticeKind, read_result, write_result
+
+CLOSED = "its faces overlap by up to 18.5 mm at (0.05, 0.05) m"
+NO_TIP = "the end of the arc (0.1, 0) m is no tip"
+
+
+@pytest.fixture(scope="module")
+def warned(tmp_path_factory):
+    root = make_run(tmp_path_factory.mktemp("warned") / "run", pictures=False)
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    notices = [
+        Notice(NoticeKind.WARNING, "cut 0", "xfem", CLOSED),
+        Notice(NoticeKind.UNAVAILABLE, "K_I", None, NO_TIP),
+    ]
+    write_result(replace(read_result(file), notices=notices), file)
+    render(root)
+    return root, read_result(file)
+
+
+def test_notices_are_read_as_they_were_written(warned):
+    _, result = warned
+    assert [notice.kind for notice in result.notices] == ["warning", "unavailable"]
+    assert result.warnings == result.notices[:1]
+    assert result.warnings[0].text == CLOSED
+
+
+def test_a_result_of_before_has_no_notices(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    record = json.loads(file.read_text())
+    del record["notices"]
+    file.write_text(json.dumps(record))
+    assert read_result(file).notices == []
+
+
+def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge(warned):
+    page = (warned[0] / "report.html").read_text()
+    top, case = page.index("Warned of"), page.index('id="case-1"')
+    assert top < page.index(CLOSED) < case
+    assert page.index("1 warning") < case
+    inside = page[case:]
+    banner = inside.index('class="banner"')
+    assert banner < inside.index("<svg")
+    assert CLOSED in inside[banner : banner + 400]
+    assert inside.index("1 warning") < banner
+    parsed(page)
+
+
+def test_what_cannot_be_had_is_a_row_of_the_table_with_its_reason(warned):
+    page = (warned[0] / "report.html").read_text()
+    numbers = page[page.index("Numbers: value ± uncertainty") :]
+    row = numbers[: numbers.index("</table>")]
+    assert "is not available" in row
+    assert NO_TIP in row
+
+
+def test_notices_stand_on_the_terminal_below_the_verdict(warned):
+    lines = list(verdict_lines([warned[1]]))
+    assert lines[1].strip() == f"WARNING: cut 0 (xfem): {CLOSED}"
+    assert lines[2].strip() == f"UNAVAILABLE: K_I: {NO_TIP}"
+
+
+def test_notices_stand_in_every_export(warned):
+    root, _ = warned
+    rows = list(csv.DictReader(io.StringIO((root / "results.csv").read_text())))
+    assert [(r["metric"], r["solver"], r["reason"]) for r in rows if r["status"] == "warning"] == [
+        ("cut 0", "xfem", CLOSED)
+    ]
+    document = json.loads((root / "results.json").read_text())
+    assert document["cases"][0]["result"]["notices"][1]["text"] == NO_TIP
+    out = ElementTree.parse(root / "junit.xml").getroot().find(".//system-out").text
+    assert CLOSED in out
+
+
+def test_a_warning_is_a_quotation_in_markdown(warned):
+    from verify.report.markdown import markdown
+
+    root, _ = warned
+    text = markdown((root / "report.html").read_text(), root)
+    assert any(
+        line.startswith(">") and CLOSED.replace("[", "\\[") in line for line in text.splitlines()
+    )
+    assert NO_TIP in text
