@@ -20,16 +20,21 @@ __all__ = [
     "ValueCheck",
 ]
 
-# near and far: closer to a tip or front than a tenth of its cut, and the rest; max and mean: over
-# time; the last seven are of dynamic analyses and need no reference
-METRICS = (
-    "displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_l2", "opening_max",
-    "displacement_l2_near", "displacement_l2_far", "energy_norm_near", "energy_norm_far",
+# of a cut; near and far: closer to a tip or front than a tenth of its cut, and the rest
+OF_CUTS = ("jump_l2", "opening_l2", "opening_max", "jump_l2_max", "jump_l2_mean")
+# max and mean: over time; the last seven need no reference
+OF_MOTION = (
     "displacement_l2_max", "displacement_l2_mean", "energy_norm_max", "energy_norm_mean",
-    "jump_l2_max", "jump_l2_mean", "strain_energy",
+    "jump_l2_max", "jump_l2_mean",
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
     "linear_momentum_drift", "angular_momentum_drift",
 )  # fmt: skip
+# measured whether a quantity asks for them or not
+METRICS = tuple(dict.fromkeys((
+    "displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_l2", "opening_max",
+    "displacement_l2_near", "displacement_l2_far", "energy_norm_near", "energy_norm_far",
+    *OF_MOTION,
+)))  # fmt: skip
 
 
 Time = Annotated[

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from verify.scene.acceptance import METRICS
+from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION
 from verify.scene.cut_placement import check_cuts, check_points
 from verify.scene.cuts import ArcCut
 from verify.scene.empty_parts import check_parts_act
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["boundary_condition_names", "check_placement"]
 
+# quantities that need no name of their own
+_QUANTITIES = ("strain_energy", "maximum_displacement")
+
 
 def check_placement(scene: "Scene") -> None:
     """Raise ValueError with one clear line if the parts of `scene` do not fit together."""
@@ -26,6 +29,7 @@ def check_placement(scene: "Scene") -> None:
     _check_formulas(scene)
     _check_exact(scene)
     _check_names(scene)
+    _check_acceptance(scene)
     check_parts_act(scene)
     _check_times(scene)
     check_cuts(scene)
@@ -221,13 +225,26 @@ def _check_names(scene: "Scene") -> None:
                 )
         if quantity.kind == "stress_intensity":
             _check_tip(scene, quantity.cut, f"quantities[{i}]")
-    known = dict.fromkeys((*METRICS, *quantities))
-    for i, check in enumerate(scene.acceptance):
-        if check.metric not in known:
+    for i, name in enumerate(quantities):
+        if name in METRICS:
             raise ValueError(
-                f"acceptance[{i}].metric: no '{check.metric}'{nearest(check.metric, known)}"
+                f"quantities[{i}].name: '{name}' is the name of an error; take another"
             )
-        if check.metric == "jump_l2" and not cuts:
-            raise ValueError(f"acceptance[{i}].metric: jump_l2 needs a cut")
+
+
+def _check_acceptance(scene: "Scene") -> None:
+    """Refuse checks of what is not measured in this scene."""
+    known = dict.fromkeys((*METRICS, *(quantity.name for quantity in scene.quantities)))
+    for i, check in enumerate(scene.acceptance):
+        place = f"acceptance[{i}].metric"
+        if check.metric not in known:
+            asked = nearest(check.metric, known)
+            if check.metric in _QUANTITIES:
+                asked = f"; ask for it: [[quantities]] kind = '{check.metric}'"
+            raise ValueError(f"{place}: no '{check.metric}'{asked}")
+        if check.metric in OF_CUTS and not scene.cuts:
+            raise ValueError(f"{place}: {check.metric} needs a cut")
+        if check.metric in OF_MOTION and scene.analysis.duration is None:
+            raise ValueError(f"{place}: {check.metric} belongs to a dynamic analysis")
         if check.check == "rate" and scene.mesh.count < 2:
             raise ValueError(f"acceptance[{i}]: a rate needs at least two mesh levels")
