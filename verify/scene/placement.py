@@ -227,9 +227,7 @@ def _check_names(scene: "Scene") -> None:
             _check_tip(scene, quantity.cut, f"quantities[{i}]")
     for i, name in enumerate(quantities):
         if name in METRICS:
-            raise ValueError(
-                f"quantities[{i}].name: '{name}' is the name of an error; take another"
-            )
+            raise ValueError(f"quantities[{i}].name: '{name}' names an error; take another")
 
 
 def _check_acceptance(scene: "Scene") -> None:
