@@ -78,14 +78,62 @@ def test_every_command_on_extending_succeeds_in_order(examples):
     assert "1 PASS" in said["import"]
 
 
+def register(folder, table):
+    """Install the entry points of a TOML table from a folder that is on the path."""
+    points = tomllib.loads(table)["project"]["entry-points"]
+    (group,) = points
+    (folder / "own-1.0.dist-info").mkdir()
+    (folder / "own-1.0.dist-info/METADATA").write_text("Name: own\nVersion: 1.0\n")
+    lines = [f"[{group}]", *(f"{name} = {value}" for name, value in points[group].items())]
+    (folder / "own-1.0.dist-info/entry_points.txt").write_text("\n".join(lines))
+
+
+OWN_FIELD = """
+title = "In-plane bending, uncut"
+requirement = "The energy shall be that of the exact solution of the user's own."
+[geometry]
+kind = "rectangle"
+lower = [0.0, 0.0]
+upper = [2.0, 1.0]
+[mesh]
+cells = [[8, 4], [16, 8], [32, 16]]
+[material]
+young = 2.0
+poisson = 0.3
+plane = "strain"
+[[supports]]
+where = "boundary"
+displacement = "exact"
+[exact]
+solution = "stretched_plate"
+parameters = { stress_gradient = 3.0 }
+[[acceptance]]
+check = "rate"
+metric = "energy_norm"
+equals = 1.0
+within = 0.1
+"""
+
+
+def test_the_entry_point_of_the_page_makes_an_exact_solution_a_case_can_name(examples):
+    (examples / "bending.toml").write_text(OWN_FIELD)
+    unknown = run("verify check bending.toml", examples)
+    assert unknown.returncode == 2
+    assert "no exact solution 'stretched_plate'" in unknown.stderr
+    register(examples, blocks("extending.md", "toml")[-1])
+    assert "stretched_plate" in run("verify list --exact", examples).stdout
+    # quadratic in x and y: P1 errs with order 1 in the energy norm
+    done = run("verify run bending.toml --solver xfem --out run --repetitions 1", examples)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (examples / "bending.toml").write_text(OWN_FIELD.replace("stress_gradient", "slope"))
+    wrong = run("verify check bending.toml", examples)
+    assert wrong.returncode == 2
+    assert "'stretched_plate' has no parameter 'slope'" in wrong.stderr
+
+
 @needs_skfem
 def test_the_entry_point_of_the_page_gives_the_solver_a_short_name(examples):
-    points = tomllib.loads(blocks("extending.md", "toml")[1])["project"]["entry-points"]
-    (group,) = points
-    (examples / "own-1.0.dist-info").mkdir()
-    (examples / "own-1.0.dist-info/METADATA").write_text("Name: own\nVersion: 1.0\n")
-    lines = [f"[{group}]", *(f"{name} = {value}" for name, value in points[group].items())]
-    (examples / "own-1.0.dist-info/entry_points.txt").write_text("\n".join(lines))
+    register(examples, blocks("extending.md", "toml")[1])
     done = run("verify conform skfem --check cut-patch", examples)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("cut-patch  kept")

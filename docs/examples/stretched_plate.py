@@ -26,16 +26,17 @@ class StretchedPlate(ExactSolution):
         return self._slope * np.moveaxis(np.array(rows), -1, 0)
 
 
-law = hooke(Material(young=2.0, poisson=0.3, plane="strain"))
-plate = StretchedPlate(law, Parameters("stretched_plate", {"stress_gradient": 3.0}))
-points, step = np.random.default_rng(1).uniform(-1, 1, (50, 2)), 1e-6
-for j, e in enumerate(np.eye(2) * step):
-    slope = (plate.displacement(points + e) - plate.displacement(points - e)) / (2 * step)
-    assert np.allclose(slope, plate.gradient(points)[:, :, j], atol=1e-9)
-stress = plate.stress(points)
-assert np.allclose(stress[:, 1, 1], 3.0 * points[:, 0])
-assert np.allclose(stress[:, 0], 0.0)
-# ∫ σ²/2E' over [0, 2] × [0, 1]: a²/2E' · 8/3
-square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
-assert np.isclose(plate.strain_energy(square), 3.0**2 / (2 * law.plane_modulus) * 8 / 3)
-print("gradient, equilibrium and energy are right")
+if __name__ == "__main__":
+    law = hooke(Material(young=2.0, poisson=0.3, plane="strain"))
+    plate = StretchedPlate(law, Parameters("stretched_plate", {"stress_gradient": 3.0}))
+    points, step = np.random.default_rng(1).uniform(-1, 1, (50, 2)), 1e-6
+    for j, e in enumerate(np.eye(2) * step):
+        slope = (plate.displacement(points + e) - plate.displacement(points - e)) / (2 * step)
+        assert np.allclose(slope, plate.gradient(points)[:, :, j], atol=1e-9)
+    stress = plate.stress(points)
+    assert np.allclose(stress[:, 1, 1], 3.0 * points[:, 0])
+    assert np.allclose(stress[:, 0], 0.0)
+    # ∫ σ²/2E' over [0, 2] × [0, 1]: a²/2E' · 8/3
+    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
+    assert np.isclose(plate.strain_energy(square), 3.0**2 / (2 * law.plane_modulus) * 8 / 3)
+    print("gradient, equilibrium and energy are right")

@@ -1,6 +1,7 @@
 """Exact solutions by name."""
 
 from collections.abc import Callable, Mapping
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from reference.exact.airy import Airy
@@ -69,11 +70,17 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     ),
 }
 _IN_SPACE = ("linear", "solid_patch", "solid_smooth", "penny")
+_GROUP = "verify.exact_solutions"  # entry points of other packages
 
 
 def exact_solution_names() -> dict[str, str]:
     """Names of the exact solutions, each with one line on what it is and its parameters."""
-    return {name: text for name, (_, text) in _CATALOGUE.items()}
+    own = {name: text for name, (_, text) in _CATALOGUE.items()}
+    return {name: f"from {point.value}" for name, point in _registered().items()} | own
+
+
+def _registered() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=_GROUP)}
 
 
 def exact_solution(name: str, parameters: Mapping[str, Any], material: Material) -> ExactSolution:
@@ -82,7 +89,8 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
     Parameters
     ----------
     name : str
-        One of `exact_solution_names`.
+        One of `exact_solution_names`: of this package, or an entry point
+        ``verify.exact_solutions`` of another.
     parameters : mapping
         Its parameters in SI units, as in the section ``[exact]`` of a case file.
     material : Material
@@ -90,12 +98,16 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
     Raises
     ------
     InputError
-        If the name or a parameter is unknown, missing or has the wrong form.
+        If the name or a parameter is unknown, missing or has the wrong form, or the code of
+        another package fails.
     """
-    if name not in _CATALOGUE:
-        raise InputError(f"no exact solution '{name}'{nearest(name, _CATALOGUE)}")
-    make, _ = _CATALOGUE[name]
     law = hooke(material)
+    if name not in _CATALOGUE:
+        given = Parameters(name, parameters)
+        solution = _from_entry_point(name, law, given)
+        given.close()
+        return solution
+    make, _ = _CATALOGUE[name]
     if law.dimension == 3 and name not in _IN_SPACE:
         raise InputError(
             f"exact solution '{name}' is plane; material.plane = 'strain' or 'stress' is missing"
@@ -105,4 +117,26 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
     given = Parameters(name, parameters)
     solution = make(law, given)
     given.close()
+    return solution
+
+
+def _from_entry_point(name: str, law: Hooke, given: Parameters) -> ExactSolution:
+    """Make a solution that another package registers; its class takes the law and parameters."""
+    points = _registered()
+    if name not in points:
+        raise InputError(f"no exact solution '{name}'{nearest(name, exact_solution_names())}")
+    try:
+        solution: ExactSolution = points[name].load()(law, given)
+    except InputError:
+        raise
+    except Exception as error:  # somebody else's code: whatever it does is one clear line
+        raise InputError(
+            f"exact solution '{name}' ({points[name].value}) cannot be made: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+    if not isinstance(solution, ExactSolution):
+        raise InputError(
+            f"exact solution '{name}' ({points[name].value}) makes a {type(solution).__name__}; "
+            "expected an instance of reference.exact.ExactSolution"
+        )
     return solution

@@ -4,6 +4,8 @@ import hashlib
 import json
 from collections.abc import Iterable
 from functools import cache
+from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +66,18 @@ def physics_digest(scene: Scene) -> str:
     content: list[Any] = [scene.schema_, physics]
     if isinstance(scene.geometry, MeshFile):
         content.append(file_digest(mesh_path(scene)))
+    if scene.exact is not None:
+        content += _registered_source(scene.exact.solution)
     return digest_of(content)
+
+
+def _registered_source(name: str) -> list[str]:
+    """Digest of the module of an exact solution that another package registers, if it is one."""
+    for point in entry_points(group="verify.exact_solutions", name=name):
+        found = find_spec(point.module)
+        if found is not None and found.origin is not None:
+            return [file_digest(Path(found.origin))]
+    return []
 
 
 @cache
