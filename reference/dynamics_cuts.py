@@ -14,6 +14,7 @@ from verify.scene import (
     PolygonCut,
     PolylineCut,
     Scene,
+    SphereCut,
     SweptCut,
 )
 from verify.scene.planar import distance_to_outline, distance_to_polyline, inside_polygon
@@ -76,6 +77,10 @@ def _distance(cut: object, points: Array) -> Array:
             share = np.hypot(*(plane / np.array(cut.semi_axes)[:, None]))
             beyond = np.hypot(*plane) * (1.0 - 1.0 / np.maximum(share, 1.0))
             return np.asarray(np.hypot(height, beyond))
+        case SphereCut():
+            first, second, along = cut.axes() @ (points - np.array(cut.centre)).T
+            across = np.hypot(first, second)
+            return _from_arc(along, across, cut.radius, 0.0, cut.opening)
     assert isinstance(cut, CylinderCut)
     x, y, z = cut.axes() @ (points - np.array(cut.base)).T
     beyond = np.maximum(np.maximum(-z, z - cut.height), 0.0)

@@ -64,12 +64,16 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         "3D: plane waves with a body force on each side of a plane cut: point, normal, axis, above "
         "and below (rows A, k1, k2, phase of U1, U2, V), shift",
     ),
+    "spherical_cut": (
+        CircularCut,
+        "3D: ball at rest, cut out of a body that is drawn outwards: centre, radius, outward, at",
+    ),
     "penny": (
         Penny,
         "3D: penny-shaped crack in infinite space under tension: centre, normal, a, tension",
     ),
 }
-_IN_SPACE = ("linear", "solid_patch", "solid_smooth", "penny")
+_IN_SPACE = ("linear", "solid_patch", "solid_smooth", "spherical_cut", "penny")
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 
 

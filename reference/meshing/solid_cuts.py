@@ -50,6 +50,8 @@ def add_surface(gmsh: ModuleType, cut: Any, origin: Array, scale: float) -> list
         case "cylinder":
             ring = _arcs(occ, cut, origin, scale)
             return _swept(occ, ring, cut.height / scale * cut.axes()[2])
+        case "sphere":
+            return _cap(occ, cut, (np.array(cut.centre) - origin) / scale, cut.radius / scale)
         case "swept":
             points = (np.array(cut.points) - origin) / scale
             tags = [occ.addPoint(*p) for p in (points[:-1] if cut.closed else points)]
@@ -140,6 +142,20 @@ def _arcs(occ: ModuleType, cut: Any, origin: Array, scale: float) -> list[int]:
     return [
         occ.addCircleArc(a, centre, b) for a, b in pairwise([*tags, tags[0]] if closed else tags)
     ]
+
+
+def _cap(occ: ModuleType, cut: Any, centre: Array, radius: float) -> list[int]:
+    """Turn a meridian around the pole's axis by thirds of a turn."""
+    first, second, pole = cut.axes()
+    polar = np.deg2rad(cut.opening) * np.array([0.0, 0.5, 1.0])  # arcs of less than half a turn
+    made = []
+    for turn in 2.0 * np.pi * np.arange(3) / 3:
+        out = np.cos(turn) * first + np.sin(turn) * second
+        line = centre + radius * (np.outer(np.cos(polar), pole) + np.outer(np.sin(polar), out))
+        tags, middle = [occ.addPoint(*p) for p in line], occ.addPoint(*centre)
+        arcs = [(1, occ.addCircleArc(a, middle, b)) for a, b in pairwise(tags)]
+        made += occ.revolve(arcs, *centre, *pole, 2.0 * np.pi / 3)
+    return [int(tag) for dim, tag in made if dim == 2]
 
 
 def _swept(occ: ModuleType, curves: list[int], along: Array) -> list[int]:

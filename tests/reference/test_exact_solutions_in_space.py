@@ -5,6 +5,7 @@ import pytest
 from fourth_order import difference
 
 from reference.exact import exact_solution, exact_solution_names
+from reference.exact.solid_energy import surface_work
 from verify.errors import InputError
 from verify.scene import Material
 
@@ -24,6 +25,7 @@ SOLUTIONS = {
         "above": [[0.1, 2.0, 1.0, 20.0], [0.05, -1.0, 3.0, 0.0], [0.04, 3.0, 1.5, 90.0]],
         "below": [[-0.1, 1.0, 2.5, 0.0], [0.08, 2.0, 0.5, 40.0], [0.05, 1.0, -2.0, 10.0]],
     },
+    "spherical_cut": {"centre": [0.1, 0.2, -0.1], "radius": 0.4, "outward": 0.1, "at": 1.0},
     "penny": {"centre": [0.4, 0.5, 0.45], "normal": [1.0, 2.0, 2.0], "a": 0.3, "tension": 1.5},
 }
 
@@ -182,3 +184,41 @@ def test_a_solution_in_space_is_refused_in_the_plane():
     plane = Material(young=1.0, poisson=0.3, plane="strain")
     with pytest.raises(InputError, match="is one of space"):
         exact_solution("penny", {"a": 1.0, "tension": 1.0}, plane)
+
+
+@pytest.mark.parametrize("centre", [[0.45, 0.5, 0.55], [-0.06, -0.03, -0.04], [0.5, 1.1, 0.2]])
+def test_the_energy_around_a_ball_is_the_integral_of_its_density(centre):
+    # a centre inside the cube, one beyond a corner and one beyond a face
+    u = exact_solution(
+        "spherical_cut", {"centre": centre, "radius": 0.4, "outward": 0.1, "at": 1.0}, SOLID
+    )
+    points = (np.arange(160) + 0.5) / 160
+    grid = np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1).reshape(-1, 3)
+    gradient = u.gradient(grid)
+    density = 0.5 * np.einsum("nij,nij->n", u.stress(grid), gradient)
+    # midpoints of 160³ cells: the 1.3 % of them on the sphere, where the density is highest, count
+    # whole or not at all
+    assert u.strain_energy(CUBE) == pytest.approx(density.mean(), rel=1e-3)
+
+
+def test_the_energy_around_a_ball_inside_the_body_is_the_work_on_its_surface():
+    u = exact_solution(
+        "spherical_cut",
+        {"centre": [0.45, 0.5, 0.55], "radius": 0.3, "outward": 0.1, "at": 1.0},
+        SOLID,
+    )
+    assert u.strain_energy(CUBE) == pytest.approx(surface_work(u, CUBE), rel=1e-11)
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.0, 0.49])
+def test_a_ball_that_is_cut_out_leaves_a_hollow_free_of_traction(poisson):
+    u = solution("spherical_cut", Material(young=1.0, poisson=poisson))
+    outward = np.random.default_rng(2).normal(size=(40, 3))
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    centre = np.array(SOLUTIONS["spherical_cut"]["centre"])
+    points = centre + 0.4 * outward
+    traction = np.einsum("nij,nj->ni", u.stress(points, points + 1e-6 * outward), outward)
+    scale = np.abs(u.stress(points, points + 1e-6 * outward)).max()
+    assert np.abs(traction).max() < 1e-13 * scale
+    np.testing.assert_allclose(u.displacement(centre + outward), 0.1 * outward, atol=1e-14)
+    assert not u.displacement(points, points - 1e-6 * outward).any()

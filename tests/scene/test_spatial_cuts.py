@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verify.errors import InputError
-from verify.scene import CylinderCut, DiscCut, PolygonCut, SweptCut, load_scene
+from verify.scene import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut, load_scene
 from verify.scene.spatial import area_inside, distance_to_triangles, ear_clipping, overlap_area
 
 CUBE = body_text("A cube", "It shall be cut.", [1.0, 1.0, 1.0], [[2, 2, 2]]) + support_text(
@@ -195,3 +195,29 @@ def test_what_is_measured_in_space_lies_where_it_can_be(tmp_path, asked, said):
     with pytest.raises(InputError) as caught:
         load(tmp_path, DISC, more=f"[[quantities]]\n{asked}\n")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("opening", [20.0, 90.0, 137.0, 180.0])
+def test_a_cap_has_the_area_of_a_sphere_and_its_centre_on_the_positive_side(opening):
+    centre, pole = np.array([0.1, 0.2, 0.3]), np.array([1.0, -2.0, 2.0]) / 3
+    cap = SphereCut(
+        kind="sphere", centre=tuple(centre), radius=0.4, towards=tuple(3 * pole), opening=opening
+    )
+    points, triangles = cap.surface(0.01)
+    away = points - centre
+    np.testing.assert_allclose(np.linalg.norm(away, axis=1), 0.4, rtol=1e-12)
+    angle = np.rad2deg(np.arccos(np.clip(away @ pole / 0.4, -1.0, 1.0)))
+    assert angle.max() == pytest.approx(opening, abs=1e-5)
+    vectors = area_vectors((points, triangles))
+    assert ((vectors * away[triangles].mean(axis=1)).sum(axis=1) < 0.0).all()
+    # facets of 0.01 lie within h²/2R² of the sphere
+    area = 2 * np.pi * 0.4**2 * (1 - np.cos(np.deg2rad(opening)))
+    assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(area, rel=1e-3)
+
+
+def test_a_cap_without_a_pole_is_refused(tmp_path):
+    cap = {"kind": "sphere", "centre": [0.5, 0.5, 0.5], "radius": 0.3, "towards": [0.0, 0.0, 0.0]}
+    with pytest.raises(InputError, match="pole is zero"):
+        load(tmp_path, cap)
+    with pytest.raises(InputError, match="opening"):
+        load(tmp_path, cap | {"towards": [0.0, 0.0, 1.0], "opening": 190.0})

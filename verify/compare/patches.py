@@ -1,4 +1,4 @@
-"""Pieces of cuts in space as asked: plane polygons, elliptical discs, parts of cylinders.
+"""Pieces of cuts in space as asked: plane polygons, discs, parts of cylinders and spheres.
 
 Each is a chart: parameters (n, 2) to points (n, 3), with normals into the positive side. A
 cylinder stays a cylinder and a disc a disc; they are not cut into facets.
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from verify.compare.curves import Arc
 from verify.scene.spatial import ear_clipping, frame
-from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut
+from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut, SphereCut
 
-__all__ = ["CylinderPatch", "DiscPatch", "Patch", "PlanePatch", "patches_of"]
+__all__ = ["CylinderPatch", "DiscPatch", "Patch", "PlanePatch", "SpherePatch", "patches_of"]
 
 Array = NDArray[np.float64]
 
@@ -219,7 +219,77 @@ class CylinderPatch:
         return ends.min(axis=0) - half, ends.max(axis=0) + half
 
 
-Patch = PlanePatch | DiscPatch | CylinderPatch
+@dataclass(frozen=True)
+class SpherePatch:
+    """A cap of a sphere, or all of it; its centre is on the positive side.
+
+    Parameters
+    ----------
+    origin : (3,) array
+        Centre.
+    axes : (3, 3) array
+        Rows: two directions across the pole's, and the pole's; parameters are the angle from the
+        pole and the angle around it.
+    radius : float
+    opening : float
+        Angle between the pole and the rim, radians; π for the whole sphere.
+    """
+
+    origin: Array
+    axes: Array
+    radius: float
+    opening: float
+    plane = False
+
+    @property
+    def curvature(self) -> float:
+        """One over the radius, 1/m."""
+        return 1.0 / self.radius
+
+    @property
+    def cells(self) -> Array:
+        """Triangles (m, 3, 2) of the parameters."""
+        return _rectangle(self.opening, 0.0, 2 * np.pi, 8)
+
+    def _outward(self, uv: Array) -> Array:
+        polar, turn = uv.T
+        local = [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)]
+        return np.asarray(np.column_stack(local) @ self.axes)
+
+    def point(self, uv: Array) -> Array:
+        """Points (n, 3)."""
+        return self.origin + self.radius * self._outward(uv)
+
+    def normal(self, uv: Array) -> Array:
+        """Return unit normals (n, 3)."""
+        return -self._outward(uv)
+
+    def stretch(self, uv: Array) -> Array:
+        """Area (n,) per area of parameters."""
+        return np.asarray(self.radius**2 * np.abs(np.sin(uv[:, 0])))
+
+    def level(self, x: Array) -> Array:
+        """Distance (n,) from the sphere, positive on the side of its centre."""
+        inside: Array = self.radius - np.linalg.norm(x - self.origin, axis=1)
+        return inside
+
+    def nearest(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Nearest points (n, 3), and whether they lie on the rim (n,)."""
+        first, second, along = self.axes @ (x - self.origin).T
+        polar = np.arctan2(np.hypot(first, second), along)
+        rim = polar >= self.opening if self.opening < np.pi else np.zeros(len(x), dtype=bool)
+        uv = np.column_stack([np.minimum(polar, self.opening), np.arctan2(second, first)])
+        return self.point(uv), rim
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of the bounding box."""
+        from_pole = np.arccos(np.clip(self.axes[2], -1.0, 1.0))
+        highest = np.cos(np.maximum(from_pole - self.opening, 0.0))
+        lowest = -np.cos(np.maximum(np.pi - from_pole - self.opening, 0.0))
+        return self.origin + self.radius * lowest, self.origin + self.radius * highest
+
+
+Patch = PlanePatch | DiscPatch | CylinderPatch | SpherePatch
 
 
 def patches_of(cut: SpatialCut) -> list[Patch]:
@@ -230,6 +300,9 @@ def patches_of(cut: SpatialCut) -> list[Patch]:
         start, sweep = np.deg2rad(cut.start), np.deg2rad(cut.sweep)
         arc = Arc(np.zeros(2), cut.radius, float(start), float(sweep))
         return [CylinderPatch(np.array(cut.base, dtype=float), cut.axes(), arc, cut.height)]
+    if isinstance(cut, SphereCut):
+        centre, opening = np.array(cut.centre, dtype=float), float(np.deg2rad(cut.opening))
+        return [SpherePatch(centre, cut.axes(), cut.radius, opening)]
     points = np.array(cut.points, dtype=float)
     if isinstance(cut, PolygonCut):
         triangles = points[ear_clipping(points)]

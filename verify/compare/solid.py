@@ -16,7 +16,7 @@ from verify.scene import Scene
 from verify.scene.geometry import Box, MeshFile
 from verify.scene.mesh_file import read_mesh
 from verify.scene.spatial import rim_edges
-from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SweptCut
+from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 
 __all__ = ["SolidBody", "solid_of"]
 
@@ -67,7 +67,7 @@ def solid_of(scene: Scene) -> SolidBody:
     size = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     cuts, fronts = {}, [np.zeros((0, 2, 3))]
     for cut in scene.cuts:
-        if not isinstance(cut, PolygonCut | DiscCut | CylinderCut | SweptCut):
+        if not isinstance(cut, PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut):
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
         cuts[cut.name] = patches_of(cut)
         fronts.append(_trimmed(rim_edges(cut.surface(size / _RIM)), inside, size))

@@ -41,7 +41,14 @@ from verify.scene.regions import Region, parse_expression, parse_region
 from verify.scene.replay import Pull, Replay
 from verify.scene.scene import Scene
 from verify.scene.skin import Skin
-from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut, SweptCut
+from verify.scene.spatial_cuts import (
+    CylinderCut,
+    DiscCut,
+    PolygonCut,
+    SpatialCut,
+    SphereCut,
+    SweptCut,
+)
 from verify.scene.tool_path import ToolPathCut
 
 __all__ = [
@@ -77,6 +84,7 @@ __all__ = [
     "Scene",
     "Skin",
     "SpatialCut",
+    "SphereCut",
     "StrainEnergyQuantity",
     "StressIntensityQuantity",
     "Support",

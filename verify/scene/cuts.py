@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from verify.scene.planar import polyline_defect
-from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SweptCut
+from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 from verify.scene.strict import Finite, NonNegative, Point2, Positive, Strict
 from verify.scene.tool_path import ToolPathCut
 
@@ -78,6 +78,6 @@ class ArcCut(Strict):
 
 PlaneCut = PolylineCut | ArcCut
 Cut = Annotated[
-    PolylineCut | ArcCut | PolygonCut | DiscCut | CylinderCut | SweptCut | ToolPathCut,
+    PolylineCut | ArcCut | PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut | ToolPathCut,
     Field(discriminator="kind"),
 ]

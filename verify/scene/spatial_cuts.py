@@ -1,4 +1,4 @@
-"""Cuts in space: plane polygons, discs, parts of cylinders, swept polylines."""
+"""Cuts in space: plane polygons, discs, parts of cylinders and spheres, swept polylines."""
 
 from typing import Literal
 
@@ -10,7 +10,7 @@ from verify.scene.planar import polygon_defect, polyline_defect
 from verify.scene.spatial import ear_clipping, frame
 from verify.scene.strict import Finite, NonNegative, Point3, Positive, Strict
 
-__all__ = ["CylinderCut", "DiscCut", "PolygonCut", "SpatialCut", "SweptCut"]
+__all__ = ["CylinderCut", "DiscCut", "PolygonCut", "SpatialCut", "SphereCut", "SweptCut"]
 
 Array = NDArray[np.float64]
 Surface = tuple[Array, NDArray[np.int64]]
@@ -166,6 +166,63 @@ class CylinderCut(_SpatialCut):
         return _strips(ring, self.height * axis, closed, inward=True)
 
 
+class SphereCut(_SpatialCut):
+    """A sphere or a cap of one; its centre is on the positive side."""
+
+    kind: Literal["sphere"]
+    centre: Point3 = Field(description="m")
+    radius: Positive = Field(description="m")
+    towards: Point3 = Field(
+        default=(0.0, 0.0, 1.0), description="direction of the cap's pole; of any length"
+    )
+    opening: float = Field(
+        strict=True,
+        default=180.0,
+        gt=0.0,
+        le=180.0,
+        description="angle between the pole and the cap's rim, degrees; 180: the whole sphere",
+    )
+
+    @model_validator(mode="after")
+    def _has_a_pole(self) -> "SphereCut":
+        if not np.linalg.norm(self.towards) > 0.0:
+            raise ValueError("the direction of the cap's pole is zero")
+        return self
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is the whole sphere."""
+        return self.opening == 180.0
+
+    def axes(self) -> Array:
+        """Two directions across the pole's, and the pole's, as rows (3, 3) of length one."""
+        return frame(self.towards)
+
+    def surface(self, spacing: float | None = None) -> Surface:
+        """Triangulate the cap in rings about its pole."""
+        around = _points_per_turn(self.radius, spacing)
+        rings = max(2, int(np.ceil(around * self.opening / 360.0)))
+        polar = np.deg2rad(self.opening) * np.arange(1, rings + (not self.closed)) / rings
+        turn = 2.0 * np.pi * np.arange(around) / around
+        first, second, pole = self.axes()
+        out = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second
+        ring = np.sin(polar)[:, None, None] * out + np.cos(polar)[:, None, None] * pole
+        poles = [pole[None], -pole[None]] if self.closed else [pole[None]]
+        points = np.concatenate([ring.reshape(-1, 3), *poles])
+        # seen from the centre the rings are passed clockwise
+        i, count = np.arange(around), len(ring)
+        j = (i + 1) % around
+        triangles = [np.column_stack([j, i, np.full(around, count * around)])]
+        for k in range(count - 1):
+            a, b = k * around, (k + 1) * around
+            triangles += [np.column_stack([a + i, a + j, b + j])]
+            triangles += [np.column_stack([a + i, b + j, b + i])]
+        if self.closed:
+            last = (count - 1) * around
+            triangles += [np.column_stack([last + i, last + j, np.full(around, len(points) - 1)])]
+        return np.array(self.centre) + self.radius * points, np.concatenate(triangles)
+
+
 class SweptCut(_SpatialCut):
     """A polyline in space, swept along a vector; its positive side is that of points × along."""
 
@@ -202,7 +259,7 @@ class SweptCut(_SpatialCut):
         return _strips(line, np.array(self.along), self.closed, inward=False)
 
 
-SpatialCut = PolygonCut | DiscCut | CylinderCut | SweptCut
+SpatialCut = PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut
 
 
 def _check_direction(normal: Point3, axis: Point3, name: str, other: str) -> None:

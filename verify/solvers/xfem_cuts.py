@@ -11,6 +11,7 @@ from verify.scene import (
     DiscCut,
     PolygonCut,
     Scene,
+    SphereCut,
     SweptCut,
     ToolPathCut,
 )
@@ -36,6 +37,8 @@ def _cut(cut: Any, size: float) -> Cut:
             return _disc(cut)
         case CylinderCut():
             return _cylinder(cut)
+        case SphereCut():
+            return _sphere(cut)
         case SweptCut():  # plane facets: the triangulation is the cut
             return TriangulatedSurface(*cut.surface())
         case ToolPathCut() if cut.dimension == 3:
@@ -85,3 +88,20 @@ def _cylinder(cut: CylinderCut) -> Cut:
         return np.minimum(along, cut.radius * (half - np.abs(turn)))
 
     return ImplicitCut(inside, depth)
+
+
+def _sphere(cut: SphereCut) -> Cut:
+    pole, centre, half = cut.axes()[2], np.array(cut.centre), np.deg2rad(cut.opening)
+
+    def inside(points: Array) -> Array:
+        found: Array = cut.radius - np.linalg.norm(points - centre, axis=1)
+        return found
+
+    def depth(points: Array) -> Array:
+        """Distance to the rim along the sphere."""
+        away = points - centre
+        along = away @ pole
+        across = np.linalg.norm(away - along[:, None] * pole, axis=1)
+        return np.asarray(cut.radius * (half - np.arctan2(across, along)))
+
+    return ImplicitCut(inside) if cut.closed else ImplicitCut(inside, depth)

@@ -1,0 +1,83 @@
+"""A spherical cut: the compact solver, the conforming mesh and the comparison against Lamé."""
+
+import numpy as np
+import pytest
+from reference_scenes import needs_fenicsx
+from solid_scenes import EXACT, cube
+
+from reference.exact import exact_solution
+from verify.compare.patches import patches_of
+from verify.compare.solid import solid_of
+from verify.compare.surface_rule import surface_rule
+from verify.scene import SphereCut
+from verify.solvers import find_solver
+
+CENTRE, RADIUS = np.array([-0.06, -0.03, -0.04]), 0.6
+
+
+def shell(cells):
+    """Cut a part of a ball out of a corner of a cube, so that the supports hold both pieces."""
+    cut = {"kind": "sphere", "centre": list(CENTRE), "radius": RADIUS, "expected": "through"}
+    return cube(
+        [cut],
+        mesh={"cells": [[n, n, n] for n in cells]},
+        supports=EXACT,
+        loads=[],
+        exact={
+            "solution": "spherical_cut",
+            "parameters": {
+                "centre": list(CENTRE), "radius": RADIUS, "outward": 0.1, "at": 1.0,
+            },
+        },
+    )  # fmt: skip
+
+
+def energy(scene):
+    known = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    return known.strain_energy(scene)
+
+
+def test_the_nearest_points_of_a_cap_are_those_of_its_fine_triangulation():
+    cap = SphereCut(
+        kind="sphere", centre=(0.1, 0.2, 0.3), radius=0.4, towards=(1.0, -1.0, 2.0), opening=65.0
+    )
+    (patch,) = patches_of(cap)
+    vertices = cap.surface(0.004)[0]
+    points = np.random.default_rng(4).uniform(-0.5, 0.9, (300, 3))
+    foot, rim = patch.nearest(points)
+    nearest = np.linalg.norm(points[:, None] - vertices, axis=2).min(axis=1)
+    # a vertex lies within 0.004 of every point of the cap: off by that along it at most
+    away = np.linalg.norm(points - foot, axis=1)
+    assert (away <= nearest + 1e-12).all()
+    assert (nearest <= np.hypot(away, 0.004) + 0.004).all()
+    assert 0.2 < rim.mean() < 0.9
+    low, high = patch.bounds()
+    assert (vertices >= low - 1e-12).all()
+    assert (vertices <= high + 1e-12).all()
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), high - low, rtol=1e-3)
+
+
+def test_the_quadrature_on_the_cut_has_the_area_of_the_sphere_inside_the_body():
+    # a whole sphere inside the cube, of which nothing is trimmed
+    scene = cube([{"kind": "sphere", "centre": [0.45, 0.5, 0.55], "radius": 0.3}])
+    rule = surface_rule(solid_of(scene), 0.1)
+    assert rule.weights.sum() == pytest.approx(4 * np.pi * 0.3**2, rel=1e-3)
+
+
+def test_the_compact_solver_has_the_energy_of_the_shell_with_order_two():
+    scene = shell([6, 12])
+    exact = energy(scene)
+    errors = [find_solver("xfem").solve(scene, k).ledger["strain"][0] / exact - 1 for k in (0, 1)]
+    # P1: the energy is off by O(h²); from one pair of levels of 3D cells the order is good to 0.4
+    assert abs(errors[1]) < 0.01
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.4)
+
+
+@pytest.mark.parametrize("solver", [pytest.param("reference", marks=needs_fenicsx)])
+def test_the_conforming_mesh_has_the_energy_of_the_shell(solver):
+    scene = shell([6])
+    exact = energy(scene)
+    found = [find_solver(solver).solve(scene, k, repetitions=0).ledger["strain"][0] for k in (0, 1)]
+    # P2 on plane facets: what is left is the volume between facets and sphere, O(h²)
+    assert abs(found[1] / exact - 1) < 0.01
+    assert abs(found[1] / exact - 1) < 0.5 * abs(found[0] / exact - 1)
