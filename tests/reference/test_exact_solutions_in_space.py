@@ -192,13 +192,13 @@ def test_the_energy_around_a_ball_is_the_integral_of_its_density(centre):
     u = exact_solution(
         "spherical_cut", {"centre": centre, "radius": 0.4, "outward": 0.1, "at": 1.0}, SOLID
     )
-    points = (np.arange(160) + 0.5) / 160
+    points = (np.arange(80) + 0.5) / 80
     grid = np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1).reshape(-1, 3)
     gradient = u.gradient(grid)
     density = 0.5 * np.einsum("nij,nij->n", u.stress(grid), gradient)
-    # midpoints of 160³ cells: the 1.3 % of them on the sphere, where the density is highest, count
+    # midpoints of 80³ cells: the 2.5 % of them on the sphere, where the density is highest, count
     # whole or not at all
-    assert u.strain_energy(CUBE) == pytest.approx(density.mean(), rel=1e-3)
+    assert u.strain_energy(CUBE) == pytest.approx(density.mean(), rel=3e-3)
 
 
 def test_the_energy_around_a_ball_inside_the_body_is_the_work_on_its_surface():
