@@ -5,6 +5,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from reference.exact.airy import Airy
+from reference.exact.arc_crack import ArcCrack
 from reference.exact.bending import Bending
 from reference.exact.circular_cut import CircularCut
 from reference.exact.crack_tip import CrackTip
@@ -49,6 +50,11 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     "griffith": (
         Griffith,
         "crack in an infinite plate: centre, a, angle, remote stress (sxx, syy, sxy)",
+    ),
+    "arc_crack": (
+        ArcCrack,
+        "crack along an arc of a circle in an infinite plate: centre, radius, angle of its middle, "
+        "half_angle, remote stress (sxx, syy, sxy)",
     ),
     "circular_cut": (
         CircularCut,

@@ -29,6 +29,12 @@ class CrackTip(ComplexCrack):
         """The tip (1, 2)."""
         return self._origin[None]
 
+    @property
+    def stress_intensity(self) -> tuple[float, float]:
+        """K_I and K_II, Pa·√m."""
+        k = self._k * np.sqrt(2 * np.pi)
+        return float(k.real), float(-k.imag)
+
     def _on_crack(self, x: Array) -> NDArray[np.bool_]:
         return np.asarray(x < 0.0)
 

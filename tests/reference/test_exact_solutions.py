@@ -28,6 +28,13 @@ SOLUTIONS = {
     },
     "tip": {"tip": [0.1, 0.2], "angle": 20.0, "intensity": [1.0, 0.7]},
     "griffith": {"a": 0.4, "centre": [0.1, 0.2], "angle": 20.0, "stress": [0.3, 1.0, 0.5]},
+    "arc_crack": {
+        "centre": [0.1, 0.2],
+        "radius": 0.5,
+        "angle": 35.0,
+        "half_angle": 50.0,
+        "stress": [0.3, 1.0, 0.4],
+    },
     "circular_cut": {"centre": [0.1, 0.2], "radius": 0.4, "outward": 0.1, "at": 1.0},
 }
 
@@ -106,6 +113,68 @@ def test_faces_of_a_crack_are_free_of_traction(name, sign):
     assert np.abs(traction).max() < 1e-12
 
 
+@pytest.mark.parametrize("stress", [[1.0, 1.0, 0.0], [0.3, 1.0, 0.4]], ids=["biaxial", "any"])
+@pytest.mark.parametrize("side", [0.99, 1.01], ids=["inside", "outside"])
+def test_faces_of_an_arc_crack_are_free_of_traction_and_the_plate_is_loaded_far_away(stress, side):
+    u = exact_solution("arc_crack", {**SOLUTIONS["arc_crack"], "stress": stress}, STRAIN)
+    turn = np.deg2rad(35.0 + np.linspace(-49.5, 49.5, 41))
+    normal = np.column_stack([np.cos(turn), np.sin(turn)])
+    face, centre = [0.1, 0.2] + 0.5 * normal, np.array([0.1, 0.2])
+    traction = np.einsum("nij,nj->ni", u.stress(face, centre + 0.5 * side * normal), normal)
+    assert np.abs(traction).max() < 1e-12  # of stresses of about 10 beside the tips
+    far = u.stress(np.array([[1e7, 3e6], [-2e6, -1e7]]))  # what the crack adds falls as r⁻²
+    s_xx, s_yy, s_xy = stress
+    assert np.abs(far - [[s_xx, s_xy], [s_xy, s_yy]]).max() < 1e-12
+
+
+def test_an_arc_crack_is_smooth_beside_its_faces_and_at_its_centre():
+    u = solution("arc_crack")
+    turn = np.deg2rad(35.0 + np.linspace(52.0, 308.0, 41))
+    ring = 0.5 * np.column_stack([np.cos(turn), np.sin(turn)])
+    inside, outside = (u.gradient([0.1, 0.2] + (1 + s) * ring) for s in (-1e-13, 1e-13))
+    assert np.abs(inside - outside).max() < 1e-9
+    # the closed form and the series meet at a fifth of the radius
+    inside, outside = (u.displacement([0.1, 0.2] + 0.2 * s * ring) for s in (1 - 1e-12, 1 + 1e-12))
+    assert np.abs(inside - outside).max() < 1e-11
+    with np.errstate(all="raise"):
+        assert np.isfinite(u.gradient(np.array([[0.1, 0.2], [0.1, 0.2 + 1e-9]]))).all()
+
+
+def test_the_intensity_of_an_arc_crack_is_that_of_the_closed_form_and_of_its_field():
+    given = {**SOLUTIONS["arc_crack"], "stress": [1.0, 1.0, 0.0]}
+    u = exact_solution("arc_crack", given, STRAIN)
+    known = np.sqrt(np.pi * 0.5 * np.sin(np.deg2rad(50.0))) / (1 + np.sin(np.deg2rad(25.0)) ** 2)
+    for tip, sign in zip(u.singular_points, (-1, 1), strict=True):
+        expected = known * np.cos(np.deg2rad(25)), sign * known * np.sin(np.deg2rad(25))
+        assert u.intensity_at(tip) == pytest.approx(expected, rel=1e-13)
+    u = solution("arc_crack")
+    for tip, sign in zip(u.singular_points, (-1, 1), strict=True):
+        turn = np.deg2rad(35.0 + sign * 50.0)
+        ahead = sign * np.array([-np.sin(turn), np.cos(turn)])
+        left = np.array([-ahead[1], ahead[0]])
+        stress = u.stress((tip + 1e-8 * ahead)[None])[0] * np.sqrt(2e-8 * np.pi)
+        # next to the tip the rest is √r of it
+        expected = left @ stress @ left, ahead @ stress @ left
+        assert u.intensity_at(tip) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_short_arc_in_a_large_circle_is_a_straight_crack():
+    # half-length 1 at a radius of 1e4: what differs is of the order of 1e-4
+    angle = np.rad2deg(1e-4)
+    stress = {"stress": [0.3, 1.0, 0.4]}
+    arc = exact_solution(
+        "arc_crack",
+        {"centre": [0.0, -1e4], "radius": 1e4, "angle": 90.0, "half_angle": angle, **stress},
+        STRAIN,
+    )
+    straight = exact_solution("griffith", {"a": 1.0, **stress}, STRAIN)
+    points = np.random.default_rng(5).uniform(-2.0, 2.0, (60, 2))
+    points = points[np.abs(points[:, 1]) > 0.05]
+    assert np.abs(arc.stress(points) - straight.stress(points)).max() < 1e-3
+    for tip in arc.singular_points:
+        assert arc.intensity_at(tip) == pytest.approx(straight.stress_intensity, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     "name, value, digits",
     [
@@ -142,7 +211,7 @@ def test_an_energy_does_not_depend_on_how_the_outline_is_walked():
     assert u.strain_energy(np.roll(SQUARE, 1, axis=0)) == pytest.approx(forward, rel=1e-13)
 
 
-@pytest.mark.parametrize("name", ["patch", "airy", "smooth", "griffith"])
+@pytest.mark.parametrize("name", ["patch", "airy", "smooth", "griffith", "arc_crack"])
 def test_energies_of_parts_add_up_also_where_an_outline_is_not_convex(name):
     u = solution(name)
     corner = np.array([[0, 0], [1, 0], [1, 0.45], [0.4, 0.45], [0.4, 1], [0, 1.0]])

@@ -1,0 +1,183 @@
+"""A crack along an arc of a circle in an infinite plate under any remote stress."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.exact.hooke import Hooke
+from reference.exact.parameters import Parameters
+from reference.exact.solution import Array, ExactSolution
+from verify.errors import InputError
+
+__all__ = ["ArcCrack"]
+
+Complex = NDArray[np.complex128]
+
+# Within this of the centre (over the radius) potentials are summed from their Taylor series,
+# whose closed forms lose digits there like the inverse of the distance.
+_NEAR_CENTRE = 0.2
+_TERMS = 64
+
+
+class _Potentials(NamedTuple):
+    """Values (n,) of φ, φ', φ'', ψ and ψ'."""
+
+    phi: Complex
+    phi_1: Complex
+    phi_2: Complex
+    psi: Complex
+    psi_1: Complex
+
+
+class ArcCrack(ExactSolution):
+    """Both faces free, from N. I. Muskhelishvili's linear relationship for circular arcs.
+
+    With z over the radius, the crack from e^{−iα} to e^{iα}, c = cos α and
+    X = √(z² − 2cz + 1), X → z far away,
+
+        φ  = ½ [(d − Ḡ/z) X − Ḡ/z + C z],
+        ψ  = {½ [G z² − C̄ − (d̄ − G z) X] − φ'} / z,
+
+    where Γ = (σ_xx + σ_yy)/4 and G = (σ_yy − σ_xx)/2 + iσ_xy of the remote stress in the axes
+    of the arc, C = 2Γ − d, Re d = (4Γ + ½ sin²α Re G)/(3 − c), Im d = ½ sin²α Im G/(1 + c);
+    2μ(u + iv) = κφ − z conj φ' − conj ψ. Under tension σ from all sides
+    K_I = σ √(πR sin α) cos(α/2)/(1 + sin²(α/2)).
+
+    The side of the centre is the positive one: left of an arc that runs counter-clockwise.
+
+    Parameters
+    ----------
+    law : Hooke
+    parameters : Parameters
+        ``centre`` (m, default the origin) and ``radius`` of the circle (m), ``angle`` of the
+        middle of the arc and ``half_angle`` α that it covers to each side of it (degrees), and
+        the remote ``stress`` (σ_xx, σ_yy, σ_xy) in the axes of the scene, Pa.
+    """
+
+    def __init__(self, law: Hooke, parameters: Parameters) -> None:
+        super().__init__(law)
+        self._centre = parameters.take("centre", (2,), default=(0.0, 0.0))
+        self._radius = parameters.positive("radius")
+        turn = np.deg2rad(float(parameters.take("angle", (), default=0.0)))
+        degrees = parameters.positive("half_angle")
+        if degrees >= 180.0:
+            raise InputError(f"parameters.half_angle = {degrees:g}; expected less than 180")
+        self._alpha = np.deg2rad(degrees)
+        c, s = np.cos(turn), np.sin(turn)
+        self._axes = np.array([[c, s], [-s, c]])
+        s_xx, s_yy, s_xy = parameters.take("stress", (3,))
+        local = self._axes @ np.array([[s_xx, s_xy], [s_xy, s_yy]]) @ self._axes.T
+        gamma = (local[0, 0] + local[1, 1]) / 4
+        self._g = complex((local[1, 1] - local[0, 0]) / 2, local[0, 1])
+        cosine, square = np.cos(self._alpha), np.sin(self._alpha) ** 2
+        self._d = complex(
+            (4 * gamma + 0.5 * square * self._g.real) / (3 - cosine),
+            0.5 * square * self._g.imag / (1 + cosine),
+        )
+        self._c = 2 * gamma - self._d
+        ring = 0.5 * np.exp(2j * np.pi * np.arange(2 * _TERMS) / (2 * _TERMS))
+        series = np.fft.fft(np.stack(self._closed(ring, np.ones(len(ring)))), axis=1)
+        powers = 0.5 ** np.arange(_TERMS)
+        self._series = series[:, :_TERMS] / (2 * _TERMS * powers)
+
+    @property
+    def singular_points(self) -> Array:
+        """Both tips (2, 2), the one at the start of the arc first."""
+        turn = np.array([-self._alpha, self._alpha])
+        at = self._radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        return np.asarray(self._centre + at @ self._axes)
+
+    def intensity_at(self, tip: Array) -> tuple[float, float]:
+        """K_I and K_II at the tip (2,) nearest to a point, Pa·√m.
+
+        Shear is positive as the sides slide in the axes of the tip: x ahead of the crack, y to
+        the left of it.
+        """
+        first, last = np.linalg.norm(self.singular_points - tip, axis=1)
+        sign = 1.0 if last <= first else -1.0
+        # the start of the arc is the end of its mirror image
+        d, g = (self._d, self._g) if sign > 0 else (self._d.conjugate(), self._g.conjugate())
+        turned = (d - g.conjugate() * np.exp(-1j * self._alpha)) * np.exp(-0.5j * self._alpha)
+        k = turned * np.sqrt(np.pi * self._radius * np.sin(self._alpha))
+        return float(k.real), float(-sign * k.imag)
+
+    def displacement(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement (n, 2), m; see `ExactSolution`."""
+        z, f = self._evaluate(points, near)
+        w = self.law.kolosov * f.phi - z * f.phi_1.conj() - f.psi.conj()
+        w = w * self._radius / (2 * self.law.shear)
+        return np.asarray(np.column_stack([w.real, w.imag]) @ self._axes)
+
+    def gradient(self, points: Array, near: Array | None = None) -> Array:
+        """Displacement gradient (n, 2, 2), nan at a tip. See `ExactSolution`."""
+        z, f = self._evaluate(points, near)
+        with np.errstate(invalid="ignore"):  # at a tip ∞ − ∞: the limit depends on the way there
+            dz = self.law.kolosov * f.phi_1 - f.phi_1.conj()
+            dz_bar = -z * f.phi_2.conj() - f.psi_1.conj()
+        along_x = (dz + dz_bar) / (2 * self.law.shear)
+        along_y = 1j * (dz - dz_bar) / (2 * self.law.shear)
+        rows = [along_x.real, along_y.real, along_x.imag, along_y.imag]
+        turned: Array = self._axes.T @ np.stack(rows, axis=1).reshape(-1, 2, 2) @ self._axes
+        return turned
+
+    def kinks(self, start: Array, end: Array) -> list[float]:
+        """Where a segment crosses the crack; see `ExactSolution`."""
+        a, b = self._local(np.stack([start, end]))
+        along = b - a
+        middle = -(a.conjugate() * along).real / abs(along) ** 2
+        square = (1.0 - abs(a + middle * along) ** 2) / abs(along) ** 2
+        if square <= 0.0:
+            return []
+        both = middle + np.array([-1.0, 1.0]) * np.sqrt(square)
+        on = self._on_arc(a + both * along)
+        return [float(t) for t in both[on] if 0.0 < t < 1.0]
+
+    def _local(self, points: Array) -> Complex:
+        x, y = ((np.asarray(points, dtype=float) - self._centre) @ self._axes.T / self._radius).T
+        return np.asarray(x + 1j * y)
+
+    def _on_arc(self, z: Complex) -> NDArray[np.bool_]:
+        """Whether points of the circle lie on the crack."""
+        return np.asarray(np.abs(np.angle(z)) < self._alpha)
+
+    def _evaluate(self, points: Array, near: Array | None) -> tuple[Complex, _Potentials]:
+        z = self._local(points)
+        sheet = np.ones(len(z))
+        if near is not None:
+            z_n = self._local(near)
+            across = (self._ratio(z).imag >= 0.0) != (self._ratio(z_n).imag >= 0.0)
+            # where the way from `near` crosses the circle
+            out, out_n = np.abs(z) - 1.0, np.abs(z_n) - 1.0
+            share = np.divide(out_n, out_n - out, out=np.ones_like(out), where=out != out_n)
+            sheet[across & self._on_arc(z_n + np.clip(share, 0.0, 1.0) * (z - z_n))] = -1.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.stack(self._closed(z, sheet))
+        # the series is that of the side of the centre
+        central = (np.abs(z) < _NEAR_CENTRE) & (sheet > 0.0)
+        found[:, central] = np.polynomial.polynomial.polyval(z[central], self._series.T)
+        return z, _Potentials(*found)
+
+    def _ratio(self, z: Complex) -> Complex:
+        """Map the crack to the negative real axis, the side of the centre above it."""
+        tip = np.exp(1j * self._alpha)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray((z - tip) / (z - tip.conjugate()) * tip.conjugate() + 0.0)
+
+    def _closed(self, z: Complex, sheet: Array) -> _Potentials:
+        """Potentials in closed form; `sheet` is −1 where they are continued across the crack."""
+        d, g, c, cosine = self._d, self._g, self._c, np.cos(self._alpha)
+        tip = np.exp(1j * self._alpha)
+        # conj(tip)·√((z−a)/(z−b)) has its branch cut on the crack
+        root = sheet * (z - tip.conjugate()) * np.exp(0.5j * self._alpha) * np.sqrt(self._ratio(z))
+        slope = (z - cosine) / root  # X'
+        bend = 1.0 / root - slope**2 / root  # X''
+        gz = g.conjugate() / z
+        phi = 0.5 * ((d - gz) * root - gz + c * z)
+        phi_1 = 0.5 * ((d - gz) * slope + gz / z * (root + 1.0) + c)
+        phi_2 = 0.5 * ((d - gz) * bend + 2 * gz / z * slope - 2 * gz / z**2 * (root + 1.0))
+        dc = d.conjugate()
+        inner = 0.5 * (g * z**2 - c.conjugate() - (dc - g * z) * root)
+        inner_1 = 0.5 * (2 * g * z - (dc - g * z) * slope + g * root)
+        psi = (inner - phi_1) / z
+        return _Potentials(phi, phi_1, phi_2, psi, (inner_1 - phi_2 - psi) / z)
