@@ -76,7 +76,8 @@ class ArcCrack(ExactSolution):
             0.5 * square * self._g.imag / (1 + cosine),
         )
         self._c = 2 * gamma - self._d
-        ring = 0.5 * np.exp(2j * np.pi * np.arange(2 * _TERMS) / (2 * _TERMS))
+        turn = np.pi * np.arange(2 * _TERMS) / _TERMS
+        ring = np.asarray(0.5 * np.exp(1j * turn), dtype=complex)
         series = np.fft.fft(np.stack(self._closed(ring, np.ones(len(ring)))), axis=1)
         powers = 0.5 ** np.arange(_TERMS)
         self._series = series[:, :_TERMS] / (2 * _TERMS * powers)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import BodyForce, Gravity, Scene, is_uniform
+from verify.scene import ArcCut, BodyForce, Gravity, PolylineCut, Scene, is_uniform
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.solution import Solution
 
@@ -48,6 +48,7 @@ def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) ->
     """Factor that an exact solution states, Pa √m; None if it states none."""
     if hasattr(exact, "intensity_at"):  # its tips differ
         cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+        assert isinstance(cut, PolylineCut | ArcCut)  # the scene is plane
         stated = exact.intensity_at(cut.vertices()[0 if asked.end == "start" else -1])
     else:
         stated = getattr(exact, "stress_intensity", None)
