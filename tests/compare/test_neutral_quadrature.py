@@ -160,8 +160,8 @@ def test_random_cuts_through_a_body_with_a_notch_lose_no_area(seed):
     body = body_of(scene([]))
     outline = np.array(L_SHAPE)
     pieces = {c["name"]: [Segment(*np.array(c["points"]))] for c in cuts}
-    parts = [part for name in pieces for part in _inner_parts(name, pieces, outline)]
-    body = replace(body, outline=outline, cuts=pieces, parts=parts, singular=outline)
+    parts = [part for name in pieces for part in _inner_parts(name, pieces, (outline,))]
+    body = replace(body, loops=(outline,), cuts=pieces, parts=parts, singular=outline)
     rule = area_rule(body, 0.1, slab_angles(body)[seed % 3])
     assert abs(rule.weights.sum() - body.measure) < 1e-13
     assert rule.weights.min() >= 0

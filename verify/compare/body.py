@@ -10,7 +10,7 @@ from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.membrane_body import MembraneBody, membrane_of
 from verify.compare.solid import SolidBody, solid_of
 from verify.errors import UnsupportedSceneError
-from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
+from verify.scene import ArcCut, MeshFile, Polygon, PolylineCut, Rectangle, Scene, read_mesh
 from verify.scene.planar import distance_to_outline, inside_polygon
 
 __all__ = ["AnyBody", "Body", "CutPart", "body_of"]
@@ -47,8 +47,8 @@ class Body:
 
     Parameters
     ----------
-    outline : (n, 2) array
-        Corners.
+    loops : tuple of (n, 2) arrays
+        Corners of the closed curves that bound it; what an odd number of them holds is inside.
     cuts : dict of str to list of Segment or Arc
         The cuts as asked, not trimmed, in their direction.
     parts : list of CutPart
@@ -61,7 +61,7 @@ class Body:
         Ends of cuts inside the body.
     """
 
-    outline: Array
+    loops: tuple[Array, ...]
     cuts: dict[str, list[Piece]]
     parts: list[CutPart]
     singular: Array
@@ -71,13 +71,28 @@ class Body:
     @property
     def measure(self) -> float:
         """Area, m²."""
-        x, y = (self.outline - self.outline[0]).T
-        return abs(float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+        area = 0.0
+        for k, loop in enumerate(self.loops):
+            x, y = (loop - loop[0]).T
+            others = self.loops[:k] + self.loops[k + 1 :]
+            sign = -1.0 if _inside(loop[:1], others)[0] else 1.0
+            area += sign * abs(float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
+        return area
+
+    @property
+    def edges(self) -> list[Piece]:
+        """Edges of all loops."""
+        return [piece for loop in self.loops for piece in closed_pieces(loop)]
+
+    @property
+    def corners(self) -> Array:
+        """Corners (n, 2) of all loops."""
+        return np.concatenate(self.loops)
 
     @property
     def size(self) -> float:
         """Diagonal of the bounding box, m."""
-        return float(np.linalg.norm(np.ptp(self.outline, axis=0)))
+        return float(np.linalg.norm(np.ptp(self.corners, axis=0)))
 
     @property
     def has_cuts(self) -> bool:
@@ -112,45 +127,87 @@ def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
     Raises
     ------
     UnsupportedSceneError
-        If the scene is neither a rectangle, a polygon, a box nor a mesh of tetrahedra or of
-        triangles in space, or a cut is no curve or surface of a known kind.
+        If the scene is neither a rectangle, a polygon, a box nor a mesh of triangles or of
+        tetrahedra, or a cut is no curve or surface of a known kind.
     """
     if scene.cell_dimension < scene.dimension:
         return membrane_of(scene)
     if scene.dimension == 3:
         return solid_of(scene)
-    if not isinstance(scene.geometry, Rectangle | Polygon):
-        raise UnsupportedSceneError(
-            f"comparison on a body of kind '{scene.geometry.kind}' is not possible yet; "
-            "rectangles and polygons are"
-        )
-    outline = scene.geometry.outline()
+    loops = _loops(scene)
     cuts = {}
     for cut in scene.cuts:
         if not isinstance(cut, PolylineCut | ArcCut):
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
         cuts[cut.name] = cut_pieces(cut)
-    parts = [part for name in cuts for part in _inner_parts(name, cuts, outline)]
+    parts = [part for name in cuts for part in _inner_parts(name, cuts, loops)]
     extra = np.zeros((0, 2)) if singular is None else np.asarray(singular, float).reshape(-1, 2)
-    size = float(np.linalg.norm(np.ptp(outline, axis=0)))
+    size = float(np.linalg.norm(np.ptp(np.concatenate(loops), axis=0)))
     tips, special = _ends(parts, size)
-    tips, special = tips[~_on(tips, outline, size)], special[~_on(special, outline, size)]
+    tips, special = tips[~_on(tips, loops, size)], special[~_on(special, loops, size)]
     # an exact field is smooth up to the outline
-    corners = outline[:0] if scene.judged_by_exact else outline
-    found = _distinct(np.vstack([special, extra, corners]), size)
-    return Body(outline, cuts, parts, found, tips)
+    corners = [] if scene.judged_by_exact else [_kinks(loop) for loop in loops]
+    found = _distinct(np.vstack([special, extra, *corners]), size)
+    return Body(loops, cuts, parts, found, tips)
 
 
-def _inner_parts(name: str, cuts: dict[str, list[Piece]], outline: Array) -> list[CutPart]:
-    size = float(np.linalg.norm(np.ptp(outline, axis=0)))
+def _loops(scene: Scene) -> tuple[Array, ...]:
+    if isinstance(scene.geometry, Rectangle | Polygon):
+        return (scene.geometry.outline(),)
+    if not isinstance(scene.geometry, MeshFile):
+        raise UnsupportedSceneError(
+            f"comparison on a body of kind '{scene.geometry.kind}' is not possible; rectangles, "
+            "polygons and mesh files of triangles are"
+        )
+    points, cells = read_mesh(scene)
+    return tuple(points[loop] for loop in boundary_loops(cells))
+
+
+def boundary_loops(cells: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Nodes of the closed curves that bound triangles (m, 3) of positive orientation."""
+    edges = cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, first, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    following: dict[int, list[int]] = {}
+    for start, end in edges[first[count == 1]].tolist():
+        following.setdefault(start, []).append(end)
+    loops = []
+    while following:
+        start = node = next(iter(following))
+        loop = []
+        while True:
+            loop.append(node)
+            ends = following[node]
+            node, at = ends.pop(), node
+            if not ends:
+                del following[at]
+            if node == start:
+                break
+        loops.append(np.array(loop, dtype=np.int64))
+    return loops
+
+
+def _kinks(loop: Array) -> Array:
+    """Corners (k, 2) at which a closed curve turns by more than 15°."""
+    along = np.roll(loop, -1, axis=0) - loop
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    return loop[np.sum(along * np.roll(along, 1, axis=0), axis=1) < np.cos(_KINK)]
+
+
+def _inner_parts(
+    name: str, cuts: dict[str, list[Piece]], loops: tuple[Array, ...]
+) -> list[CutPart]:
+    size = float(np.linalg.norm(np.ptp(np.concatenate(loops), axis=0)))
+    edges = [piece for loop in loops for piece in closed_pieces(loop)]
     others = [p for other, pieces in cuts.items() if other != name for p in pieces]
     parts = []
     for piece in cuts[name]:
-        met = [meeting_parameters(piece, p) for p in [*closed_pieces(outline), *others]]
+        met = [meeting_parameters(piece, p) for p in [*edges, *others]]
         stops = np.unique(np.concatenate([*met, [0.0, 1.0]]))
         stops = stops[np.concatenate([[True], np.diff(stops) * piece.length > 1e-14 * size])]
         middle = piece.point(0.5 * (stops[1:] + stops[:-1]))
-        inside = inside_polygon(middle, outline) & ~_on(middle, outline, size)
+        inside = _inside(middle, loops) & ~_on(middle, loops, size)
         parts += [
             CutPart(name, piece, float(stops[i]), float(stops[i + 1]))
             for i in np.flatnonzero(inside)
@@ -171,8 +228,17 @@ def _ends(parts: list[CutPart], size: float) -> tuple[Array, Array]:
     return ends[count == 1], ends[~((count == 2) & straight)]
 
 
-def _on(points: Array, outline: Array, size: float) -> NDArray[np.bool_]:
-    on: NDArray[np.bool_] = distance_to_outline(points, outline) <= 1e-12 * size
+def _inside(points: Array, loops: tuple[Array, ...]) -> NDArray[np.bool_]:
+    inside = np.zeros(len(points), dtype=bool)
+    for loop in loops:
+        inside ^= inside_polygon(points, loop)
+    return inside
+
+
+def _on(points: Array, loops: tuple[Array, ...], size: float) -> NDArray[np.bool_]:
+    on = np.zeros(len(points), dtype=bool)
+    for loop in loops:
+        on |= distance_to_outline(points, loop) <= 1e-12 * size
     return on
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.body import Body
-from verify.compare.curves import Arc, Piece, Segment, closed_pieces
+from verify.compare.curves import Arc, Piece, Segment
 from verify.compare.locate import Field
 from verify.compare.simplices import in_frames
 
@@ -99,7 +99,7 @@ def area_rule(
         Exact areas of the body and, for straight cuts, of each of its parts.
     """
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    pieces = [(piece.rotated(turn), True) for piece in closed_pieces(body.outline)]
+    pieces = [(piece.rotated(turn), True) for piece in body.edges]
     pieces += [
         (_part(part.piece, part.start, part.end).rotated(turn), False) for part in body.parts
     ]
@@ -111,7 +111,7 @@ def area_rule(
     ys = graded_breaks(ys, tips[:, 1], spacing, depth * spacing, grading)
     if poles:  # x(y) is like a square root there
         ys = graded_breaks(ys, np.array(poles), spacing, 1e-4 * spacing)
-    corners = body.outline @ turn.T
+    corners = body.corners @ turn.T
     span = np.array([corners[:, 0].min(), corners[:, 0].max()])
     xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
     xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
