@@ -9,7 +9,7 @@ from verify.xfem.cuts import Plane
 from verify.xfem.errors import XfemError
 from verify.xfem.sparse.cholesky import SingularStiffnessError
 from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
-from verify.xfem.statics import NotInEquilibriumError, finite_rotation, static_equilibrium
+from verify.xfem.statics import NotInEquilibriumError, newton, static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -153,9 +153,9 @@ def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(monke
     fixed = np.repeat(ends[:, None], 3, axis=1)
     force = InternalForce(v, material(3))
     direct = static_equilibrium(force, fixed, twisted, load_steps=2)
-    monkeypatch.setattr(finite_rotation, "ITERATE_FROM", 0)
+    monkeypatch.setattr(newton, "ITERATE_FROM", 0)
     monkeypatch.setattr(
-        finite_rotation, "ConjugateGradients", lambda *of: ConjugateGradients(*of, limit=limit)
+        newton, "ConjugateGradients", lambda *of: ConjugateGradients(*of, limit=limit)
     )
     iterated = static_equilibrium(force, fixed, twisted, load_steps=2)
     # both to 1e-10 of the forces

@@ -1,5 +1,6 @@
 """Adapters of the other ways to cut (`verify.methods`): a scene in, a neutral solution out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from inspect import signature
@@ -21,13 +22,13 @@ from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_motion import MotionChoice
 from verify.solvers.xfem_scene import background_mesh, material_of
-from verify.solvers.xfem_static import in_load_steps
+from verify.solvers.xfem_static import dismissed_equilibria, path_notes
 from verify.solvers.xfem_steps import SCHEMES
-from verify.solvers.xfem_supports import supports_of
+from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.xfem.corotation import InternalForce
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.statics import solve_static
+from verify.xfem.statics import solve_static, static_equilibrium
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh
 
@@ -63,6 +64,7 @@ class _Run:
     iterations: dict[str, int]
     notes: dict[str, str]
     clamped: int
+    further: Sequence[Regularisation] = ()
 
 
 class MethodSolver:
@@ -76,7 +78,7 @@ class MethodSolver:
     Parameters of `solve`
     ---------------------
     load_steps : int
-        Corotational statics: equal parts of the load; 0: as few as converge.
+        Corotational statics: as of the solver ``xfem``.
     scheme : str
         Dynamics: as of the solver ``xfem``.
     step_factor : float
@@ -197,6 +199,8 @@ class MethodSolver:
         supports = supports_of(scene, body.virtual, exact)
         load = loads_of(scene, body.virtual, exact)
         timings = {**body.seconds, "loading": perf_counter() - start}
+        notes: dict[str, str] = {}
+        further: list[Regularisation] = []
         if kinematics == "linear" and self._force is InternalForce:
             static = solve_static(body.resisting, material, supports, load)
             u, energy, iterations, clamped = static.displacement, static.strain_energy, {}, 0
@@ -206,15 +210,19 @@ class MethodSolver:
             start = perf_counter()
             force = self._force(body.resisting, material, kinematics)
 
-            def prescribed(share: float) -> _Floats:
-                return supports_of(scene, body.virtual, exact, share).values
-
-            found, steps = in_load_steps(force, supports.fixed, prescribed, load, choice.load_steps)
+            path = path_of_supports(scene, body.virtual, exact)
+            found = static_equilibrium(
+                force, supports.fixed, lambda s: path(s).values, load, choice.load_steps or 1
+            )
             u, energy, clamped = found.displacement, found.energy, getattr(force, "clamped", 0)
+            steps = len(found.iterations)
             iterations = {"newton": sum(found.iterations), "load steps": steps}
+            notes, further = path_notes(found), dismissed_equilibria(found)
             timings["solve"] = perf_counter() - start
         ledger = {"strain": np.array([energy])}
-        return _Run(body, np.zeros(1), u[None], None, ledger, timings, iterations, {}, clamped)
+        return _Run(
+            body, np.zeros(1), u[None], None, ledger, timings, iterations, notes, clamped, further
+        )
 
 
 class MassSpringSolver(MethodSolver):
@@ -278,6 +286,7 @@ def _solution(name: str, run: _Run, size: float, timings: dict[str, list[float]]
         Regularisation(change.kind, change.count, change.size, change.unit)
         for change in body.changes
     ]
+    regularisations += run.further
     if run.clamped:
         kind = "spring that the fit would make negative left out"
         regularisations.append(Regularisation(kind, run.clamped, 0.0, "N/m"))

@@ -66,7 +66,8 @@ class XfemSolver:
         `verify.xfem.slivers`. A direct static solve does not mind them, so they are kept. The last
         is a ghost penalty, of linear statics and of motion with the side-wise mass.
     load_steps : int
-        Corotational statics: equal parts in which supports and loads grow; 0: as few as converge.
+        Corotational statics: equal parts in which supports and loads grow, halved where the energy
+        asks for it; 0: one.
     scheme : {"newmark", "implicit_euler", "energy_momentum", "central_differences",
               "symplectic_euler", "forward_euler"}
         Dynamics: time integration.

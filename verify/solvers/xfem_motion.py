@@ -16,9 +16,8 @@ from verify.solvers.xfem_answer import Answer, penalised
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import nodal_forces
 from verify.solvers.xfem_scene import density_of, material_of
-from verify.solvers.xfem_static import in_load_steps
 from verify.solvers.xfem_steps import MASSES, SCHEMES, largest_step
-from verify.solvers.xfem_supports import initial_supports, motion_of_supports
+from verify.solvers.xfem_supports import initial_path, motion_of_supports
 from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     DynamicBody,
@@ -35,6 +34,7 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import GhostPenalty, SliverReport, treat_slivers
+from verify.xfem.statics import static_equilibrium
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
@@ -220,12 +220,11 @@ class Mover:
             if not isinstance(entry, Gravity):
                 load += first_factor(entry.history) * forces
 
-        def prescribed(share: float) -> _Floats:
-            return initial_supports(self.scene, virtual, self.exact, share).values
-
-        check_bodies(virtual, initial_supports(self.scene, virtual, self.exact, 1.0))
-        found, _ = in_load_steps(body.force, body.fixed, prescribed, load, 0)
-        return found.displacement
+        path = initial_path(self.scene, virtual, self.exact)
+        check_bodies(virtual, path(1.0))
+        return static_equilibrium(
+            body.force, body.fixed, lambda share: path(share).values, load
+        ).displacement
 
     def _inherited(
         self, virtual: VirtualMesh, further: VirtualMesh, state: MotionState

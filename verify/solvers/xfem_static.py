@@ -1,6 +1,5 @@
 """Static equilibrium of a cut body, in linear and in corotational kinematics."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
@@ -14,24 +13,17 @@ from verify.solvers.xfem_answer import penalised
 from verify.solvers.xfem_bases import solve_in_basis
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_scene import material_of
-from verify.solvers.xfem_supports import supports_of
+from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.xfem.corotation import InternalForce
 from verify.xfem.slivers import GhostPenalty
-from verify.xfem.statics import (
-    NotInEquilibriumError,
-    StaticEquilibrium,
-    solve_static,
-    static_equilibrium,
-)
+from verify.xfem.statics import StaticEquilibrium, solve_static, static_equilibrium
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Equilibrium", "in_load_steps", "solve_equilibrium"]
+__all__ = ["Equilibrium", "dismissed_equilibria", "path_notes", "solve_equilibrium"]
 
 _Floats = NDArray[np.float64]
-
-_MOST_LOAD_STEPS = 64
 
 
 @dataclass(frozen=True)
@@ -111,14 +103,14 @@ def _corotational(
     check_bodies(virtual, supports)
     clock = perf_counter()
     force = InternalForce(virtual, material_of(scene))
-
-    def prescribed(share: float) -> _Floats:
-        return supports_of(scene, virtual, exact, share).values
-
-    found, steps = in_load_steps(force, supports.fixed, prescribed, load, load_steps)
+    path = path_of_supports(scene, virtual, exact)
+    found = static_equilibrium(
+        force, supports.fixed, lambda share: path(share).values, load, load_steps or 1
+    )
+    own = {"direct": "sparse Cholesky", "iterative": "conjugate gradients"}
     notes = {
-        "linear solver": "own sparse Cholesky",
-        "load steps": str(steps),
+        "linear solver": " and ".join(f"own {own[name]}" for name in sorted(found.solvers)),
+        **path_notes(found),
         "pieces inside out": _inverted(force, found.displacement),
     }
     return Equilibrium(
@@ -127,31 +119,31 @@ def _corotational(
         {"solve": perf_counter() - clock},
         {"newton": sum(found.iterations)},
         notes,
+        dismissed_equilibria(found),
     )
 
 
-def in_load_steps(
-    force: InternalForce,
-    fixed: NDArray[np.bool_],
-    prescribed: Callable[[float], _Floats],
-    load: _Floats,
-    load_steps: int,
-) -> tuple[StaticEquilibrium, int]:
-    """Find the equilibrium in as many load steps as asked for, or (0) as few as do.
+def path_notes(found: StaticEquilibrium) -> dict[str, str]:
+    """Load steps of an equilibrium at finite rotation, and what it was checked by."""
+    check = found.check
+    stable = "stiffness is singular (slack, or a collapsed piece): not shown"
+    compared = "none: the work of loads and supports accounts for the energy"
+    if check.compared:
+        compared = f"{check.compared} load steps solved again in halves"
+    return {
+        "load steps": str(len(found.iterations)),
+        "stability": "stiffness positive definite" if check.stable else stable,
+        "second paths": compared,
+    }
 
-    Raises
-    ------
-    NotInEquilibriumError
-        If the steps asked for, or the most that are tried, do not lead there.
-    """
-    steps = load_steps or 1
-    while True:
-        try:
-            return static_equilibrium(force, fixed, prescribed, load, steps), steps
-        except NotInEquilibriumError:
-            if load_steps or steps >= _MOST_LOAD_STEPS:
-                raise
-            steps *= 2
+
+def dismissed_equilibria(found: StaticEquilibrium) -> list[Regularisation]:
+    """Report equilibria that were found and left for one of less energy."""
+    energies = found.check.dismissed
+    if not energies:
+        return []
+    kind = "equilibrium left for one of less potential energy"
+    return [Regularisation(kind, len(energies), max(energies), "J")]
 
 
 def _inverted(force: InternalForce, displacement: _Floats) -> str:

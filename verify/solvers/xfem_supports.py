@@ -1,5 +1,6 @@
 """Supports of a scene on the unknowns of a cut body, each on its own side of the cuts."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ from verify.xfem.dynamics import MovingSupports
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["initial_supports", "motion_of_supports", "supports_of"]
+__all__ = ["initial_path", "motion_of_supports", "path_of_supports", "supports_of"]
 
 _Floats = NDArray[np.float64]
 
@@ -40,21 +41,30 @@ class _Held:
         return self.exact if self.exact is not None else self.support.rates(self.points, factor)
 
 
-def supports_of(scene: Scene, virtual: VirtualMesh, exact: Any, share: float = 1.0) -> Supports:
+def supports_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports:
     """Return the supports of a static scene; a later one wins where two hold the same node.
 
-    A field with jumps is taken at each unknown node on the side of its own material. A `share`
-    below 1 is a point of the path on which a large displacement is prescribed.
+    A field with jumps is taken at each unknown node on the side of its own material.
     """
-    held = _held(scene, virtual, exact)
-    return Supports(*_filled(virtual, held, [one.values(share) for one in held]))
+    return path_of_supports(scene, virtual, exact)(1.0)
 
 
-def initial_supports(scene: Scene, virtual: VirtualMesh, exact: Any, share: float) -> Supports:
-    """Supports with `share` of the first factor of their history."""
+def path_of_supports(scene: Scene, virtual: VirtualMesh, exact: Any) -> Callable[[float], Supports]:
+    """Supports at a share of the path of a static scene: of displacements and angles."""
     held = _held(scene, virtual, exact)
-    values = [one.values(share * first_factor(one.support.history)) for one in held]
-    return Supports(*_filled(virtual, held, values))
+    return lambda share: Supports(*_filled(virtual, held, [one.values(share) for one in held]))
+
+
+def initial_path(scene: Scene, virtual: VirtualMesh, exact: Any) -> Callable[[float], Supports]:
+    """Supports at a share of the first factor of their history."""
+    held = _held(scene, virtual, exact)
+    factors = [first_factor(one.support.history) for one in held]
+
+    def at(share: float) -> Supports:
+        values = [one.values(share * f) for one, f in zip(held, factors, strict=True)]
+        return Supports(*_filled(virtual, held, values))
+
+    return at
 
 
 def motion_of_supports(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports | MovingSupports:

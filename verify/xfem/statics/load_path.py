@@ -1,0 +1,244 @@
+"""Path of an equilibrium from load factor 0 to 1, in steps whose energy is accounted for."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.corotation.internal_force import InternalForce
+from verify.xfem.statics.newton import Newton, NotInEquilibriumError
+from verify.xfem.statics.rigid_motion import RigidMotions
+
+__all__ = ["LoadPath", "PathCheck"]
+
+_Floats = NDArray[np.float64]
+
+_HALVINGS = 6  # of a load step
+_FURTHER = 2  # of them, to compare with a step that has converged
+_SAMPLES = 16  # places of the supports on the whole path that are looked at beforehand
+_MOST_STRAIN = 0.5  # root mean square of held edges: parts of a body turn by 58° against each other
+_UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the work
+_ROUND_OFF = 1e-14  # of stiffness times size squared
+_STRAIGHT = 1e-9  # of the largest displacement, half way
+_SAME = 1e-6  # of the energy, between two paths
+_INVERTED = 1e-3  # of the volume: cells at singular points do turn inside out
+_MOST_WAYS_OUT = 4
+
+
+class PathCheck(NamedTuple):
+    """What an equilibrium was checked by.
+
+    Attributes
+    ----------
+    stable : bool or None
+        Whether the exact stiffness is positive definite; None where it is singular without a mode
+        of negative curvature (a slack membrane, a collapsed piece).
+    compared : int
+        Load steps that were solved on a second path, in halves.
+    dismissed : tuple of float
+        Strain energies in joules of equilibria that were found and left for one of less energy.
+    """
+
+    stable: bool | None
+    compared: int
+    dismissed: tuple[float, ...]
+
+
+class _Step(NamedTuple):
+    """State (N, d) at the end of a step, and what it is judged by."""
+
+    displacement: _Floats
+    count: int
+    energy: float  # strain energy, J
+    potential: float  # less the work of the loads, J
+    excess: float  # of the strain energy over the work, J
+    allowed: float  # of it, J
+    trusted: bool
+
+
+class LoadPath:
+    """Equilibria on the way from load factor 0 to 1.
+
+    A step counts if its strain energy is that at its start and the work of its reactions and loads
+    by the trapezoidal rule, up to a quarter, and hardly any volume turned inside out. It may store
+    less than that where supports rest, as what stiffens under dead loads does. Any other step is
+    solved again in two halves. If both paths end at one energy, that counts; if not, the state of
+    less potential energy does. So a column that buckles or an arch that snaps through is found, and
+    a state that its supports could not have paid for is left or refused.
+
+    Parameters
+    ----------
+    force : InternalForce
+    fixed : (N, d) bool array
+    prescribed : callable
+        Displacement (N, d) of the fixed components at a load factor, zero elsewhere. On a straight
+        path, in proportion to the factor, bodies are turned all the same.
+    load : (N, d) float array
+        Dead nodal forces at load factor 1.
+    newton : Newton
+    """
+
+    def __init__(
+        self,
+        force: InternalForce,
+        fixed: NDArray[np.bool_],
+        prescribed: Callable[[float], _Floats],
+        load: _Floats,
+        newton: Newton,
+    ) -> None:
+        self._force, self._fixed, self._load, self._newton = force, fixed, load, newton
+        self._motions = RigidMotions(force.virtual, fixed) if force.turning else None
+        self._prescribed = prescribed if self._motions is None else self._along_turns(prescribed)
+        self._sampled: dict[float, _Floats] = {}
+        self._stable: bool | None = None
+        self._compared = 0
+        self._dismissed: list[float] = []
+
+    def _along_turns(self, prescribed: Callable[[float], _Floats]) -> Callable[[float], _Floats]:
+        """Path as given, or, where a straight one turns bodies, one that turns them on the way."""
+        assert self._motions is not None
+        whole = prescribed(1.0)
+        turned = self._motions.turned_path(whole)
+        if turned is None:
+            return prescribed
+        straight = np.abs(prescribed(0.5) - 0.5 * whole).max() <= _STRAIGHT * np.abs(whole).max()
+        return turned if straight else prescribed
+
+    def check(self) -> PathCheck:
+        """Sum up what has been done so far."""
+        return PathCheck(self._stable, self._compared, tuple(self._dismissed))
+
+    def follow(self, displacement: _Floats, parts: int) -> tuple[_Floats, tuple[int, ...]]:
+        """Equilibrium (N, d) at load factor 1, and the corrections of every step.
+
+        Raises
+        ------
+        NotInEquilibriumError
+            If a step does not converge, or none of two paths is accounted for.
+        """
+        steps: list[_Step] = []
+        for k in range(parts):
+            steps += self._advance(displacement, k / parts, (k + 1) / parts, _HALVINGS)
+            displacement = steps[-1].displacement
+        return displacement, tuple(step.count for step in steps)
+
+    def settle(self, displacement: _Floats) -> _Floats:
+        """Leave an unstable equilibrium at load factor 1 for a stable one of less energy.
+
+        Raises
+        ------
+        NotInEquilibriumError
+            If none is found.
+        """
+        newton, load = self._newton, self._load
+        for _ in range(_MOST_WAYS_OUT):
+            if newton.is_stable(displacement):
+                self._stable = True
+                return displacement
+            if self._force.is_membrane:  # slack ones have no stiffness across their plane
+                return displacement
+            place = newton.place(displacement, load)
+            out = newton.way_out(place, load)
+            if out is None:
+                return displacement
+            energy = self._force.evaluate(displacement)[1]
+            self._dismissed.append(energy)
+            displacement, _ = newton.solve(out.displacement, np.zeros_like(load), load)
+        raise NotInEquilibriumError(
+            f"equilibria of {', '.join(f'{energy:.6g}' for energy in self._dismissed)} J are "
+            "unstable, and no stable one was found beside them; expected a positive definite "
+            "stiffness. Other supports or loads that break a symmetry may help"
+        )
+
+    def _advance(self, start: _Floats, since: float, until: float, room: int) -> list[_Step]:
+        """Take steps from a state at one load factor to another, in as few parts as count."""
+        middle = 0.5 * (since + until)
+
+        def halves(room: int) -> list[_Step]:
+            first = self._advance(start, since, middle, room)
+            return first + self._advance(first[-1].displacement, middle, until, room)
+
+        if room > 0 and self._strains(start, since, until):
+            return halves(room - 1)
+        try:
+            whole = self._step(start, until)
+        except NotInEquilibriumError:
+            if room == 0:
+                raise
+            return halves(room - 1)
+        if whole.trusted:
+            return [whole]
+        if room == 0:
+            if whole.excess > whole.allowed:
+                raise self._refusal(whole, until, "smaller steps were not tried")
+            return [whole]
+        self._compared += 1
+        try:
+            path = halves(min(room - 1, _FURTHER))
+        except NotInEquilibriumError as error:
+            raise self._refusal(whole, until, f"in two halves: {error}") from None
+        return self._better(whole, path)
+
+    def _better(self, whole: _Step, path: list[_Step]) -> list[_Step]:
+        """Of two paths to one load factor, that to the lower potential energy."""
+        other = path[-1]
+        near = _SAME * max(whole.energy, other.energy) + self._floor()
+        if abs(whole.energy - other.energy) <= near:
+            return [whole]
+        lower, higher = ([whole], other) if whole.potential < other.potential else (path, whole)
+        self._dismissed.append(higher.energy)
+        return lower
+
+    def _refusal(self, step: _Step, until: float, why: str) -> NotInEquilibriumError:
+        return NotInEquilibriumError(
+            f"the equilibrium found at load factor {until:.4g} stores {step.energy:.6g} J, but "
+            f"supports and loads account for {step.energy - step.excess:.6g} J of it; {why}"
+        )
+
+    def _strains(self, start: _Floats, since: float, until: float) -> bool:
+        """Whether supports turn parts of a body far against one another on the way."""
+        if self._motions is None:
+            return False
+        within = [k / _SAMPLES for k in range(1, _SAMPLES) if since < k / _SAMPLES < until]
+        return any(
+            self._motions.strain(start, self._change(start, share)) > _MOST_STRAIN
+            for share in (*within, until)
+        )
+
+    def _change(self, displacement: _Floats, share: float) -> _Floats:
+        if share not in self._sampled:
+            self._sampled[share] = self._prescribed(share)
+        return np.where(self._fixed, self._sampled[share] - displacement, 0.0)
+
+    def _step(self, start: _Floats, until: float) -> _Step:
+        change = self._change(start, until)
+        followed = start if self._motions is None else self._motions.follow(start, change)
+        before, energy_before = self._force.evaluate(followed)
+        rest = np.where(self._fixed, start + change - followed, 0.0)
+        found, count = self._newton.solve(followed, rest, until * self._load)
+        after, energy = self._force.evaluate(found)
+        # reactions and loads, as the rest of the internal force is zero; none in a rigid motion
+        work = 0.5 * float(np.vdot(before + after, found - followed))
+        excess = energy - energy_before - work
+        allowed = _UNBALANCED * max(energy, energy_before) + self._floor()
+        # under dead loads alone less than the work is stored by what stiffens or snaps through
+        least = -allowed if rest.any() else -np.inf
+        trusted = least <= excess <= allowed and not self._turns_inside_out(followed, found)
+        potential = energy - until * float(np.vdot(self._load, found))
+        return _Step(found, count, energy, potential, excess, allowed, trusted)
+
+    def _floor(self) -> float:
+        """Round-off of an energy, J."""
+        virtual = self._force.virtual
+        size = float(np.ptp(virtual.mesh.points, axis=0).max())
+        return _ROUND_OFF * self._newton.largest_stiffness * size**2
+
+    def _turns_inside_out(self, before: _Floats, after: _Floats) -> bool:
+        if self._force.is_membrane:
+            return False
+        volumes = self._force.virtual.volumes
+        was, now = (
+            volumes[self._force.inverted(displacement)].sum() for displacement in (before, after)
+        )
+        return bool(now - was > _INVERTED * volumes.sum())

@@ -1,0 +1,316 @@
+"""Newton's method for the equilibrium of a cut body, on its potential energy."""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.assembly_kernels import constrain
+from verify.xfem.corotation.internal_force import InternalForce
+from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
+from verify.xfem.statics.linear import ITERATE_FROM
+
+__all__ = ["Descent", "Newton", "NotInEquilibriumError", "Place"]
+
+_Floats = NDArray[np.float64]
+
+_HALVINGS = 12
+_ROUND_OFF = 256.0 * np.finfo(float).eps
+# of membranes, tensions over μ: at first, below which the exact stiffness is tried, and the least
+_TAUT, _SLACK, _LEAST, _FALL = 1.0, 1e-3, 1e-6, 0.1
+_ENOUGH = 1e-4  # of the fall of the energy that its slope promises
+# of what turning adds to the stiffness, the shares that are tried until it is positive definite
+_TURNS = (1.0, 0.5, 0.25, 0.125, 0.0)
+_COLLAPSED = 1e-3  # of the largest stretch
+_UNSEEN = 1e-12  # of the energy
+_INVERSE_ITERATIONS = 12
+_FIRST_WAY_OUT = 0.1  # of the size of the body, along the softest mode
+_INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
+
+
+class NotInEquilibriumError(RuntimeError):
+    """No equilibrium of a load step was found, or none that a second path agrees with."""
+
+
+class Place(NamedTuple):
+    """Displacement (N, d), its residual (N, d) and what both are judged by."""
+
+    displacement: _Floats
+    residual: _Floats
+    norm: float
+    scale: float  # to which the norm compares, N
+    energy: float  # potential, J
+
+
+class Newton:
+    """Newton's method of one load step, and the stability of what it finds.
+
+    Parameters
+    ----------
+    force : InternalForce
+    fixed : (N, d) bool array
+    tolerance : float
+        Of the residual, over the largest of load, reactions and internal force.
+    iterations : int
+        Allowed per load step.
+
+    Attributes
+    ----------
+    solvers : set of {"direct", "iterative"}
+        What has solved its linear systems.
+    """
+
+    def __init__(
+        self, force: InternalForce, fixed: NDArray[np.bool_], tolerance: float, iterations: int
+    ) -> None:
+        self._force, self._fixed = force, fixed
+        self._tolerance, self._iterations = tolerance, iterations
+        virtual = force.virtual
+        space = virtual.mesh.space
+        self._pattern = block_pattern(virtual.cells, virtual.node_count)
+        self._blocks = np.zeros((len(self._pattern.columns), space, space))
+        large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
+        self.solvers: set[str] = set()
+        self._iterative = ConjugateGradients(self._pattern, space, _INEXACT) if large else None
+
+    @property
+    def largest_stiffness(self) -> float:
+        """Largest entry of the stiffness that was assembled last."""
+        return float(np.abs(self._blocks).max(initial=0.0))
+
+    @cached_property
+    def _direct(self) -> Cholesky:
+        return Cholesky(self._pattern, self._blocks.shape[1], self._fixed.all(axis=1))
+
+    def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
+        """Equilibrium after a change of the fixed components, and the solves that it took."""
+        start = self.place(displacement, load)
+        place = self.place(displacement + self._spread(start, change), load)
+        count = 1
+        while not self._is_small(place):
+            if count == self._iterations or not np.isfinite(place.norm):
+                raise NotInEquilibriumError(
+                    f"residual {place.norm:.3g} N against forces of {place.scale:.3g} N after "
+                    f"{count} iterations; expected {self._tolerance:g} of them. "
+                    f"{self._why(place)}"
+                )
+            place = self._next(place, load)
+            count += 1
+        return place.displacement, count
+
+    def _why(self, place: Place) -> str:
+        """Say what stood in the way, as far as it can be seen."""
+        collapsed = self._force.collapsed(place.displacement, _COLLAPSED)
+        if len(collapsed) == 0:
+            return "More load steps may help"
+        return (
+            f"{len(collapsed)} of {len(self._force.virtual.cells)} pieces have collapsed, the "
+            f"first number {collapsed[0]}: the force is not continuous there (a strip is so thin "
+            "at a stretch of 1 + 1/ν), so that there may be no equilibrium"
+        )
+
+    def place(self, displacement: _Floats, load: _Floats) -> Place:
+        """Judge a displacement (N, d) under a load (N, d)."""
+        internal, energy = self._force.evaluate(displacement)
+        scale = max(float(np.linalg.norm(internal)), float(np.linalg.norm(load)))
+        potential = energy - float(np.vdot(load, displacement))
+        residual = np.where(self._fixed, 0.0, load - internal)
+        return Place(displacement, residual, float(np.linalg.norm(residual)), scale, potential)
+
+    def is_stable(self, displacement: _Floats) -> bool:
+        """Whether the exact stiffness at a displacement (N, d) is positive definite.
+
+        A factorisation without pivoting exists only then; conjugate gradients, from forces in all
+        directions, meet a negative curvature among the first extreme ones that they find.
+        """
+        self._assemble(displacement, 1.0)
+        constrain(self._pattern.starts, self._pattern.columns, self._fixed, self._blocks)
+        try:
+            self._solved(self._random_force())
+        except SingularStiffnessError:
+            return False
+        return True
+
+    def way_out(self, place: Place, load: _Floats) -> Place | None:
+        """Place of less potential energy along the softest mode of an unstable equilibrium.
+
+        None if the curvature is not negative there: the stiffness is then singular, not indefinite.
+        """
+        mode = self._softest_mode(place.displacement)
+        if mode is None:
+            return None
+        reach = float(np.ptp(self._force.virtual.mesh.points, axis=0).max())
+        for halving in range(2 * _HALVINGS):
+            step = _FIRST_WAY_OUT * 0.5**halving * reach * mode
+            trials = [self.place(place.displacement + sign * step, load) for sign in (1.0, -1.0)]
+            best = min(trials, key=lambda trial: trial.energy)
+            if best.energy < place.energy - _UNSEEN * abs(place.energy):
+                return best
+        return None
+
+    def _softest_mode(self, displacement: _Floats) -> _Floats | None:
+        """Mode (N, d) of negative curvature, its largest entry one; None if there is none."""
+        for turning in _TURNS[1:]:
+            self._assemble(displacement, turning)
+            constrain(self._pattern.starts, self._pattern.columns, self._fixed, self._blocks)
+            mode = self._random_force()
+            try:
+                for _ in range(_INVERSE_ITERATIONS):
+                    mode = self._solved(mode)
+                    mode[self._fixed] = 0.0
+                    mode /= np.abs(mode).max()
+            except SingularStiffnessError:
+                continue
+            self._assemble(displacement, 1.0)
+            curvature = mode.ravel() @ (self._pattern.matrix(self._blocks) @ mode.ravel())
+            if curvature < 0.0:
+                return mode
+        return None
+
+    def _random_force(self) -> _Floats:
+        forces = np.random.default_rng(0).standard_normal(self._fixed.shape)
+        return np.where(self._fixed, 0.0, forces)
+
+    def _spread(self, start: Place, change: _Floats) -> _Floats:
+        """Spread the prescribed change with the stiffness before it."""
+        return self._correct(start.displacement, start.residual, change)
+
+    def _next(self, place: Place, load: _Floats) -> Place:
+        """Place with a smaller residual; if that is not a correction away, one further down."""
+        leap = place
+        for turning in _TURNS:
+            try:
+                correction = self._solve(place.displacement, place.residual, None, turning)
+            except SingularStiffnessError:
+                if turning == 0.0:
+                    raise
+                continue
+            if turning == 1.0:
+                trial = self.place(place.displacement + correction, load)
+                if trial.norm < place.norm:
+                    return trial
+                leap = trial
+            share = self._share_downhill(place, correction, load)
+            if share > 0.0:
+                return self.place(place.displacement + share * correction, load)
+        return leap  # beside a piece whose force jumps, or in round-off
+
+    def _share_downhill(self, place: Place, correction: _Floats, load: _Floats) -> float:
+        """Share of a correction that lowers the potential energy as its slope says; 0 if none."""
+        fall = float(np.vdot(place.residual, correction))
+        for halving in range(_HALVINGS):
+            share = 0.5**halving
+            trial = self.place(place.displacement + share * correction, load)
+            # below the round-off of the energy
+            unseen = share * fall < _UNSEEN * abs(place.energy)
+            falls = trial.energy <= place.energy - _ENOUGH * share * fall
+            if falls or (unseen and trial.norm < place.norm):
+                return share
+        return 0.0
+
+    def _is_small(self, place: Place) -> bool:
+        """Whether a residual is within the tolerance, or what round-off of positions leaves."""
+        reach = np.abs(self._force.virtual.node_points + place.displacement).max()
+        round_off = _ROUND_OFF * self.largest_stiffness * reach
+        return place.norm <= max(self._tolerance * place.scale, round_off)
+
+    def _correct(self, displacement: _Floats, residual: _Floats, change: _Floats | None) -> _Floats:
+        try:
+            return self._solve(displacement, residual, change, 1.0)
+        except SingularStiffnessError:
+            return self._solve(displacement, residual, change, 0.0)
+
+    def _solve(
+        self,
+        displacement: _Floats,
+        residual: _Floats,
+        change: _Floats | None,
+        turning: float,
+        least: float = 0.0,
+    ) -> _Floats:
+        """Solve for a change of the fixed components, or for the residual; see `_assemble`."""
+        pattern, blocks = self._pattern, self._blocks
+        self._assemble(displacement, turning, least)
+        load = residual.copy()
+        if change is not None:
+            load -= (pattern.matrix(blocks) @ change.ravel()).reshape(change.shape)
+            load[self._fixed] = 0.0
+        constrain(pattern.starts, pattern.columns, self._fixed, blocks)
+        correction = self._solved(load)
+        return correction if change is None else correction + change
+
+    def _assemble(self, displacement: _Floats, turning: float, least: float = 0.0) -> None:
+        """Fill the blocks with the stiffness at a displacement.
+
+        `turning` is the share of what turning pieces add to the stiffness. Without it membranes
+        have the stiffness of their tension, taken to be `least` at least.
+        """
+        pattern, blocks = self._pattern, self._blocks
+        blocks[:] = 0.0
+        self._force.evaluate(displacement)
+        if turning > 0.0:
+            self._force.add_stiffness(pattern, blocks, turning, "exact", displacement)
+        if turning < 1.0:
+            self._force.add_stiffness(pattern, blocks, 1.0 - turning)
+        if turning == 0.0 and self._force.is_membrane:
+            nothing = np.zeros_like(displacement)
+            self._force.add_tension(
+                pattern, displacement, nothing, 0.0, 1.0, nothing, blocks, least
+            )
+
+    def _solved(self, load: _Floats) -> _Floats:
+        """Solve with the blocks; iterate if the body is large, factorise if that fails.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If the stiffness is found not to be positive definite, by either.
+        """
+        if self._iterative is not None:
+            self._iterative.factorize(self._blocks)
+            try:
+                correction = self._iterative.solve(load)
+                self.solvers.add("iterative")
+                return correction
+            except NotConvergedError:
+                pass
+        self._direct.factorize(self._blocks)
+        self.solvers.add("direct")
+        return self._direct.solve(load)
+
+
+class Descent(Newton):
+    """Down the potential energy of a membrane, which has next to no stiffness where it is slack.
+
+    Tangents, not forces, are those of a tension that is at least so much; it falls as long as full
+    steps lower the energy. The exact stiffness follows where it is positive definite.
+    """
+
+    _least = _TAUT
+
+    def _spread(self, start: Place, change: _Floats) -> _Floats:
+        """Let what is prescribed happen; how far the rest goes with it, the energy says later."""
+        self._least = _TAUT
+        return self._solve(start.displacement, start.residual, change, 0.0, least=self._least)
+
+    def _next(self, place: Place, load: _Floats) -> Place:
+        """Place further down; the same one with more tension if no way leads there."""
+        correction = self._downhill(place.displacement, place.residual, self._least)
+        share = self._share_downhill(place, correction, load)
+        if share == 0.0:
+            self._least = max(self._least, _SLACK) / _FALL
+            return place
+        self._least *= _FALL if share == 1.0 else 1.0
+        return self.place(place.displacement + share * correction, load)
+
+    def _downhill(self, displacement: _Floats, residual: _Floats, least: float) -> _Floats:
+        """Correction along which the energy falls."""
+        if least < _SLACK:
+            try:
+                return self._solve(displacement, residual, None, 1.0)
+            except SingularStiffnessError:
+                pass
+        return self._solve(displacement, residual, None, 0.0, least=max(least, _LEAST))

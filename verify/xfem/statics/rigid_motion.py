@@ -1,0 +1,160 @@
+"""Rigid motion of every free body that its supports ask for.
+
+A body that is turned by its supports moves rigidly first, and only what its supports want beyond
+that strains it. The energy does not see the first part, so that a turn of any angle is one step;
+the linear response to the whole of it would stretch the body by its arm times the angle.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["RigidMotions", "nearest_rotation", "part_of_rotation"]
+
+_Floats = NDArray[np.float64]
+
+_UNDETERMINED = 1e-9  # of the spread of the points: turns that they do not determine stay near 1
+_SMALL = 1e-2  # change of a vector of length one: smaller turns are the linear response's
+
+
+class RigidMotions:
+    """Rigid motions of the bodies of a cut mesh between two places of their supports.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    fixed : (N, d) bool array
+        Components that are prescribed. Nodes held in all components determine the motion; a body
+        without such a node stays where it is.
+    """
+
+    def __init__(self, virtual: VirtualMesh, fixed: NDArray[np.bool_]) -> None:
+        self._points = virtual.node_points
+        whole = fixed.all(axis=1)
+        bodies = virtual.bodies
+        held = np.flatnonzero(whole)
+        count = np.bincount(bodies[held], minlength=int(bodies.max(initial=-1)) + 1)
+        ends = np.cumsum(count)
+        order = held[np.argsort(bodies[held], kind="stable")]
+        self._held = [order[end - n : end] for end, n in zip(ends, count, strict=True)]
+        inside = np.argsort(bodies, kind="stable")
+        size = np.bincount(bodies)
+        self._nodes = [inside[end - n : end] for end, n in zip(np.cumsum(size), size, strict=True)]
+        self._edges = _edges_within(virtual.cells, whole)
+
+    def follow(self, displacement: _Floats, change: _Floats) -> _Floats:
+        """Displacement (N, d) after each body has followed the `change` (N, d) of its supports.
+
+        It is the least-squares motion of the nodes that are held in all components.
+        """
+        moved = displacement.copy()
+        for nodes, turn, centre, wanted in self._turns(displacement, change):
+            here = self._points[nodes] + displacement[nodes]
+            moved[nodes] = (here - centre) @ turn.T + wanted - self._points[nodes]
+        return moved
+
+    def turned_path(self, displacement: _Floats) -> Callable[[float], _Floats] | None:
+        """Path to a prescribed displacement (N, d) along rotations; None if no body turns.
+
+        Each body turns by a share of its angle, so that it does not shrink on the way as on the
+        straight one, and what its supports want beyond that grows in proportion.
+        """
+        turns = list(self._turns(np.zeros_like(displacement), displacement))
+        if not turns:
+            return None
+
+        def at(share: float) -> _Floats:
+            values = share * displacement
+            for nodes, turn, centre, wanted in turns:
+                arm = self._points[nodes] - centre
+                strained = (self._points[nodes] + displacement[nodes] - wanted) @ turn - arm
+                part = part_of_rotation(turn, share)
+                values[nodes] = (arm + share * strained) @ part.T - arm + share * (wanted - centre)
+            return values
+
+        return at
+
+    def _turns(
+        self, displacement: _Floats, change: _Floats
+    ) -> Iterator[tuple[NDArray[np.int64], _Floats, _Floats, _Floats]]:
+        """Nodes of each body that turns, its rotation, and the centre of what holds it: two places.
+
+        Bodies that turn by little are left to the linear response.
+        """
+        for held, nodes in zip(self._held, self._nodes, strict=True):
+            if len(held) == 0:
+                continue
+            before = self._points[held] + displacement[held]
+            after = before + change[held]
+            centre, wanted = before.mean(axis=0), after.mean(axis=0)
+            turn = nearest_rotation(before - centre, after - wanted)
+            if np.linalg.norm(turn - np.eye(len(turn))) >= _SMALL:
+                yield nodes, turn, centre, wanted
+
+    def strain(self, displacement: _Floats, change: _Floats) -> float:
+        """Root mean square by which edges of held nodes change beyond the motion of their body.
+
+        Parts that turn against one another by an angle θ make it 2 sin(θ/4) or less.
+        """
+        if len(self._edges) == 0:
+            return 0.0
+        first, second = self._edges.T
+        moved = self.follow(displacement, change)
+        left = displacement + change - moved
+        lengths = np.linalg.norm(
+            (self._points + displacement)[second] - (self._points + displacement)[first], axis=1
+        )
+        apart = np.linalg.norm(left[second] - left[first], axis=1)
+        sound = lengths > 0.0
+        ratio = apart[sound] / lengths[sound]
+        return float(np.sqrt(np.mean(ratio**2))) if len(ratio) else 0.0
+
+
+def nearest_rotation(before: _Floats, after: _Floats) -> _Floats:
+    """Rotation (d, d) that takes centred points (k, d) nearest to others, by least squares.
+
+    What the points leave open (one point, points on a line) is turned as little as possible.
+    Source: W. Kabsch, Acta Cryst. A 32, 1976; S. Umeyama, IEEE PAMI 13, 1991, for the sign.
+    """
+    d = before.shape[1]
+    covariance = after.T @ before
+    scale = float(np.linalg.norm(before) * np.linalg.norm(after))
+    if scale == 0.0:
+        return np.eye(d)
+    turn = np.eye(d)
+    for _ in range(2):  # the second time what is determined is not pulled back any more
+        left, _, right = np.linalg.svd(covariance / scale + _UNDETERMINED * turn)
+        sign = np.ones(d)
+        sign[-1] = np.sign(np.linalg.det(left) * np.linalg.det(right))
+        turn = (left * sign) @ right
+    return turn
+
+
+def part_of_rotation(turn: _Floats, share: float) -> _Floats:
+    """Rotation (d, d) about the same axis by a share of the angle, which is at most half a turn."""
+    d = len(turn)
+    if d == 2:
+        angle, axis = np.arctan2(turn[1, 0], turn[0, 0]), np.array([[0.0, -1.0], [1.0, 0.0]])
+    else:
+        skew = 0.5 * np.array(
+            [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+        )
+        x, y, z = np.linalg.svd(turn - np.eye(3))[2][2]  # what the rotation leaves where it is
+        along = float(skew @ (x, y, z))
+        angle = np.arctan2(along, 0.5 * (np.trace(turn) - 1.0))
+        axis = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = share * angle
+    rotation: _Floats = np.eye(d) + np.sin(angle) * axis + (1.0 - np.cos(angle)) * axis @ axis
+    return rotation
+
+
+def _edges_within(cells: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Edges (e, 2) of cells both ends of which are chosen."""
+    corners = cells.shape[1]
+    pairs = [(i, j) for i in range(corners) for j in range(i + 1, corners)]
+    edges = np.concatenate([cells[:, pair] for pair in pairs])
+    edges = edges[chosen[edges].all(axis=1)]
+    return np.unique(np.sort(edges, axis=1), axis=0)
