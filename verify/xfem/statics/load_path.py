@@ -49,7 +49,7 @@ class _Step(NamedTuple):
     """State (N, d) at the end of a step, and what it is judged by."""
 
     displacement: _Floats
-    count: int
+    corrections: int
     energy: float  # strain energy, J
     potential: float  # less the work of the loads, J
     excess: float  # of the strain energy over the work, J
@@ -121,7 +121,7 @@ class LoadPath:
         for k in range(parts):
             steps += self._advance(displacement, k / parts, (k + 1) / parts, _HALVINGS)
             displacement = steps[-1].displacement
-        return displacement, tuple(step.count for step in steps)
+        return displacement, tuple(step.corrections for step in steps)
 
     def settle(self, displacement: _Floats) -> _Floats:
         """Leave an unstable equilibrium at load factor 1 for a stable one of less energy.
