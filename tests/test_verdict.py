@@ -22,9 +22,13 @@ def solve(level, value, width=0.0, solver="xfem", metric="energy_norm", referenc
     )
 
 
+def verdicts(check, records, rates=(), judge_only=(), **more):
+    asked = scene([STRAIGHT], acceptance=[{"metric": "energy_norm", **check}], **more)
+    return judge(asked, records, list(rates), judge_only)
+
+
 def verdict(check, records, rates=()):
-    asked = scene([STRAIGHT], acceptance=[{"metric": "energy_norm", **check}])
-    (found,) = judge(asked, records, list(rates))
+    (found,) = verdicts({"solver": "xfem", **check}, records, rates)
     return found
 
 
@@ -178,14 +182,14 @@ def test_an_order_that_means_nothing_never_passes(reason, expected):
 )
 def test_a_solve_that_did_not_finish_is_an_error_with_its_reason(status, check):
     records = [solve(0, 0.1), SolveRecord("a test", "xfem", 1, status, "out of luck")]
+    records.append(solve(0, 0.1, solver="conforming"))
     found = verdict(check, records)
     assert found.verdict is Verdict.ERROR
     assert "out of luck" in found.reason
 
 
-def test_a_solver_that_was_not_run_and_a_metric_that_was_not_measured_are_errors():
+def test_a_metric_that_was_not_measured_is_an_error():
     check = {"check": "error", "at_most": 1.0}
-    assert "not run" in verdict(check, []).reason
     bare = SolveRecord("a test", "xfem", 0, Status.SOLVED, notes={"energy_norm": "no reference"})
     found = verdict(check, [bare])
     assert found.verdict is Verdict.ERROR
@@ -196,3 +200,95 @@ def test_a_value_that_is_not_a_number_fails():
     found = verdict({"check": "error", "at_most": 1.0}, [solve(0, float("nan"))])
     assert found.verdict is Verdict.FAIL
     assert "not finite" in found.reason
+
+
+BOUND = {"check": "error", "at_most": 0.05}
+WITHIN = {"check": "ratio", "at_most": 2.0}
+
+
+def by_solver(found):
+    return {one.solver: one.verdict for one in found}
+
+
+def test_a_check_that_names_no_solver_is_made_of_each_but_the_reference():
+    records = [
+        solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 0.01, "reference": 9}.items()
+    ]
+    assert by_solver(verdicts(BOUND, records)) == {"mine": Verdict.FAIL, "xfem": Verdict.PASS}
+
+
+def test_a_rate_is_judged_for_each_solver_by_its_own():
+    records = [solve(i, 0.1, solver=s) for s in ("mine", "xfem") for i in (0, 1)]
+    rates = [Rate(s, "energy_norm", p, 0.01, "", [p, p]) for s, p in (("mine", 0.1), ("xfem", 1.0))]
+    found = verdicts({"check": "rate", "at_least": 0.9}, records, rates)
+    assert by_solver(found) == {"mine": Verdict.FAIL, "xfem": Verdict.PASS}
+
+
+def test_a_ratio_is_made_of_all_but_the_one_compared_with():
+    records = [
+        solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 0.1, "conforming": 0.1}.items()
+    ]
+    assert by_solver(verdicts(WITHIN, records)) == {"mine": Verdict.FAIL, "xfem": Verdict.PASS}
+
+
+def test_a_solver_that_refuses_the_case_is_not_judged_and_one_that_failed_is():
+    refused = SolveRecord("a test", "no", 0, Status.REFUSED, "only space")
+    failed = SolveRecord("a test", "broken", 0, Status.FAILED, "singular")
+    found = verdicts(BOUND, [refused, failed, solve(0, 0.01)])
+    assert by_solver(found) == {"broken": Verdict.ERROR, "xfem": Verdict.PASS}
+
+
+def test_a_check_that_holds_for_nobody_is_undecided_and_says_so():
+    (found,) = verdicts(WITHIN, [solve(0, 0.1, solver="conforming")])
+    assert (found.solver, found.verdict) == ("", Verdict.UNDECIDED)
+    assert "no solver" in found.reason
+    refused = SolveRecord("a test", "no", 0, Status.REFUSED, "only space")
+    (found,) = verdicts(BOUND, [refused, solve(0, 0.1, solver="reference")])
+    assert found.verdict is Verdict.UNDECIDED
+    assert "refuses" in found.reason
+
+
+def test_who_was_not_asked_is_undecided_and_judge_only_narrows():
+    records = [solve(0, 1.0, solver=s) for s in ("mine", "xfem", "reference")]
+    (found,) = verdicts({**BOUND, "solver": "yours"}, records)
+    assert (found.verdict, found.reason) == (
+        Verdict.UNDECIDED,
+        "the run was not asked for solver 'yours'",
+    )
+    assert "conforming" in verdicts(WITHIN, records)[0].reason
+    assert list(by_solver(verdicts(BOUND, records, judge_only=["mine"]))) == ["mine"]
+    (found,) = verdicts({**BOUND, "solver": "xfem"}, records, judge_only=["mine"])
+    assert found.verdict is Verdict.UNDECIDED
+    # the reference is what all rest on: a check of it is never narrowed away
+    (found,) = verdicts({**BOUND, "solver": "reference"}, records, judge_only=["mine"])
+    assert found.verdict is Verdict.FAIL
+
+
+def known(solver="mine", check="error"):
+    return [
+        {"solver": solver, "check": check, "metric": "energy_norm", "reason": "it drops slivers"}
+    ]
+
+
+def test_a_known_finding_fails_with_its_reason_and_passes_with_a_hint():
+    records = [solve(0, e, solver=s) for s, e in {"mine": 1.0, "xfem": 1.0}.items()]
+    mine, xfem = verdicts(BOUND, records, known_findings=known())
+    assert mine.verdict is xfem.verdict is Verdict.FAIL
+    assert (mine.known, mine.counts_as_failed) == ("it drops slivers", False)
+    assert (xfem.known, xfem.counts_as_failed) == ("", True)
+    (mine,) = verdicts(BOUND, [solve(0, 0.01, solver="mine")], known_findings=known())
+    assert mine.verdict is Verdict.PASS
+    assert "the entry can go" in mine.reason
+
+
+@pytest.mark.parametrize(
+    "check, finding",
+    [
+        (BOUND, known(check="rate")),
+        ({**BOUND, "solver": "xfem"}, known()),
+        (WITHIN, known("conforming", "ratio")),
+    ],
+)
+def test_a_known_finding_that_names_no_check_of_the_case_is_refused(check, finding):
+    with pytest.raises(ValueError, match=r"known_findings\[0\]: no check"):
+        verdicts(check, [], known_findings=finding)

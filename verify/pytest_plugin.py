@@ -1,17 +1,20 @@
-"""pytest plugin: one test per acceptance check of a case.
+"""pytest plugin: one test per acceptance check of a case and solver.
 
 Two ways in. Case files are collected (``*.verify.toml``, and what the ini option ``verify_cases``
 names), or a test function is marked ``@pytest.mark.verify("case")``: it becomes one test per
-check, whose body runs if the check passes and may ask for the fixtures ``verify_check`` (a
-`VerdictRecord`) and ``verify_result`` (a `CaseResult`).
+check and solver, whose body runs if the check passes and may ask for the fixtures
+``verify_check`` (a `VerdictRecord`) and ``verify_result`` (a `CaseResult`).
 
-FAIL and ERROR fail. UNDECIDED is skipped with its reason, because nothing was found out; with
-``--verify-strict`` it fails. A case is run once per process, through the runner, in a temporary
-directory (or ``--verify-out``, where a later session takes over what is finished).
+The solvers are those of the ini option ``verify_solvers``, else ``xfem`` and those that the checks
+name. FAIL and ERROR fail; a FAIL that the case lists as a known finding is an expected failure.
+UNDECIDED is skipped with its reason, because nothing was found out; with ``--verify-strict`` it
+fails. So is a check of a solver that refuses the case. A case is run once per process, through
+the runner, in a temporary directory (or ``--verify-out``, where a later session takes over what is
+finished).
 """
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +23,8 @@ import pytest
 
 if TYPE_CHECKING:
     from verify.result import CaseResult, SolveRecord, VerdictRecord
+    from verify.runner import Options
+    from verify.scene import Scene
 
 __all__ = ["CaseFile", "CheckItem"]
 
@@ -37,6 +42,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--verify-out", metavar="DIR", help="keep the runs below DIR, and resume them")
     parser.addini("verify_cases", "case files to collect: patterns below rootdir", "args", [])
     parser.addini("verify_strict", "an UNDECIDED check fails instead of a skip", "bool", False)
+    parser.addini("verify_solvers", "solvers to run and judge, e.g. my_module:MySolver", "args", [])
     parser.addini("verify_timeout", "wall seconds after which a solve is killed", default="600")
     parser.addini("verify_references", "bundle of references to judge by, below rootdir")
 
@@ -44,7 +50,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the marker; make room for the runs."""
     config.addinivalue_line(
-        "markers", "verify(case): a test per acceptance check of the case (name or file)"
+        "markers", "verify(case): a test per acceptance check of the case and solver"
     )
     config.stash[_RUNS] = _Runs(config)
 
@@ -61,6 +67,7 @@ class _Runs:
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
         self._results: dict[str, CaseResult | str] = {}
+        self._solvers = tuple(config.getini("verify_solvers"))
         self._place: tempfile.TemporaryDirectory[str] | None = None
 
     @property
@@ -82,27 +89,51 @@ class _Runs:
             pytest.fail(found, pytrace=False)
         return found
 
-    def _run(self, source: str) -> "CaseResult":
-        from verify.runner import Options, run_cases
-        from verify.runner.reference_cache import cache_folder
+    def check_names(self, source: str) -> list[str]:
+        """Names of the checks of a case, one per solver; a case without any has one."""
+        from verify.applied_checks import judged_by
+        from verify.runner.plan import solvers_of
         from verify.scene import load_scene
 
         scene = load_scene(source)
-        timeout = float(self._config.getini("verify_timeout"))
+        solvers = solvers_of(scene, self._options(scene))
+        made = [
+            (check.check, check.metric, solver)
+            for check in scene.acceptance
+            for solver in judged_by(check, solvers) or [""]
+        ]
+        return _names(made) or [_NO_CHECK]
+
+    def verdict(self, source: str, name: str) -> "VerdictRecord | None":
+        """Return the verdict on a check; None if the solver refuses the case."""
+        verdicts = self.result(source).verdicts
+        names = _names([(v.check, v.metric, v.solver) for v in verdicts])
+        return dict(zip(names, verdicts, strict=True)).get(name)
+
+    def _options(self, scene: "Scene") -> "Options":
+        from verify.runner import Options
+        from verify.runner.reference_cache import cache_folder
+
         named = {name for c in scene.acceptance for name in (c.solver, getattr(c, "to", c.solver))}
         # the default would run the conforming solver too, for the report that nobody reads here;
         # if more are named, the default takes them all and survives one that is not installed
-        alone = ("xfem",) if named == {"xfem"} else ()
+        alone = ("xfem",) if named <= {"xfem", None} else ()
         bundle = self._config.getini("verify_references")
-        options = Options(
-            solvers=alone,
+        return Options(
+            solvers=self._solvers or alone,
             repetitions=1,
-            timeout=timeout,
+            timeout=float(self._config.getini("verify_timeout")),
             cache=cache_folder(),
             references=self._config.rootpath / bundle if bundle else None,
         )
+
+    def _run(self, source: str) -> "CaseResult":
+        from verify.runner import run_cases
+        from verify.scene import load_scene
+
+        scene = load_scene(source)
         folder = self._root() / scene.name.replace("/", "__")
-        return run_cases([scene], folder, options, _Silent(), "pytest").results[0]
+        return run_cases([scene], folder, self._options(scene), _Silent(), "pytest").results[0]
 
     def _root(self) -> Path:
         if kept := self._config.getoption("verify_out"):
@@ -128,28 +159,29 @@ class _Silent:
     def judged(self, result: "CaseResult") -> None: ...
 
 
-def _check_names(source: str) -> list[str]:
-    """Names of the checks of a case, distinct, in their order; a case without any has one."""
-    from verify.scene import load_scene
-
+def _names(made: Iterable[tuple[str, str, str]]) -> list[str]:
+    """Names of checks, distinct, in their order, from kind, metric and solver."""
     names: list[str] = []
-    for check in load_scene(source).acceptance:
-        name = f"{check.check}-{check.metric}-{check.solver}"
+    for name in map("-".join, made):
         twins = sum(other == name or other.startswith(f"{name}-#") for other in names)
         names.append(f"{name}-#{twins + 1}" if twins else name)
-    return names or [_NO_CHECK]
+    return names
 
 
-def _judge(runs: _Runs, source: str, index: int) -> "VerdictRecord":
+def _judge(runs: _Runs, source: str, name: str) -> "VerdictRecord":
     """End the test unless the check passes."""
     from verify.result import Verdict
 
-    if _check_names(source) == [_NO_CHECK]:
+    if name == _NO_CHECK:
         pytest.skip("the case makes no acceptance check")
-    record = runs.result(source).verdicts[index]
+    record = runs.verdict(source, name)
+    if record is None:
+        pytest.skip(f"{name}: the solver refuses the case")
     observed = "not observed" if record.observed is None else f"{record.observed:.6g}"
     text = f"{record.verdict}: {record.metric} ({record.solver}): {observed}, "
     text += f"wanted {record.limit}: {record.reason}"
+    if record.known:
+        pytest.xfail(f"known finding: {record.known}: {text}")
     if record.verdict is Verdict.UNDECIDED and not runs.strict:
         pytest.skip(text)
     if record.verdict is not Verdict.PASS:
@@ -176,30 +208,26 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> "CaseFile 
 
 
 class CaseFile(pytest.File):
-    """A case file; its tests are its acceptance checks."""
+    """A case file; its tests are its acceptance checks, of each solver."""
 
     def collect(self) -> Iterator["CheckItem"]:
-        """Yield a test per acceptance check."""
+        """Yield a test per acceptance check and solver."""
         from verify.errors import InputError
 
         try:
-            names = _check_names(str(self.path))
+            names = self.config.stash[_RUNS].check_names(str(self.path))
         except InputError as error:
             raise self.CollectError(str(error)) from None
-        for index, name in enumerate(names):
-            yield CheckItem.from_parent(self, name=name, index=index)
+        for name in names:
+            yield CheckItem.from_parent(self, name=name)
 
 
 class CheckItem(pytest.Item):
-    """An acceptance check of a case file."""
-
-    def __init__(self, *, index: int, **others: Any) -> None:
-        super().__init__(**others)
-        self.index = index
+    """An acceptance check of a case file, made of one solver."""
 
     def runtest(self) -> None:
         """Run the case, if that is not done, and judge the check."""
-        _judge(self.config.stash[_RUNS], str(self.path), self.index)
+        _judge(self.config.stash[_RUNS], str(self.path), self.name)
 
     def reportinfo(self) -> tuple[Path, None, str]:
         """Say which check of which file this is."""
@@ -210,7 +238,7 @@ class CheckItem(pytest.Item):
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Make one test per acceptance check of a marked function."""
+    """Make one test per acceptance check and solver of a marked function."""
     marker = metafunc.definition.get_closest_marker("verify")
     if marker is None:
         return
@@ -218,12 +246,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
     source = _case_of(marker)
     try:
-        names = _check_names(source)
+        names = metafunc.config.stash[_RUNS].check_names(source)
     except InputError as error:
         raise pytest.UsageError(f"{metafunc.definition.nodeid}: {error}") from None
     if "verify_check" not in metafunc.fixturenames:
         metafunc.fixturenames.append("verify_check")
-    metafunc.parametrize("verify_check", range(len(names)), ids=names, indirect=True)
+    metafunc.parametrize("verify_check", names, indirect=True)
 
 
 def _case_of(marker: pytest.Mark) -> str:
@@ -237,8 +265,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> None:
     """Judge the check before the body of a marked test."""
     marker = pyfuncitem.get_closest_marker("verify")
     if marker is not None:
-        index: Any = pyfuncitem.callspec.params["verify_check"]
-        record = _judge(pyfuncitem.config.stash[_RUNS], _case_of(marker), index)
+        name: Any = pyfuncitem.callspec.params["verify_check"]
+        record = _judge(pyfuncitem.config.stash[_RUNS], _case_of(marker), name)
         pyfuncitem.funcargs["verify_check"] = record
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "Status",
     "Verdict",
     "VerdictRecord",
+    "error_picture",
     "read_result",
     "write_result",
 ]
@@ -147,11 +148,12 @@ class Rate:
 
 @dataclass(frozen=True)
 class VerdictRecord:
-    """The verdict on one acceptance check of a case.
+    """The verdict on one acceptance check of a case, made of one solver.
 
-    `observed` is what was measured, `low`/`high` the interval in which its true value lies
-    given the reference's uncertainty, `limit` what the case demands (as text), `reason` one
-    sentence.
+    `solver` is empty if the check holds for no solver of the run. `observed` is what was measured,
+    `low`/`high` the interval in which its true value lies given the reference's uncertainty,
+    `limit` what the case demands (as text), `reason` one sentence. `known` is the reason that the
+    case gives for a FAIL that it lists as a known finding, else empty.
     """
 
     check: str
@@ -163,6 +165,12 @@ class VerdictRecord:
     high: float | None
     limit: str
     reason: str
+    known: str = ""
+
+    @property
+    def counts_as_failed(self) -> bool:
+        """Whether this is a FAIL that the case does not list as a known finding."""
+        return self.verdict is Verdict.FAIL and not self.known
 
 
 class NoticeKind(StrEnum):
@@ -221,6 +229,16 @@ class CaseResult:
     def warnings(self) -> list[Notice]:
         """The notices that put an answer in doubt."""
         return [notice for notice in self.notices if notice.kind is NoticeKind.WARNING]
+
+    @property
+    def failing(self) -> list[str]:
+        """Solvers that fail a check, known findings included, in their order."""
+        return list(dict.fromkeys(v.solver for v in self.verdicts if v.verdict is Verdict.FAIL))
+
+
+def error_picture(solver: str) -> str:
+    """Return the name under which `CaseResult.pictures` has the error field of a solver."""
+    return f"error_field of {solver}"
 
 
 def write_result(result: CaseResult, path: Path) -> None:

@@ -6,16 +6,17 @@ check needs is missing.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
+from verify.applied_checks import applied_checks
 from verify.result import Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 from verify.study.energy_account import ACCOUNT
 from verify.study.error_history import ERROR_NAMES
 from verify.study.rates import ROUND_OFF
 
-__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge"]
+__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge", "unjudged"]
 
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
 
@@ -45,9 +46,12 @@ class NotMeasuredError(Exception):
 
 
 def judge(
-    scene: Scene, records: Sequence[SolveRecord], rates: Sequence[Rate]
+    scene: Scene,
+    records: Sequence[SolveRecord],
+    rates: Sequence[Rate],
+    judge_only: Sequence[str] = (),
 ) -> list[VerdictRecord]:
-    """Judge every acceptance check of `scene` on what was measured.
+    """Judge every acceptance check of `scene` on what was measured, for each solver by itself.
 
     Parameters
     ----------
@@ -55,11 +59,13 @@ def judge(
     records : sequence of SolveRecord
         All solves of the case, with their metrics.
     rates : sequence of Rate
+    judge_only : sequence of str
+        Solvers that are judged; empty: all that were asked and do not refuse the case.
 
     Returns
     -------
     list of VerdictRecord
-        One per check, in the order of the scene.
+        One per check and solver, in the order of the scene, then of the solvers in `records`.
     """
     judges: dict[type, Callable[..., VerdictRecord]] = {
         RateCheck: _judge_rate,
@@ -68,12 +74,35 @@ def judge(
         ValueCheck: _judge_value,
     }
     verdicts = []
-    for check in scene.acceptance:
+    for applied in applied_checks(scene.acceptance, records, judge_only):
+        check = applied.check
+        if applied.not_judged:
+            verdicts.append(unjudged(check, Verdict.UNDECIDED, applied.not_judged))
+            continue
         try:
             verdicts.append(judges[type(check)](check, records, rates))
         except NotMeasuredError as problem:
-            verdicts.append(_record(check, Verdict.ERROR, None, _limit(check), str(problem)))
-    return verdicts
+            verdicts.append(unjudged(check, Verdict.ERROR, str(problem)))
+    return [_marked(scene, verdict) for verdict in verdicts]
+
+
+def unjudged(check: Check, verdict: Verdict, reason: str) -> VerdictRecord:
+    """Return the verdict on a check, made of one solver, for which nothing was observed."""
+    return _record(check, verdict, None, _limit(check), reason)
+
+
+def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:
+    """Enter the reason if the case lists this as a known finding; say if it is none any more."""
+    for known in scene.known_findings:
+        named = (known.check, known.metric, known.solver)
+        if named != (found.check, found.metric, found.solver):
+            continue
+        if found.verdict is Verdict.FAIL:
+            return replace(found, known=known.reason)
+        if found.verdict is Verdict.PASS:
+            text = "it passes, and is listed as a known finding: the entry can go"
+            return replace(found, reason=f"{found.reason}; {text}")
+    return found
 
 
 def error_interval(metric: Metric) -> Interval:
@@ -202,8 +231,9 @@ def _record(
     check: Check, verdict: Verdict, found: Interval | None, limit: str, reason: str
 ) -> VerdictRecord:
     value, low, high = (None, None, None) if found is None else (found.value, found.low, found.high)
+    solver = check.solver or ""
     return VerdictRecord(
-        check.check, check.solver, check.metric, verdict, value, low, high, limit, reason
+        check.check, solver, check.metric, verdict, value, low, high, limit, reason
     )
 
 
@@ -223,7 +253,7 @@ def _limit(check: Check) -> str:
             return f"{check.equals:.10g} ± {check.relative_tolerance:g} (relative)"
 
 
-def _levels(records: Sequence[SolveRecord], solver: str) -> list[SolveRecord]:
+def _levels(records: Sequence[SolveRecord], solver: str | None) -> list[SolveRecord]:
     """All solves of a solver, coarse to fine; every one must have finished."""
     own = sorted((r for r in records if r.solver == solver), key=lambda r: r.level)
     if not own:

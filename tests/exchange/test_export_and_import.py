@@ -156,9 +156,13 @@ def test_right_answers_pass_and_wrong_ones_fail_the_checks_that_the_case_makes(t
             answer(tmp_path / name, level, factor)
     out = ["--out", str(tmp_path / "run")]
     right = main(["import", CASE, str(tmp_path / "right"), "--solver", "right", *out, "--json"])
-    said = json.loads(capsys.readouterr().out)
+    captured = capsys.readouterr()
+    said = json.loads(captured.out)
     assert (right, {v["verdict"] for v in said["verdicts"]}) == (0, {"PASS"})
     assert {v["solver"] for v in said["verdicts"]} == {"right"}
+    # judged once, with the answers
+    assert "not judged" not in captured.err
+    assert captured.err.count(f"{CASE}: ") == 1
     # the second program joins the first in the report
     wrong = main(["import", CASE, str(tmp_path / "wrong"), "--solver", "wrong", *out])
     assert wrong == 1

@@ -18,6 +18,7 @@ from verify.result import (
     Status,
     Verdict,
     VerdictRecord,
+    error_picture,
     write_result,
 )
 from verify.solution import Solution, write_solution
@@ -101,7 +102,11 @@ def make_run(root: Path, pictures: bool = True, hostile: bool = False) -> Path:
     (root / "run.json").write_text(json.dumps(record), encoding="utf-8")
     for case in cases:
         folder = root / "cases" / case.case.replace("/", "__")
-        write_result(case, folder / "result.json")
+        drawn = {
+            error_picture(solver): f"cases/{folder.name}/error_field_{solver}.vtu"
+            for solver in ("xfem", "conforming")
+        }
+        write_result(replace(case, pictures=drawn if pictures else {}), folder / "result.json")
         if pictures:
             slender = case.case.endswith("strip")
             for solver, n, order in (("xfem", 24, 1), ("conforming", 24, 1), ("reference", 16, 2)):
@@ -109,7 +114,9 @@ def make_run(root: Path, pictures: bool = True, hostile: bool = False) -> Path:
                     solution = cut_square(n, order, 0.03, slender)
                     for level in (2, 3):
                         write_solution(solution, folder / f"{solver}-{level}" / "solution")
-            write_error_field(cut_square(24, slender=slender), folder / "error_field.vtu")
+            for solver in ("xfem", "conforming"):
+                body = cut_square(24, slender=slender)
+                write_error_field(body, folder / f"error_field_{solver}.vtu")
     return root
 
 

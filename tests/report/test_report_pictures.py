@@ -106,7 +106,7 @@ def test_a_machine_without_opengl_gets_pictures_by_matplotlib_and_a_note(
     monkeypatch.setattr(pictures, "_VTK", command)
     root = make_run(tmp_path / "run")
     page = parsed(render(root).read_text(encoding="utf-8"))
-    assert len(page.all("img")) == 9
+    assert len(page.all("img")) == 12
     assert "drawn by matplotlib" in page.text
     assert reason in page.text
 
@@ -116,7 +116,8 @@ def test_missing_and_damaged_solutions_become_notes(tmp_path):
     folder = root / "cases" / "statics__f3_inclined"
     (folder / "xfem-3" / "solution.vtu").write_text("no mesh")
     (folder / "conforming-3" / "solution.json").unlink()
-    (folder / "error_field.vtu").unlink()
+    for solver in ("xfem", "conforming"):
+        (folder / f"error_field_{solver}.vtu").unlink()
     shown = case_pictures(root, load_run(root).entries[0])
     assert not shown.all
     notes = " ".join(shown.notes)
@@ -132,11 +133,39 @@ def test_a_solution_outside_the_run_directory_is_not_read(tmp_path):
     result = json.loads(file.read_text())
     for solve in result["solves"]:
         solve["solution"] = "../../secret/solution.json"
-    result["pictures"] = {"error_field": "/etc/passwd"}
+    result["pictures"] = {"error_field of xfem": "/etc/passwd"}
     file.write_text(json.dumps(result))
     shown = case_pictures(root, load_run(root).entries[0])
     assert not shown.all
     assert "outside the run directory" in shown.notes[0]
+
+
+def test_the_error_of_each_solver_is_drawn_the_largest_first_at_one_scale(tmp_path):
+    root = make_run(tmp_path / "run")
+    folder = root / "cases" / "statics__griffith_inside"
+    shown = load_run(root).entries[1].result
+    assert shown.failing == ["xfem"]
+    names = ["xfem", "conforming", "a:A", "b:B", "still:Still"]
+    result = json.loads((folder / "result.json").read_text())
+    body = cut_square(4)
+    for size, name in enumerate(names, 1):
+        file = folder / f"error_field_{size}.vtu"
+        write_error_field(body, file, np.full(len(body.points), float(size)))
+        result["pictures"][f"error_field of {name}"] = f"cases/{folder.name}/{file.name}"
+        if size > 2:
+            result["solves"].append({**result["solves"][0], "solver": name})
+    (folder / "result.json").write_text(json.dumps(result))
+    found = case_pictures(root, load_run(root).entries[1])
+    assert [picture.title for picture in found.error] == [
+        "error of still:Still, at most 5 m",
+        "error of b:B, at most 4 m",
+        "error of a:A, at most 3 m",
+        "error of conforming P1, at most 2 m",
+    ]
+    assert {picture.view.limits for picture in found.error} == {(0.0, 5.0)}
+    assert "Without picture of the error, 4 being shown: XFEM." in found.notes
+    # who fails is drawn before who does not, whatever the order of the solvers
+    assert "still:Still" in " ".join(note for note in found.notes if "deformed" in note)
 
 
 def test_an_error_field_that_is_zero_or_not_finite_is_handled(tmp_path):

@@ -1,6 +1,7 @@
 """The exit code says the worst that is certain."""
 
 import itertools
+from dataclasses import replace
 
 import pytest
 
@@ -38,6 +39,14 @@ SOLVED, REFUSED = Status.SOLVED, Status.REFUSED
 def test_the_exit_code_of_one_case(verdicts, statuses, normal, strict):
     assert exit_code([result(verdicts, statuses)]) == normal
     assert exit_code([result(verdicts, statuses)], strict=True) == strict
+
+
+def test_a_known_finding_does_not_count_and_another_failure_does():
+    case = result([PASS, FAIL], [SOLVED])
+    case.verdicts[1] = replace(case.verdicts[1], known="its reason")
+    assert case.verdict is FAIL
+    assert exit_code([case], strict=True) == 0
+    assert exit_code([case, result([FAIL], [SOLVED])]) == 1
 
 
 def test_the_order_of_the_cases_does_not_matter():

@@ -81,6 +81,22 @@ def test_a_case_that_is_exact_to_round_off_does_not_enter_the_mean():
     assert "y 1.00e-01" in entry["reason"]
 
 
+@pytest.mark.parametrize("level", [0, 1])
+def test_solvers_at_round_off_tie_for_first_and_a_wrong_one_is_last(level):
+    errors = {"still": 1.0, "x": 3e-15, "near": 1e-6, "y": 2e-16}
+    solves = [solve("patch", n, level if n == "still" else 1, e) for n, e in errors.items()]
+    ranking = rank_solvers([case_of("patch", solves)])
+    found, by = compared(ranking, view="where a solver is exact")
+    assert {n: s["rank"] for n, s in by.items()} == {"x": 1, "y": 1, "near": 3, "still": 4}
+    assert by["x"]["tied"]
+    assert by["y"]["tied"]
+    assert [s["solver"] for s in found["standings"]][-1] == "still"
+    # it does not move at all: that is no answer
+    body = Metric("displacement_l2", 1.0 - 2e-16, "1", None, 1e-3, "conforming")
+    solves = [solve("a", "still", 0, metrics=[body]), solve("a", "x", 0, 0.1)]
+    assert rank_solvers([case_of("a", solves)])["stability"][-1]["solver"] == "still"
+
+
 def test_an_error_below_the_reference_s_uncertainty_cannot_be_beaten():
     solves = [solve("a", "x", 0, 0.010, 0.020), solve("a", "y", 0, 0.012, 0.001)]
     found, by = compared(rank_solvers([case_of("a", solves)]))

@@ -72,7 +72,7 @@ def _independent(
     checks = [
         check
         for check in result.scene.get("acceptance", [])
-        if (check["solver"], check["metric"]) == (solver, metric.name)
+        if check["solver"] in (None, solver) and check["metric"] == metric.name
     ]
     for check in checks:
         if check["check"] == "value":

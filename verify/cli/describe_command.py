@@ -35,6 +35,13 @@ def description(scene: Scene) -> str:
         ("measured", [_keys(quantity) for quantity in scene.quantities]),
         ("judged by", [_judge(scene)]),
         ("accepted if", [_demand(check) for check in scene.acceptance] or ["nothing is judged"]),
+        (
+            "known",
+            [
+                f"{f.check} of {f.metric} fails with {f.solver}: {f.reason}"
+                for f in scene.known_findings
+            ],
+        ),
         ("hash", [scene_hash(scene)]),
     ]
     lines = [scene.name, scene.title, "", textwrap.fill(scene.requirement, 92), ""]
@@ -53,7 +60,7 @@ def description(scene: Scene) -> str:
 
 def _demand(check: Any) -> str:
     """Say an acceptance check as the end of "accepted if …"."""
-    what = f"{check.metric} of {check.solver}"
+    what = f"{check.metric} of {check.solver or 'each solver'}"
     match check.check:
         case "value":
             within = f"within {check.relative_tolerance:g} relative"

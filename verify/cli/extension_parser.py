@@ -71,9 +71,8 @@ def _add_import(add: Add) -> None:
         "with, and the reference)",
     )  # fmt: skip
     command.add_argument(
-        "--judged-as", metavar="NAME", default="xfem",
-        help="the checks that the case makes of this solver are made of the program "
-        "(default: xfem)",
+        "--judged-as", metavar="NAME",
+        help="checks that the case makes of this solver by its name are made of the program too",
     )  # fmt: skip
     add_timeout(command, 600.0, "a solve beside it is killed")
     add_repetitions(command, 1, what="timed repetitions of the solves beside it")

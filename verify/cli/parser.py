@@ -194,6 +194,11 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "(default: those that the case names)",
     )  # fmt: skip
     command.add_argument(
+        "--judge", metavar="NAME", action="append", dest="judge_only", default=[],
+        help="solver that is judged; repeat for several (default: each that is asked and does "
+        "not refuse the case); the others are compared and ranked only",
+    )  # fmt: skip
+    command.add_argument(
         "--set", metavar="SOLVER.NAME=VALUE", dest="parameters", action="append", default=[],
         help="parameter of a solver, e.g. xfem.scheme=implicit_euler; repeat for several",
     )  # fmt: skip

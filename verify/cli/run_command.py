@@ -43,6 +43,7 @@ def execute(arguments: argparse.Namespace) -> int:
         references=arguments.references,
         cluster=arguments.cluster,
         ranks=arguments.ranks,
+        judge_only=tuple(dict.fromkeys(arguments.judge_only)),
     )
     with progress_on(sys.stderr) as progress:
         try:

@@ -19,7 +19,8 @@ def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
         yield from (f"    {notice_text(notice)}" for notice in result.notices)
         for record in result.verdicts:
             if record.verdict is not Verdict.PASS:
-                yield f"    {record.verdict}: {_check(record)}: {record.reason}"
+                known = f" (known finding: {record.known})" if record.known else ""
+                yield f"    {record.verdict}: {_check(record)}: {record.reason}{known}"
         for solve in result.solves:
             if solve.status is not Status.SOLVED:
                 yield f"    {solve.solver}, level {solve.level}: {solve.status}: {solve.reason}"
@@ -33,4 +34,5 @@ def notice_text(notice: Notice) -> str:
 
 def _check(record: VerdictRecord) -> str:
     observed = "not observed" if record.observed is None else f"{record.observed:.6g}"
-    return f"{record.check} of {record.metric} ({record.solver}): {observed}, wanted {record.limit}"
+    whose = record.solver or "nobody"
+    return f"{record.check} of {record.metric} ({whose}): {observed}, wanted {record.limit}"

@@ -41,7 +41,7 @@ def compare_answers(
     out: Path,
     options: Options,
     progress: Progress,
-    judged_as: str = "xfem",
+    judged_as: str | None = None,
     command: str = "",
 ) -> CaseResult:
     """Compare the `answers` of the program `name` to `scene` and judge them.
@@ -59,8 +59,8 @@ def compare_answers(
         Limits of the solves; its ``solvers`` run beside the answers, with those that the checks
         compare with and the reference.
     progress : Progress
-    judged_as : str
-        The checks that the case makes of this solver are made of `name`.
+    judged_as : str, optional
+        The checks that the case makes of this solver by its name are made of `name` too.
     command : str
         The command line, for the record.
 
@@ -79,7 +79,7 @@ def compare_answers(
     judged = _judged_scene(scene, judged_as, names)
     options = replace(options, solvers=_beside(judged, options, names), parameters={})
     if options.solvers:
-        run_cases([_with_acceptance(scene, [])], out, options, progress, command)
+        run_cases([_with_acceptance(scene, [])], out, options, _Solving(progress), command)
     identity = {"cases": [scene.name], "options_of_result": options.of_result()}
     with claimed(out, identity) as directory:
         origin = provenance()
@@ -94,10 +94,23 @@ def compare_answers(
         }
         write_run(directory, record)
         _store(scene, answers, name, directory)
-        result = _assess(judged, [*options.solvers, *names], directory, options, origin)
+        result = _assess(judged, directory, options, origin)
         progress.judged(result)
         write_run(directory, {**record, "finished": provenance()["date"]})
     return result
+
+
+class _Solving:
+    """Progress of the solves alone: the case is judged later, with the answers."""
+
+    def __init__(self, progress: Progress) -> None:
+        self.planned, self.started, self.solved = (
+            progress.planned,
+            progress.started,
+            progress.solved,
+        )
+
+    def judged(self, result: CaseResult) -> None: ...
 
 
 def _imported_before(out: Path) -> list[str]:
@@ -105,20 +118,29 @@ def _imported_before(out: Path) -> list[str]:
     return list(read_json(file).get("imported", [])) if file.is_file() else []
 
 
-def _judged_scene(scene: Scene, judged_as: str, names: list[str]) -> Scene:
-    """Make the checks of the solver `judged_as` for each of `names` instead."""
-    own = [check for check in scene.acceptance if check.solver == judged_as]
-    if scene.acceptance and not own:
-        raise InputError(
-            f"{scene.name} makes no check of '{judged_as}'; it does of "
-            f"{', '.join(sorted({check.solver for check in scene.acceptance}))}"
+def _judged_scene(scene: Scene, judged_as: str | None, names: list[str]) -> Scene:
+    """Make the checks that name the solver `judged_as` of each of `names` instead."""
+    if judged_as is None:
+        return scene
+    made = {check.solver for check in scene.acceptance if check.solver is not None}
+    if judged_as not in made:
+        own = ", ".join(sorted(made)) or "none by its name"
+        raise InputError(f"{scene.name} makes no check of '{judged_as}'; it does of {own}")
+    checks = [
+        one
+        for check in scene.acceptance
+        for one in (
+            [check.model_copy(update={"solver": name}) for name in names]
+            if check.solver == judged_as
+            else [check]
         )
-    checks = [check.model_copy(update={"solver": name}) for name in names for check in own]
+    ]
     return _with_acceptance(scene, checks)
 
 
 def _with_acceptance(scene: Scene, checks: list[Any]) -> Scene:
-    changed = scene.model_copy(update={"acceptance": checks})
+    known = [known for known in scene.known_findings if any(map(known.concerns, checks))]
+    changed = scene.model_copy(update={"acceptance": checks, "known_findings": known})
     changed._name, changed._file = scene.name, scene.file
     return changed
 
@@ -162,7 +184,6 @@ def _record(job: Job, solution: Solution) -> SolveRecord:
 
 def _assess(
     scene: Scene,
-    solvers: list[str],
     directory: RunDirectory,
     options: Options,
     origin: dict[str, Any],
@@ -173,7 +194,7 @@ def _assess(
     solves = sorted(path.parent for path in folder.glob("*/record.json"))
     question = {
         "key": digest_of([scene_content(scene), [file_digest(s / "record.json") for s in solves]]),
-        "solvers": solvers,
+        "judge_only": [],
         "folders": [os.path.relpath(solve, directory.root) for solve in solves],
         "root": str(directory.root.resolve()),
         "provenance": origin,

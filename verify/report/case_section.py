@@ -6,7 +6,7 @@ from verify.report.figures_convergence import convergence_figure, error_range, r
 from verify.report.figures_cost import time_figure, unknowns_figure
 from verify.report.markup import Markup, joined, tag
 from verify.report.motion_section import motion_section
-from verify.report.notation import error_title, number, number_text
+from verify.report.notation import error_title, number, number_text, solver_title
 from verify.report.notices import warning_banner, warning_mark
 from verify.report.pictures import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
@@ -38,6 +38,7 @@ def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup
         tag(
             "p",
             badge(verdict_of(entry)),
+            _whose(result),
             " ",
             warning_mark(result),
             " ",
@@ -57,6 +58,11 @@ def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup
     else:
         body = _body(result, pictures)
     return tag("section", head, body, id=anchor(index), class_="case")
+
+
+def _whose(result: CaseResult | None) -> str:
+    failing = ", ".join(map(solver_title, result.failing)) if result else ""
+    return f" {failing}" if failing else ""
 
 
 def _body(result: CaseResult, pictures: CasePictures) -> Markup:
@@ -95,7 +101,9 @@ def _pictures(pictures: CasePictures) -> Markup:
         parts.append(_figure(pictures.deformed, "displacement |u|", caption))
     if pictures.error and pictures.error[0].image:
         caption = tag(
-            "figcaption", "Error of the displacement, |u − u reference|, undeformed body."
+            "figcaption",
+            "Error of the displacement of each solver's finest solution, |u − u reference|, on the "
+            "undeformed body, one colour scale, the largest first.",
         )
         parts.append(_figure(pictures.error, "error", caption))
     notes = [tag("p", note, class_="quiet") for note in pictures.notes]

@@ -103,7 +103,9 @@ def junit_document(run: Run) -> str:
             _testcase(suite, entry, "result", Verdict.UNDECIDED, "the case states no check")
         else:
             for record in entry.result.verdicts:
-                _testcase(suite, entry, _test_name(record), record.verdict, record.reason)
+                _testcase(
+                    suite, entry, _test_name(record), record.verdict, record.reason, record.known
+                )
         _count(suite)
         if entry.result and entry.result.notices:
             said = "\n".join(
@@ -157,18 +159,26 @@ def _rows(entry: CaseEntry, solve: SolveRecord) -> Iterator[dict[str, Any]]:
 
 
 def _test_name(record: VerdictRecord) -> str:
-    return f"{record.check} {record.metric} of {record.solver}: {record.limit}"
+    return f"{record.check} {record.metric} of {record.solver or 'nobody'}: {record.limit}"
 
 
 def _testcase(
-    suite: ElementTree.Element, entry: CaseEntry, name: str, verdict: Verdict, reason: str
+    suite: ElementTree.Element,
+    entry: CaseEntry,
+    name: str,
+    verdict: Verdict,
+    reason: str,
+    known: str = "",
 ) -> None:
+    """Add a verdict; a known finding does not count as a failure, as in the exit code."""
     classname = printable(entry.name).replace("/", ".")
     case = ElementTree.SubElement(suite, "testcase", name=printable(name), classname=classname)
     elements = {Verdict.FAIL: "failure", Verdict.ERROR: "error", Verdict.UNDECIDED: "skipped"}
     if verdict in elements:
-        said = printable(reason) or "no reason given"
-        ElementTree.SubElement(case, elements[verdict], message=f"{verdict}: {said}")
+        said = f"{verdict}: {printable(reason) or 'no reason given'}"
+        if known:
+            said = f"known finding ({printable(known)}): {said}"
+        ElementTree.SubElement(case, "skipped" if known else elements[verdict], message=said)
 
 
 def _count(element: ElementTree.Element) -> None:

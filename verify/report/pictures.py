@@ -1,4 +1,4 @@
-"""Pictures of a run: reference and XFEM with the cut open, and where the error is."""
+"""Pictures of a run: the reference and the solvers with the cut open, and where each errs."""
 
 import base64
 import io
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from verify.applied_checks import REFERENCE
 from verify.errors import InputError
 from verify.report import draw_with_matplotlib
 from verify.report.bodies import Body, deformed_body, error_body, read_stored
@@ -22,7 +23,7 @@ from verify.report.notation import number_text, solver_title
 from verify.report.run_directory import CaseEntry
 from verify.report.turntable import packed
 from verify.report.view import View, common_view
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult, SolveRecord, Status, error_picture
 from verify.solution import Solution
 
 __all__ = ["CasePictures", "Picture", "case_pictures", "drawn"]
@@ -31,6 +32,7 @@ DISPLACEMENT_COLOURS, ERROR_COLOURS = "cividis", "YlOrBr"
 _VTK = [sys.executable, "-m", "verify.report.draw_with_vtk"]
 _SECONDS = 60.0  # to start VTK
 _SECONDS_EACH = 20.0
+_MOST = 4  # bodies side by side
 _OPENING_SHOWN = 0.15  # of the body's diagonal: what the largest displacement is scaled to
 
 
@@ -86,7 +88,9 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
     if entry.result is None:
         return pictures
     shown: list[tuple[SolveRecord, Solution]] = []
-    for solve in _shown_solves(entry.result):
+    solves = _finest_solves(entry.result)
+    _say_left_out(pictures, "deformed body", [solve.solver for solve in solves[_MOST:]])
+    for solve in solves[:_MOST]:
         try:
             shown.append((solve, read_stored(root, solve.solution or "")))
         except InputError as error:
@@ -99,7 +103,7 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         _deformed(pictures, shown)
     elif not pictures.notes:
         pictures.notes.append("No pictures: no solution is stored.")
-    _error(pictures, root, entry)
+    _errors(pictures, root, entry.result)
     return pictures
 
 
@@ -150,16 +154,20 @@ def _as_webp(path: Path) -> bytes:
     return buffer.getvalue()
 
 
-def _shown_solves(result: CaseResult) -> list[SolveRecord]:
-    """Return the finest stored solve of the reference (else the conforming) and of the rest."""
+def _finest_solves(result: CaseResult) -> list[SolveRecord]:
+    """Return the finest stored solve of each solver: reference, those that fail, the others."""
     finest: dict[str, SolveRecord] = {}
     for solve in sorted(result.solves, key=lambda solve: solve.level):
         if solve.status is Status.SOLVED and solve.solution:
             finest[solve.solver] = solve
-    if "reference" in finest:
+    if REFERENCE in finest and "conforming" not in result.failing:
         finest.pop("conforming", None)
-    order = {"reference": 0, "conforming": 1, "xfem": 2}
-    return sorted(finest.values(), key=lambda solve: order.get(solve.solver, 3))[:4]
+    order = {REFERENCE: 0, "conforming": 2, "xfem": 3}
+
+    def place(solve: SolveRecord) -> int:
+        return 1 if solve.solver in result.failing else order.get(solve.solver, 4)
+
+    return sorted(finest.values(), key=place)
 
 
 def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> None:
@@ -187,18 +195,41 @@ def _round_scale(scale: float) -> float:
     return next(m * power for m in (5, 2, 1) if scale >= m * power * (1 - 1e-12))
 
 
-def _error(pictures: CasePictures, root: Path, entry: CaseEntry) -> None:
-    named = entry.result.pictures.get("error_field") if entry.result else None
-    path = root / named if named else entry.folder / "error_field.vtu"
-    if not path.resolve().is_relative_to(root.resolve()) or not path.is_file():
+def _errors(pictures: CasePictures, root: Path, result: CaseResult) -> None:
+    """Prepare the error of each solver, the largest first, in one view and one colour scale."""
+    bodies: dict[str, Body] = {}
+    for solver in dict.fromkeys(solve.solver for solve in result.solves):
+        if (named := result.pictures.get(error_picture(solver))) is None:
+            continue
+        path = root / named
+        if not path.resolve().is_relative_to(root.resolve()) or not path.is_file():
+            pictures.notes.append(f"No picture of the error of {solver_title(solver)}: no file.")
+            continue
+        try:
+            bodies[solver] = error_body(path)
+        except InputError as error:
+            said = f"No picture of the error of {solver_title(solver)}: {error.what}."
+            pictures.notes.append(said)
+    if not bodies:
         pictures.notes.append("No picture of the error: no error field is stored for this case.")
         return
-    try:
-        body = error_body(path)
-    except InputError as error:
-        pictures.notes.append(f"No picture of the error: {error.what}.")
-        return
-    largest = number_text(float(body.values.max()))
-    description = f"Error of the displacement on the undeformed body; largest {largest} m."
-    view = common_view([body], ERROR_COLOURS)
-    pictures.error.append(Picture("error of XFEM", description, body, view))
+    largest = {solver: float(body.values.max()) for solver, body in bodies.items()}
+    worst_first = sorted(bodies, key=lambda solver: -largest[solver])
+    shown, rest = worst_first[:_MOST], worst_first[_MOST:]
+    _say_left_out(pictures, "error", rest)
+    view = common_view([bodies[solver] for solver in shown], ERROR_COLOURS)
+    for solver in shown:
+        number = number_text(largest[solver])
+        title = f"error of {solver_title(solver)}, at most {number} m"
+        title += " (FAIL)" if solver in result.failing else ""
+        description = (
+            f"Error of the displacement of {solver_title(solver)} on the undeformed body; "
+            f"largest {number} m."
+        )
+        pictures.error.append(Picture(title, description, bodies[solver], view))
+
+
+def _say_left_out(pictures: CasePictures, what: str, solvers: Sequence[str]) -> None:
+    if solvers:
+        names = ", ".join(map(solver_title, solvers))
+        pictures.notes.append(f"Without picture of the {what}, {_MOST} being shown: {names}.")

@@ -17,7 +17,9 @@ _MEAN = (
 _HOW = {
     "accuracy": f"Who is nearest to the truth? {_MEAN} The interval is what the uncertainty of "
     "the reference leaves open, and overlapping intervals are a tie (=). It does not contain how "
-    "an error changes when the mesh is moved a little: a few per cent are no difference.",
+    "an error changes when the mesh is moved a little: a few per cent are no difference. Where a "
+    "solver is exact to round-off there is no ratio: the largest error of each over those cases "
+    "counts, and all at round-off are first.",
     "energy": "Who keeps energy and momentum where things move? The worst case counts, on the "
     "finest level.",
     "cost": f"Who is cheapest at equal error? {_MEAN} Times are interpolated between levels at the "

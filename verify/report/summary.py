@@ -41,10 +41,13 @@ def verdict_of(entry: CaseEntry) -> Verdict:
 
 
 def check_text(record: VerdictRecord) -> str:
-    """Return what a check looks at, in words."""
+    """Return whom a check judges and what it looks at, in words."""
+    return f"{solver_title(record.solver) if record.solver else 'nobody'}: {_what(record)}"
+
+
+def _what(record: VerdictRecord) -> str:
     name = metric_title(record.metric) if record.check == "value" else error_title(record.metric)
-    what = f"{_CHECKS.get(record.check, record.check)} {name}".strip()
-    return f"{solver_title(record.solver)}: {what}"
+    return f"{_CHECKS.get(record.check, record.check)} {name}".strip()
 
 
 def summary(run: Run) -> Markup:
@@ -52,13 +55,18 @@ def summary(run: Run) -> Markup:
     judged = [(e, v) for e in run.entries if e.result for v in e.result.verdicts]
     counts = Counter(v.verdict for _, v in judged)
     cases, checks = len(run.entries), len(judged)
+    solvers = len({v.solver for _, v in judged if v.solver})
     said: list[str | Markup] = [
-        f"{_count(cases, 'case')} with {_count(checks, 'check')}: "
+        f"{_count(cases, 'case')} with {_count(checks, 'check')} of {_count(solvers, 'solver')}: "
         f"{counts[Verdict.PASS]} passed, {counts[Verdict.FAIL]} failed, "
         f"{counts[Verdict.UNDECIDED]} undecided, {counts[Verdict.ERROR]} not judged. "
     ]
-    if failed := [f"{e.name} ({check_text(v)})" for e, v in judged if v.verdict is Verdict.FAIL]:
-        said.append(joined(tag("b", "Failed"), ": ", _listed(failed), ". "))
+    failed = [(e, v) for e, v in judged if v.verdict is Verdict.FAIL]
+    if new := [(e, v) for e, v in failed if not v.known]:
+        said.append(joined(tag("b", "Failed"), ": ", _listed(_by_solver(new, judged)), ". "))
+    if known := [(e, v) for e, v in failed if v.known]:
+        words = _listed(_by_solver(known, judged))
+        said.append(joined(tag("b", "Failed, known findings"), ": ", words, ". "))
     open_ = [(e, v) for e, v in judged if v.verdict is Verdict.UNDECIDED]
     if undecided := [f"{e.name} ({check_text(v)}): {_clause(v.reason)}" for e, v in open_]:
         said.append(joined(tag("b", "Undecided"), ": ", _listed(undecided), ". "))
@@ -88,6 +96,23 @@ def summary(run: Run) -> Markup:
     return joined(tag("p", said, class_="summary"), _warnings(run))
 
 
+def _by_solver(
+    failed: list[tuple[CaseEntry, VerdictRecord]], judged: list[tuple[CaseEntry, VerdictRecord]]
+) -> list[str]:
+    """Say of each solver what it fails, the one that fails most first."""
+    counts = Counter(v.solver for _, v in failed)
+    said = []
+    for solver, count in counts.most_common():
+        made = sum(v.solver == solver for _, v in judged)
+        where: dict[str, list[str]] = {}
+        for entry, record in failed:
+            if record.solver == solver:
+                where.setdefault(entry.name, []).append(_what(record))
+        places = "; ".join(f"{name} ({', '.join(whats)})" for name, whats in where.items())
+        said.append(f"{solver_title(solver)}, {count} of its {_count(made, 'check')}: {places}")
+    return said
+
+
 def verdict_table(run: Run) -> Markup:
     """Return all verdicts, a group of rows per case."""
     groups = []
@@ -102,9 +127,10 @@ def verdict_table(run: Run) -> Markup:
             colspan=3,
             scope="rowgroup",
         )
-        verdict = tag(
-            "td", badge(verdict_of(entry)), " ", warning_mark(entry.result), class_="worst"
-        )
+        failing = ", ".join(map(solver_title, entry.result.failing)) if entry.result else ""
+        whose = tag("div", failing, class_="reason") if failing else None
+        mark = warning_mark(entry.result)
+        verdict = tag("td", badge(verdict_of(entry)), " ", mark, whose, class_="worst")
         rows = [tag("tr", head, verdict, class_="case-row")]
         rows += [check_row(record) for record in entry.result.verdicts] if entry.result else []
         groups.append(tag("tbody", rows))
@@ -126,8 +152,12 @@ def check_row(record: VerdictRecord) -> Markup:
         tag("td", check_text(record)),
         tag("td", observed, class_="number", data_label="observed "),
         tag("td", record.limit, data_label="limit "),
-        tag("td", badge(record.verdict), tag("div", record.reason, class_="reason")),
+        tag("td", badge(record.verdict), tag("div", _reason(record), class_="reason")),
     )
+
+
+def _reason(record: VerdictRecord) -> str:
+    return f"Known finding: {record.known} ({record.reason})" if record.known else record.reason
 
 
 def _warnings(run: Run) -> Markup:

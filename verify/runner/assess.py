@@ -1,7 +1,7 @@
 """The comparison of a finished case: ``python -m verify.runner.assess judge.json``.
 
 Reads the stored solves of a case, has `verify.study` compare and judge them, and writes
-``result.json``, the error field for the pictures and, last, ``judged.json`` with the key of what
+``result.json``, the error fields for the pictures and, last, ``judged.json`` with the key of what
 was compared.
 """
 
@@ -15,11 +15,11 @@ from verify.compare.locate import Field, SolutionField
 from verify.compare.motion import ExactMotion
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.result import CaseResult, SolveRecord, Status, Verdict, write_result
+from verify.result import CaseResult, SolveRecord, Status, error_picture, write_result
 from verify.runner.childhood import die_with_parent
+from verify.runner.directory import folder_name
 from verify.runner.error_field import write_error_field
 from verify.runner.job import load_record
-from verify.runner.unjudged import unjudged_check
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.study.accuracy import assess_accuracy
@@ -37,17 +37,11 @@ def main(question_file: Path) -> None:
     scene = restore_scene(read_json(folder / "scene.json"))
     records, solutions = _stored(root, question["folders"])
     exact = _exact(scene)
-    asked, left_out = _split_acceptance(scene, question["solvers"])
-    result: CaseResult = assess_accuracy(asked, records, solutions, exact)
-    result = replace(
-        result,
-        verdicts=[*result.verdicts, *left_out],
-        provenance=question["provenance"],
-        scene=scene.model_dump(mode="json", by_alias=True),
-    )
-    if picture := _error_picture(scene, solutions, exact, folder):
-        pictures = {**result.pictures, "error_field": str(picture.relative_to(root))}
-        result = replace(result, pictures=pictures)
+    result: CaseResult = assess_accuracy(scene, records, solutions, exact, question["judge_only"])
+    result = replace(result, provenance=question["provenance"])
+    drawn = _error_pictures(scene, solutions, exact, folder)
+    pictures = {name: str(path.relative_to(root)) for name, path in drawn.items()}
+    result = replace(result, pictures={**result.pictures, **pictures})
     write_result(result, folder / "result.json")
     write_json({"key": question["key"]}, folder / "judged.json")
 
@@ -80,38 +74,24 @@ def _exact(scene: Scene) -> Any:
     return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
-def _split_acceptance(scene: Scene, solvers: Sequence[str]) -> tuple[Scene, list[Any]]:
-    """Take away the checks of solvers that this run was not asked for; they stay undecided."""
-    kept, left_out = [], []
-    for check in scene.acceptance:
-        names = [check.solver, *([check.to] if check.check == "ratio" else [])]
-        missing = [name for name in names if name not in solvers]
-        if missing:
-            reason = f"the run was not asked for solver '{missing[0]}'"
-            left_out.append(unjudged_check(check, Verdict.UNDECIDED, reason))
-        else:
-            kept.append(check)
-    asked = scene.model_copy(update={"acceptance": kept})
-    asked._name, asked._file = scene.name, scene.file
-    return asked, left_out
-
-
-def _error_picture(
+def _error_pictures(
     scene: Scene, solutions: dict[str, dict[int, Solution]], exact: Any, folder: Path
-) -> Path | None:
-    """Write the error field of the finest XFEM solution, if there is one and a reference."""
-    own = solutions.get("xfem", {})
+) -> dict[str, Path]:
+    """Write the error field of the finest solution of each solver, if there is a reference."""
     references = solutions.get(REFERENCE, {})
     truth: Field | None = None
     if scene.judged_by_exact:
         truth = ExactMotion(exact).at(scene.analysis.duration)
     elif references:
         truth = SolutionField(references[max(references)])
-    if not own or truth is None:
-        return None
-    path = folder / "error_field.vtu"
-    write_error_field(own[max(own)], truth, path)
-    return path
+    pictures: dict[str, Path] = {}
+    for solver, own in solutions.items():
+        if solver == REFERENCE or truth is None:
+            continue
+        path = folder / f"error_field_{folder_name(solver)}.vtu"
+        write_error_field(own[max(own)], truth, path)
+        pictures[error_picture(solver)] = path
+    return pictures
 
 
 if __name__ == "__main__":

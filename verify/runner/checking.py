@@ -28,7 +28,8 @@ def check_scene(scene: Scene) -> None:
             raise InputError(f"exact: {error}", where) from None
     for i, check in enumerate(scene.acceptance):
         for name in (check.solver, *([check.to] if check.check == "ratio" else [])):
-            check_solver_name(name, f"{where}: acceptance[{i}]")
+            if name is not None:
+                check_solver_name(name, f"{where}: acceptance[{i}]")
 
 
 def check_solver_name(name: str, where: str) -> None:

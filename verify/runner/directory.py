@@ -46,7 +46,12 @@ class RunDirectory:
 
     def solve_folder(self, case: str, solver: str, level: int) -> Path:
         """Folder of one solve."""
-        return self.case_folder(case) / f"{re.sub(r'[^A-Za-z0-9_.+-]', '_', solver)}-{level}"
+        return self.case_folder(case) / f"{folder_name(solver)}-{level}"
+
+
+def folder_name(solver: str) -> str:
+    """Return the name of a solver as part of the name of a file."""
+    return re.sub(r"[^A-Za-z0-9_.+-]", "_", solver)
 
 
 @contextmanager

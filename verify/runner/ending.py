@@ -3,7 +3,7 @@
 A failed verdict (1) goes before a failed solve (3): a FAIL is only given when the whole interval
 of what is known violates the limit, so it stands whatever the missing solves would have said,
 and a script that repeats a run on code 3 must not take a wrong answer for a bad day of the
-machine.
+machine. A FAIL that its case lists as a known finding does not count.
 """
 
 from collections.abc import Sequence
@@ -39,9 +39,10 @@ def exit_code(results: Sequence[CaseResult], strict: bool = False) -> int:
     strict : bool
         Whether an undecided verdict, a refusal, or a case without any verdict counts.
     """
-    verdicts = [record.verdict for result in results for record in result.verdicts]
+    judged = [record for result in results for record in result.verdicts]
+    verdicts = [record.verdict for record in judged]
     statuses = [solve.status for result in results for solve in result.solves]
-    if Verdict.FAIL in verdicts:
+    if any(record.counts_as_failed for record in judged):
         return VERDICT_FAILED
     if Verdict.ERROR in verdicts or any(status in _BROKEN for status in statuses):
         return SOLVER_FAILED

@@ -38,6 +38,8 @@ class Options:
         Scheduler of a Dask cluster whose workers solve; None: processes of this machine do.
     ranks : int
         MPI ranks of each reference.
+    judge_only : tuple of str
+        Solvers that are judged; empty: all that are asked and do not refuse the case.
     judged : bool
         Whether the references that judge are solved with the rest; without them only `solvers` run.
     """
@@ -52,6 +54,7 @@ class Options:
     references: Path | None = None
     cluster: str | None = None
     ranks: int = 1
+    judge_only: tuple[str, ...] = ()
     judged: bool = True
 
     def of_result(self) -> dict[str, Any]:
@@ -65,4 +68,5 @@ class Options:
     def record(self) -> dict[str, Any]:
         """Return all of them as plain values."""
         paths = {name: str(v) if (v := getattr(self, name)) else None for name in _PATHS}
-        return {**asdict(self), **paths, "solvers": list(self.solvers)}
+        names = {"solvers": list(self.solvers), "judge_only": list(self.judge_only)}
+        return {**asdict(self), **paths, **names}

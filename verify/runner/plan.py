@@ -20,8 +20,9 @@ from verify.runner.options import Options
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
 from verify.scene import Scene, scene_content
+from verify.scene.nearest import nearest
 
-__all__ = ["CasePlan", "Survey", "plan_case", "solvers_of", "survey_solvers"]
+__all__ = ["CasePlan", "Survey", "check_judged", "plan_case", "solvers_of", "survey_solvers"]
 
 _SURVEY_SECONDS = 300.0
 
@@ -44,12 +45,20 @@ class CasePlan:
 
 def solvers_of(scene: Scene, options: Options) -> list[str]:
     """Return the names of the solvers that a run of `scene` takes, the reference last."""
-    named = [check.solver for check in scene.acceptance]
+    named = [check.solver for check in scene.acceptance if check.solver is not None]
     named += [check.to for check in scene.acceptance if check.check == "ratio"]
     names = list(dict.fromkeys(options.solvers or ("xfem", "conforming", *named)))
     if options.judged and not scene.judged_by_exact and REFERENCE not in names:
         names.append(REFERENCE)
     return names
+
+
+def check_judged(scenes: Sequence[Scene], options: Options) -> None:
+    """Raise `InputError` if a solver that shall be judged is asked in none of `scenes`."""
+    asked = sorted({name for scene in scenes for name in solvers_of(scene, options)})
+    for name in options.judge_only:
+        if name not in asked:
+            raise InputError(f"solver '{name}' is not asked{nearest(name, asked)}", "--judge")
 
 
 def survey_solvers(

@@ -23,7 +23,7 @@ from verify.runner.interruption import StopRequest, listening
 from verify.runner.job import Job, store_record, stored_record
 from verify.runner.log import telling_line
 from verify.runner.options import Options
-from verify.runner.plan import CasePlan, plan_case, survey_solvers
+from verify.runner.plan import CasePlan, check_judged, plan_case, survey_solvers
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
@@ -94,6 +94,7 @@ def run_cases(
         "cases": [scene.name for scene in scenes],
         "options_of_result": options.of_result(),
     }
+    check_judged(scenes, options)
     if options.ranks > 1 and not options.cluster:
         mpiexec()  # or say now that there is none
     bundle = ReferenceBundle(options.references) if options.references else None
@@ -294,10 +295,11 @@ class _Work:
         plan, folder = self.plans[case], self.directory.case_folder(case)
         jobs = [*plan.jobs, *(job for job, _ in plan.refused)]
         records = [digest_of(read_json(job.folder / "record.json")) for job in jobs]
-        key = digest_of([records, scene_content(plan.scene), code_of_comparison()])
+        judge_only = list(self.options.judge_only)
+        key = digest_of([records, scene_content(plan.scene), judge_only, code_of_comparison()])
         question = {
             "key": key,
-            "solvers": plan.solvers,
+            "judge_only": judge_only,
             "folders": [os.path.relpath(job.folder, self.directory.root) for job in jobs],
             "root": str(self.directory.root.resolve()),
             "provenance": self.origin,
@@ -324,7 +326,11 @@ class _Work:
             _, why = self._death(child, ending)
             jobs = [*plan.jobs, *(job for job, _ in plan.refused)]
             result = unjudged_result(
-                plan.scene, [job.folder for job in jobs], f"comparison failed: {why}", self.origin
+                plan.scene,
+                [job.folder for job in jobs],
+                f"comparison failed: {why}",
+                self.origin,
+                self.options.judge_only,
             )
             write_json(asdict(result), folder / "result.json")
         self._case_done(result)

@@ -1,18 +1,24 @@
-"""The result of a case that could not be compared: its solves, and a verdict ERROR per check."""
+"""The result of a case that could not be compared: its solves, and an ERROR per check."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from verify.result import CaseResult, SolveRecord, Verdict, VerdictRecord
+from verify.applied_checks import applied_checks
+from verify.result import CaseResult, SolveRecord, Verdict
 from verify.runner.job import load_record
 from verify.scene import Scene, scene_hash
+from verify.verdict import unjudged
 
-__all__ = ["limit_text", "unjudged_check", "unjudged_result"]
+__all__ = ["unjudged_result"]
 
 
 def unjudged_result(
-    scene: Scene, folders: Sequence[Path], reason: str, provenance: dict[str, Any]
+    scene: Scene,
+    folders: Sequence[Path],
+    reason: str,
+    provenance: dict[str, Any],
+    judge_only: Sequence[str] = (),
 ) -> CaseResult:
     """Return what is known of `scene` without a comparison.
 
@@ -24,6 +30,8 @@ def unjudged_result(
     reason : str
         Why there is no comparison, in one sentence.
     provenance : dict
+    judge_only : sequence of str
+        Solvers that are judged; empty: all that were asked and do not refuse the case.
     """
     solves: list[SolveRecord] = [load_record(folder) for folder in folders]
     return CaseResult(
@@ -35,27 +43,9 @@ def unjudged_result(
         reference={},
         solves=solves,
         rates=[],
-        verdicts=[unjudged_check(check, Verdict.ERROR, reason) for check in scene.acceptance],
+        verdicts=[
+            unjudged(applied.check, Verdict.ERROR, reason)
+            for applied in applied_checks(scene.acceptance, solves, judge_only)
+        ],
         provenance=provenance,
     )
-
-
-def unjudged_check(check: Any, verdict: Verdict, reason: str) -> VerdictRecord:
-    """Return the verdict on an acceptance check that was not observed."""
-    return VerdictRecord(
-        check=check.check,
-        solver=check.solver,
-        metric=check.metric,
-        verdict=verdict,
-        observed=None,
-        low=None,
-        high=None,
-        limit=limit_text(check),
-        reason=reason,
-    )
-
-
-def limit_text(check: Any) -> str:
-    """Say what an acceptance check demands."""
-    said = check.model_dump(exclude={"check", "solver", "metric", "source"}, exclude_none=True)
-    return ", ".join(f"{key} {value}" for key, value in said.items())

@@ -3,6 +3,7 @@
 from verify.scene.acceptance import (
     BoundCheck,
     DisplacementQuantity,
+    KnownFinding,
     MaximumDisplacementQuantity,
     OpeningQuantity,
     RateCheck,
@@ -64,6 +65,7 @@ __all__ = [
     "Equilibrium",
     "Exact",
     "Gravity",
+    "KnownFinding",
     "Material",
     "MaximumDisplacementQuantity",
     "MeshFile",

@@ -113,8 +113,12 @@ def mesh_path(scene: Scene) -> Path:
 
 
 def scene_hash(scene: Scene) -> str:
-    """Content hash of a scene: the same physics gives the same hash wherever it is stored."""
-    content = scene.model_dump(mode="json", by_alias=True, exclude={"title", "requirement", "tags"})
+    """Content hash of a scene: the same physics gives the same hash wherever it is stored.
+
+    Defaults are left out, so that a key that a later version adds does not change it.
+    """
+    words = {"title", "requirement", "tags"}
+    content = scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
     if isinstance(scene.geometry, MeshFile):
         digest.update(mesh_path(scene).read_bytes())

@@ -30,6 +30,7 @@ def check_placement(scene: "Scene") -> None:
     _check_exact(scene)
     _check_names(scene)
     _check_acceptance(scene)
+    _check_known_findings(scene)
     check_parts_act(scene)
     _check_times(scene)
     check_cuts(scene)
@@ -246,3 +247,14 @@ def _check_acceptance(scene: "Scene") -> None:
             raise ValueError(f"{place}: {check.metric} belongs to a dynamic analysis")
         if check.check == "rate" and scene.mesh.count < 2:
             raise ValueError(f"acceptance[{i}]: a rate needs at least two mesh levels")
+
+
+def _check_known_findings(scene: "Scene") -> None:
+    made = [f"{check.check} of {check.metric}" for check in scene.acceptance]
+    for i, finding in enumerate(scene.known_findings):
+        if not any(map(finding.concerns, scene.acceptance)):
+            own = ", ".join(dict.fromkeys(made)) or "none"
+            raise ValueError(
+                f"known_findings[{i}]: no check '{finding.check} of {finding.metric}' is made of "
+                f"'{finding.solver}'; the case makes {own}"
+            )

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from verify.scene.acceptance import Acceptance, Quantity, StrainEnergyQuantity
+from verify.scene.acceptance import Acceptance, KnownFinding, Quantity, StrainEnergyQuantity
 from verify.scene.cuts import Cut
 from verify.scene.geometry import Geometry, MeshFile
 from verify.scene.initial import AtRest, Initial
@@ -50,6 +50,7 @@ class Scene(Strict):
         default_factory=_strain_energy_only
     )
     acceptance: list[Acceptance] = Field(default_factory=list)
+    known_findings: list[KnownFinding] = Field(default_factory=list)
 
     # where it was read from; set by `load_scene`
     _file: Path | None = PrivateAttr(default=None)

@@ -48,6 +48,7 @@ def assess_accuracy(
     records: Sequence[SolveRecord],
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: ExactField | None = None,
+    judge_only: Sequence[str] = (),
 ) -> CaseResult:
     """Measure all solutions of a case and judge its requirements.
 
@@ -61,6 +62,8 @@ def assess_accuracy(
         exact solution judges.
     exact : object with ``displacement``, ``gradient`` and ``singular_points``, optional
         The exact solution that the scene names.
+    judge_only : sequence of str
+        Solvers that are judged; empty: all that were asked and do not refuse the case.
 
     Returns
     -------
@@ -103,7 +106,7 @@ def assess_accuracy(
         reference=record,
         solves=measured,
         rates=rates,
-        verdicts=judge(scene, measured, rates),
+        verdicts=judge(scene, measured, rates, judge_only),
     )
 
 

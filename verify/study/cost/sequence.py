@@ -43,7 +43,7 @@ def growing_scenes(scene: Scene, steps: int) -> list[Scene]:
         points = _beginning(np.array(first.points, dtype=float), step / steps)
         expected = first.expected if step == steps else None
         content = scene.model_dump(mode="json", by_alias=True)
-        content |= {"acceptance": [], "tags": []}
+        content |= {"acceptance": [], "known_findings": [], "tags": []}
         content["cuts"][0] |= {"points": points, "expected": expected}
         one = Scene.model_validate(content)
         one._file = scene.file or Path(f"{scene.name}.toml")

@@ -6,12 +6,13 @@ from verify.ranking import Comparison, LeftOut
 from verify.result import CaseResult
 from verify.study.energy_account import ACCOUNT
 from verify.study.ranking.finest import interval_of, item_on_finest
-from verify.study.ranking.standing import Item, compared_by_mean
+from verify.study.ranking.standing import Item, compared_by_mean, compared_by_worst, is_exact
 from verify.verdict import ERROR_METRICS
 
-__all__ = ["EQUAL_SIZE", "FINEST", "QUANTITIES", "accuracy_comparisons"]
+__all__ = ["EQUAL_SIZE", "EXACT", "FINEST", "QUANTITIES", "accuracy_comparisons"]
 
 EQUAL_SIZE, FINEST = "equal size", "finest level"
+EXACT = "where a solver is exact"
 QUANTITIES = "quantities"  # all quantities of interest of all cases together
 _MAIN = ("displacement_l2", "energy_norm", "jump_l2")
 _SAME_SIZE = 0.1  # as for checks of ratios: unstructured meshes do not meet a size exactly
@@ -29,7 +30,9 @@ def accuracy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) 
     Returns
     -------
     list of Comparison
-        For each metric one at equal size and one on the finest level.
+        For each metric one at equal size and one on the finest level. Items in which a solver is
+        exact to round-off have no ratios: they are compared by the largest number of each solver
+        on its finest level.
     """
     judged = {v.metric for r in results for v in r.verdicts if v.metric in ERROR_METRICS}
     metrics = [*_MAIN, *sorted(judged - {*_MAIN, *ACCOUNT}), QUANTITIES]
@@ -47,6 +50,10 @@ def accuracy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) 
             found = compared_by_mean(metric, view, solvers, items, left_out)
             if found is not None:
                 comparisons.append(found)
+        # of the view above that came last: on the finest level
+        exact = [item for item in items if len(item.found) > 1 and is_exact(item)]
+        if (found := compared_by_worst(metric, EXACT, solvers, exact)) is not None:
+            comparisons.append(found)
     return comparisons
 
 

@@ -8,7 +8,7 @@ from verify.ranking import Comparison, LeftOut, Standing
 from verify.study.rates import ROUND_OFF
 from verify.verdict import Interval
 
-__all__ = ["Item", "compared_by_mean", "compared_by_worst"]
+__all__ = ["Item", "compared_by_mean", "compared_by_worst", "is_exact"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,11 @@ class Item:
     missing: dict[str, str] = field(default_factory=dict)
 
 
+def is_exact(item: Item) -> bool:
+    """Whether the least number of an item is round-off, so that there are no ratios to it."""
+    return min(found.value for found in item.found.values()) <= ROUND_OFF
+
+
 def compared_by_mean(
     metric: str,
     view: str,
@@ -40,8 +45,8 @@ def compared_by_mean(
     The least counts among the solvers that have a number in every item: one that does a single
     case well must not be the measure of all others there. The interval of a ratio is that of the
     solver's own number, since the least one only sets the scale, which is the same for all. An
-    item whose least number is round-off has no ratios and is left out, with the numbers; what was
-    left out `before` is listed with it.
+    item whose least number is round-off has no ratios and is left out, with the numbers
+    (`compared_by_worst` is for those); what was left out `before` is listed with it.
     """
     counted, left_out = [], list(before)
     for item in items:
@@ -49,7 +54,7 @@ def compared_by_mean(
         if len(item.found) < 2:
             alone = f"{', '.join(item.found)} alone" if item.found else "no solver"
             left_out.append(LeftOut(item.case, "", f"nothing to compare: {alone}"))
-        elif min(found.value for found in item.found.values()) <= ROUND_OFF:
+        elif is_exact(item):
             left_out.append(LeftOut(item.case, "", _exact_text(item.found)))
         else:
             counted.append(item)

@@ -1,0 +1,80 @@
+"""Acceptance checks and the solvers that each is made of."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from verify.result import SolveRecord, Status
+
+__all__ = ["REFERENCE", "AppliedCheck", "applied_checks", "judged_by"]
+
+REFERENCE = "reference"  #: judges the others; judged itself only by a check that names it
+
+
+@dataclass(frozen=True)
+class AppliedCheck:
+    """A check, made of one solver.
+
+    Parameters
+    ----------
+    check : acceptance check of a scene
+        Its `solver` is set; it is empty if there is nobody whom the check is made of.
+    not_judged : str
+        Why nothing can be said, in one sentence; empty if the check can be judged.
+    """
+
+    check: Any
+    not_judged: str = ""
+
+
+def judged_by(check: Any, solvers: Sequence[str]) -> list[str]:
+    """Return those of `solvers` that `check` is made of.
+
+    That is the one that it names, else all but the reference, and but the one that it compares
+    with.
+    """
+    if check.solver is not None:
+        return [check.solver]
+    aside = {REFERENCE, check.to if check.check == "ratio" else REFERENCE}
+    return [name for name in solvers if name not in aside]
+
+
+def applied_checks(
+    checks: Sequence[Any], records: Sequence[SolveRecord], judge_only: Sequence[str] = ()
+) -> Iterator[AppliedCheck]:
+    """Make every check of each solver that it holds for.
+
+    Parameters
+    ----------
+    checks : sequence of acceptance checks
+    records : sequence of SolveRecord
+        All solves of the case; a solver without any was not asked. One all of whose solves were
+        refused is judged only where a check names it.
+    judge_only : sequence of str
+        Solvers that are judged; empty: all. The reference is judged wherever a check names it.
+
+    Yields
+    ------
+    AppliedCheck
+        In the order of the checks, then of the solvers in `records`; one with an empty solver for
+        a check that holds for nobody.
+    """
+    asked = dict.fromkeys(record.solver for record in records)
+    answering = {record.solver for record in records if record.status is not Status.REFUSED}
+    judged = [n for n in asked if n in answering and (not judge_only or n in judge_only)]
+    for check in checks:
+        names = judged_by(check, judged)
+        if not names:
+            reason = "no solver of this run is judged by this check"
+            if not answering - {REFERENCE}:
+                reason = "every solver that was asked refuses the case"
+            yield AppliedCheck(check.model_copy(update={"solver": ""}), reason)
+        for name in names:
+            one = check.model_copy(update={"solver": name})
+            needed = [name, *([check.to] if check.check == "ratio" else [])]
+            if judge_only and name not in (*judge_only, REFERENCE):
+                yield AppliedCheck(one, f"this run judges only {', '.join(judge_only)}")
+            elif missing := [other for other in needed if other not in asked]:
+                yield AppliedCheck(one, f"the run was not asked for solver '{missing[0]}'")
+            else:
+                yield AppliedCheck(one)
