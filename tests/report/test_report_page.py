@@ -39,7 +39,7 @@ def test_every_link_within_the_page_leads_somewhere(pictured_run):
 
 def test_every_picture_and_figure_has_an_alternative_text(pictured_run):
     page = parsed(page_of(pictured_run))
-    assert len(page.all("img")) == 9
+    assert len(page.all("img")) == 12
     assert all(len(image["alt"]) > 20 for image in page.all("img"))
     panels = [svg for svg in page.all("svg") if svg["class"] == "panel"]
     assert len(panels) == 3 * 7  # size, unknowns, time for 2 + 3 + 2 metrics
@@ -78,7 +78,7 @@ def test_hostile_words_in_every_text_of_a_result_stay_text(tmp_path):
 @pytest.mark.parametrize(
     "words",
     [
-        "3 cases with 6 checks: 3 passed, 1 failed, 1 undecided, 1 not judged",
+        "3 cases with 6 checks of 1 solver: 3 passed, 1 failed, 1 undecided, 1 not judged",
         "killed after 60 s",
         "cannot do a tip inside an element",
         "is not clearly below the error 0.12",
@@ -112,7 +112,7 @@ def test_rendering_again_gives_the_same_bytes(plain_run):
 
 def test_a_run_directory_can_be_moved_before_it_is_rendered(pictured_run, tmp_path):
     moved = shutil.copytree(pictured_run, tmp_path / "a b'c")
-    assert len(parsed(page_of(render(moved).parent)).all("img")) == 9
+    assert len(parsed(page_of(render(moved).parent)).all("img")) == 12
 
 
 def test_figures_and_tables_of_120_cases_take_less_than_5_megabytes(tmp_path, plain_run):
@@ -138,8 +138,8 @@ def test_pictures_are_left_out_with_a_note_before_a_page_gets_too_large(
     monkeypatch.setattr("verify.report.rendering._PAGE_BYTES", limit)
     page = parsed(page_of(render(root).parent))
     assert (root / "report.html").stat().st_size < limit
-    assert len(page.all("img")) == 6
-    assert "3 of 9 pictures are left out" in page.text
+    assert len(page.all("img")) == 8
+    assert "4 of 12 pictures are left out" in page.text
 
 
 def test_the_report_needs_no_solver():
