@@ -5,7 +5,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 __all__ = [
-    "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells", "segment_distance2",
+    "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells", "holding_cells",
+    "segment_distance2",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -189,6 +190,18 @@ def find_cells(points, directions, lower, upper, cells, corners, normals, centre
         if cell < 0:
             cell = _nearest(points[i], lower, upper, cells, corners, normals)
         found[i] = cell
+    return found
+
+
+@njit(cache=True)
+def holding_cells(points, lower, upper, cells, corners, normals, centres, tolerance):
+    """Find the cell (n,) that holds each point (n, d), within `tolerance`; −1 where none does."""
+    n, d = points.shape
+    found, nowhere = np.empty(n, dtype=np.int64), np.zeros(d)
+    for i in range(n):
+        found[i] = _containing(
+            points[i], nowhere, False, lower, upper, cells, corners, normals, centres, tolerance
+        )
     return found
 
 

@@ -1,0 +1,181 @@
+"""Overlap of the faces of cuts in the deformed body: how deep, how much, and where.
+
+There is no contact model, so that an answer may put two parts of a body into one place. Faces that
+slide along each other at a finite rotation have no opposite points left; therefore points of all
+faces are looked for in the deformed cells of whatever is there: the other side of their cut, or
+another part of the body.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.compare.cell_tree import build_cell_tree
+from verify.compare.deformed import (
+    DeformedCells,
+    Faces,
+    deformed_cells,
+    faces_of,
+    facet_normals,
+    is_glued,
+)
+from verify.compare.locate import SolutionField
+from verify.compare.locate_kernels import holding_cells
+from verify.compare.overlap_kernels import first_exits, overlapping
+from verify.errors import UnsupportedSceneError
+from verify.solution import Solution
+
+__all__ = ["Overlap", "OverlapSearch"]
+
+Array = NDArray[np.float64]
+
+# A point of a face is looked for so far outside of its own material, over the smallest height of
+# its facet; and at most and at least so far, over the size of the body. Round-off of a place is
+# 1e-16 of the body, a millionth of the smallest step. Facets of less than `_SMALL` of the body
+# have larger ones beside them.
+_STEP, _LONGEST, _SMALL = 1e-4, 1e-7, 1e-6
+_PULL = 1e-3  # points stand so far from the corners of their facet, over the way to its middle
+_INSIDE = 1e-13  # of the body's size: round-off at the border of a cell
+# Depths are differences of places in the deformed body: below this share of its size they are
+# round-off, and two faces that touch do not overlap.
+_RESOLVED = 1e-11
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """How far a deformed body covers a place twice.
+
+    Parameters
+    ----------
+    depth : float
+        Largest normal penetration of a face into other material, m; 0 if there is none.
+    measure : float
+        Area (2D, m²) or volume (3D, m³) that is covered twice.
+    material, deformed : (d,) arrays or None
+        Where the largest depth is: the point of the face before and after the deformation.
+    """
+
+    depth: float = 0.0
+    measure: float = 0.0
+    material: Array | None = None
+    deformed: Array | None = None
+
+
+class OverlapSearch:
+    """Overlaps of a solution, at any of its output times.
+
+    Parameters
+    ----------
+    solution : Solution
+        In the plane or in space.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If it is a membrane in space: lines have no inside.
+    """
+
+    def __init__(self, solution: Solution) -> None:
+        if solution.cell_dimension < solution.dimension:
+            raise UnsupportedSceneError(
+                "the edges of a cut in a membrane pass each other in space: they have no inside "
+                "that another could be in"
+            )
+        self.solution = solution
+        self._field = SolutionField(solution)
+        self._faces = faces_of(solution, self._field)
+        self._size = self._field.scale
+
+    def at(self, step: int = -1) -> Overlap:
+        """Overlap at an output time, by its number."""
+        u = self.solution.displacement[step]
+        places = self.solution.points + u
+        faces = self._apart(u)
+        cut = faces.across != faces.behind
+        if not cut.any() or not np.isfinite(u).all():
+            return Overlap()
+        region = places[faces.nodes[cut]].reshape(-1, places.shape[1])
+        margin = _LONGEST * self._size
+        low, high = region.min(axis=0) - margin, region.max(axis=0) + margin
+        corners = places[faces.nodes]
+        near = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
+        faces = Faces(faces.nodes[near], faces.behind[near], faces.across[near])
+        cells = deformed_cells(self.solution, u, low, high)
+        return self._overlap(faces, cells, places)
+
+    def _apart(self, u: Array) -> Faces:
+        """Faces whose sides do not move as one."""
+        faces = self._faces
+        kept = ~is_glued(faces, self.solution, self._field.with_nodal(u))
+        return Faces(faces.nodes[kept], faces.behind[kept], faces.across[kept])
+
+    def _overlap(self, faces: Faces, cells: DeformedCells, places: Array) -> Overlap:
+        depth, shares, which = self._depths(faces, cells, places)
+        if not len(depth) or depth.max() <= _RESOLVED * self._size:
+            return Overlap()
+        deep = depth > _RESOLVED * self._size
+        nodes, weights = faces.nodes[which[deep]], shares[deep]
+        material = np.einsum("nk,nkd->nd", weights, self.solution.points[nodes])
+        deformed = np.einsum("nk,nkd->nd", weights, places[nodes])
+        worst = int(np.argmax(depth[deep]))
+        seeds = self._holding(cells, deformed)
+        measure = overlapping(
+            np.unique(seeds[seeds >= 0]), cells.tree.lower, cells.tree.upper, cells.tree.cells,
+            cells.low, cells.high, cells.shape.corners, cells.shape.normals, _INSIDE * self._size,
+        )  # fmt: skip
+        return Overlap(float(depth.max()), float(measure), material[worst], deformed[worst])
+
+    def _depths(
+        self, faces: Faces, cells: DeformedCells, places: Array
+    ) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Penetration (n,) of points of faces, their shares (n, d) of corners, and facets (n,)."""
+        corners = np.ascontiguousarray(places[faces.nodes])
+        normals = facet_normals(corners)
+        height = _smallest_height(corners)
+        sound = (height > _SMALL * self._size) & np.isfinite(normals).all(axis=1)
+        sound = np.flatnonzero(sound)
+        normals = np.nan_to_num(normals)
+        d = corners.shape[1]
+        middle = np.full((1, d), 1 / d)
+        pulled = (1 - _PULL) * np.eye(d) + _PULL * middle
+        rows = np.concatenate([pulled, middle])
+        which = np.repeat(sound, len(rows))
+        shares = np.tile(rows, (len(sound), 1))
+        points = np.einsum("nk,nkd->nd", shares, corners[which])
+        step = np.minimum(_STEP * height[which], _LONGEST * self._size)
+        outside = points + step[:, None] * normals[which]
+        inside = self._holding(cells, outside) >= 0
+        which, shares, points = which[inside], shares[inside], points[inside]
+        step, outside = step[inside], outside[inside]
+        if not len(which):
+            return np.zeros(0), shares, which
+        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
+        bounds = tree.lower, tree.upper, tree.cells, corners, normals
+        along, leaving = first_exits(outside, -normals[which], *bounds)
+        depth = np.where(np.isfinite(along), along - step, 0.0)
+        # a facet that is left at an angle may be nearer along its own normal
+        square, _ = first_exits(points, normals[np.maximum(leaving, 0)], *bounds)
+        depth = np.minimum(depth, np.where(leaving >= 0, square, np.inf))
+        # a point of the body's outside counts where it went in through a face of a cut
+        cut = faces.across != faces.behind
+        depth[~(cut[which] | cut[leaving])] = 0.0
+        return np.maximum(depth, 0.0), shares, which
+
+    def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
+        found: NDArray[np.int64] = holding_cells(
+            np.ascontiguousarray(points), cells.tree.lower, cells.tree.upper, cells.tree.cells,
+            cells.shape.corners, cells.shape.normals, cells.shape.corners.mean(axis=1),
+            _INSIDE * self._size,
+        )  # fmt: skip
+        return found
+
+
+def _smallest_height(corners: Array) -> Array:
+    """Length (f,) of segments (f, 2, 2), or smallest height of triangles (f, 3, 3), m."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    if corners.shape[2] == 2:
+        return np.asarray(longest)
+    twice = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return np.asarray(twice / np.maximum(longest, 1e-300))

@@ -1,0 +1,258 @@
+"""Kernels: where a ray leaves a body, and how much of two simplices is common to both.
+
+Of simplices a (d + 1, d) array of corners; of facets a (d, d) array, whose normal points out of
+the material. `lower`, `upper` and `cells` are a tree, see `verify.compare.cell_tree`.
+"""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["first_exits", "overlapping"]
+
+# A ray through an edge must not slip between two facets.
+_EDGE = 1e-9
+_MOST = 128  # parts that a tetrahedron has at most when four planes have cut it: 3⁴
+
+
+@njit(cache=True)
+def _meets_box(x, way, low, high):
+    """Whether the ray x + t way, t ≥ 0, meets a box."""
+    first, last = 0.0, np.inf
+    for a in range(x.shape[0]):
+        if way[a] == 0.0:
+            if x[a] < low[a] or x[a] > high[a]:
+                return False
+            continue
+        s, t = (low[a] - x[a]) / way[a], (high[a] - x[a]) / way[a]
+        first, last = max(first, min(s, t)), min(last, max(s, t))
+    slack = 1e-9 * (abs(first) + abs(last)) if last < np.inf else 0.0
+    return first <= last + slack
+
+
+@njit(cache=True)
+def _crossing(x, way, facet):
+    """Parameter t at which the line x + t way crosses a facet, or −1."""
+    if x.shape[0] == 2:
+        ex, ey = facet[1, 0] - facet[0, 0], facet[1, 1] - facet[0, 1]
+        ox, oy = facet[0, 0] - x[0], facet[0, 1] - x[1]
+        det = way[0] * ey - way[1] * ex
+        if det == 0.0:
+            return -1.0
+        on = (ox * way[1] - oy * way[0]) / det
+        return (ox * ey - oy * ex) / det if -_EDGE <= on <= 1.0 + _EDGE else -1.0
+    det = u = v = t = 0.0  # Möller & Trumbore (1997)
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        e1, e2, off = facet[1, a] - facet[0, a], facet[2, a] - facet[0, a], x[a] - facet[0, a]
+        p = way[b] * (facet[2, c] - facet[0, c]) - way[c] * (facet[2, b] - facet[0, b])
+        q = (x[b] - facet[0, b]) * (facet[1, c] - facet[0, c])
+        q -= (x[c] - facet[0, c]) * (facet[1, b] - facet[0, b])
+        det += e1 * p
+        u += off * p
+        v += way[a] * q
+        t += e2 * q
+    if det == 0.0:
+        return -1.0
+    u, v = u / det, v / det
+    return t / det if u >= -_EDGE and v >= -_EDGE and u + v <= 1.0 + _EDGE else -1.0
+
+
+@njit(cache=True)
+def first_exits(points, ways, lower, upper, cells, facets, normals):
+    """Distance (n,) to the first facet through which a ray leaves material, and which (n,).
+
+    Facets through which it enters are passed; infinite and −1 where it leaves nothing. `ways`
+    (n, d) are unit vectors, `facets` is (f, d, d), `normals` (f, d).
+    """
+    n = points.shape[0]
+    distance, which = np.full(n, np.inf), np.full(n, -1, dtype=np.int64)
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    stack = np.empty(64, dtype=np.int64)
+    for i in range(n):
+        stack[0], top = 1, 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            if not _meets_box(points[i], ways[i], lower[node], upper[node]):
+                continue
+            if node < leaves:
+                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+                top += 2
+                continue
+            for k in range((node - leaves) * leaf_size, (node - leaves + 1) * leaf_size):
+                facet = cells[k]
+                if facet < 0:
+                    break
+                if np.dot(normals[facet], ways[i]) <= 0.0:
+                    continue
+                t = _crossing(points[i], ways[i], facets[facet])
+                if 0.0 <= t < distance[i]:
+                    distance[i], which[i] = t, facet
+    return distance, which
+
+
+@njit(cache=True)
+def _measure(simplex):
+    """Area or volume of a simplex, whatever its orientation."""
+    e = simplex[1:] - simplex[0]
+    if e.shape[0] == 2:
+        return 0.5 * abs(e[0, 0] * e[1, 1] - e[0, 1] * e[1, 0])
+    det = 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        det += e[0, a] * (e[1, b] * e[2, c] - e[1, c] * e[2, b])
+    return abs(det) / 6.0
+
+
+@njit(cache=True)
+def _kept(simplex, depth, parts, count):
+    """Append to `parts` the part of a simplex where a linear function is positive.
+
+    `depth` (d + 1,) are its values at the corners. The part with k positive corners is a simplex
+    (k = 1), a simplex less one (k = d), or in space a wedge (k = 2).
+    """
+    size = depth.shape[0]
+    order = np.argsort(-depth)
+    positive = 0
+    for i in range(size):
+        positive += depth[i] > 0.0
+    if positive == 0:
+        return count
+    if positive == size:
+        parts[count] = simplex
+        return count + 1
+    inside, outside = order[:positive], order[positive:]
+    # cut[i, j]: where the edge from inside corner i to outside corner j is met
+    cut = np.empty((positive, size - positive, size - 1))
+    for i in range(positive):
+        for j in range(size - positive):
+            share = depth[inside[i]] / (depth[inside[i]] - depth[outside[j]])
+            cut[i, j] = simplex[inside[i]] + share * (simplex[outside[j]] - simplex[inside[i]])
+    # as many corners as a simplex has, of the corners inside and the cut points, in a fan: the
+    # staircase triangulation of the product of two simplices
+    if positive == 1:
+        parts[count, 0] = simplex[inside[0]]
+        for j in range(size - 1):
+            parts[count, j + 1] = cut[0, j]
+        return count + 1
+    if size - positive == 1:
+        for first in range(positive):
+            for k in range(first + 1):
+                parts[count, k] = cut[k, 0]
+            for k in range(first, positive):
+                parts[count, k + 1] = simplex[inside[k]]
+            count += 1
+        return count
+    a, b = simplex[inside[0]], simplex[inside[1]]
+    wedge = np.empty((6, 3))
+    wedge[0], wedge[1], wedge[2] = a, cut[0, 0], cut[0, 1]
+    wedge[3], wedge[4], wedge[5] = b, cut[1, 0], cut[1, 1]
+    for first in range(3):
+        for k in range(first + 1):
+            parts[count, k] = wedge[3 + k]
+        for k in range(first, 3):
+            parts[count, k + 1] = wedge[k]
+        count += 1
+    return count
+
+
+@njit(cache=True)
+def _apart(one, other, inward, tolerance):
+    """Whether a facet of `other` has all of `one` behind it, or within `tolerance` of it."""
+    size, d = one.shape
+    for facet in range(size):
+        deepest = -np.inf
+        for i in range(size):
+            depth = 0.0
+            for a in range(d):
+                depth += inward[facet, a] * (one[i, a] - other[(facet + 1) % size, a])
+            deepest = max(deepest, depth)
+        if deepest <= tolerance:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _common(one, other, inward, tolerance):
+    """Area or volume of what two simplices have in common, less a layer of thickness `tolerance`.
+
+    `inward` (d + 1, d) are the unit normals of the facets of `other` opposite to its corners.
+    """
+    size, d = one.shape
+    parts, cut = np.empty((_MOST, size, d)), np.empty((_MOST, size, d))
+    parts[0], count = one, 1
+    depth = np.empty(size)
+    for facet in range(size):
+        on_it = other[(facet + 1) % size]
+        kept = 0
+        for p in range(count):
+            for i in range(size):
+                depth[i] = -tolerance
+                for a in range(d):
+                    depth[i] += inward[facet, a] * (parts[p, i, a] - on_it[a])
+            kept = _kept(parts[p], depth, cut, kept)
+        parts, cut, count = cut, parts, kept
+        if count == 0:
+            return 0.0
+    total = 0.0
+    for p in range(count):
+        total += _measure(parts[p])
+    return total
+
+
+@njit(cache=True)
+def overlapping(seeds, lower, upper, cells, low, high, corners, inward, tolerance):
+    """Area or volume that is covered twice by simplices around the `seeds` (s,).
+
+    Starting from the seeds, neighbours of cells that overlap another are looked at as well, so
+    that every cell of a connected region of overlap is met. `low` and `high` (m, d) are the boxes
+    of the cells, `corners` (m, d + 1, d), `inward` their facets' unit normals.
+    """
+    d = low.shape[1]
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    seen = np.zeros(low.shape[0], dtype=np.bool_)
+    waiting = np.empty(low.shape[0], dtype=np.int64)
+    begun = ended = 0
+    for seed in seeds:
+        if not seen[seed]:
+            seen[seed], waiting[ended] = True, seed
+            ended += 1
+    stack, near = np.empty(64, dtype=np.int64), np.empty(low.shape[0], dtype=np.int64)
+    total = 0.0
+    while begun < ended:
+        one = waiting[begun]
+        begun += 1
+        stack[0], top, around = 1, 1, 0
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            apart = False
+            for a in range(d):
+                apart |= low[one, a] > upper[node, a] or high[one, a] < lower[node, a]
+            if apart:
+                continue
+            if node < leaves:
+                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+                top += 2
+                continue
+            for k in range((node - leaves) * leaf_size, (node - leaves + 1) * leaf_size):
+                if cells[k] < 0:
+                    break
+                near[around] = cells[k]
+                around += 1
+        own = 0.0
+        for k in range(around):
+            other = near[k]
+            if other == one or _apart(corners[one], corners[other], inward[other], tolerance):
+                continue
+            if not _apart(corners[other], corners[one], inward[one], tolerance):
+                own += _common(corners[one], corners[other], inward[other], tolerance)
+        total += 0.5 * own
+        if own > 0.0:
+            for k in range(around):
+                if not seen[near[k]]:
+                    seen[near[k]], waiting[ended] = True, near[k]
+                    ended += 1
+    return total
