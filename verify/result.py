@@ -20,6 +20,8 @@ __all__ = [
     "Metric",
     "Notice",
     "NoticeKind",
+    "OpeningCurve",
+    "OpeningProfile",
     "Rate",
     "SolveRecord",
     "Status",
@@ -202,6 +204,52 @@ class Notice:
 
 
 @dataclass(frozen=True)
+class OpeningCurve:
+    """The displacement jump of one field along a line on a cut.
+
+    `level` is None for an exact solution. `normal` and `tangential` are in m, positive where the
+    cut opens; in space the tangential jump is a length. The bands are half-widths of what is known
+    of a reference, m; empty where nothing says how well the field is known.
+    """
+
+    solver: str
+    level: int | None
+    normal: list[float]
+    tangential: list[float]
+    normal_band: list[float] = field(default_factory=list)
+    tangential_band: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class OpeningProfile:
+    """Jumps along a line on a cut, of all solvers (their finest levels) and the reference.
+
+    Parameters
+    ----------
+    cut : str
+    where : str
+        Which line on the cut, in words.
+    time : float or None
+        In s; None for a static case.
+    why : str
+        Why at this time.
+    arc : list of float
+        Arc length along the line, m.
+    points : list of list of float
+        Places in the material, m.
+    curves : list of OpeningCurve
+    """
+
+    cut: str
+    where: str
+    time: float | None
+    why: str
+    arc: list[float]
+    points: list[list[float]]
+    curves: list[OpeningCurve]
+
+
+@dataclass(frozen=True)
 class CaseResult:
     """All that is known about one case of a run."""
 
@@ -217,6 +265,7 @@ class CaseResult:
     pictures: dict[str, str] = field(default_factory=dict)  # name -> path in the run directory
     provenance: dict[str, Any] = field(default_factory=dict)
     notices: list[Notice] = field(default_factory=list)
+    openings: list[OpeningProfile] = field(default_factory=list)
     schema: int = SCHEMA_VERSION
 
     @property
@@ -288,6 +337,10 @@ def read_result(path: Path) -> CaseResult:
         ]
         record["notices"] = [
             Notice(**{**n, "kind": NoticeKind(n["kind"])}) for n in record.get("notices", [])
+        ]
+        record["openings"] = [
+            OpeningProfile(**{**o, "curves": [OpeningCurve(**c) for c in o["curves"]]})
+            for o in record.get("openings", [])
         ]
         return CaseResult(**record)
     except (AttributeError, LookupError, TypeError, ValueError) as error:

@@ -14,7 +14,14 @@ from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.simplices import EDGES, Simplices, simplices
 from verify.solution import Solution
 
-__all__ = ["DeformedCells", "Faces", "deformed_cells", "faces_of"]
+__all__ = [
+    "DeformedCells",
+    "Faces",
+    "deformed_cells",
+    "facet_normals",
+    "faces_of",
+    "is_glued",
+]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -46,6 +53,10 @@ class Faces:
     nodes: Ints
     behind: Ints
     across: Ints
+
+    def take(self, kept: NDArray[np.bool_]) -> "Faces":
+        """Return some of them."""
+        return Faces(self.nodes[kept], self.behind[kept], self.across[kept])
 
 
 @dataclass(frozen=True)

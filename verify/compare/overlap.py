@@ -6,7 +6,7 @@ faces are looked for in the deformed cells of whatever is there: the other side 
 another part of the body.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,12 @@ from verify.compare.deformed import (
 )
 from verify.compare.locate import SolutionField
 from verify.compare.locate_kernels import holding_cells
-from verify.compare.overlap_kernels import first_exits, overlapping
+from verify.compare.overlap_kernels import (
+    facet_distances,
+    first_exits,
+    nearest_before,
+    overlapping,
+)
 from verify.errors import UnsupportedSceneError
 from verify.solution import Solution
 
@@ -54,12 +59,16 @@ class Overlap:
         Area (2D, m²) or volume (3D, m³) that is covered twice.
     material, deformed : (d,) arrays or None
         Where the largest depth is: the point of the face before and after the deformation.
+    inside_out : int
+        Facets of cuts whose cells are inside out in the deformed body: they have no inside that
+        something could be in, and are left out.
     """
 
     depth: float = 0.0
     measure: float = 0.0
     material: Array | None = None
     deformed: Array | None = None
+    inside_out: int = 0
 
 
 class OverlapSearch:
@@ -92,23 +101,34 @@ class OverlapSearch:
         u = self.solution.displacement[step]
         places = self.solution.points + u
         faces = self._apart(u)
-        cut = faces.across != faces.behind
-        if not cut.any() or not np.isfinite(u).all():
+        if not np.isfinite(u).all():
             return Overlap()
+        lost = self._inside_out(places)[faces.behind]
+        cut = faces.across != faces.behind
+        turned = int(np.sum(lost & cut))
+        faces, cut = faces.take(~lost), cut[~lost]
+        if not cut.any():
+            return Overlap(inside_out=turned)
         region = places[faces.nodes[cut]].reshape(-1, places.shape[1])
         margin = _LONGEST * self._size
         low, high = region.min(axis=0) - margin, region.max(axis=0) + margin
         corners = places[faces.nodes]
         near = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
-        faces = Faces(faces.nodes[near], faces.behind[near], faces.across[near])
         cells = deformed_cells(self.solution, u, low, high)
-        return self._overlap(faces, cells, places)
+        return replace(self._overlap(faces.take(near), cells, places), inside_out=turned)
 
     def _apart(self, u: Array) -> Faces:
         """Faces whose sides do not move as one."""
         faces = self._faces
         kept = ~is_glued(faces, self.solution, self._field.with_nodal(u))
-        return Faces(faces.nodes[kept], faces.behind[kept], faces.across[kept])
+        return faces.take(kept)
+
+    def _inside_out(self, places: Array) -> NDArray[np.bool_]:
+        """Cells (m,) of the solution whose corners are turned round by the deformation."""
+        corners = self.solution.cells[:, : self.solution.dimension + 1]
+        before, after = self.solution.points[corners], places[corners]
+        turns = [np.linalg.det(x[:, 1:] - x[:, :1]) for x in (before, after)]
+        return np.asarray(turns[0] * turns[1] <= 0.0)
 
     def _overlap(self, faces: Faces, cells: DeformedCells, places: Array) -> Overlap:
         depth, shares, which = self._depths(faces, cells, places)
@@ -145,8 +165,9 @@ class OverlapSearch:
         points = np.einsum("nk,nkd->nd", shares, corners[which])
         step = np.minimum(_STEP * height[which], _LONGEST * self._size)
         outside = points + step[:, None] * normals[which]
-        inside = self._holding(cells, outside) >= 0
-        which, shares, points = which[inside], shares[inside], points[inside]
+        held = self._holding(cells, outside)
+        inside = held >= 0
+        which, shares, points, held = which[inside], shares[inside], points[inside], held[inside]
         step, outside = step[inside], outside[inside]
         if not len(which):
             return np.zeros(0), shares, which
@@ -154,13 +175,35 @@ class OverlapSearch:
         bounds = tree.lower, tree.upper, tree.cells, corners, normals
         along, leaving = first_exits(outside, -normals[which], *bounds)
         depth = np.where(np.isfinite(along), along - step, 0.0)
-        # a facet that is left at an angle may be nearer along its own normal
-        square, _ = first_exits(points, normals[np.maximum(leaving, 0)], *bounds)
-        depth = np.minimum(depth, np.where(leaving >= 0, square, np.inf))
+        out = self._ways_out(faces, cells, held, outside)
+        depth = np.minimum(depth, facet_distances(points, out, corners, normals))
         # a point of the body's outside counts where it went in through a face of a cut
         cut = faces.across != faces.behind
         depth[~(cut[which] | cut[leaving])] = 0.0
         return np.maximum(depth, 0.0), shares, which
+
+    def _ways_out(
+        self, faces: Faces, cells: DeformedCells, held: NDArray[np.int64], points: Array
+    ) -> NDArray[np.int64]:
+        """Facets (n,) by which deformed points inside the cells `held` (n,) are nearest to get out.
+
+        A ray along a normal may be longer than the way out, and where faces turn by a right angle,
+        as at a tip that closes, it misses them. Nearest is told in the material: there a point of
+        a cell is on the inner side of the faces of its own part, and of no other.
+        """
+        shape = cells.shape
+        off = points[:, None] - np.roll(shape.corners[held], -1, axis=1)
+        height = np.sum(shape.normals[held] * off, axis=2)
+        # barycentric: height over a facet, over that of the opposite corner
+        shares = height * np.linalg.norm(shape.gradients[held], axis=2)
+        places = np.einsum("nk,nkd->nd", shares, self.solution.points[cells.nodes[held]])
+        corners = np.ascontiguousarray(self.solution.points[faces.nodes])
+        tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
+        found: NDArray[np.int64] = nearest_before(
+            np.ascontiguousarray(places), tree.lower, tree.upper, tree.cells, corners,
+            np.nan_to_num(facet_normals(corners)),
+        )  # fmt: skip
+        return found
 
     def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
         found: NDArray[np.int64] = holding_cells(

@@ -7,7 +7,9 @@ the material. `lower`, `upper` and `cells` are a tree, see `verify.compare.cell_
 import numpy as np
 from numba import njit
 
-__all__ = ["first_exits", "overlapping"]
+from verify.compare.locate_kernels import box_distance2, segment_distance2
+
+__all__ = ["facet_distances", "first_exits", "nearest_before", "overlapping"]
 
 # A ray through an edge must not slip between two facets.
 _EDGE = 1e-9
@@ -90,6 +92,81 @@ def first_exits(points, ways, lower, upper, cells, facets, normals):
                 if 0.0 <= t < distance[i]:
                     distance[i], which[i] = t, facet
     return distance, which
+
+
+@njit(cache=True)
+def _facet_distance2(x, facet, normal):
+    """Squared distance of a point to a facet."""
+    d = x.shape[0]
+    best = np.inf
+    for i in range(d):
+        best = min(best, segment_distance2(x, facet[i], facet[(i + 1) % d]))
+    if d == 2:
+        return best
+    height = side = 0.0
+    for a in range(3):
+        height += normal[a] * (x[a] - facet[0, a])
+    if height * height >= best:
+        return best
+    for i in range(3):  # whether the foot lies inside of all edges
+        side = 0.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            edge_b = facet[(i + 1) % 3, b] - facet[i, b]
+            edge_c = facet[(i + 1) % 3, c] - facet[i, c]
+            side += normal[a] * (edge_b * (x[c] - facet[i, c]) - edge_c * (x[b] - facet[i, b]))
+        if side < 0.0:
+            return best
+    return height * height
+
+
+@njit(cache=True)
+def facet_distances(points, which, facets, normals):
+    """Distance (n,) of each point to one facet, `which` (n,); infinite for facet −1."""
+    found = np.full(points.shape[0], np.inf)
+    for i in range(points.shape[0]):
+        if which[i] >= 0:
+            facet, normal = facets[which[i]], normals[which[i]]
+            found[i] = np.sqrt(_facet_distance2(points[i], facet, normal))
+    return found
+
+
+@njit(cache=True)
+def nearest_before(points, lower, upper, cells, facets, normals):
+    """Nearest facet (n,) that has a point on its inner side; −1 where none has."""
+    n = points.shape[0]
+    found = np.full(n, -1, dtype=np.int64)
+    leaves = lower.shape[0] // 2
+    leaf_size = cells.shape[0] // leaves
+    stack = np.empty(64, dtype=np.int64)
+    for i in range(n):
+        best2 = np.inf
+        stack[0], top = 1, 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            if box_distance2(points[i], lower[node], upper[node]) >= best2:
+                continue
+            if node < leaves:
+                left, right = 2 * node, 2 * node + 1
+                left2 = box_distance2(points[i], lower[left], upper[left])
+                if left2 < box_distance2(points[i], lower[right], upper[right]):
+                    left, right = right, left
+                stack[top], stack[top + 1] = left, right  # the nearer child is taken first
+                top += 2
+                continue
+            for k in range((node - leaves) * leaf_size, (node - leaves + 1) * leaf_size):
+                facet = cells[k]
+                if facet < 0:
+                    break
+                height = 0.0
+                for a in range(points.shape[1]):
+                    height += normals[facet, a] * (points[i, a] - facets[facet, 0, a])
+                if height < 0.0:
+                    distance2 = _facet_distance2(points[i], facets[facet], normals[facet])
+                    if distance2 < best2:
+                        best2, found[i] = distance2, facet
+    return found
 
 
 @njit(cache=True)

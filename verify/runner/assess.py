@@ -23,6 +23,7 @@ from verify.runner.job import load_record
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.study.accuracy import assess_accuracy
+from verify.study.closing import with_openings
 
 __all__ = ["main"]
 
@@ -38,6 +39,7 @@ def main(question_file: Path) -> None:
     records, solutions = _stored(root, question["folders"])
     exact = _exact(scene)
     result: CaseResult = assess_accuracy(scene, records, solutions, exact, question["judge_only"])
+    result = with_openings(result, scene, solutions, exact)
     result = replace(result, provenance=question["provenance"])
     drawn = _error_pictures(scene, solutions, exact, folder)
     pictures = {name: str(path.relative_to(root)) for name, path in drawn.items()}

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr, model_validator
 
 from verify.scene.acceptance import Acceptance, KnownFinding, Quantity, StrainEnergyQuantity
+from verify.scene.contact import Contact
 from verify.scene.cuts import Cut
 from verify.scene.geometry import Geometry, MeshFile
 from verify.scene.initial import AtRest, Initial
@@ -42,6 +43,7 @@ class Scene(Strict):
     loads: list[Load] = Field(default_factory=list)
     exact: Exact | None = None
     cuts: list[Cut] = Field(default_factory=list)
+    contact: Contact = Field(default_factory=Contact)
     analysis: Analysis = Field(default_factory=Analysis)
     initial: Initial = Field(default_factory=_at_rest)
     reference: ReferenceLevels = Field(default_factory=ReferenceLevels)

@@ -1,0 +1,18 @@
+"""What a case expects of the faces of its cuts where the deformation presses them together."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from verify.scene.strict import Strict
+
+__all__ = ["Contact"]
+
+
+class Contact(Strict):
+    """Contact of faces. No solver here has a contact model: faces that close overlap."""
+
+    expected: Literal["none", "overlap"] = Field(
+        default="none",
+        description="none: an overlap of faces of cuts is warned of; overlap: the case means it",
+    )
