@@ -8,6 +8,7 @@ from verify.report.markup import Markup, joined, tag
 from verify.report.motion_section import motion_section
 from verify.report.notation import error_title, number, number_text, solver_title
 from verify.report.notices import warning_banner, warning_mark
+from verify.report.opening_section import opening_section
 from verify.report.pictures import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
 from verify.report.summary import anchor, badge, verdict_of
@@ -73,7 +74,7 @@ def _body(result: CaseResult, pictures: CasePictures) -> Markup:
         curves = [curve for name in names for curve in error_curves(result, name)]
         said = tag("p", " ".join(_reservations(curves, result)), class_="quiet")
         parts += [tag("h3", "Convergence and cost"), said, *diagrams]
-    parts.append(motion_section(result))
+    parts += [opening_section(result), motion_section(result)]
     parts += [orders_table(result), numbers_table(result), times_table(result)]
     reference = reference_record(result.reference)
     parts.append(tag("h3", "Reference"))

@@ -19,6 +19,7 @@ def time_panel(
     curves: Sequence[tuple[str, Sequence[float]]],
     marks: Sequence[float] = (),
     x_title: str = "time, s",
+    band: tuple[Sequence[float], Sequence[float]] | None = None,
 ) -> Markup:
     """Return a figure of several curves over a common time.
 
@@ -34,8 +35,11 @@ def time_panel(
         Instants to be marked by a vertical line.
     x_title : str
         What the curves are drawn over, if not time.
+    band : (values, values), optional
+        Lower and upper edge of a grey band below the curves.
     """
-    values = [v for _, curve in curves for v in curve if math.isfinite(v)]
+    drawn = [curve for _, curve in curves] + list(band or ())
+    values = [v for curve in drawn for v in curve if math.isfinite(v)]
     low, high = min([0.0, *values]), max([*values, 0.0])
     room = 0.04 * (high - low) or 1.0
     low, high = low - room, high + room
@@ -56,6 +60,13 @@ def time_panel(
     for tick in _ticks(time[0], time[-1]):
         parts.append(tag("path", d=f"M{x(tick):.1f} {y0}v4", class_="frame"))
         parts.append(text(x(tick), y0 + 17, f"{tick:g}", text_anchor="middle"))
+    if band is not None:
+        low_edge, high_edge = (
+            [(x(t), y(v)) for t, v in zip(time, edge, strict=True) if math.isfinite(v)]
+            for edge in band
+        )
+        around = "L".join(f"{a:.1f} {b:.1f}" for a, b in [*low_edge, *reversed(high_edge)])
+        parts.append(tag("path", tag("title", "uncertainty"), d=f"M{around}Z", class_="floor"))
     for mark in marks:
         line = f"M{x(mark):.1f} {y0}V{y1}"
         parts.append(tag("path", tag("title", f"cut at {mark:.3g} s"), d=line, class_="floor-edge"))

@@ -1,0 +1,101 @@
+"""Opening profiles of a case: reference and solvers in one figure, with the reference's band."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from verify.report.markup import Markup, joined, tag
+from verify.report.notation import solver_title
+from verify.report.time_panel import time_panel
+from verify.result import CaseResult, OpeningCurve, OpeningProfile
+
+__all__ = ["opening_section"]
+
+_REFERENCE = "reference"
+_PER_PANEL = 4  # solvers beside the reference; colours and dashes are five
+_NOTHING = 1e-12  # of the length of the line: jumps below are round-off
+
+
+def opening_section(result: CaseResult) -> Markup | None:
+    """Return the profiles along every cut, or None if the result has none."""
+    figures = [figure for profile in result.openings for figure in _figures(profile, result)]
+    if not figures:
+        return None
+    said = (
+        "Displacement jump along the cuts, positive side less negative side, of every solver's "
+        "finest level. Below zero the faces of a cut overlap, as far as displacements are small: "
+        "the depth in the deformed body stands in the numbers."
+    )
+    return tag("div", tag("h3", "Opening of the cuts"), tag("p", said, class_="quiet"), *figures)
+
+
+def _figures(profile: OpeningProfile, result: CaseResult) -> Iterator[Markup]:
+    curves = [c for c in profile.curves if len(c.normal) == len(profile.arc) > 1]
+    if not curves:
+        return
+    when = "" if profile.time is None else f", at {profile.time:.4g} s ({profile.why})"
+    place = f"{profile.cut}{when}"
+    length = profile.arc[-1] - profile.arc[0]
+    largest = max(
+        (abs(v) for c in curves for v in (*c.normal, *c.tangential) if math.isfinite(v)),
+        default=0.0,
+    )
+    if largest <= _NOTHING * length:
+        yield tag("p", f"{place}: the jump is zero along the whole cut, to round-off.")
+        return
+    reference = next((c for c in curves if c.solver == _REFERENCE), None)
+    others = [c for c in curves if c is not reference]
+    groups = [others[i : i + _PER_PANEL] for i in range(0, len(others), _PER_PANEL)] or [[]]
+    panels = [
+        panel
+        for group in groups
+        for part in ("normal", "tangential")
+        if (panel := _panel(profile, part, reference, group, _NOTHING * length)) is not None
+    ]
+    yield tag(
+        "figure",
+        tag("div", panels, class_="panels"),
+        tag("figcaption", f"{place}: {profile.where}. ", _band_text(reference, result)),
+    )
+
+
+def _panel(
+    profile: OpeningProfile,
+    part: str,
+    reference: OpeningCurve | None,
+    others: Sequence[OpeningCurve],
+    nothing: float,
+) -> Markup | None:
+    shown = [*([reference] if reference else []), *others]
+    curves = [(_name(c), getattr(c, part)) for c in shown]
+    if all(abs(v) <= nothing for _, values in curves for v in values if math.isfinite(v)):
+        return None
+    band = None
+    if reference is not None and (half := getattr(reference, f"{part}_band")):
+        middle = getattr(reference, part)
+        band = (
+            [v - w for v, w in zip(middle, half, strict=True)],
+            [v + w for v, w in zip(middle, half, strict=True)],
+        )
+    title = f"{profile.cut}: {part} jump, m"
+    return time_panel(title, profile.arc, curves, x_title="arc length, m", band=band)
+
+
+def _name(curve: OpeningCurve) -> str:
+    if curve.solver == _REFERENCE:
+        return "exact" if curve.level is None else "reference"
+    return solver_title(curve.solver)
+
+
+def _band_text(reference: OpeningCurve | None, result: CaseResult) -> Markup:
+    if reference is None:
+        return joined("There is no reference to draw.")
+    source = result.reference.get("source") or "unnamed"
+    if reference.level is None:
+        return joined(f"The reference ({source}) has no uncertainty.")
+    if not reference.normal_band:
+        return joined(f"The reference ({source}) has too few levels for a band of uncertainty.")
+    widest = max(reference.normal_band)
+    return joined(
+        f"Grey band: uncertainty of the reference ({source}) from the differences of its levels, "
+        f"at most {widest:.2g} m of the normal jump."
+    )
