@@ -54,9 +54,7 @@ def test_a_half_that_is_turned_into_the_other_overlaps_by_as_much_wherever_both_
     found = OverlapSearch(pressed(d, 7 if d == 2 else 5, moves)).at()
     assert found.measure == pytest.approx(measure, rel=1e-5)
     assert depth - 0.3 * np.sin(np.deg2rad(20.0)) <= found.depth <= depth * (1 + 1e-9)
-    heights = [
-        abs((found.deformed - s - t @ np.full(d, 0.5)) @ (t @ normal(d))) for t, s in moves
-    ]
+    heights = [abs((found.deformed - s - t @ np.full(d, 0.5)) @ (t @ normal(d))) for t, s in moves]
     assert max(heights) == pytest.approx(found.depth, rel=1e-6)
 
 

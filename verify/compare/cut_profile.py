@@ -6,6 +6,7 @@ line half-way along a swept polyline, and of a polygon the line through its cent
 longest direction.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,7 +94,7 @@ def _on_surface(body: SolidBody, cut: str) -> ProfileLine:
     return _line(body, cut, where, _lengths(points), points, normals)
 
 
-def _line_of(patches: list[Patch]) -> tuple[str, list[Array]]:
+def _line_of(patches: Sequence[Patch]) -> tuple[str, list[Array]]:
     """Say which line it is, and its parameters (n, 2) on each patch."""
     share = _towards_ends()
     first = patches[0]
@@ -111,9 +112,9 @@ def _line_of(patches: list[Patch]) -> tuple[str, list[Array]]:
         ways = (2 * share - 1) * first.opening
         turned = np.where(ways < 0.0, np.pi, zero)
         return "along a meridian", [np.column_stack([np.abs(ways), turned])]
-    assert all(isinstance(patch, PlanePatch) for patch in patches)
     if len(patches) > 1:
-        return "half-way along the swept line", [_half_way(p, share) for p in patches]
+        swept = [_half_way(p, share) for p in patches if isinstance(p, PlanePatch)]
+        return "half-way along the swept line", swept
     return "along its longest direction, through its centroid", [_longest(first, share)]
 
 
@@ -156,7 +157,9 @@ def _on_membrane(body: MembraneBody, cut: str) -> ProfileLine:
     return ProfileLine(cut, "arc length along the cut", arc, rule)
 
 
-def _line(body: AnyBody, cut: str, where: str, arc: Array, points: Array, normals: Array) -> ProfileLine:
+def _line(
+    body: AnyBody, cut: str, where: str, arc: Array, points: Array, normals: Array
+) -> ProfileLine:
     rule = CutRule.beside(points, np.ones(len(points)), normals, AWAY * body.size)
     return ProfileLine(cut, where, arc, rule)
 

@@ -18,8 +18,8 @@ __all__ = [
     "DeformedCells",
     "Faces",
     "deformed_cells",
-    "facet_normals",
     "faces_of",
+    "facet_normals",
     "is_glued",
 ]
 
@@ -122,7 +122,7 @@ def faces_of(solution: Solution, field: SolutionField) -> Faces:
 
 
 def facet_normals(corners: Array) -> Array:
-    """Unit normals (f, d) of facets (f, d, d), by the order of their corners."""
+    """Return unit normals (f, d) of facets (f, d, d), by the order of their corners."""
     edges = corners[:, 1:] - corners[:, :1]
     if corners.shape[2] == 2:
         across = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
@@ -132,7 +132,9 @@ def facet_normals(corners: Array) -> Array:
         return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
 
 
-def deformed_cells(solution: Solution, displacement: Array, low: Array, high: Array) -> DeformedCells:
+def deformed_cells(
+    solution: Solution, displacement: Array, low: Array, high: Array
+) -> DeformedCells:
     """Take the cells that meet the box from `low` to `high` (d,) when nodes are moved.
 
     Parameters

@@ -153,8 +153,8 @@ class OverlapSearch:
         corners = np.ascontiguousarray(places[faces.nodes])
         normals = facet_normals(corners)
         height = _smallest_height(corners)
-        sound = (height > _SMALL * self._size) & np.isfinite(normals).all(axis=1)
-        sound = np.flatnonzero(sound)
+        whole = (height > _SMALL * self._size) & np.isfinite(normals).all(axis=1)
+        sound = np.flatnonzero(whole)
         normals = np.nan_to_num(normals)
         d = corners.shape[1]
         middle = np.full((1, d), 1 / d)

@@ -159,7 +159,7 @@ def _contestants(
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: Any,
 ) -> list[Contestant]:
-    """Reference first, then the finest solved level of each solver."""
+    """List the reference first, then the finest solved level of each solver."""
     shown = []
     levels = solutions.get(REFERENCE, {})
     if scene.judged_by_exact and exact is not None:
@@ -228,9 +228,7 @@ def _warnings(
     return warned
 
 
-def uncertainty(
-    name: str, time: float | None, openings: Sequence[OpeningProfile]
-) -> float | None:
+def uncertainty(name: str, time: float | None, openings: Sequence[OpeningProfile]) -> float | None:
     """How well the opening of a solver is known, m; None without a reference that says so."""
     widths = []
     for profile in openings:

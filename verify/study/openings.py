@@ -99,7 +99,7 @@ def _curve(
 
 
 def _parts(body: AnyBody, line: ProfileLine, motion: Motion, time: float | None) -> Array:
-    """Normal and tangential jump (2, n), m; in space the second is a length."""
+    """Return normal and tangential jump (2, n), m; in space the second is a length."""
     jump, normals = displacement_jump(motion.at(time), line.rule), line.rule.normals
     normal = np.sum(jump * normals, axis=1)
     if body.dimension == 2:
@@ -120,15 +120,11 @@ def _band(
     levels = [_parts(body, line, m, time) for m in one.coarser[-2:]] + [parts]
     differences = [_around(levels[1] - levels[0]), _around(levels[2] - levels[1])]
     sizes = list(one.sizes[-3:])
-    return np.array(
-        [
-            [
-                place_uncertainty(v, [first, last], sizes, one.order + 1).half_width
-                for v, first, last in zip(parts[k], differences[0][k], differences[1][k], strict=True)
-            ]
-            for k in range(2)
-        ]
-    )
+
+    def width(value: float, first: float, last: float) -> float:
+        return place_uncertainty(value, [first, last], sizes, one.order + 1).half_width
+
+    return np.asarray(np.vectorize(width, otypes=[float])(parts, *differences))
 
 
 def _around(difference: Array) -> Array:
