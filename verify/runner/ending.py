@@ -37,7 +37,7 @@ def exit_code(results: Sequence[CaseResult], strict: bool = False) -> int:
     ----------
     results : sequence of CaseResult
     strict : bool
-        Whether an undecided verdict, a refusal, or a case without any verdict counts.
+        Whether an undecided verdict, a refusal, a warning, or a case without any verdict counts.
     """
     judged = [record for result in results for record in result.verdicts]
     verdicts = [record.verdict for record in judged]
@@ -49,5 +49,5 @@ def exit_code(results: Sequence[CaseResult], strict: bool = False) -> int:
     if Status.SOLVED not in statuses:
         return NOTHING_RAN
     doubtful = Verdict.UNDECIDED in verdicts or Status.REFUSED in statuses
-    doubtful |= any(not result.verdicts for result in results)
+    doubtful |= any(not result.verdicts or result.warnings for result in results)
     return ONLY_WARNINGS if strict and doubtful else ALL_PASS
