@@ -14,7 +14,7 @@ from verify.scene import Scene
 
 __all__ = ["FinishedRun", "physics_of", "read_run"]
 
-_WORDS = {"title", "requirement", "tags", "acceptance", "known_findings"}
+_WORDS = {"title", "requirement", "tags", "acceptance", "known_findings", "contact"}
 
 
 @dataclass(frozen=True)
