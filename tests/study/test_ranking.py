@@ -135,13 +135,17 @@ def test_time_at_equal_error_is_that_of_the_power_laws():
     assert not found["left_out"]
 
 
-@pytest.mark.parametrize(("repetitions", "said"), [(1, 1), (2, 0)])
-def test_times_without_repetition_rank_nobody_before_another(repetitions, said):
-    solves = [solve("a", "x", 0, 0.1), solve("a", "y", 0, 0.1)]
+@pytest.mark.parametrize(
+    ("repetitions", "notes", "said"),
+    [(1, {}, 1), (2, {}, 1), (3, {}, 0), (3, {"timing": "contended: load 9 on 2 cores"}, 1)],
+)
+def test_times_that_are_no_sample_rank_nobody_before_another(repetitions, notes, said):
+    solves = [solve("a", name, 0, 0.1, notes=dict(notes)) for name in ("x", "y")]
     for one, seconds in zip(solves, (2.0, 3.0), strict=True):
         one.timings.update({"meshing": [1.0], "solve": [seconds] * repetitions})
     ranking = rank_solvers([case_of("a", solves)])
-    assert sum("timed once" in note for note in ranking["contended"]) == said
+    assert sum("all are tied" in note for note in ranking["contended"]) == said
+    assert len(ranking["contended"]) == said
     _, by = compared(ranking, "cost", view="time at equal error")
     assert by["y"]["value"] == pytest.approx(4 / 3)
     assert (by["x"]["rank"], by["y"]["rank"]) == (1, 1 if said else 2)

@@ -66,9 +66,8 @@ def _study(arguments: argparse.Namespace) -> int:
         print(json.dumps({"record": str(written), "report": str(page), "findings": said}, indent=2))
         return 0
     for finding in findings:
-        mark = {Verdict.PASS: "as expected", Verdict.FAIL: "NOT KEPT"}.get(
-            finding.verdict, str(finding.verdict)
-        )
+        marks = {Verdict.PASS: "as expected", Verdict.FAIL: "NOT KEPT", None: "shown"}
+        mark = marks.get(finding.verdict, str(finding.verdict))
         print(f"{mark}: {finding.topic}: {finding.sentence} [expected: {finding.expected}]")
     print(f"report: {page}")
     return 0

@@ -180,7 +180,10 @@ def _floor_text(curves: list[Curve]) -> str:
         return "No uncertainty of the comparison is recorded."
     where = f"at most {number_text(floor, 2)} on the finest level"
     if any(limits(point) for point in points):
-        return f"Grey band and bars: uncertainty of reference and integration, {where}."
+        return (
+            "Bars: uncertainty of reference and integration; grey band: the least of a level; "
+            f"{where}."
+        )
     return f"Uncertainty of reference and integration: {where}, below 1/30 of every error."
 
 

@@ -96,12 +96,15 @@ def limits(point: Point) -> bool:
 def floor(
     curves: Sequence[Curve], abscissa: Callable[[Point], float | None]
 ) -> list[tuple[float, float]]:
-    """Return (abscissa, uncertainty) of every point: the largest uncertainty on its level."""
+    """Return (abscissa, uncertainty) of every point: the least uncertainty on its level.
+
+    That is what no solver can be below; what a point has beyond it is its own error bar.
+    """
     points = [point for curve in curves for point in curve.points]
-    largest: dict[int, float] = {}
+    least: dict[int, float] = {}
     for point in points:
-        largest[point.level] = max(point.uncertainty, largest.get(point.level, 0.0))
-    return sorted((x, largest[p.level]) for p in points if (x := abscissa(p)) is not None)
+        least[point.level] = min(point.uncertainty, least.get(point.level, point.uncertainty))
+    return sorted((x, least[p.level]) for p in points if (x := abscissa(p)) is not None)
 
 
 def error_curves(result: CaseResult, metric: str) -> list[Curve]:

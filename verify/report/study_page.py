@@ -93,7 +93,7 @@ def _findings(record: Mapping[str, Any]) -> Markup:
             "tr",
             tag("td", tag("b", f["topic"]), tag("div", f["sentence"])),
             tag("td", f["expected"]),
-            tag("td", badge(Verdict(f["verdict"]))),
+            tag("td", badge(Verdict(f["verdict"])) if f["verdict"] else "–"),
         )
         for f in record["findings"]
     ]

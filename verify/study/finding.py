@@ -1,10 +1,11 @@
 """A finding: one sentence with its numbers, what was expected, and whether it came out so."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from verify.result import Verdict
 
-__all__ = ["Finding"]
+__all__ = ["Finding", "kept_by_all"]
 
 
 @dataclass(frozen=True)
@@ -18,11 +19,20 @@ class Finding:
         With the numbers.
     expected : str
         The stated limit or the known result against which it is held.
-    verdict : Verdict
-        PASS if it came out as expected, FAIL if not, UNDECIDED if the numbers do not tell.
+    verdict : Verdict or None
+        PASS if it came out as expected, FAIL if not, UNDECIDED if the numbers do not tell or there
+        are none; None for what is only shown.
     """
 
     topic: str
     sentence: str
     expected: str
-    verdict: Verdict
+    verdict: Verdict | None
+
+
+def kept_by_all(measured: Iterable[bool]) -> Verdict:
+    """Return PASS if every one is kept, FAIL if one is not, UNDECIDED if nothing was measured."""
+    found = list(measured)
+    if not found:
+        return Verdict.UNDECIDED
+    return Verdict.PASS if all(found) else Verdict.FAIL

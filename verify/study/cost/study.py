@@ -203,7 +203,7 @@ def _findings(
                 "Pareto front at the last step",
                 f"No other solve is both faster and more accurate than {said}.",
                 "shown, not judged",
-                Verdict.PASS,
+                None,
             )
         )
     return found

@@ -42,6 +42,9 @@ class Drift:
     kind : {"kept", "bounded oscillation", "secular loss", "secular gain"}
         Secular if zero lies outside the interval of the slope, or if the period means rise or
         fall in a row (a decay that is not a line); kept if slope and oscillation are round-off.
+    is_line : bool
+        Whether zero lies outside the interval of the slope; where it does not, what is secular
+        is so by the order of the period means.
     """
 
     per_period: float
@@ -49,6 +52,7 @@ class Drift:
     oscillation: float
     periods: int
     kind: str
+    is_line: bool = True
 
 
 def secular_drift(stages: Sequence[tuple[_Floats, _Floats]], period: float, scale: float) -> Drift:
@@ -87,13 +91,14 @@ def secular_drift(stages: Sequence[tuple[_Floats, _Floats]], period: float, scal
         float(np.abs(energy / scale - means.mean() - slope * (time / period - at.mean())).max())
         for (time, energy), (at, means) in zip(stages, parts, strict=True)
     )
+    is_line, trend = abs(slope) > width, _trend([means for _, means in parts])
     if max(abs(slope), oscillation) <= _ROUND_OFF:
         kind = "kept"
-    elif abs(slope) > width or abs(_trend([means for _, means in parts])) > _TREND:
-        kind = "secular gain" if slope > 0.0 else "secular loss"
+    elif (way := slope if is_line else trend) and (is_line or abs(trend) > _TREND):
+        kind = "secular gain" if way > 0.0 else "secular loss"
     else:
         kind = "bounded oscillation"
-    return Drift(slope, width, oscillation, count, kind)
+    return Drift(slope, width, oscillation, count, kind, is_line)
 
 
 def _trend(stages: Sequence[_Floats]) -> float:

@@ -10,17 +10,18 @@ from verify.study.ranking.standing import Item, compared_by_mean
 from verify.study.rates import ROUND_OFF
 from verify.verdict import Interval
 
-__all__ = ["any_timed_once", "common_error", "cost_comparisons"]
+__all__ = ["common_error", "cost_comparisons", "why_times_are_no_sample"]
 
 _METRICS = ("displacement_l2", "energy_norm")
+_SAMPLE = 3  # repetitions: two have a range, but not one that says anything about a third
 
 
 def cost_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
     """Compare the time that each new cut costs, at the error that `common_error` finds.
 
-    Where a solve was timed once nobody is certainly faster: all are tied.
+    Where times are no sample (`why_times_are_no_sample`) nobody is certainly faster: all are tied.
     """
-    comparisons, uncertain = [], any_timed_once(results, solvers)
+    comparisons, uncertain = [], bool(why_times_are_no_sample(results, solvers))
     for metric in _METRICS:
         items, left_out = [], []
         for result in results:
@@ -39,10 +40,14 @@ def cost_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> l
     return comparisons
 
 
-def any_timed_once(results: Sequence[CaseResult], solvers: Sequence[str]) -> bool:
-    """Whether there is a time without a repetition, and so without an interval."""
-    timed = [s.timings for r in results for s in r.solves if s.solver in solvers and s.timings]
-    return any(max(map(len, each.values())) == 1 for each in timed)
+def why_times_are_no_sample(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[str]:
+    """Say why the range of the repetitions does not bound the times, if it does not."""
+    own = [s for r in results for s in r.solves if s.solver in solvers and s.timings]
+    said = {s.notes["timing"] for s in own if s.notes.get("timing", "").startswith("contended")}
+    fewest = min((max(map(len, s.timings.values())) for s in own), default=_SAMPLE)
+    if fewest < _SAMPLE:
+        said.add(f"solves that were timed fewer than {_SAMPLE} times have no interval ({fewest})")
+    return sorted(f"{why}: by time all are tied" for why in said)
 
 
 def _tied(standings: Sequence[Standing]) -> list[Standing]:

@@ -8,7 +8,7 @@ from verify.ranking import LeftOut, Ranking
 from verify.result import CaseResult, Status, Verdict
 from verify.study.energy_account import ACCOUNT
 from verify.study.ranking.accuracy import accuracy_comparisons
-from verify.study.ranking.cost import any_timed_once, cost_comparisons
+from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
 from verify.study.ranking.energy import energy_comparisons
 from verify.study.ranking.stability import stability_standings
 from verify.verdict import ERROR_METRICS
@@ -57,10 +57,9 @@ def rank_solvers(
 
 
 def _why_times_may_be_off(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[str]:
-    said = {s.notes["timing"] for r in results for s in r.solves if "timing" in s.notes}
-    if any_timed_once(results, solvers):
-        said.add("solves that were timed once have no interval: by time all are tied")
-    return sorted(said)
+    said = why_times_are_no_sample(results, solvers)
+    known = {s.notes["timing"] for r in results for s in r.solves if "timing" in s.notes}
+    return sorted({*said, *(n for n in known if not any(why.startswith(n) for why in said))})
 
 
 def _left_out(results: Sequence[CaseResult]) -> list[LeftOut]:

@@ -1,13 +1,14 @@
 """The measurements of one dimension: looked up, put into words and judged."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from math import nan
 from typing import Any
 
 from verify.result import Verdict
 from verify.study.slivers.measurement import Measurement
 from verify.study.slivers.placements import NEAR_NODES
 
-__all__ = ["FLAT", "Results", "counts", "expects", "exponent_text", "span", "worst"]
+__all__ = ["FLAT", "Results", "counts", "expects", "exponent_text", "extreme", "span", "worst"]
 
 FLAT = 0.02  # exponents as near as that to zero change a value by 10 % in two decades at most
 
@@ -82,7 +83,9 @@ def expects(growth: dict[str, Any], low: float, high: float) -> Verdict:
 
 
 def worst(verdicts: Sequence[Verdict]) -> Verdict:
-    """Return FAIL if any failed, else UNDECIDED if any is, else PASS."""
+    """Return FAIL if any failed, else UNDECIDED if any is or there are none, else PASS."""
+    if not verdicts:
+        return Verdict.UNDECIDED
     for verdict in (Verdict.FAIL, Verdict.UNDECIDED):
         if verdict in verdicts:
             return verdict
@@ -93,6 +96,11 @@ def span(measured: Sequence[Measurement]) -> str:
     """Write the range of the values that are known."""
     known = [m.value for m in measured if m.value is not None]
     return f"between {min(known):.4g} and {max(known):.4g}" if known else "nothing measured"
+
+
+def extreme(pick: Callable[[Sequence[float]], float], known: Sequence[float]) -> float:
+    """Return the least or largest of some values; not a number if there is none."""
+    return pick(known) if known else nan
 
 
 def counts(measured: Sequence[Measurement]) -> str:
