@@ -9,10 +9,11 @@ from synthetic_run import make_run
 
 from verify.report import load_run
 from verify.report.axes import Axis, Panel, log_range
-from verify.report.curves import duration, error_curves
+from verify.report.case_section import _floor_text
+from verify.report.curves import duration, error_curves, floor, limits
 from verify.report.figures_convergence import convergence_figure, error_range, required_slope
 from verify.report.marks import band, slope_triangle
-from verify.result import SolveRecord, Status
+from verify.result import Metric, SolveRecord, Status
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +111,22 @@ def test_the_floor_of_the_reference_is_inside_the_figure_that_it_limits(results)
     edge = re.search(r'd="M(\S+) (\S+)L[^"]*" class="floor-edge"', figure)
     panel = Panel((1, 2), (low, high), "", "")
     assert float(edge[2]) == pytest.approx(panel.y.at(0.03), abs=0.06)
+
+
+def test_the_band_and_its_caption_say_the_same_where_uncertainties_differ(results):
+    """A solver far off is uncertain by more than all of another's error: no band over the other."""
+    result = results["statics/f3_inclined"]
+    levels = {"still": (1.0, 1e-3), "fine": (1e-4, 1e-6)}
+    solves = [
+        SolveRecord(
+            "c", name, 0, Status.SOLVED, size=0.1, metrics=[Metric("energy_norm", e, "1", None, u)]
+        )
+        for name, (e, u) in levels.items()
+    ]
+    curves = error_curves(replace(result, solves=solves, rates=[]), "energy_norm")
+    assert not any(limits(point) for curve in curves for point in curve.points)
+    assert {u for _, u in floor(curves, lambda point: point.size)} == {1e-6}
+    assert "below 1/30 of every error" in _floor_text(curves)
 
 
 def test_an_exact_reference_draws_no_floor(results):

@@ -52,6 +52,8 @@ def test_a_solver_ten_times_slower_at_equal_accuracy_is_said_to_be_that():
     (finding,) = [f for f in study.findings if f.topic.endswith(", other")]
     assert "10 times as much" in finding.sentence
     assert finding.verdict is Verdict.PASS
+    (front,) = [f for f in study.findings if f.topic.startswith("Pareto")]
+    assert (front.expected, front.verdict) == ("shown, not judged", None)
 
 
 def test_a_faster_solver_of_lower_order_is_compared_at_the_error_that_both_reach():

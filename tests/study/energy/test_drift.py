@@ -1,10 +1,13 @@
 """A drift that was put into an account is found, with its kind and its uncertainty."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from verify.errors import InputError
 from verify.study.energy.drift import secular_drift
+from verify.study.energy.study import _way
 
 PERIOD, SCALE = 0.7, 5.0
 
@@ -50,6 +53,22 @@ def test_a_pure_oscillation_is_bounded_and_has_its_amplitude():
     assert found.kind == "bounded oscillation"
     assert found.oscillation == pytest.approx(0.03, rel=0.05)
     assert abs(found.per_period) <= found.uncertainty
+
+
+def test_a_loss_that_is_no_line_is_told_by_its_trend_and_not_by_the_slope():
+    """A fast decay to a level: the line through the means is as uncertain as it is steep."""
+    time, energy = account(0.0, periods=8, amplitude=0.0)
+    turn = (time - time[0]) / PERIOD
+    # the means fall in a row until the last, which lies far above: the slope even rises
+    energy = energy - SCALE * 1e-3 * np.minimum(turn, 7.0) + SCALE * 0.05 * (turn >= 7.0)
+    found = secular_drift([(time, energy)], PERIOD, SCALE)
+    assert abs(found.per_period) <= found.uncertainty
+    assert not found.is_line
+    assert found.kind != "secular gain"
+    text = _way(replace(found, kind="secular loss"))
+    assert "not along a line" in text
+    assert "fall in a row" in text
+    assert _way(secular_drift([account(-3e-2)], PERIOD, SCALE)) == "Secular loss:"
 
 
 def test_a_constant_energy_is_kept():
