@@ -23,6 +23,7 @@ def simplex(dimension, order, times=1):
         cells=np.arange(len(points))[None],
         displacement=generator.normal(size=(times, len(points), dimension)),
         velocity=generator.normal(size=(times, len(points), dimension)),
+        acceleration=generator.normal(size=(times, len(points), dimension)),
         times=np.linspace(0.0, 1.0, times),
         order=order,
         cut_facets=generator.normal(size=(3, dimension, dimension)),

@@ -92,6 +92,9 @@ class Solution:
         geometry alone.
     velocity : (t, n, d) float array, optional
         Nodal velocity in m/s.
+    acceleration : (t, n, d) float array, optional
+        Nodal acceleration in m/s² that balances the forces of the field at that time. Without
+        it there are no stress-intensity factors of a motion.
     ledger : dict of str to (t,) float array
         Energies by name (``"strain"``, ``"kinetic"``, …) at each output time, in joules (per
         metre of thickness in 2D), as the solver itself adds them up.
@@ -121,6 +124,7 @@ class Solution:
     cut_facets: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2, 2)))
     cell_sides: NDArray[np.int64] | None = None
     velocity: NDArray[np.float64] | None = None
+    acceleration: NDArray[np.float64] | None = None
     ledger: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     quantities: dict[str, float] = field(default_factory=dict)
     unknowns: int = 0
@@ -153,6 +157,11 @@ class Solution:
             raise InputError("displacement has values that are not finite")
         if self.velocity is not None and self.velocity.shape != (t, n, d):
             raise InputError(f"velocity of shape {self.velocity.shape}; expected {(t, n, d)}")
+        if self.acceleration is not None and self.acceleration.shape != (t, n, d):
+            shape = self.acceleration.shape
+            raise InputError(f"acceleration of shape {shape}; expected {(t, n, d)}")
+        if self.acceleration is not None and not np.isfinite(self.acceleration).all():
+            raise InputError("acceleration has values that are not finite")
         if not np.isfinite(self.times).all() or (np.diff(self.times) <= 0.0).any():
             raise InputError(f"times {self.times.tolist()}; expected ascending and finite")
         for name, column in self.ledger.items():
@@ -198,6 +207,8 @@ def write_solution(solution: Solution, path: Path) -> None:
         fields = {"displacement": _three(solution.displacement[step])}
         if solution.velocity is not None:
             fields["velocity"] = _three(solution.velocity[step])
+        if solution.acceleration is not None:
+            fields["acceleration"] = _three(solution.acceleration[step])
         mesh = meshio.Mesh(
             points,
             [(solution.cell_type, solution.cells)],
@@ -270,7 +281,6 @@ def read_solution(path: Path) -> Solution:
             raise InputError(f"times {times} for {len(files)} files; expected one each")
         _check_same_mesh(meshes, files, cell_type, str(source))
         sides = first.cell_data_dict.get("side", {}).get(cell_type)
-        moving = all("velocity" in mesh.point_data for mesh in meshes)
         size = record.get("size")
         return Solution(
             points=np.ascontiguousarray(first.points[:, :d], dtype=float),
@@ -280,7 +290,8 @@ def read_solution(path: Path) -> Solution:
             order=order,
             cut_facets=np.asarray(record.get("cut_facets", []), dtype=float).reshape(-1, k, d),
             cell_sides=None if sides is None else np.asarray(sides, dtype=np.int64),
-            velocity=np.stack([_vectors(m, "velocity", d) for m in meshes]) if moving else None,
+            velocity=_over_time(meshes, "velocity", d),
+            acceleration=_over_time(meshes, "acceleration", d),
             ledger={n: np.asarray(v, dtype=float) for n, v in record.get("ledger", {}).items()},
             quantities={n: float(v) for n, v in record.get("quantities", {}).items()},
             unknowns=int(record.get("unknowns", 0)),
@@ -348,6 +359,13 @@ def _vectors(mesh: Any, name: str, dimension: int) -> NDArray[np.float64]:
     if values.ndim != 2 or values.shape[1] < dimension:
         raise InputError(f"{name} of shape {values.shape}; expected vectors")
     return np.ascontiguousarray(values[:, :dimension])
+
+
+def _over_time(meshes: list[Any], name: str, dimension: int) -> NDArray[np.float64] | None:
+    """Point data (t, n, d) that all files have, or None."""
+    if not all(name in mesh.point_data for mesh in meshes):
+        return None
+    return np.stack([_vectors(mesh, name, dimension) for mesh in meshes])
 
 
 def _check_same_mesh(meshes: list[Any], files: list[str], cell_type: str, where: str) -> None:

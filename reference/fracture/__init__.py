@@ -9,7 +9,7 @@ from reference.fracture.front import CircularFront, Front, FrontCoordinates, Str
 from reference.fracture.front_intensity import FrontIntensity, front_intensity
 from reference.fracture.intensity import StressIntensity, stress_intensity
 from reference.fracture.opening import crack_opening
-from reference.fracture.tips import Tip, tips
+from reference.fracture.tips import Tip, no_tip, tips
 
 __all__ = [
     "CircularFront",
@@ -25,6 +25,7 @@ __all__ = [
     "face_opening",
     "front_intensity",
     "j_integral",
+    "no_tip",
     "stress_intensity",
     "tips",
 ]

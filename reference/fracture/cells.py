@@ -32,6 +32,8 @@ class CellGradients(NamedTuple):
         Gradients of the linear hat functions of the corners, 1/m.
     corner_shares : (q, d + 1) array
         Values of the hat functions.
+    shape : (q, k) array
+        Values of the shape functions of all nodes.
     """
 
     points: Array
@@ -39,6 +41,7 @@ class CellGradients(NamedTuple):
     gradient: Array
     hats: Array
     corner_shares: Array
+    shape: Array
 
 
 def cell_gradients(solution: Solution, cells: NDArray[np.int64], step: int = -1) -> CellGradients:
@@ -68,6 +71,7 @@ def cell_gradients(solution: Solution, cells: NDArray[np.int64], step: int = -1)
         gradient,
         hats,
         corner,
+        shape,
     )
 
 

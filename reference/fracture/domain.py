@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.exact.hooke import hooke
+from reference.fracture.balance import Force, net_force
 from reference.fracture.cells import CellGradients, cell_gradients
 from reference.fracture.pressure import stress_of
 from verify.errors import InputError
@@ -66,13 +67,16 @@ def j_integral(
     tip: Array,
     direction: Array,
     radii: Array,
-    body_force: Array | None = None,
+    body_force: Force = None,
+    drag: float = 0.0,
+    step: int = -1,
 ) -> JIntegral:
     """Energy release rate of a crack that grows straight on, by several domains.
 
-    J = ∫ (σ_ij u_i,1 − W δ_1j) q_,j dA − ∫ f_i u_i,1 q dA with q linear in each cell
-    (Li, Shih & Needleman, Eng. Fract. Mech. 21, 1985). The faces are straight in the domain, and
-    free of traction.
+    J = ∫ (σ_ij u_i,1 − W δ_1j) q_,j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) u_i,1 q dA with q linear in
+    each cell (Li, Shih & Needleman, Eng. Fract. Mech. 21, 1985; Moran & Shih, same journal 27,
+    1987, for a tip that stands still in a motion). The faces are straight in the domain, and free
+    of traction.
 
     Parameters
     ----------
@@ -85,34 +89,43 @@ def j_integral(
         Unit vector in which the crack points.
     radii : (r,) array
         Radii of the domains, m.
-    body_force : (2,) array, optional
-        Force per volume, N/m³ (the specific weight under gravity).
+    body_force : (2,) array or callable, optional
+        Force per volume, or its values (n, 2) at points (n, 2), N/m³: under gravity the specific
+        weight.
+    drag : float
+        α, Rayleigh's damping by the mass, 1/s.
+    step : int
+        Which output time; default the last.
 
     Raises
     ------
     InputError
-        If a radius is not positive or too small for the mesh.
+        If a radius is not positive or too small for the mesh, or the field is in motion and
+        carries no accelerations.
     """
     law = hooke(material)
-    stresses = stress_of(solution, law)
+    stresses = stress_of(solution, law, step)
+    force = net_force(solution, material, body_force, drag, step)
     values = []
     for radius in np.atleast_1d(radii):
-        around = ring(solution, tip, float(radius), whole=body_force is not None)
+        around = ring(solution, tip, float(radius), force is not None, step)
         at = around.at
         stress = stresses(around.cells, at)
         energy = 0.5 * np.sum(stress * at.gradient, axis=(2, 3))
         along = at.gradient @ direction  # u_i,1
         flux = np.einsum("mqij,mqi->mqj", stress, along) - energy[..., None] * direction
         density = np.sum(flux * around.grad_q, axis=2)
-        if body_force is not None:
-            density -= (along @ body_force) * around.q
+        if force is not None:
+            density -= np.sum(force(around.cells, at) * along, axis=2) * around.q
         values.append(float(np.sum(density * at.weights)))
     domains = np.array(values)
     mean = float(domains.mean())
     return JIntegral(mean, float(np.abs(domains - mean).max()), domains)
 
 
-def ring(solution: Solution, tip: Array, radius: float, whole: bool = False) -> Ring:
+def ring(
+    solution: Solution, tip: Array, radius: float, whole: bool = False, step: int = -1
+) -> Ring:
     """Gather the cells where q falls from 1 to 0: those with corners on both sides of a circle.
 
     Parameters
@@ -123,6 +136,8 @@ def ring(solution: Solution, tip: Array, radius: float, whole: bool = False) -> 
         m.
     whole : bool
         Also gather the cells inside, where q = 1.
+    step : int
+        Which output time; default the last.
 
     Raises
     ------
@@ -144,7 +159,7 @@ def ring(solution: Solution, tip: Array, radius: float, whole: bool = False) -> 
             "between the cells at the tip and the body's boundary"
         )
     cells = np.flatnonzero(mixed | inside.all(axis=1)) if whole else np.flatnonzero(mixed)
-    at = cell_gradients(solution, cells)
+    at = cell_gradients(solution, cells, step)
     hat = inside[cells].astype(float)
     grad_q = np.einsum("mk,mqkj->mqj", hat, at.hats)
     near = np.broadcast_to(

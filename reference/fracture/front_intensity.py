@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.exact.hooke import hooke
+from reference.fracture.balance import Force, NetForce, net_force
 from reference.fracture.cells import CellGradients, cell_gradients
 from reference.fracture.front import Front
 from reference.fracture.front_modes import mode_field
@@ -49,14 +50,17 @@ def front_intensity(
     front: Front,
     radii: Array,
     stations: int = 1,
-    body_force: Array | None = None,
+    body_force: Force = None,
+    drag: float = 0.0,
+    step: int = -1,
 ) -> FrontIntensity:
     """K_I, K_II and K_III along the front of a plane crack.
 
     The interaction integral with the plane tip fields in the coordinates of the front, with the
     terms of its curvature (M. Gosz & B. Moran, Eng. Fract. Mech. 69, 2002):
     M = ∫ (σ_ij û_i,k + σ̂_ij u_i,k − σ:ε̂ δ_kj) q_k,j
-    + (σ_ij (û_i,kj − ε̂_ij,k) + σ̂_ij,j u_i,k − f_i û_i,k) q_k dV. The virtual extension q points
+    + (σ_ij (û_i,kj − ε̂_ij,k) + σ̂_ij,j u_i,k − (f_i − ρ (ü_i + α u̇_i)) û_i,k) q_k dV. The virtual
+    extension q points
     ahead of the front, falls off linearly from half the radius to the radius, and along the front
     by a hat per station: K is a mean with that weight. Then K_I = E' M/(2∫w ds), K_III = μ M/∫w ds.
 
@@ -71,13 +75,18 @@ def front_intensity(
         Radii of the tubes, m, below the front's own radius.
     stations : int
         Number of stations; with one, a closed front gives its mean.
-    body_force : (3,) array, optional
-        Force per volume, N/m³.
+    body_force : (3,) array or callable, optional
+        Force per volume, or its values (n, 3) at points (n, 3), N/m³.
+    drag : float
+        α, Rayleigh's damping by the mass, 1/s.
+    step : int
+        Which output time; default the last.
 
     Raises
     ------
     InputError
-        If the field is plane, or a radius or the number of stations does not fit the mesh.
+        If the field is plane, or in motion without accelerations, or a radius or the number of
+        stations does not fit the mesh.
     """
     if solution.dimension != 3:
         raise InputError("stress intensities along a front of a plane field; expected one in space")
@@ -93,7 +102,8 @@ def front_intensity(
         _check_fit(solution, place, away, radius)
     within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
     nodes = place[solution.cells[within, :4]]
-    nodal = _nodal_shares(solution, material, front, within, nodes, at.axes[:, 0], body_force)
+    force = net_force(solution, material, body_force, drag, step)
+    nodal = _nodal_shares(solution, material, front, within, nodes, at.axes[:, 0], force, step)
     hats = np.array([_hat(front, at.along, centre, width) for centre in centres])
     falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
     modulus = 0.5 * material.young / (1 - material.poisson**2)
@@ -158,16 +168,18 @@ def _nodal_shares(
     cells: NDArray[np.int64],
     nodes: NDArray[np.int64],
     ahead: Array,
-    body_force: Array | None,
+    force: NetForce | None,
+    step: int,
 ) -> Array:
     """M (c, 3) of the three modes, linear in the extension of each node along `ahead` (c, 3)."""
-    stresses = stress_of(solution, hooke(material))
+    stresses = stress_of(solution, hooke(material), step)
     nodal = np.zeros((len(ahead), 3))
     for start in range(0, len(cells), _CHUNK):
         part, corners = cells[start : start + _CHUNK], nodes[start : start + _CHUNK]
-        field = cell_gradients(solution, part)
+        field = cell_gradients(solution, part, step)
         stress = stresses(part, field)
-        found = _interaction(material, front, field, stress, ahead[corners], body_force)
+        forces = None if force is None else force(part, field)
+        found = _interaction(material, front, field, stress, ahead[corners], forces)
         for mode in range(3):
             values = found[:, :, mode].ravel()
             nodal[:, mode] += np.bincount(corners.ravel(), values, minlength=len(ahead))
@@ -180,7 +192,7 @@ def _interaction(
     at: CellGradients,
     stress: Array,
     ahead: Array,
-    body_force: Array | None,
+    forces: Array | None,
 ) -> Array:
     """M (m, 4, 3) of the three modes in some cells, if a corner alone moves by one ahead."""
     local = front.coordinates(at.points.reshape(-1, 3))
@@ -202,9 +214,9 @@ def _interaction(
         flux[:, [0, 1, 2], [0, 1, 2]] -= work[:, None]
         source = (turned @ field.divergence[:, :, None])[:, :, 0]
         source[:, 0] += np.sum(stress * field.misfit, axis=(1, 2))
-        if body_force is not None:
-            force = axes @ np.asarray(body_force, dtype=float)
-            source -= (field.gradient.swapaxes(1, 2) @ force[:, :, None])[:, :, 0]
+        if forces is not None:
+            force = axes @ forces.reshape(-1, 3, 1)
+            source -= (field.gradient.swapaxes(1, 2) @ force)[:, :, 0]
         density = np.sum((unit @ flux) * slope, axis=2)
         density += share * (unit @ source[:, :, None])[:, :, 0]
         found[:, :, mode - 1] = (weights * density).reshape(len(at.points), -1, 4).sum(axis=1)

@@ -5,11 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact import exact_solution
-from reference.exact.hooke import hooke
-from reference.fracture.domain import ring
+from reference.exact.hooke import Hooke, hooke
+from reference.exact.solution import ExactSolution
+from reference.fracture.balance import Force, net_force
+from reference.fracture.domain import Ring, ring
 from reference.fracture.pressure import stress_of
-from verify.scene import Material
+from reference.fracture.tip_fields import ahead_of, tip_fields
+from verify.scene import ArcCut, Material
 from verify.solution import Solution
 
 __all__ = ["StressIntensity", "stress_intensity"]
@@ -43,46 +45,77 @@ def stress_intensity(
     tip: Array,
     direction: Array,
     radii: Array,
-    body_force: Array | None = None,
+    body_force: Force = None,
+    drag: float = 0.0,
+    step: int = -1,
+    arc: ArcCut | None = None,
 ) -> StressIntensity:
-    """K_I and K_II of a straight crack from a plane field.
+    """K_I and K_II of a crack that is straight, or an arc, from a plane field.
 
-    The interaction integral with the tip fields of each mode (Yau, Wang & Corten, J. Appl. Mech.
-    47, 1980): M = ∫ (σ_ij û_i,1 + σ̂_ij u_i,1 − σ_ij ε̂_ij δ_1j) q_,j dA − ∫ f_i û_i,1 q dA and
-    K = E' M / 2, with E' = E/(1−ν²) in plane strain, E in plane stress.
+    The interaction integral with fields of each mode (Yau, Wang & Corten, J. Appl. Mech. 47,
+    1980), M = ∫ (σ_ij δû_i + σ̂_ij δu_i − σ_ij ε̂_ij t_j) q_,j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) δû_i q
+    dA, and K = E' M / 2 with E' = E/(1−ν²) in plane strain, E in plane stress. At a straight crack
+    t is its direction and δu = u_,t. At an arc t = ω (x − c) is the turn about its centre that
+    moves the tip by one, and δu = u_,t − ω u: the faces of the arc and an isotropic law stay what
+    they are in it (J. K. Knowles & E. Sternberg, Arch. Ration. Mech. Anal. 44, 1972), so that the
+    integral has no terms of the curvature. The fields of both modes are in equilibrium and free
+    of traction on the crack; a tip that stands still has them in a motion too.
 
     Parameters
     ----------
-    solution, material, tip, direction, radii, body_force
-        As for `reference.fracture.j_integral`. Within the largest radius the crack is straight
-        and free of traction, and nothing else is met.
+    solution, material, tip, direction, radii, body_force, drag, step
+        As for `reference.fracture.j_integral`. Within the largest radius the crack is straight,
+        or the arc, and free of traction, and nothing else is met.
+    arc : ArcCut, optional
+        Of which the tip is an end.
     """
     law = hooke(material)
-    stresses = stress_of(solution, law)
-    angle = float(np.rad2deg(np.arctan2(direction[1], direction[0])))
+    stresses = stress_of(solution, law, step)
+    force = net_force(solution, material, body_force, drag, step)
+    modes = tip_fields(material, tip, direction, arc)
+    u = solution.displacement[step]
     values = []
     for radius in np.atleast_1d(radii):
-        around = ring(solution, tip, float(radius), whole=body_force is not None)
+        around = ring(solution, tip, float(radius), force is not None, step)
         at = around.at
-        points, near = at.points.reshape(-1, 2), around.near.reshape(-1, 2)
+        way, turn = ahead_of(at.points, tip, direction, arc)
+        moved = at.shape @ u[solution.cells[around.cells]]
+        change = np.einsum("mqij,mqj->mqi", at.gradient, way) - moved @ turn.T
         stress = stresses(around.cells, at)
-        along = at.gradient @ direction
-        both = []
-        for intensity in ([1.0, 0.0], [0.0, 1.0]):
-            mode = exact_solution(
-                "tip", {"tip": tip.tolist(), "angle": angle, "intensity": intensity}, material
-            )
-            gradient = mode.gradient(points, near).reshape(at.gradient.shape)
-            mode_along = gradient @ direction
-            flux = np.einsum("mqij,mqi->mqj", stress, mode_along)
-            flux += np.einsum("mqij,mqi->mqj", law.stress(gradient), along)
-            flux -= np.sum(stress * gradient, axis=(2, 3))[..., None] * direction
-            density = np.sum(flux * around.grad_q, axis=2)
-            if body_force is not None:
-                density -= (mode_along @ body_force) * around.q
-            both.append(0.5 * law.plane_modulus * float(np.sum(density * at.weights)))
-        values.append(both)
+        forces = None if force is None else force(around.cells, at)
+        found = [
+            _interaction(around, law, stress, change, way, turn, mode, forces) for mode in modes
+        ]
+        values.append([0.5 * law.plane_modulus * one for one in found])
     domains = np.array(values)
     mean = domains.mean(axis=0)
     spread = np.abs(domains - mean).max(axis=0)
     return StressIntensity(float(mean[0]), float(mean[1]), spread, domains)
+
+
+def _interaction(
+    around: Ring,
+    law: Hooke,
+    stress: Array,
+    change: Array,
+    way: Array,
+    turn: Array,
+    mode: list[tuple[float, ExactSolution]],
+    forces: Array | None,
+) -> float:
+    """M of a field, of which stress and δu are given, with one of unit intensity."""
+    at = around.at
+    points, near = at.points.reshape(-1, 2), around.near.reshape(-1, 2)
+    gradient = sum(share * field.gradient(points, near) for share, field in mode)
+    gradient = np.reshape(gradient, at.gradient.shape)
+    own = np.einsum("mqij,mqj->mqi", gradient, way)
+    if turn.any():
+        moved = sum(share * field.displacement(points, near) for share, field in mode)
+        own -= np.reshape(moved, at.points.shape) @ turn.T
+    flux = np.einsum("mqij,mqi->mqj", stress, own)
+    flux += np.einsum("mqij,mqi->mqj", law.stress(gradient), change)
+    flux -= np.sum(stress * gradient, axis=(2, 3))[..., None] * way
+    density = np.sum(flux * around.grad_q, axis=2)
+    if forces is not None:
+        density -= np.sum(forces * own, axis=2) * around.q
+    return float(np.sum(density * at.weights))

@@ -31,16 +31,18 @@ class NodalPressure:
     solution : Solution
         Quadratic.
     law : Hooke
+    step : int
+        Which output time; default the last.
     """
 
-    def __init__(self, solution: Solution, law: Hooke) -> None:
+    def __init__(self, solution: Solution, law: Hooke, step: int = -1) -> None:
         d = solution.dimension
         corners, self._place = np.unique(solution.cells[:, : d + 1], return_inverse=True)
         self._place = self._place.reshape(-1, d + 1)
         right, measure = np.zeros(len(corners)), np.empty(len(self._place))
         for start in range(0, len(self._place), _CHUNK):
             cells = np.arange(start, min(start + _CHUNK, len(self._place)))
-            at = cell_gradients(solution, cells)
+            at = cell_gradients(solution, cells, step)
             divergence = np.trace(at.gradient, axis1=2, axis2=3) * at.weights
             shares = law.lame * divergence @ at.corner_shares
             right += np.bincount(self._place[cells].ravel(), shares.ravel(), len(corners))
@@ -63,9 +65,9 @@ class NodalPressure:
 
 
 def stress_of(
-    solution: Solution, law: Hooke
+    solution: Solution, law: Hooke, step: int = -1
 ) -> Callable[[NDArray[np.int64], CellGradients], Array]:
     """Give the stress (m, q, d, d) at points of cells: with a pressure if the solution has one."""
     if solution.notes.get("unknowns") == MIXED:
-        return partial(NodalPressure(solution, law).stress, law)
+        return partial(NodalPressure(solution, law, step).stress, law)
     return lambda _cells, at: law.stress(at.gradient)

@@ -8,17 +8,20 @@ from numpy.typing import NDArray
 
 from reference.meshing.features import plane_features
 from reference.meshing.grading import singular_points
-from verify.scene import Polygon, PolylineCut, Rectangle, Scene
-from verify.scene.planar import inside_polygon
+from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
+from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["Tip", "tips"]
+__all__ = ["Tip", "no_tip", "tips"]
 
 Array = NDArray[np.float64]
+End = Literal["start", "end"]
+_ENDS: tuple[End, End] = ("start", "end")
+_TOUCHING = 1e-9  # of the body: two points so close are one
 
 
 @dataclass(frozen=True)
 class Tip:
-    """An end of a straight part of a cut inside the body.
+    """An end of a straight or circular part of a cut inside the body.
 
     Attributes
     ----------
@@ -31,13 +34,16 @@ class Tip:
         Unit vector in which the cut would go on.
     reach : float
         Distance to the next feature that a domain must not meet, m.
+    arc : ArcCut, optional
+        The cut, if it is an arc.
     """
 
     cut: str
-    end: Literal["start", "end"]
+    end: End
     point: Array
     direction: Array
     reach: float
+    arc: ArcCut | None = None
 
     def radii(self, count: int = 3) -> Array:
         """Radii (count,) of domains that stay clear of tip and next feature, m."""
@@ -45,37 +51,70 @@ class Tip:
 
 
 def tips(scene: Scene) -> list[Tip]:
-    """Tips of the polyline cuts of a plane scene; tips of arcs are not straight and left out."""
-    assert isinstance(scene.geometry, Rectangle | Polygon)
-    found = []
-    for cut in scene.cuts:
-        if not isinstance(cut, PolylineCut):
-            continue
-        vertices = cut.vertices()
-        if not np.array_equal(vertices[0], vertices[-1]):
-            found.append(_tip(scene, cut.name, "start", vertices[0], vertices[1]))
-            found.append(_tip(scene, cut.name, "end", vertices[-1], vertices[-2]))
-    return [tip for tip in found if tip is not None]
+    """Tips of the cuts of a plane scene: ends inside the body at which nothing else is met."""
+    return [
+        _tip(scene, cut, end)
+        for cut in scene.cuts
+        for end in _ENDS
+        if no_tip(scene, cut.name, end) is None
+    ]
 
 
-def _tip(
-    scene: Scene, cut: str, end: Literal["start", "end"], point: Array, before: Array
-) -> Tip | None:
-    """Make a tip of an end of a cut, unless it is a mouth, lies outside or is a junction."""
+def no_tip(scene: Scene, name: str, end: End) -> str | None:
+    """Why an end of a cut of a plane scene is no tip, or None if it is one."""
     assert isinstance(scene.geometry, Rectangle | Polygon)
-    outline = scene.geometry.outline()
-    touching = 1e-9 * float(np.ptp(outline, axis=0).max())
+    cut = next(cut for cut in scene.cuts if cut.name == name)
+    assert isinstance(cut, ArcCut | PolylineCut)
+    vertices, outline = cut.vertices(), scene.geometry.outline()
+    said = f"the {end} of cut '{name}' is no tip:"
+    if np.array_equal(vertices[0], vertices[-1]):
+        return f"{said} the cut is closed"
+    point = _ends(cut)[_ENDS.index(end)]
+    touching = _TOUCHING * float(np.ptp(outline, axis=0).max())
+    if distance_to_outline(point[None], outline)[0] <= touching:
+        return f"{said} it is on the boundary of the body"
+    if not inside_polygon(point[None], outline)[0]:
+        return f"{said} it is outside the body"
+    ending, away = _features_around(scene, point)
+    # where more than its own end ends, branches meet
+    if ending > 1 or min(away) <= touching:
+        return f"{said} it meets another cut"
+    return None
+
+
+def _ends(cut: ArcCut | PolylineCut) -> Array:
+    """Both ends (2, 2) of an open cut, m."""
+    if isinstance(cut, PolylineCut):
+        return cut.vertices()[[0, -1]]
+    turned = np.deg2rad(cut.start + cut.sweep * np.array([0.0, 1.0]))
+    return np.asarray(cut.centre) + cut.radius * np.column_stack([np.cos(turned), np.sin(turned)])
+
+
+def _features_around(scene: Scene, point: Array) -> tuple[int, list[float]]:
+    """Count the features that end at a point, and give the distances of the others, m."""
     ending, away = 0, []
     for feature in plane_features(scene):
         if np.array_equal(point, feature.start) or np.array_equal(point, feature.end):
             ending += 1
         else:
             away.append(float(feature.distance(point[None])[0]))
-    # where more than its own end ends, branches meet
-    junction = ending > 1 or min(away) <= touching
-    if junction or not inside_polygon(point[None], outline)[0]:
-        return None
+    return ending, away
+
+
+def _tip(scene: Scene, cut: ArcCut | PolylineCut, end: End) -> Tip:
+    """Make a tip of an end that is one."""
+    assert isinstance(scene.geometry, Rectangle | Polygon)
+    at = _ENDS.index(end)
+    point = _ends(cut)[at]
+    _, away = _features_around(scene, point)
+    touching = _TOUCHING * float(np.ptp(scene.geometry.outline(), axis=0).max())
     singular = np.linalg.norm(singular_points(scene) - point, axis=1)
+    reach = min([*away, *singular[singular > touching].tolist()])
+    if isinstance(cut, ArcCut):
+        spoke = (point - np.asarray(cut.centre)) / cut.radius
+        sign = 1.0 if end == "end" else -1.0
+        ahead = sign * np.array([-spoke[1], spoke[0]])
+        return Tip(cut.name, end, point, ahead, reach, cut)
+    before = cut.vertices()[[1, -2][at]]
     length = float(np.linalg.norm(point - before))
-    reach = min([*away, *singular[singular > touching].tolist(), length])
-    return Tip(cut, end, point, (point - before) / length, reach)
+    return Tip(cut.name, end, point, (point - before) / length, min(reach, length))

@@ -2,7 +2,7 @@
 
 from reference.meshing.background import background_mesh
 from reference.meshing.conforming import conforming_mesh
-from reference.meshing.grading import Grading, singular_points
+from reference.meshing.grading import Grading, clear_radii, singular_points
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.imprint_facets import Realised, imprint_facets
 from reference.meshing.imprint_solid import imprint_polygons, structured_tetrahedra
@@ -15,6 +15,7 @@ __all__ = [
     "Grading",
     "Realised",
     "background_mesh",
+    "clear_radii",
     "conforming_mesh",
     "imprint",
     "imprint_facets",

@@ -159,6 +159,12 @@ def _set_sizes(
         graded = f"{size:.17g}*({squared}/{radius**2:.17g})^{grading.exponent / 2:.17g}"
         field.setString(tag, "F", f"{graded} + {smallest:.17g}")
         terms.append(tag)
+    for point, start in grading.close_points():
+        tag = field.add("MathEval")
+        at_point = grading.smallest_at(start)
+        field.setString(tag, "F", _close(grading, (point - origin) / scale, start, at_point, scale))
+        terms.append(tag)
+        smallest = min(smallest, at_point / scale)
     if grading.strip is not None:
         close = close_pairs(features, APART * scale, grading.size / grading.strip)
         for i, j in close:
@@ -175,6 +181,14 @@ def _set_sizes(
     field.setAsBackgroundMesh(least)
     gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+
+
+def _close(grading: Grading, point: Array, start: float, least: float, scale: float) -> str:
+    """Write the sizes around a point that is graded to from a distance on; see `Grading`."""
+    away = f"(sqrt((x-({point[0]:.17g}))^2+(y-({point[1]:.17g}))^2)/{start / scale:.17g})"
+    power = f"{away}^{grading.exponent:.17g}"
+    larger = f"0.5*({power}+{away}+abs({power}-{away}))"
+    return f"{grading.share * start / scale:.17g}*{larger} + {least / scale:.17g}"
 
 
 def _distance(feature: Feature, origin: Array, scale: float) -> str:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,14 +10,17 @@ from numpy.typing import NDArray
 from reference.meshing.features import Feature, crossing_points, plane_features
 from reference.meshing.outline import divided_outline, load_jumps, supported_edges
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
+from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.cuts import Cut
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["Grading", "singular_points"]
+__all__ = ["Grading", "clear_radii", "singular_points"]
 
 Array = NDArray[np.float64]
 _MESHED = 3e-9  # of the grading radius: nearer to a point, gmsh runs out of digits
 _SMALLEST = 1e-12  # of the grading radius: nearer, coordinates do
+_SAME = 1e-9  # of the body: points that close are one
+_DOMAIN = 0.4  # of the way from a tip to what is next: the smallest domain of an integral
 _KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matter
 
 
@@ -40,6 +44,13 @@ class Grading:
     strip : float, optional
         Element size over the width of the strip between two features that come close to each
         other; none leaves such strips to the other sizes.
+    clear : (k,) array, optional
+        Distance from each point within which nothing else is, m; infinite where no domain of an
+        integral is wanted. Where the elements would be larger than `share` of the distance from
+        the point at 0.4 of it, they are graded anew from there: so a domain fits around the tip of
+        a short branch or ligament, however large the body is.
+    share : float
+        Largest element at that place over its distance from the point.
     curves : bool
         In space: whether to grade to fronts, kinks and junctions of the cuts and to the edges
         where supports end. With exponent ⅔, where quadratic elements reach order 3 in energy
@@ -51,6 +62,8 @@ class Grading:
     radius: float = 1.0
     exponent: float = 0.8
     strip: float | None = None
+    clear: Array | None = None
+    share: float = 1 / 3
     curves: bool = False
 
     @property
@@ -67,7 +80,27 @@ class Grading:
     def halved(self, level: int) -> "Grading":
         """Divide all sizes by 2^level."""
         strip = None if self.strip is None else self.strip / 2**level
-        return replace(self, size=self.size / 2**level, strip=strip)
+        return replace(self, size=self.size / 2**level, strip=strip, share=self.share / 2**level)
+
+    def close_points(self) -> list[tuple[Array, float]]:
+        """Points that are graded to anew, each with the distance r₀ from which on, m.
+
+        There h(r) = share · r₀ · max((r/r₀)^exponent, r/r₀): outside r₀ elements grow in
+        proportion to the distance, so that their number grows with its logarithm only.
+        """
+        if self.clear is None:
+            return []
+        found = []
+        for point, clear in zip(self.points, self.clear, strict=True):
+            at = _DOMAIN * float(clear)
+            so_far = self.size * min(1.0, at / self.radius) ** self.exponent
+            if np.isfinite(at) and self.share * at < so_far:
+                found.append((point, at))
+        return found
+
+    def smallest_at(self, clear: float) -> float:
+        """Element size that gmsh is asked for at a point that is graded to from `clear` on, m."""
+        return max(clear * self.share ** (1 / (1 - self.exponent)), self.radius * _MESHED)
 
 
 def singular_points(scene: Scene) -> Array:
@@ -91,6 +124,28 @@ def singular_points(scene: Scene) -> Array:
     scale = float(np.ptp(outline, axis=0).max())
     _, first = np.unique(np.round(points / scale, 9), axis=0, return_index=True)
     return points[first]
+
+
+def clear_radii(scene: Scene, points: Array) -> Array:
+    """Distance (k,) from singular points to what is next to them, m, where a domain must fit.
+
+    That is at tips whose stress intensity the scene asks for; it is infinite elsewhere.
+    """
+    geometry = scene.geometry
+    assert isinstance(geometry, Rectangle | Polygon)
+    touching = _SAME * float(np.ptp(geometry.outline(), axis=0).max())
+    features = np.array([feature.distance(points) for feature in plane_features(scene)])
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    away = np.concatenate([features, apart])
+    nearest = np.where(away > touching, away, np.inf).min(axis=0, initial=np.inf)
+    cuts: dict[str, Any] = {cut.name: cut for cut in scene.cuts}
+    asked = [
+        cuts[one.cut].vertices()[0 if one.end == "start" else -1]
+        for one in scene.quantities
+        if isinstance(one, StressIntensityQuantity)
+    ]
+    from_asked = np.linalg.norm(points[:, None] - np.reshape(asked, (1, -1, 2)), axis=2)
+    return np.where((from_asked <= touching).any(axis=1), nearest, np.inf)
 
 
 def _inner(points: Array, outline: Array) -> Array:

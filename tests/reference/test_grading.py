@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx, polyline, square
 
-from reference.meshing.grading import Grading, singular_points
+from reference.meshing.grading import Grading, clear_radii, singular_points
 from verify.scene import load_scene
 
 CLAMPED_TOP = {"supports": [{"where": "top", "displacement": [0, 0]}]}
@@ -128,3 +128,70 @@ def resultant(scene, space):
     v = ufl.TestFunction(space.function_space)
     vector = fem.assemble_vector(fem.form(load_form(scene, space, v, None)))
     return vector.array.reshape(-1, 2).sum(axis=0)
+
+
+WIDE = {"geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [2000, 2000]}}
+SHORT = {
+    "a branch of a tenth of an arm": [
+        polyline("a", (1000, 1000), (990, 1002)),
+        polyline("b", (1000, 1000), (1009, 1001)),
+        polyline("c", (1000, 1000), (1000.5, 1000.86)),
+    ],
+    "a ligament of a tenth of a crack": [
+        polyline("a", (990, 1000), (1000, 1000)),
+        polyline("b", (1001, 1000.1), (1011, 1000.7)),
+    ],
+}
+
+
+def factors_of(cuts):
+    """K_I at both ends of every cut: those that are no tips are refused by check alone."""
+    return [
+        {"kind": "stress_intensity", "name": f"{cut['name']} {end}", "cut": cut["name"], "end": end}
+        for cut in cuts
+        for end in ("start", "end")
+    ]
+
+
+@pytest.mark.parametrize("cuts", SHORT.values(), ids=SHORT)
+@pytest.mark.parametrize("level", [0, 1])
+class TestAroundShortBranches:
+    pytestmark = needs_fenicsx
+
+    def test_domains_fit_around_every_tip_on_the_coarsest_level_too(self, cuts, level):
+        from reference.fracture import tips
+        from reference.fracture.domain import ring
+        from verify.solution import Solution
+        from verify.solvers.conforming_meshes import reference_mesh
+
+        scene = square(cuts, **WIDE, quantities=factors_of(cuts))
+        mesh, _ = reference_mesh(scene, level)
+        field = Solution(mesh.points, mesh.cells, np.zeros((1, *mesh.points.shape)))
+        found = tips(scene)
+        assert len(found) == (3 if len(cuts) == 3 else 4)
+        for tip in found:
+            for radius in tip.radii():
+                around = ring(field, tip.point, float(radius))
+                # elements of a third of the smallest radius, halved with every level: a ring of
+                # them has 2π 3 2^level of at least two triangles each
+                assert len(around.cells) > 30 * 2**level
+
+
+def test_only_tips_that_are_asked_for_and_lie_close_to_something_are_graded_to_anew():
+    def close(cuts, quantities, **changes):
+        scene = square(cuts, quantities=quantities, **changes)
+        outline = scene.geometry.outline()
+        extent = float(np.sqrt(np.prod(np.ptp(outline, axis=0))))
+        points = singular_points(scene)
+        clear = clear_radii(scene, points)
+        grading = Grading(extent / 12, points, extent / 2, clear=clear)
+        assert len(grading.halved(3).close_points()) == len(grading.close_points())
+        return [place.tolist() for place, _ in grading.close_points()]
+
+    energy = [{"kind": "strain_energy"}]
+    ligament = SHORT["a ligament of a tenth of a crack"]
+    assert close(ligament, energy, **WIDE) == []
+    asked = factors_of(ligament)[1:2]  # the end of a
+    assert close(ligament, asked, **WIDE) == [[1000.0, 1000.0]]
+    common = [polyline("a", (0.2, 0.5), (0.7, 0.6))]
+    assert close(common, factors_of(common)) == []

@@ -1,15 +1,20 @@
 """Stress-intensity factors as a quantity of interest: of any solver's solution, with reasons."""
 
+from dataclasses import replace
+
 import pytest
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
-from verify.errors import UnsupportedSceneError
+from verify.errors import InputError, UnsupportedSceneError
+from verify.result import Metric, SolveRecord, Status
+from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
 from verify.study.quantities import Measured, unit_of
-from verify.study.reference import exact_reference
+from verify.study.reference import conforming_reference, exact_reference
+from verify.study.unavailable import unavailable_quantities
 
 ASKED = [
     {"kind": "stress_intensity", "name": f"K_{mode} at the {end}", "end": end, "mode": mode}
@@ -72,3 +77,108 @@ def test_what_is_no_tip_or_not_linear_is_refused_with_the_reason():
     turned = Scene.model_validate(content | {"analysis": {"kinematics": "corotational"}})
     with pytest.raises(UnsupportedSceneError, match="linear kinematics"):
         Measured(solved, body_of(case), hooke(case.material), turned).quantity(turned.quantities[0])
+
+
+OPENS_LATER = [{"kind": "polyline", "points": [[-1.0, 0.0], [1.0, 0.0]], "opens_at": 0.5}]
+MOTION = {"kind": "dynamic", "duration": 1.0, "outputs": 5}
+
+
+@pytest.mark.parametrize(
+    "changes, asked, reason",
+    [
+        ({"cuts": [{"kind": "polyline", "points": [[-2, 0], [0, 0]]}]}, {}, "on the boundary"),
+        ({"cuts": [{"kind": "polyline", "points": [[-3, 0], [0, 0]]}]}, {}, "outside the body"),
+        ({"cuts": [{"kind": "arc", "centre": [0, 0], "radius": 1}]}, None, "closed"),
+        (
+            {
+                "cuts": [
+                    {"kind": "polyline", "points": [[-1, 0], [0, 0]]},
+                    {"kind": "polyline", "name": "b", "points": [[-1, -1], [-1, 1]]},
+                ]
+            },
+            {},
+            "meets another cut",
+        ),
+        ({"analysis": {"kinematics": "corotational"}}, {}, "linear kinematics"),
+        ({"analysis": MOTION | {"damping": [0, 0.1]}}, {}, "damping by the stiffness"),
+        ({"analysis": MOTION}, {"time": 0.4}, "no output time"),
+        ({"analysis": MOTION}, {"time": 0.0}, "has not opened yet"),
+        ({"analysis": MOTION, "cuts": OPENS_LATER}, {"time": 0.5}, "has not opened yet"),
+        (
+            {
+                "analysis": MOTION,
+                "loads": [
+                    {"kind": "body_force", "force": [0, 1], "history": [[1, 0], [1, 1]]},
+                ],
+            },
+            {},
+            "body force jumps",
+        ),
+    ],
+)
+def test_a_factor_that_no_solution_can_have_is_refused_beforehand(changes, asked, reason):
+    content = load_scene("statics/griffith_inside").model_dump(by_alias=True)
+    content["material"]["density"] = 1.0
+    content["cuts"] = [{"kind": "polyline", "points": [[-1.0, 0.0], [1.0, 0.0]]}]
+    content |= {"acceptance": [], "exact": None, "reference": {}}
+    content["supports"] = [{"where": "boundary", "displacement": [0, 0]}]
+    content |= changes
+    one = {"kind": "stress_intensity", "name": "K", "end": "start"} | (asked or {})
+    if asked is None:  # the case file says it
+        with pytest.raises(ValueError, match=reason):
+            Scene.model_validate(content | {"quantities": [one]})
+        return
+    scene = Scene.model_validate(content | {"quantities": [one]})
+    with pytest.raises(InputError, match=rf"quantities\[0\] \('K'\).*{reason}"):
+        check_scene(scene)
+    energy = [{"kind": "strain_energy"}]
+    check_scene(Scene.model_validate(content | {"quantities": energy}))
+
+
+def test_a_solution_in_motion_without_accelerations_has_no_factor():
+    case = griffith(
+        material={"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
+        analysis=MOTION, exact=None, reference={}, loads=[],
+        supports=[{"where": "boundary", "displacement": [0, 0]}],
+    )  # fmt: skip
+    solved = find_solver("xfem").solve(case, 0, repetitions=0)
+    assert solved.acceleration is not None
+    found = Measured(solved, body_of(case), hooke(case.material), case).quantity(case.quantities[0])
+    assert found == pytest.approx(0.0, abs=1e-12)  # nothing moves
+    bare = replace(solved, acceleration=None)
+    with pytest.raises(UnsupportedSceneError, match="no accelerations"):
+        Measured(bare, body_of(case), hooke(case.material), case).quantity(case.quantities[0])
+
+
+def test_what_only_fine_levels_have_is_known_from_those():
+    case = griffith(mesh={"pattern": "structured", "cells": [[n, n] for n in (2, 16, 32, 64)]})
+    body, law = body_of(case), hooke(case.material)
+    levels = {k: find_solver("xfem").solve(case, k, repetitions=0) for k in range(4)}
+    reference = conforming_reference(case, levels, body, law, 0.5)
+    values = reference.record["metrics"]["K_I at the end"]["values"]
+    assert values[0] is None
+    assert None not in values[1:]
+    assert "missing" not in reference.record
+    fewer = conforming_reference(case, {k: levels[k] for k in (0, 1, 2)}, body, law, 0.5)
+    assert "K_I at the end" not in fewer.quantities
+    assert "does not fit" in fewer.record["missing"]["K_I at the end"]
+
+
+def solved(solver, level, value=None, why=""):
+    metrics = [] if value is None else [Metric("K_I at the end", value, "Pa √m", None, 0.0, "")]
+    return SolveRecord(
+        "case", solver, level, Status.SOLVED, metrics=metrics, notes={"K_I at the end": why}
+    )
+
+
+def test_missing_quantities_are_noticed_with_their_levels_and_reason():
+    case = griffith(quantities=ASKED[2:3])
+    coarse = "too coarse"
+    some = [solved("a", 0, why=coarse), solved("a", 1, 1.0), solved("b", 0, 1.0)]
+    (one,) = unavailable_quantities(case, some)
+    assert (one.about, one.solver) == ("K_I at the end", "a")
+    assert one.text == "on level 0: too coarse (level 1 has it)"
+    all_alike = [solved(name, level, why=coarse) for name in "ab" for level in (0, 1)]
+    (one,) = unavailable_quantities(case, all_alike)
+    assert (one.solver, one.text) == (None, "too coarse")
+    assert unavailable_quantities(case, [solved("a", 0, 1.0)]) == []

@@ -2,6 +2,7 @@
 
 from verify.errors import InputError
 from verify.scene import MeshFile, Scene, read_mesh
+from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.empty_parts import check_parts_of_mesh
 from verify.scene.nearest import nearest
 from verify.solvers import solver_names
@@ -26,10 +27,20 @@ def check_scene(scene: Scene) -> None:
             exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
         except InputError as error:
             raise InputError(f"exact: {error}", where) from None
+    for i, asked in enumerate(scene.quantities):
+        if isinstance(asked, StressIntensityQuantity) and (reason := _missing(scene, asked)):
+            raise InputError(f"quantities[{i}] ('{asked.name}'): {reason}", where)
     for i, check in enumerate(scene.acceptance):
         for name in (check.solver, *([check.to] if check.check == "ratio" else [])):
             if name is not None:
                 check_solver_name(name, f"{where}: acceptance[{i}]")
+
+
+def _missing(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+    """Why a stress-intensity factor cannot be had from any solution, or None."""
+    from verify.study.stress_intensity import intensity_defect
+
+    return intensity_defect(scene, asked)
 
 
 def check_solver_name(name: str, where: str) -> None:

@@ -98,6 +98,10 @@ class StressIntensityQuantity(Strict):
     cut: str = "cut"
     end: Literal["start", "end"] = Field(description="which end of the cut")
     mode: Literal["I", "II"] = "I"
+    time: Annotated[
+        NonNegative | None,
+        Field(description="dynamic: an output time, s; default the last"),
+    ] = None
 
 
 Quantity = Annotated[

@@ -43,12 +43,13 @@ def _refusal(scene: Scene) -> str | None:
 
 
 class _Answer(NamedTuple):
-    """What every way to solve gives; displacement and velocity are (t, n, d)."""
+    """What every way to solve gives; displacement and its rates are (t, n, d)."""
 
     space: ConformingSpace
     times: NDArray[np.float64]
     displacement: NDArray[np.float64]
     velocity: NDArray[np.float64] | None
+    acceleration: NDArray[np.float64] | None
     ledger: dict[str, NDArray[np.float64]]
     timings: dict[str, float]
     iterations: dict[str, int]
@@ -228,6 +229,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             np.zeros(1),
             linear.displacement[None],
             None,
+            None,
             {"strain": np.array([linear.strain_energy])},
             linear.timings,
             {"cg": linear.answer.iterations} if linear.answer.iterations else {},
@@ -255,6 +257,7 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
         np.zeros(1),
         finite.displacement[None],
         None,
+        None,
         {"strain": np.array([finite.strain_energy])},
         finite.timings,
         {"newton": finite.iterations, "load steps": finite.steps},
@@ -278,6 +281,7 @@ def _solution(
         displacement=result.displacement,
         times=result.times,
         velocity=result.velocity,
+        acceleration=result.acceleration,
         order=space.degree,
         cut_facets=mesh.realised_cut,
         cell_sides=mesh.pieces,

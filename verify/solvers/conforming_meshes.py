@@ -11,6 +11,7 @@ from reference.meshing import (
     Grading,
     Realised,
     background_mesh,
+    clear_radii,
     conforming_mesh,
     imprint,
     imprint_facets,
@@ -119,7 +120,8 @@ def _plane_grading(scene: Scene) -> Grading:
     x, y = scene.geometry.outline().T  # type: ignore[union-attr]
     extent = np.sqrt(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
     size = scene.reference.size or extent / 12
-    return Grading(size, singular_points(scene), extent / 2, strip=1.0)
+    points = singular_points(scene)
+    return Grading(size, points, extent / 2, strip=1.0, clear=clear_radii(scene, points))
 
 
 def _solid_grading(scene: Scene) -> Grading:

@@ -43,6 +43,8 @@ class ConformingMotion:
         s.
     displacement, velocity : (t, n, d) arrays
         m, m/s.
+    acceleration : (t, n, d) array, optional
+        m/s², that balances the forces of the same time; of linear kinematics only.
     ledger : dict of str to (t,) array
     timings : dict of str to float
     iterations : dict of str to int
@@ -53,6 +55,7 @@ class ConformingMotion:
     times: Array
     displacement: Array
     velocity: Array
+    acceleration: Array | None
     ledger: dict[str, Array]
     timings: dict[str, float]
     iterations: dict[str, int]
@@ -170,6 +173,9 @@ class _Mover:
             self.times[: len(states)],
             np.reshape([state.displacement for state in states], shape),
             np.reshape([state.velocity for state in states], shape),
+            np.reshape([state.acceleration for state in states], shape)
+            if self.scene.analysis.kinematics == "linear"
+            else None,
             self.ledger.columns(),
             self.timings,
             {"steps": self.steps, "newton": self.solves},
@@ -239,7 +245,7 @@ class _Mover:
                 break
             state.time = float(b)  # without the round-off of the sum of steps
             if b in wanted:
-                outputs.append(state.copy())
+                outputs.append(self._balanced(body, state, scheme))
                 self.ledger.enter(body, state)
         self.solves += sum(stepper.solves for stepper in steppers.values())
         for stepper in steppers.values():
@@ -251,12 +257,27 @@ class _Mover:
         state.velocity[body.held] = body.prescribed(state.time)[1]
         self.ledger.started(body, state)
         size = _SAME * float(self.times[-1])
+        state.acceleration = self._acceleration(body, state, state.time + size)
+
+    def _balanced(self, body: MovingBody, state: State, scheme: Scheme) -> State:
+        """Copy a state, with the acceleration that balances its forces.
+
+        Where accelerations and forces are those of the same share of a step, it has it already:
+        what is in balance at the start of a step is at its end.
+        """
+        found = state.copy()
+        if self.scene.analysis.kinematics == "linear" and scheme.alpha_m != scheme.alpha_f:
+            found.acceleration = self._acceleration(body, state, state.time)
+        return found
+
+    def _acceleration(self, body: MovingBody, state: State, time: float) -> Array:
+        """Acceleration of a state in balance with the loads at a time."""
         law, (mass, stiffness) = body.law, self.scene.analysis.damping
-        forces = body.external(state.time + size) - law.force(state.displacement)
+        forces = body.external(time) - law.force(state.displacement)
         forces -= mass * (body.mass @ state.velocity)
         if stiffness:
             forces -= stiffness * law.viscous(state.displacement, state.velocity)
-        state.acceleration = body.accelerations(forces)
+        return body.accelerations(forces)
 
     def _step(self, body: MovingBody, stepper: Stepper, state: State) -> None:
         clock = perf_counter()

@@ -59,6 +59,7 @@ class _Run:
     times: _Floats
     displacement: _Floats
     velocity: _Floats | None
+    acceleration: _Floats | None
     ledger: dict[str, _Floats]
     timings: dict[str, float]
     iterations: dict[str, int]
@@ -192,8 +193,9 @@ class MethodSolver:
             mover = MethodMover(body, law, scene, mesh, size, exact, choice.motion)
             moved = mover.run(trial)
             return _Run(
-                body, moved.times, moved.displacement, moved.velocity, moved.ledger,
-                moved.timings, moved.iterations, moved.notes, getattr(forces[-1], "clamped", 0),
+                body, moved.times, moved.displacement, moved.velocity, moved.acceleration,
+                moved.ledger, moved.timings, moved.iterations, moved.notes,
+                getattr(forces[-1], "clamped", 0),
             )  # fmt: skip
         start = perf_counter()
         supports = supports_of(scene, body.virtual, exact)
@@ -221,7 +223,17 @@ class MethodSolver:
             timings["solve"] = perf_counter() - start
         ledger = {"strain": np.array([energy])}
         return _Run(
-            body, np.zeros(1), u[None], None, ledger, timings, iterations, notes, clamped, further
+            body,
+            np.zeros(1),
+            u[None],
+            None,
+            None,
+            ledger,
+            timings,
+            iterations,
+            notes,
+            clamped,
+            further,
         )
 
 
@@ -293,9 +305,10 @@ def _solution(name: str, run: _Run, size: float, timings: dict[str, list[float]]
     return Solution(
         points=shown.points,
         cells=shown.cells,
-        displacement=_at_points(body, run.displacement),
+        displacement=np.stack([shown.interpolation @ one for one in run.displacement]),
         times=run.times,
-        velocity=None if run.velocity is None else _at_points(body, run.velocity),
+        velocity=_at_points(body, run.velocity),
+        acceleration=_at_points(body, run.acceleration),
         cut_facets=shown.cut_facets,
         ledger=run.ledger,
         unknowns=run.displacement[0].size,
@@ -314,5 +327,6 @@ def _solution(name: str, run: _Run, size: float, timings: dict[str, list[float]]
     )
 
 
-def _at_points(body: CutBody, values: _Floats) -> _Floats:
-    return np.stack([body.conforming.interpolation @ one for one in values])
+def _at_points(body: CutBody, values: _Floats | None) -> _Floats | None:
+    at = body.conforming.interpolation
+    return None if values is None else np.stack([at @ one for one in values])

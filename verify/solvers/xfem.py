@@ -209,6 +209,7 @@ def _run(
         times=np.zeros(1),
         displacement=found.displacement[None],
         velocity=None,
+        acceleration=None,
         ledger={"strain": np.array([found.strain_energy])},
         timings={"enrichment": enrichment, **found.timings},
         iterations=found.iterations,

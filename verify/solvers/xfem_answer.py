@@ -19,12 +19,13 @@ _Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Answer:
-    """Displacements and velocities (t, N, d) of the unknowns of a cut mesh at output times."""
+    """Displacements and their rates (t, N, d) of the unknowns of a cut mesh at output times."""
 
     virtual: VirtualMesh
     times: _Floats
     displacement: _Floats
     velocity: _Floats | None
+    acceleration: _Floats | None
     ledger: dict[str, _Floats]
     timings: dict[str, float]
     iterations: dict[str, int]
@@ -58,9 +59,10 @@ def solution_of(
     return Solution(
         points=body.points,
         cells=body.cells,
-        displacement=_at_points(body, answer.displacement),
+        displacement=np.stack([body.interpolation @ one for one in answer.displacement]),
         times=answer.times,
-        velocity=None if answer.velocity is None else _at_points(body, answer.velocity),
+        velocity=_at_points(body, answer.velocity),
+        acceleration=_at_points(body, answer.acceleration),
         cut_facets=body.cut_facets,
         cell_sides=_side_labels(virtual.label[body.cell_piece]),
         ledger=answer.ledger,
@@ -85,8 +87,8 @@ def penalised(ghost: GhostPenalty | None, share: float | None = None) -> list[Re
     return [Regularisation("face with a ghost penalty", len(ghost.weights), size, unit)]
 
 
-def _at_points(body: Subdivision, values: _Floats) -> _Floats:
-    return np.stack([body.interpolation @ one for one in values])
+def _at_points(body: Subdivision, values: _Floats | None) -> _Floats | None:
+    return None if values is None else np.stack([body.interpolation @ one for one in values])
 
 
 def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:

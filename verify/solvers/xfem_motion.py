@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from itertools import pairwise
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from verify.xfem.dynamics import (
     Integrator,
     MotionState,
     RayleighDamping,
+    acceleration_of,
     ancestors,
     inherit_state,
     treat_moving_body,
@@ -85,6 +86,14 @@ def move(
     return Mover(scene, mesh, size, exact, choice).run(trial)
 
 
+class _Output(NamedTuple):
+    """A state at an output time, on the mesh with the cuts that are open then."""
+
+    virtual: VirtualMesh
+    state: MotionState
+    acceleration: _Floats | None
+
+
 class Mover:
     """One motion, stage by stage.
 
@@ -119,7 +128,7 @@ class Mover:
         body = self._body(virtual)
         state = self._initial(body)
         starts = sorted({0.0, *self.opens})
-        fields: list[tuple[VirtualMesh, MotionState]] = []
+        fields: list[_Output] = []
         for k, start in enumerate(starts):
             count = sum(opens <= start for opens in self.opens)
             if count > opened:
@@ -130,7 +139,7 @@ class Mover:
             end = float(self.times[-1]) if last else starts[k + 1]
             wanted = self.times[(self.times >= start) & ((self.times < end) | last)]
             stage = self._stage(body, state, start, end, wanted, trial)
-            fields += [(virtual, output) for output in stage]
+            fields += [_Output(virtual, *output) for output in stage]
             if trial:
                 break
         return self._answer(virtual, fields)
@@ -245,7 +254,7 @@ class Mover:
         end: float,
         wanted: _Floats,
         trial: bool,
-    ) -> list[MotionState]:
+    ) -> list[tuple[MotionState, _Floats | None]]:
         """Step from one opening to the next; return the states at the times that are wanted."""
         scene, choice = self.scene, self.choice
         largest, self.said = largest_step(
@@ -261,7 +270,7 @@ class Mover:
         integrators: dict[float, Integrator] = {}
         outputs, instants, taken = [], [], 0
         if start in wanted:
-            outputs, instants = [state.copy()], [0]
+            outputs, instants = [self._kept(body, state)], [0]
         for a, b in pairwise(stops):
             count = max(1, int(np.ceil((b - a) / largest * (1 - 1e-9))))
             size = float(f"{(b - a) / count:.14g}")  # the same up to round-off: one integrator
@@ -279,13 +288,19 @@ class Mover:
             if trial:
                 break
             if b in wanted:
-                outputs.append(state.copy())
+                outputs.append(self._kept(body, state))
                 instants.append(taken)
         self.account.enter(ledger.close(), instants)
         self.steps += taken
         newton = [one for one in integrators.values() if isinstance(one, NewtonIntegrator)]
         self.solves += sum(one.solves for one in newton)
         return outputs
+
+    def _kept(self, body: DynamicBody, state: MotionState) -> tuple[MotionState, _Floats | None]:
+        """Copy a state, with its acceleration where that is to be had."""
+        alone = body.mass.diagonal is not None or not body.moving
+        linear = self.scene.analysis.kinematics == "linear"
+        return state.copy(), acceleration_of(body, state) if linear and alone else None
 
     def _integrator(self, body: DynamicBody, size: float) -> Integrator:
         try:
@@ -301,15 +316,20 @@ class Mover:
         apart = [t for t in found if np.abs(self.times - t).min() > tolerance]
         return [t for t in apart if start + tolerance < t < end - tolerance]
 
-    def _answer(
-        self, virtual: VirtualMesh, fields: list[tuple[VirtualMesh, MotionState]]
-    ) -> Answer:
-        sources = {id(old): ancestors(old, virtual) for old, _ in fields if old is not virtual}
+    def _answer(self, virtual: VirtualMesh, fields: list["_Output"]) -> Answer:
+        olds = {id(one.virtual): one.virtual for one in fields if one.virtual is not virtual}
+        sources = {key: ancestors(old, virtual) for key, old in olds.items()}
         shape = (len(fields), *virtual.node_points.shape)
-        displacement, velocity = np.empty(shape), np.empty(shape)
-        for k, (old, state) in enumerate(fields):
-            source = sources.get(id(old), slice(None))
-            displacement[k], velocity[k] = state.displacement[source], state.velocity[source]
+        displacement, velocity, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
+        balanced = True
+        for k, one in enumerate(fields):
+            source = sources.get(id(one.virtual), slice(None))
+            displacement[k] = one.state.displacement[source]
+            velocity[k] = one.state.velocity[source]
+            if one.acceleration is None:
+                balanced = False
+            else:
+                acceleration[k] = one.acceleration[source]
         sizes = sorted(self.step_sizes)
         notes = {
             "scheme": self.choice.scheme,
@@ -327,6 +347,7 @@ class Mover:
             self.times[: len(fields)],
             displacement,
             velocity,
+            acceleration if balanced else None,
             self.account.columns(),
             self.timings,
             iterations,

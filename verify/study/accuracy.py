@@ -31,6 +31,7 @@ from verify.study.reference import (
     size_of,
 )
 from verify.study.sufficiency import sufficiency
+from verify.study.unavailable import unavailable_quantities
 from verify.verdict import error_interval, judge
 
 __all__ = ["assess_accuracy"]
@@ -107,6 +108,7 @@ def assess_accuracy(
         solves=measured,
         rates=rates,
         verdicts=judge(scene, measured, rates, judge_only),
+        notices=unavailable_quantities(scene, measured),
     )
 
 

@@ -211,14 +211,15 @@ def conforming_reference(
     quantities: dict[str, tuple[float, float]] = {}
     missing: dict[str, str] = {}
     for asked in scene.quantities:
-        try:
-            values = [one.quantity(asked) for one in measured]
-        except UnsupportedSceneError as problem:
-            missing[asked.name] = str(problem)
+        values, why = _on_finest(asked, measured)
+        if len(values) < 3:
+            missing[asked.name] = why
             continue
-        known = known_quantity(asked, measured, values, sizes)
+        coarse = len(measured) - len(values)  # levels that do not have it
+        known = known_quantity(asked, measured[coarse:], values, sizes[coarse:])
         quantities[asked.name] = known.value, known.half_width
-        metrics[asked.name] = _entry(values, known) | _second_opinion(asked, second, known)
+        entry = _entry([*[None] * coarse, *values], known)
+        metrics[asked.name] = entry | _second_opinion(asked, second, known)
     norms, entries = _field_norms(scene, measured, sizes, order, size)
     metrics |= entries
     source = f"conforming P{order}, {len(solutions)} levels, GCI"
@@ -257,6 +258,17 @@ def known_quantity(
         return place_uncertainty(values[-1], around, sizes, order + 1)
     # functionals of a Galerkin solution converge with up to twice its order
     return extrapolate(values, sizes, order, 2 * order)
+
+
+def _on_finest(asked: Quantity, measured: Sequence[Measured]) -> tuple[list[float], str]:
+    """Values on the finest levels, as far as they have one, and why the next does not."""
+    values: list[float] = []
+    for one in reversed(measured):
+        try:
+            values.insert(0, one.quantity(asked))
+        except UnsupportedSceneError as problem:
+            return values, str(problem)
+    return values, ""
 
 
 def _field_norms(
@@ -321,7 +333,9 @@ def _near_text(body: AnyBody) -> dict[str, Any]:
             "root of the area of the cuts"} if radius else {}  # fmt: skip
 
 
-def _entry(values: list[float], known: Extrapolation, scale: float = 1.0) -> dict[str, Any]:
+def _entry(
+    values: Sequence[float | None], known: Extrapolation, scale: float = 1.0
+) -> dict[str, Any]:
     order = known.order if known.order is not None and np.isfinite(known.order) else None
     return {
         "values": values,

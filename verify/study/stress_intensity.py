@@ -1,43 +1,99 @@
 """Stress-intensity factors of any solver's solution, by the reference's interaction integral."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, BodyForce, Gravity, PolylineCut, Scene, is_uniform
+from verify.scene import ArcCut, BodyForce, Gravity, PolylineCut, Scene
 from verify.scene.acceptance import StressIntensityQuantity
+from verify.scene.history import factor_at, jumps
 from verify.solution import Solution
 
-__all__ = ["exact_intensity", "solution_intensity"]
+__all__ = ["exact_intensity", "intensity_defect", "solution_intensity"]
+
+Array = NDArray[np.float64]
+_SAME_TIME = 1e-9  # of the duration
+
+
+def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+    """Why a factor cannot be had from any solution of a scene, or None."""
+    if scene.dimension != 2 or scene.analysis.kinematics != "linear":
+        return "stress-intensity factors are measured in plane scenes of linear kinematics"
+    if any(isinstance(load, BodyForce) and load.force == "exact" for load in scene.loads):
+        return "stress-intensity factors are not measured under the body force of an exact solution"
+    if reason := _defect_in_time(scene, asked):
+        return reason
+    from reference.fracture import no_tip
+
+    return no_tip(scene, asked.cut, asked.end)
+
+
+def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+    """Why a factor cannot be had at the time at which it is asked for, or None."""
+    duration = scene.analysis.duration
+    if duration is None:
+        return None
+    slack, time = _SAME_TIME * duration, _time(scene, asked)
+    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+    opens = float(getattr(cut, "opens_at", 0.0))
+    still_closed = "closed" if opens > 0.0 or time == 0.0 else ""
+    if scene.analysis.damping[1]:
+        return (
+            "stress-intensity factors are not measured under damping by the stiffness: its stress "
+            "is not in the displacement"
+        )
+    if still_closed and time <= opens + slack:
+        return f"at {time:.6g} s cut '{asked.cut}' has not opened yet (opens_at = {opens:.6g} s)"
+    if min(abs(time - t) for t in scene.analysis.output_times) > slack:
+        return f"{time:.6g} s is no output time, and accelerations are known at those only"
+    forces = [load.history for load in scene.loads if isinstance(load, BodyForce)]
+    if any(abs(time - t) <= slack for history in forces for t in jumps(history)):
+        return f"a body force jumps at {time:.6g} s, and with it every acceleration"
+    return None
 
 
 def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQuantity) -> float:
-    """K_I or K_II in Pa √m at an end of a straight cut, from the field alone.
+    """K_I or K_II in Pa √m at an end of a cut, from the field alone.
 
     The mean over domains around the end as asked: a tip that a solver has put elsewhere shows.
 
     Raises
     ------
     UnsupportedSceneError
-        If the scene is not plane and linear, the end is no tip, or the mesh is too coarse for a
-        domain around it.
+        If `intensity_defect` gives a reason, the mesh is too coarse for a domain around the end,
+        or the solution is in motion and carries no accelerations.
+    InputError
+        If the solution has no field at that time.
     """
-    if scene.dimension != 2 or scene.analysis.kinematics != "linear":
-        raise UnsupportedSceneError(
-            "stress-intensity factors are measured in plane scenes of linear kinematics"
-        )
+    if reason := intensity_defect(scene, asked):
+        raise UnsupportedSceneError(reason)
     from reference.fracture import stress_intensity, tips
 
-    tip = next((t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end)), None)
-    if tip is None:
-        raise UnsupportedSceneError(
-            f"the {asked.end} of cut '{asked.cut}' is no tip: it is not inside the body, or meets "
-            "another cut"
-        )
+    tip = next(t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end))
+    time = _time(scene, asked)
+    step = int(np.argmin(np.abs(solution.times - time)))
+    moving = scene.analysis.duration is not None
+    if moving and abs(solution.times[step] - time) > _SAME_TIME * float(scene.analysis.duration):
+        raise InputError(f"the solution has no field at {time:.6g} s, an output time of the scene")
+    if moving and solution.acceleration is None:
+        raise UnsupportedSceneError("the solution carries no accelerations: its inertia is unknown")
+    drag = scene.analysis.damping[0]
+    if drag and solution.velocity is None:
+        raise UnsupportedSceneError("the solution carries no velocities: its damping is unknown")
     try:
         found = stress_intensity(
-            solution, scene.material, tip.point, tip.direction, tip.radii(), _body_force(scene)
+            solution,
+            scene.material,
+            tip.point,
+            tip.direction,
+            tip.radii(),
+            _body_force(scene, time),
+            drag,
+            step,
+            tip.arc,
         )
     except InputError as problem:
         raise UnsupportedSceneError(str(problem)) from None
@@ -55,16 +111,24 @@ def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) ->
     return None if stated is None else float(stated[0 if asked.mode == "I" else 1])
 
 
-def _body_force(scene: Scene) -> np.ndarray | None:
-    """Force per volume (2,) in N/m³, if there is any."""
-    total = np.zeros(scene.dimension)
-    for load in scene.loads:
-        if isinstance(load, Gravity):
-            total += (scene.material.density or 0.0) * np.asarray(load.acceleration)
-        elif isinstance(load, BodyForce):
-            if load.force == "exact" or not is_uniform(load.force):
-                raise UnsupportedSceneError(
-                    "stress-intensity factors are measured with uniform body forces only"
-                )
-            total += np.asarray(load.force)
-    return total if total.any() else None
+def _time(scene: Scene, asked: StressIntensityQuantity) -> float:
+    """Time at which a factor is asked for, s; 0 in statics."""
+    return float(scene.analysis.output_times[-1] if asked.time is None else asked.time)
+
+
+def _body_force(scene: Scene, time: float) -> Callable[[Array], Array] | None:
+    """Force per volume (n, 2) at points (n, 2) in N/m³, if there is any."""
+    weights = [load for load in scene.loads if isinstance(load, Gravity)]
+    forces = [load for load in scene.loads if isinstance(load, BodyForce)]
+    if not weights and not forces:
+        return None
+
+    def force(points: Array) -> Array:
+        total = np.zeros_like(points)
+        for weight in weights:
+            total += (scene.material.density or 0.0) * np.asarray(weight.acceleration)
+        for given in forces:
+            total += factor_at(given.history, time) * given.values(points)
+        return total
+
+    return force

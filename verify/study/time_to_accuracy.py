@@ -28,7 +28,7 @@ def time_to_accuracy(
     -------
     dict
         By level: ``unknowns``, wall ``seconds`` (None where it was not timed) and the bound by
-        metric (None of a quantity that vanishes).
+        metric (None of a quantity that vanishes, or that the level does not have).
     """
     rows: dict[str, dict[str, float | int | None]] = {}
     for place, level in enumerate(sorted(levels)):
@@ -46,8 +46,12 @@ def time_to_accuracy(
     return rows
 
 
-def _bound(values: Sequence[float], half_width: float, place: int, levels: int) -> float | None:
+def _bound(
+    values: Sequence[float | None], half_width: float, place: int, levels: int
+) -> float | None:
     if len(values) < levels:
-        return float(sum(values[place:])) + half_width
-    finest = values[-1]
-    return (abs(values[place] - finest) + half_width) / abs(finest) if finest else None
+        return float(sum(v for v in values[place:] if v is not None)) + half_width
+    here, finest = values[place], values[-1]
+    if here is None or not finest:
+        return None
+    return (abs(here - finest) + half_width) / abs(finest)

@@ -1,7 +1,12 @@
 """Motion of cut bodies: time integration, supports, loads, and the inheritance of a state."""
 
 from verify.xfem.dynamics.body import DynamicBody, MotionState, MovingSupports, RayleighDamping
-from verify.xfem.dynamics.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
+from verify.xfem.dynamics.explicit import (
+    CentralDifferences,
+    ForwardEuler,
+    SymplecticEuler,
+    acceleration_of,
+)
 from verify.xfem.dynamics.implicit import EnergyMomentum, ImplicitEuler, Trapezoidal
 from verify.xfem.dynamics.inheritance import ancestors, inherit_state
 from verify.xfem.dynamics.integrator import Integrator, StepFailedError, StepForces
@@ -31,6 +36,7 @@ __all__ = [
     "SymplecticEuler",
     "Trapezoidal",
     "TreatedBody",
+    "acceleration_of",
     "ancestors",
     "inherit_state",
     "treat_moving_body",

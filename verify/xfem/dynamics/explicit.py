@@ -18,7 +18,7 @@ from verify.xfem.dynamics.integrator import (
 )
 from verify.xfem.errors import XfemError
 
-__all__ = ["CentralDifferences", "ForwardEuler", "SymplecticEuler"]
+__all__ = ["CentralDifferences", "ForwardEuler", "SymplecticEuler", "acceleration_of"]
 
 _Floats = NDArray[np.float64]
 
@@ -62,6 +62,18 @@ class _Explicit:
         where, speed = self.body.prescribed(time)
         displacement[fixed], velocity[fixed] = where[fixed], speed[fixed]
         state.displacement[:], state.velocity[:], state.time = displacement, velocity, time
+
+
+def acceleration_of(body: DynamicBody, state: MotionState) -> _Floats:
+    """Acceleration (N, d) in m/s² that balances all forces of a state; zero where held.
+
+    Raises
+    ------
+    XfemError
+        If supports move and the mass is not diagonal, or the state is not one of the body.
+    """
+    check_state(state, body.shape)
+    return _Explicit(body, 1.0)._acceleration(state.displacement, state.velocity, state.time)[0]
 
 
 def _supported(body: DynamicBody, component: int) -> SuperLU:
