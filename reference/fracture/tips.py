@@ -56,7 +56,7 @@ def tips(scene: Scene) -> list[Tip]:
         _tip(scene, cut, end)
         for cut in scene.cuts
         for end in _ENDS
-        if no_tip(scene, cut.name, end) is None
+        if isinstance(cut, ArcCut | PolylineCut) and no_tip(scene, cut.name, end) is None
     ]
 
 

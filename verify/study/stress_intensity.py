@@ -75,8 +75,8 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
     tip = next(t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end))
     time = _time(scene, asked)
     step = int(np.argmin(np.abs(solution.times - time)))
-    moving = scene.analysis.duration is not None
-    if moving and abs(solution.times[step] - time) > _SAME_TIME * float(scene.analysis.duration):
+    moving = scene.analysis.kind == "dynamic"
+    if abs(solution.times[step] - time) > _SAME_TIME * (scene.analysis.duration or np.inf):
         raise InputError(f"the solution has no field at {time:.6g} s, an output time of the scene")
     if moving and solution.acceleration is None:
         raise UnsupportedSceneError("the solution carries no accelerations: its inertia is unknown")

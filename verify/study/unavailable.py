@@ -21,7 +21,7 @@ def unavailable_quantities(scene: Scene, records: Sequence[SolveRecord]) -> list
     solvers = list(dict.fromkeys(record.solver for record in solved))
     notices = []
     for asked in scene.quantities:
-        said = {
+        said: dict[str | None, str | None] = {
             solver: _reason([r for r in solved if r.solver == solver], asked.name)
             for solver in solvers
         }
