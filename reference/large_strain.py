@@ -1,7 +1,7 @@
 """Statics at finite rotation and strain: SNES on the energy, with load steps that adapt."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, Literal
 
@@ -19,6 +19,9 @@ Energy = Literal[
     "corotated", "corotated_mixed", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"
 ]
 _SMALLEST_STEP = 1e-4
+_SHORT = 1 / 64  # step that is not halved because energy is lost: something has snapped through
+_FINER = 2.7  # steps of a second path: another, but no multiple of the first
+_SAME = 1e-6  # of the energy, between two paths
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,13 @@ class LargeStrainSolve:
         Load steps taken.
     refused_steps : list of str
         Why steps were taken again with half their size.
+    negative_modes : int or None
+        Modes of the tangent in which the energy does not grow; None for membranes and for tangents
+        that are too large to be factorised.
+    paths : int
+        Paths that were followed: two if the first ended in a state that is not stable.
+    dismissed : float or None
+        Strain energy of the other path's end in J if it was another one.
     timings : dict of str to float
         Seconds.
     """
@@ -53,7 +63,10 @@ class LargeStrainSolve:
     iterations: int
     steps: int
     refused_steps: list[str]
+    negative_modes: int | None
     timings: dict[str, float]
+    paths: int = 1
+    dismissed: float | None = None
 
 
 def solve_large_strain(
@@ -67,8 +80,12 @@ def solve_large_strain(
 ) -> LargeStrainSolve:
     """Find the equilibrium at load factor 1, from rest at load factor 0.
 
-    Each step starts with the linear response to its increment; then PETSc's Newton with line
-    search. A step that does not converge, or turns too much inside out, is halved.
+    In each step every piece follows the rigid motion of its supports first, and then the linear
+    response to what is left; then PETSc's Newton with line search. A step that does not converge,
+    turns too much inside out, or stores what neither its supports nor its loads could have paid for
+    is halved. An end whose tangent is not positive definite is sought again in smaller steps; the
+    stable one of two ends counts, and an unstable one only where cells inside out leave the energy
+    without a tangent and both paths end there.
 
     Parameters
     ----------
@@ -91,8 +108,47 @@ def solve_large_strain(
     IllConditionedError
         If the body is held so weakly somewhere that the tangent at rest is lost in round-off.
     RuntimeError
-        If steps below 1e-4 do not converge; with the load factor reached and PETSc's reason.
+        If steps below 1e-4 do not converge; with the load factor reached and PETSc's reason. If
+        neither of two paths ends in a stable state; with both energies.
     """
+
+    def path(step: float) -> LargeStrainSolve:
+        return _follow(material, space, unknowns, prescribed, load, energy, step)
+
+    one = path(first_step)
+    if not one.negative_modes:
+        return one
+    two = path(first_step / _FINER)
+    timings = {"solve": one.timings["solve"] + two.timings["solve"]}
+    found = f"{one.strain_energy:.6g} J and {two.strain_energy:.6g} J"
+    least = min(one.strain_energy, two.strain_energy)
+    if abs(one.strain_energy - two.strain_energy) <= _SAME * abs(least):
+        # where cells are inside out the energy has kinks, and a tangent says little
+        if two.negative_modes and not two.inverted:
+            raise RuntimeError(
+                f"two paths end in an unstable equilibrium, of {found} with {two.negative_modes} "
+                "modes in which the energy falls; a stable one is expected. Supports or loads that "
+                "break a symmetry may lead there"
+            )
+        return replace(two, paths=2, timings=timings)
+    if two.negative_modes:
+        raise RuntimeError(
+            f"two paths end in equilibria of {found}; both are unstable ({one.negative_modes} and "
+            f"{two.negative_modes} modes in which the energy falls)"
+        )
+    return replace(two, paths=2, timings=timings, dismissed=one.strain_energy)
+
+
+def _follow(
+    material: Material,
+    space: ConformingSpace,
+    unknowns: NDArray[np.int32],
+    prescribed: Callable[[float], Array],
+    load: Any,
+    energy: Energy,
+    first_step: float,
+) -> LargeStrainSolve:
+    """Go from load factor 0 to 1 in steps that adapt."""
     start = perf_counter()
     equations = StrainEquations(material, space, unknowns, load, energy)
     factor, step, steps = 0.0, first_step, 0
@@ -103,7 +159,7 @@ def solve_large_strain(
         if target > 1.0 - 1e-9:
             target = 1.0
         before = x.array.copy()
-        reason = equations.advance(target, prescribed(target))
+        reason = equations.advance(target, prescribed(target), step <= _SHORT)
         if not reason:
             factor, steps, step = target, steps + 1, 1.5 * step
             continue
@@ -120,6 +176,7 @@ def solve_large_strain(
         equations.iterations,
         steps,
         refused,
+        equations.negative_modes(),
         {"solve": perf_counter() - start},
     )
     equations.destroy()

@@ -15,6 +15,7 @@ __all__ = [
     "direct_solver",
     "general_solver",
     "iterate",
+    "modes_not_positive",
     "near_null_space",
     "rigid_motions",
     "set_multigrid",
@@ -96,6 +97,30 @@ def symmetric_solver(matrix: Any) -> Any:
 def general_solver(matrix: Any) -> Any:
     """Factorise a matrix that need not be symmetric by MUMPS; gives a PETSc KSP."""
     return _factorised(matrix, "lu")
+
+
+def modes_not_positive(matrix: Any) -> int:
+    """Count the eigenvalues of a symmetric matrix that are not positive, by Sylvester's law.
+
+    They are the negative and the vanishing pivots of MUMPS.
+    """
+    from petsc4py import PETSc
+
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOperators(matrix)
+    solver.setType("preonly")
+    conditioner = solver.getPC()
+    conditioner.setType("cholesky")
+    conditioner.setFactorSolverType("mumps")
+    conditioner.setFactorSetUpSolverType()
+    # pivots of the last front are not counted otherwise, and vanishing ones are an error
+    for option in (13, 24):
+        conditioner.getFactorMatrix().setMumpsIcntl(option, 1)
+    solver.setUp()
+    negative, vanishing, _ = conditioner.getFactorMatrix().getInertia()
+    solver.destroy()
+    return int(negative + vanishing)
 
 
 def solve_directly(

@@ -7,11 +7,17 @@ from numpy.typing import NDArray
 
 from reference.dolfinx_versions import take_whole_steps
 from reference.elasticity import lame, mean_stiffness
-from reference.linear_solvers import near_null_space, set_multigrid, solve_directly
+from reference.linear_solvers import (
+    modes_not_positive,
+    near_null_space,
+    set_multigrid,
+    solve_directly,
+)
 from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import MixedDeformation, mixed_space
 from reference.mixed_stretch import MixedStretch
 from reference.polar_stretch import PolarStretch
+from reference.rigid_motion import RigidMotions
 from reference.space import ConformingSpace, SharedUnknowns
 from reference.strain_energies import ENERGIES, virtual_work
 from verify.errors import InputError
@@ -21,6 +27,8 @@ __all__ = ["StrainEquations"]
 
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
+_UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the work
+_ROUND_OFF = 1e-14  # of stiffness times size squared, J
 _GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall further
 _MOST_ITERATIONS = 25
 # share of the body that may be inside out: the corotated energy has no barrier, and at a tip or a
@@ -95,6 +103,7 @@ class StrainEquations:
         self._residual = fem.form(residual)
         tangent = polar.derivative(residual, ufl.TrialFunction(V))
         self._tension: Any = None
+        self._is_membrane, self._motions = membrane, RigidMotions(space, unknowns)
         if membrane:
             self._tension = fem.Constant(V.mesh, 1.0)
             tension = thickness * self._tension * mu
@@ -108,23 +117,34 @@ class StrainEquations:
         self._solver = self._newton()
         self._unproven = self._solver.getKSP().getType() == "preonly"
 
-    def advance(self, target: float, values: Array) -> str:
+    def advance(self, target: float, values: Array, is_short: bool = False) -> str:
         """Go to another load factor; say why not, or nothing.
+
+        A state counts if its energy is that before and the work of reactions and loads on the way,
+        by the trapezoidal rule up to a quarter. Less may be stored by what snaps through in a short
+        step, and under dead loads.
 
         Parameters
         ----------
         target : float
         values : (k,) array
             Of the constrained unknowns there, m.
+        is_short : bool
+            Whether the step will not be halved for energy that is lost.
 
         Raises
         ------
         IllConditionedError
             If the first tangent was factorised, and its solution is lost in round-off.
         """
+        x = self.solution.x.petsc_vec
+        stored = self.energy()
+        self._follow(values)
+        moved, before = x.array.copy(), self._internal_force()
+        rests = bool(np.abs(values[self._at] - moved[self._own]).max(initial=0.0) == 0.0)
+        rests = bool(x.comm.tompi4py().allreduce(int(rests)) == x.comm.size)
         self._factor.value = np.asarray(target)
         self._predict(values[self._at])
-        x = self.solution.x.petsc_vec
         # no step so small that it would count as converged: a line search that fails takes such
         limit, solver = _TOLERANCE * self._force, self._solver
         solver.setTolerances(atol=limit, rtol=0.0, stol=0.0, max_it=_MOST_ITERATIONS)
@@ -142,7 +162,48 @@ class StrainEquations:
         if not inverted <= self._most_inverted:
             part = "area" if self._space.mesh.cell_dimension == 2 else "volume"
             return f"{inverted:.2g} of the {part} turned inside out (least det F {least:.2g})"
+        return self._imbalance(stored, before, moved, is_short or rests)
+
+    def _imbalance(self, stored: float, before: Array, moved: Array, may_lose: bool) -> str:
+        """Say that the energy is not what was stored and the work since a state; or nothing."""
+        x = self.solution.x.petsc_vec
+        forces = before + self._internal_force()
+        forces[self._pressures()] = 0.0
+        work = 0.5 * float(x.comm.tompi4py().allreduce(float(forces @ (x.array - moved))))
+        energy = self.energy()
+        excess = energy - stored - work
+        size = float(np.ptp(self._space.node_points, axis=0).max())
+        allowed = _UNBALANCED * max(energy, stored) + _ROUND_OFF * abs(self._diagonal) * size**2
+        if excess > allowed or (excess < -allowed and not may_lose):
+            return f"{energy:.4g} J stored, {energy - excess:.4g} J accounted for"
         return ""
+
+    def _internal_force(self) -> Array:
+        """Assemble the forces of the strain energy on the unknowns of this rank, N."""
+        from dolfinx.fem import petsc
+
+        factor = float(self._factor.value)
+        self._factor.value = np.asarray(0.0)
+        vector = petsc.assemble_vector(self._residual)
+        vector.ghostUpdate(addv=True, mode="reverse")
+        self._factor.value = np.asarray(factor)
+        forces = np.array(vector.array, dtype=float)
+        vector.destroy()
+        return forces
+
+    def negative_modes(self) -> int | None:
+        """Count modes in which the energy does not grow; None if that is not known.
+
+        By the inertia of a factorisation (Sylvester); one negative pivot for each pressure is the
+        saddle's own. Membranes may be slack, and large tangents are not factorised.
+        """
+        linear = self._solver.getKSP()
+        if self._is_membrane or linear.getType() != "preonly":
+            return None
+        self._assemble(self._matrix)
+        self._matrix.zeroRowsColumns(self._rows, self._diagonal)
+        comm = self._space.function_space.mesh.comm
+        return modes_not_positive(self._matrix) - int(comm.allreduce(len(self._pressures())))
 
     def displacement(self) -> Array:
         """Nodal displacements (n, d) on every rank, m."""
@@ -191,6 +252,25 @@ class StrainEquations:
         self._take(x)
         self._assemble(matrix, snes.getIterationNumber())
         matrix.zeroRowsColumns(self._rows, self._diagonal)
+
+    def _pressures(self) -> NDArray[np.int64]:
+        return np.empty(0, dtype=np.int64) if self._mixed is None else self._mixed.pressure_dofs
+
+    def _follow(self, values: Array) -> None:
+        """Let pieces turn with their supports; what is left is the linear response's."""
+        displacement = self.displacement()
+        moved = self._motions.follow(displacement, values)
+        if moved is None:
+            return
+        x, increment, vector = self.solution.x.petsc_vec, self._increment, self._vector
+        self._take(x)
+        self._assemble(self._matrix)
+        increment.array[:] = self._unknowns.own_part(moved - displacement)
+        # forces of the linear response to the turn: a rigid one has none by which to judge others
+        self._matrix.mult(increment, vector)
+        self._force = max(self._force, float(vector.norm()))
+        x.axpy(1.0, increment)
+        self._take(x)
 
     def _predict(self, values: Array) -> None:
         """Add the linear response to the increments of the prescribed values and of the load."""

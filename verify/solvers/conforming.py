@@ -12,7 +12,7 @@ from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_solution
 from reference.fracture.pressure import MIXED
-from reference.large_strain import solve_large_strain
+from reference.large_strain import LargeStrainSolve, solve_large_strain
 from reference.meshing import ConformingMesh
 from reference.nearly_incompressible import solve_mixed, wants_pressure
 from reference.space import ConformingSpace, conforming_space
@@ -267,8 +267,22 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             "smallest det F": f"{finite.smallest_jacobian:.3g}",
             "area inside out": f"{finite.inverted:.1e}",
             "steps taken again": "; ".join(finite.refused_steps) or "none",
+            "stability": _stability(finite),
         },
     )
+
+
+def _stability(finite: LargeStrainSolve) -> str:
+    """Say what the equilibrium was checked by beyond the energy of each step."""
+    modes = finite.negative_modes
+    if modes is None:
+        return "not shown: a membrane, or a tangent too large to be factorised"
+    said = f"{modes} negative modes of the tangent" if modes else "tangent positive definite"
+    if finite.paths == 1:
+        return said
+    if finite.dismissed is None:
+        return f"{said}; two paths end at one energy"
+    return f"{said}; an unstable state of {finite.dismissed:.6g} J on another path was left"
 
 
 def _solution(
