@@ -23,11 +23,9 @@ class RigidMotions:
     """
 
     def __init__(self, space: ConformingSpace, unknowns: NDArray[np.int32]) -> None:
-        d = space.dimension
         self._points = space.node_points
-        place = np.full(self._points.size, -1, dtype=np.int64)
-        place[unknowns] = np.arange(len(unknowns))
-        place = place.reshape(-1, d)
+        place = np.full(self._points.shape, -1, dtype=np.int64)
+        place.ravel()[unknowns] = np.arange(len(unknowns))
         whole = (place >= 0).all(axis=1)
         pieces = space.mesh.pieces
         owner = np.zeros(len(self._points), dtype=np.int64)
