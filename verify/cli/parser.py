@@ -27,8 +27,8 @@ __all__ = ["build_parser"]
 
 _EXIT_CODES = """\
 exit codes:
-  0  every verdict is PASS (or UNDECIDED, without --strict)
-  1  a verdict is FAIL; goes before 3, because a FAIL stands whatever the missing solves say
+  0  every verdict is PASS (or UNDECIDED, without --strict; or a known finding of its case)
+  1  a verdict is FAIL, of whichever solver; goes before 3: it stands whatever others would say
   2  bad input or usage; nothing was run, nothing was written
   3  a solve failed, timed out, ran out of memory, or could not be stored
   4  nothing ran: no case matches, or every solver refused

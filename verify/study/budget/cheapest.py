@@ -73,7 +73,8 @@ def cheapest_adequate(
             text += (
                 f" The best is {best.title}: {100 * best.error:.3g} % (to {100 * best.high:.3g})."
             )
-        return None, Finding(topic, text, wanted, Verdict.FAIL)
+        excluded = bool(known) and all(c.low > tolerance for c in known)
+        return None, Finding(topic, text, wanted, Verdict.FAIL if excluded else Verdict.UNDECIDED)
     first = adequate[0]
     sentence = (
         f"{first.title}: {100 * first.error:.3g} % (at most {100 * first.high:.3g} %) in "

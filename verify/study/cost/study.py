@@ -11,6 +11,7 @@ from verify.study.finding import Finding
 __all__ = ["CostStudy", "cost_study"]
 
 REFERENCE = "reference"
+SAMPLE = 3  # repetitions from which on their range bounds a time
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def cost_study(
     last = [record for record in results[-1].solves if record.solver != REFERENCE]
     final = work_points(last, metric)
     notes = [r.notes.get("timing", "") for result in results for r in result.solves]
-    contended = next((note for note in notes if note), "")
+    contended = next((note for note in notes if note), "") or _too_few(results)
     running = sums.sums
     return CostStudy(
         case=case,
@@ -154,6 +155,13 @@ def _reason(record: SolveRecord) -> dict[str, Any]:
     }
 
 
+def _too_few(results: Sequence[CaseResult]) -> str:
+    """Say that the repetitions are no sample: two have a range that says nothing of a third."""
+    timed = [r for result in results for r in result.solves if r.timings and r.solver != REFERENCE]
+    fewest = min((max(map(len, r.timings.values())) for r in timed), default=SAMPLE)
+    return f"of {fewest} repetitions; {SAMPLE} are a sample" if fewest < SAMPLE else ""
+
+
 def _findings(
     running: Mapping[str, Sequence[tuple[float, float, float] | None]],
     steps: Sequence[Mapping[str, Any]],
@@ -170,7 +178,7 @@ def _findings(
                 continue
             least, most = other[1] / own[2], other[2] / own[1]
             verdict = Verdict.PASS if least > 1 else Verdict.FAIL if most < 1 else Verdict.UNDECIDED
-            if contended and verdict is Verdict.PASS and least < 2.0:
+            if contended and least < 2.0 and most > 0.5:
                 verdict = Verdict.UNDECIDED
             found.append(
                 Finding(
