@@ -225,3 +225,18 @@ def test_a_plate_pressed_across_its_slit_warns_and_one_pulled_as_far_does_not(tm
     depth = pressed_.solves[0].metric("overlap_depth").value
     assert depth == pytest.approx(opening.max(), rel=0.1)
     assert pulled.solves[0].metric("overlap_depth").value == 0.0
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [lambda points, u: 1e300 * (1.0 + u), lambda points, u: -points[None]],
+    ids=["huge", "collapsed"],
+)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_guest_that_blew_up_or_collapsed_takes_nothing_from_the_others(tmp_path, spoil):
+    shift = -0.0185 * normal(2)
+    guest = moved(shift, 5, 7)
+    guest = replace(guest, displacement=spoil(guest.points, guest.displacement))
+    result = examined(scene(tmp_path), {"guest": {0: guest}, "reference": levels(shift)})
+    assert "reference" in [warned.solver for warned in result.warnings]
+    assert result.openings[0].curves[0].normal == pytest.approx([-0.0185] * 48)

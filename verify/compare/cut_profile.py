@@ -129,8 +129,11 @@ def _longest(patch: PlanePatch, share: Array) -> Array:
     edges = patch.cells[:, 1:] - patch.cells[:, :1]
     area = 0.5 * np.abs(np.linalg.det(edges))
     middle = np.average(patch.cells.mean(axis=1), axis=0, weights=area)
-    corners = patch.cells.reshape(-1, 2) - middle
-    along = np.linalg.svd(corners)[2][0]
+    triangles = patch.cells - middle
+    whole = triangles.sum(axis=1)
+    moment = np.einsum("m,mki,mkj->ij", area, triangles, triangles)
+    moment += np.einsum("m,mi,mj->ij", area, whole, whole)  # second moment of area, times twelve
+    corners, along = triangles.reshape(-1, 2), np.linalg.eigh(moment)[1][:, -1]
     reach = np.abs(corners @ along).max()
     s = np.linspace(-reach, reach, _FINE)
     on = ~patch.nearest(patch.point(middle + s[:, None] * along))[1]

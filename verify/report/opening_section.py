@@ -12,6 +12,7 @@ __all__ = ["opening_section"]
 
 _REFERENCE = "reference"
 _PER_PANEL = 4  # solvers beside the reference; colours and dashes are five
+_FAR = 20.0  # times the reference's largest jump, and longer than the cut: it would hide the others
 _NOTHING = 1e-12  # of the length of the line: jumps below are round-off
 
 
@@ -35,15 +36,15 @@ def _figures(profile: OpeningProfile, result: CaseResult) -> Iterator[Markup]:
     when = "" if profile.time is None else f", at {profile.time:.4g} s ({profile.why})"
     place = f"{profile.cut}{when}"
     length = profile.arc[-1] - profile.arc[0]
-    largest = max(
-        (abs(v) for c in curves for v in (*c.normal, *c.tangential) if math.isfinite(v)),
-        default=0.0,
-    )
+    reference = next((c for c in curves if c.solver == _REFERENCE), None)
+    largest = max(map(_largest, curves))
     if largest <= _NOTHING * length:
         yield tag("p", f"{place}: the jump is zero along the whole cut, to round-off.")
         return
-    reference = next((c for c in curves if c.solver == _REFERENCE), None)
-    others = [c for c in curves if c is not reference]
+    scale = _largest(reference) if reference else min(map(_largest, curves))
+    far = [c for c in curves if c is not reference and _largest(c) > max(_FAR * scale, length)]
+    others = [c for c in curves if c is not reference and c not in far]
+    left_out = [f"{_name(c)} (up to {_largest(c):.2g} m)" for c in far]
     groups = [others[i : i + _PER_PANEL] for i in range(0, len(others), _PER_PANEL)] or [[]]
     panels = [
         panel
@@ -54,8 +55,19 @@ def _figures(profile: OpeningProfile, result: CaseResult) -> Iterator[Markup]:
     yield tag(
         "figure",
         tag("div", panels, class_="panels"),
-        tag("figcaption", f"{place}: {profile.where}. ", _band_text(reference, result)),
+        tag(
+            "figcaption",
+            f"{place}: {profile.where}. ",
+            _band_text(reference, result),
+            f" Off the scale, and left out: {', '.join(left_out)}." if left_out else None,
+        ),
     )
+
+
+def _largest(curve: OpeningCurve) -> float:
+    """Return the largest jump of a curve, m; infinite if it has one that is not finite."""
+    values = [abs(v) for v in (*curve.normal, *curve.tangential)]
+    return max(values, default=0.0) if all(map(math.isfinite, values)) else math.inf
 
 
 def _panel(
