@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 _POINTS = 48  # per straight or curved piece, denser to its ends, where an opening ends in a root
 _PIECES = 200  # of a cut through the triangles of a membrane; of more every n-th is taken
-_FINE = 400  # points that the extent of a line on a polygon is found by
+_FINE = 4000  # points that the extent of a line on a polygon is found by
 
 
 @dataclass(frozen=True)
