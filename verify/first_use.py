@@ -22,7 +22,7 @@ from time import perf_counter
 import numpy as np
 
 from verify.compare.cell_tree import build_cell_tree
-from verify.compare.facet_kernels import crossings, distance_to_segments
+from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
 from verify.compare.simplices import simplices
 from verify.compile_times import compile_times
@@ -141,17 +141,16 @@ def _comparison() -> None:
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
         shape = simplices(mesh.points, mesh.cells)
         for near in (np.empty((0, mesh.space)), points):
+            no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
             cells = find_cells(
-                points, near, tree.lower, tree.upper, tree.cells, shape.corners, shape.normals,
-                corners.mean(axis=1), 1e-12,
+                points, near, no_sides[0], tree.lower, tree.upper, tree.cells, shape.corners,
+                shape.normals, corners.mean(axis=1), no_sides[1], 1e-12,
             )  # fmt: skip
         origin = np.ascontiguousarray(corners[:, 0])
         evaluate_linear(points, cells, origin, origin, np.ascontiguousarray(shape.gradients[:, 1:]))
         nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
         evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
         distance_to_segments(points, points, points)
-    facets = np.ascontiguousarray(corners[:, :3])
-    crossings(points, points, tree.lower, tree.upper, tree.cells, facets)
 
 
 _STAGES: list[tuple[str, Callable[[], None]]] = [

@@ -14,8 +14,8 @@ from verify.compare.cell_tree import morton_order
 from verify.compare.patches import Patch
 from verify.compare.simplex_body import SimplexBody
 from verify.compare.simplex_rule import points_in
-from verify.compare.slabs import Rule
-from verify.compare.splitting import bisect, split_at_level
+from verify.compare.slabs import ROUND_OFF, Rule
+from verify.compare.splitting import bisect, heights, split_at_level
 
 __all__ = ["body_rule"]
 
@@ -52,9 +52,10 @@ def body_rule(
         Exact measures of the body and, for plane cuts, of each of its parts; of a membrane with
         frames.
     """
-    points, weights = points_in(_cells(body, spacing, seed, depth, grading), order)
-    kept = np.flatnonzero(weights > 0.0)
-    kept = kept[morton_order(points[kept])]
+    cells = _cells(body, spacing, seed, depth, grading)
+    # the points of a piece that is round-off would be on the cut
+    points, weights = points_in(cells[heights(cells) > ROUND_OFF * body.size], order)
+    kept = morton_order(points)
     points = np.ascontiguousarray(points[kept])
     return Rule(points, weights[kept], body.frames_at(points))
 

@@ -47,6 +47,16 @@ class Segment:
         t: Array = np.clip((points - self.start) @ edge / (edge @ edge), 0.0, 1.0)
         return t
 
+    def foot(self, points: Array) -> Array:
+        """Nearest points (n, 2) to `points` (n, 2)."""
+        return self.point(self.nearest(points))
+
+    def level(self, points: Array) -> Array:
+        """Distance (n,) from the whole line, m, positive on the left."""
+        x, y = (self.end - self.start) / self.length
+        off = points - self.start
+        return np.asarray(x * off[:, 1] - y * off[:, 0])
+
     def rotated(self, turn: Array) -> "Segment":
         """Rotate by the matrix `turn` (2, 2)."""
         return Segment(turn @ self.start, turn @ self.end)
@@ -84,6 +94,14 @@ class Arc:
         nearer_start = 2 * np.pi - turned < turned - self.sweep
         t: Array = np.where(beyond, np.where(nearer_start, 0.0, 1.0), turned / self.sweep)
         return t
+
+    def foot(self, points: Array) -> Array:
+        """Nearest points (n, 2) to `points` (n, 2)."""
+        return self.point(self.nearest(points))
+
+    def level(self, points: Array) -> Array:
+        """Distance (n,) from the whole circle, m, positive on the side of the centre."""
+        return np.asarray(self.radius - np.linalg.norm(points - self.centre, axis=1))
 
     def rotated(self, turn: Array) -> "Arc":
         """Rotate by the matrix `turn` (2, 2)."""

@@ -78,10 +78,10 @@ class SolutionField:
         self._centres = shape.corners.mean(axis=1)
         self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
         self._origin = np.ascontiguousarray(shape.corners[:, 0])
-        self._across = self._sides = None
-        if membrane:
-            self._across = np.ascontiguousarray(triangle_frames(shape.corners)[:, 2])
-            self._sides = np.zeros((len(self._cells), 0), dtype=np.int8)
+        self._across = (
+            np.ascontiguousarray(triangle_frames(shape.corners)[:, 2]) if membrane else None
+        )
+        self._sides = np.zeros((len(self._cells), 0), dtype=np.int8)
         self._set_nodal(solution.displacement[step])
 
     def _set_nodal(self, displacement: Array) -> None:
@@ -113,12 +113,14 @@ class SolutionField:
         found: NDArray[np.int64] = find_cells(
             points,
             np.ascontiguousarray(directions),
+            self._wanted(points, near),
             self._tree.lower,
             self._tree.upper,
             self._tree.cells,
             self.shape.corners,
             self.shape.normals,
             self._centres,
+            self._sides,
             ROUND_OFF * self.scale,
         )
         return found
@@ -138,8 +140,12 @@ class SolutionField:
         return found
 
     def _wanted(self, points: Array, near: Array | None) -> NDArray[np.int8]:
-        """Sides (n, 0) of cuts that are wanted on a membrane: no cut is known here."""
+        """Sides (n, 0) of cuts that are wanted: no cut is known here."""
         return np.zeros((len(points), 0), dtype=np.int8)
+
+    def inner_points(self, cells: NDArray[np.int64]) -> Array:
+        """Points (n, d) on the sides of the cuts on which given cells (n,) lie: their centres."""
+        return np.asarray(self._centres[cells])
 
     def in_cells(self, points: Array, cells: NDArray[np.int64]) -> tuple[Array, Array]:
         """Displacement (n, d) and gradient (n, d, d) of the polynomial of each given cell."""

@@ -5,8 +5,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 __all__ = [
-    "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells", "holding_cells",
-    "segment_distance2",
+    "allowed", "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells",
+    "holding_cells", "segment_distance2",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -85,7 +85,18 @@ def _is_over(x, height, facet, normals, corners):
 
 
 @njit(cache=True)
-def _containing(x, direction, sided, lower, upper, cells, corners, normals, centres, tolerance):
+def allowed(wish, side):
+    """Whether sides of cuts do not contradict those that are wished for; 0 is either side."""
+    for p in range(wish.shape[0]):
+        if wish[p] * side[p] < 0:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _containing(
+    x, direction, sided, wish, lower, upper, cells, corners, normals, centres, sides, tolerance
+):
     """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
     d = x.shape[0]
     leaves = lower.shape[0] // 2
@@ -112,7 +123,7 @@ def _containing(x, direction, sided, lower, upper, cells, corners, normals, cent
             if cell < 0:
                 break
             depth = _depth(x, normals[cell], corners[cell])
-            if depth < -tolerance:
+            if depth < -tolerance or not allowed(wish, sides[cell]):
                 continue
             if depth > tolerance:
                 return cell
@@ -128,8 +139,8 @@ def _containing(x, direction, sided, lower, upper, cells, corners, normals, cent
 
 
 @njit(cache=True)
-def _nearest(x, lower, upper, cells, corners, normals):
-    """Find the cell nearest to `x`, by branch and bound."""
+def _nearest(x, wish, lower, upper, cells, corners, normals, sides):
+    """Find the cell nearest to `x`, by branch and bound; -1 if none is allowed."""
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
     stack = np.empty(64, dtype=np.int64)
@@ -153,6 +164,8 @@ def _nearest(x, lower, upper, cells, corners, normals):
             cell = cells[k]
             if cell < 0:
                 break
+            if not allowed(wish, sides[cell]):
+                continue
             if _depth(x, normals[cell], corners[cell]) >= 0.0:
                 return cell
             distance2 = _outside_distance2(x, normals[cell], corners[cell])
@@ -173,22 +186,32 @@ def box_distance2(x, lower, upper):
 
 
 @njit(cache=True)
-def find_cells(points, directions, lower, upper, cells, corners, normals, centres, tolerance):
+def find_cells(
+    points, directions, wanted, lower, upper, cells, corners, normals, centres, sides, tolerance
+):
     """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
 
-    `directions` is (n, d), or (0, d) where no side is wanted.
+    `directions` is (n, d), or (0, d) where no side is wanted. `wanted` (n, c) is the side of c
+    cuts, −1, 1 or 0 (either), that the cell must lie on, and `sides` (m, c) the one that each cell
+    lies on, 0 if unknown. A point whose wish no cell fulfils gets what it would without one.
     """
     n = points.shape[0]
     found = np.empty(n, dtype=np.int64)
     sided = directions.shape[0] == n
-    nowhere = np.zeros(points.shape[1])
+    nowhere, either = np.zeros(points.shape[1]), np.zeros(wanted.shape[1], dtype=wanted.dtype)
     for i in range(n):
         direction = directions[i] if sided else nowhere
-        cell = _containing(
-            points[i], direction, sided, lower, upper, cells, corners, normals, centres, tolerance
-        )
-        if cell < 0:
-            cell = _nearest(points[i], lower, upper, cells, corners, normals)
+        wish = wanted[i]
+        for _ in range(2):
+            cell = _containing(
+                points[i], direction, sided, wish, lower, upper, cells, corners, normals, centres,
+                sides, tolerance,
+            )  # fmt: skip
+            if cell < 0:
+                cell = _nearest(points[i], wish, lower, upper, cells, corners, normals, sides)
+            if cell >= 0:
+                break
+            wish = either
         found[i] = cell
     return found
 
@@ -198,10 +221,12 @@ def holding_cells(points, lower, upper, cells, corners, normals, centres, tolera
     """Find the cell (n,) that holds each point (n, d), within `tolerance`; −1 where none does."""
     n, d = points.shape
     found, nowhere = np.empty(n, dtype=np.int64), np.zeros(d)
+    no_wish, no_sides = np.zeros(0, dtype=np.int8), np.zeros((len(corners), 0), dtype=np.int8)
     for i in range(n):
         found[i] = _containing(
-            points[i], nowhere, False, lower, upper, cells, corners, normals, centres, tolerance
-        )
+            points[i], nowhere, False, no_wish, lower, upper, cells, corners, normals, centres,
+            no_sides, tolerance,
+        )  # fmt: skip
     return found
 
 

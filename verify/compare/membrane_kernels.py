@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from verify.compare.locate_kernels import box_distance2, segment_distance2
+from verify.compare.locate_kernels import allowed, box_distance2, segment_distance2
 
 __all__ = ["nearest_triangles"]
 
@@ -73,7 +73,7 @@ def _nearest(
             cell = cells[k]
             if cell < 0:
                 break
-            if not _allowed(wish, sides[cell]):
+            if not allowed(wish, sides[cell]):
                 continue
             away, depth = _distance_and_depth(x, normals[cell], across[cell], corners[cell])
             if away > nearest + tolerance:
@@ -93,15 +93,6 @@ def _nearest(
                 best, best_depth, best_side = cell, depth, on_side
             nearest = min(nearest, away)
     return best, nearest
-
-
-@njit(cache=True)
-def _allowed(wish, side):
-    allowed = True
-    for p in range(wish.shape[0]):
-        if wish[p] * side[p] < 0:
-            allowed = False
-    return allowed
 
 
 @njit(cache=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody
 from verify.compare.locate import Field, SolutionField
-from verify.compare.realised import SidedField, field_of
+from verify.compare.realised import field_of
 from verify.compare.sampled import Sampled
 from verify.errors import InputError
 from verify.solution import Solution
@@ -145,7 +145,7 @@ _Found = dict[tuple[int, int], tuple[Array, Array | None, NDArray[np.int64]]]
 class _Located:
     """A solution's field that keeps the cells of arrays of points, which must not change."""
 
-    def __init__(self, field: SolutionField | SidedField, found: _Found) -> None:
+    def __init__(self, field: SolutionField, found: _Found) -> None:
         self._field, self._found = field, found
 
     def evaluate(self, points: Array, near: Array | None = None) -> tuple[Array, Array]:

@@ -81,6 +81,10 @@ class PlanePatch:
             foot[inside], best[inside], rim[inside] = uv[inside], 0.0, False
         return self.point(foot), rim
 
+    def foot(self, x: Array) -> Array:
+        """Nearest points (n, 3)."""
+        return self.nearest(x)[0]
+
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""
         corners = self.point(self.cells.reshape(-1, 2))
@@ -147,6 +151,10 @@ class DiscPatch:
         foot = np.where(outside[:, None], on_rim, flat)
         return self.origin + foot @ self.axes[:2], outside
 
+    def foot(self, x: Array) -> Array:
+        """Nearest points (n, 3)."""
+        return self.nearest(x)[0]
+
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""
         half = np.linalg.norm(np.array(self.semi_axes)[:, None] * self.axes[:2], axis=0)
@@ -211,6 +219,10 @@ class CylinderPatch:
         if self.arc.sweep < 2 * np.pi:
             rim |= (share == 0.0) | (share == 1.0)
         return self.point(np.column_stack([share, along])), rim
+
+    def foot(self, x: Array) -> Array:
+        """Nearest points (n, 3)."""
+        return self.nearest(x)[0]
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of a box around it."""

@@ -20,9 +20,12 @@ from verify.compare.curves import Arc, Piece, Segment
 from verify.compare.locate import Field
 from verify.compare.simplices import in_frames
 
-__all__ = ["Rule", "area_rule", "graded_breaks", "slab_angles"]
+__all__ = ["ROUND_OFF", "Rule", "area_rule", "graded_breaks", "slab_angles"]
 
 Array = NDArray[np.float64]
+
+# Of the body's size: a piece of the body that is thinner has no place that is surely inside.
+ROUND_OFF = 1e-13
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,15 @@ def area_rule(
     cells = [
         cell
         for low, high in pairwise(ys)
-        for cell in _slab(curves, low, high, xs, order, max(order, 6) if has_arcs else order)
+        for cell in _slab(
+            curves,
+            low,
+            high,
+            xs,
+            order,
+            max(order, 6) if has_arcs else order,
+            ROUND_OFF * body.size,
+        )
     ]
     points = np.vstack([p for p, _ in cells]) @ turn
     return Rule(points, np.concatenate([w for _, w in cells]))
@@ -217,9 +228,13 @@ def _monotone(piece: Piece, outline: bool) -> list[_Monotone]:
 
 
 def _slab(
-    curves: list[_Monotone], low: float, high: float, columns: Array, across: int, along: int
-) -> list[tuple[Array, Array]]:
-    """Quadrature of the body between two heights, one entry per strip between two curves."""
+    curves: list[_Monotone], low: float, high: float, columns: Array, across: int, along: int,
+    thinnest: float,
+) -> list[tuple[Array, Array]]:  # fmt: skip
+    """Quadrature of the body between two heights, one entry per strip between two curves.
+
+    A strip thinner than `thinnest`, in m, is round-off, and its points would be on the cut.
+    """
     middle = np.array([0.5 * (low + high)])
     here = [c for c in curves if c.low < middle[0] < c.high]
     here.sort(key=lambda c: float(c.x(middle)[0]))
@@ -234,9 +249,9 @@ def _slab(
         x0, x1 = left.x(ys), right.x(ys)
         m0, m1 = float(left.x(middle)[0]), float(right.x(middle)[0])
         width = x1 - x0
-        if m1 <= m0:
+        if m1 - m0 <= thinnest:
             continue  # two curves on each other: a strip of no width
-        between = columns[(columns > m0) & (columns < m1)]
+        between = columns[(columns > m0 + thinnest) & (columns < m1 - thinnest)]
         s = np.concatenate([[0.0], (between - m0) / (m1 - m0), [1.0]])
         step = np.diff(s)
         place = (s[:-1, None] + step[:, None] * u).ravel()

@@ -11,7 +11,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bisect", "divide", "measures", "split_at_level"]
+__all__ = ["bisect", "divide", "heights", "measures", "split_at_level"]
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,14 @@ def measures(corners: Array) -> Array:
     else:
         size = np.sqrt(np.maximum(np.linalg.det(edges @ np.swapaxes(edges, 1, 2)), 0.0))
     return size / factorial(edges.shape[1])
+
+
+def heights(corners: Array) -> Array:
+    """Smallest heights (m,) of simplices (m, k + 1, d), k ≤ d: 0 of a flat one."""
+    count = corners.shape[1]
+    largest = np.max([measures(np.delete(corners, k, axis=1)) for k in range(count)], axis=0)
+    volume = (count - 1) * measures(corners)
+    return np.asarray(np.divide(volume, largest, out=np.zeros(len(corners)), where=largest > 0.0))
 
 
 def split_at_level(corners: Array, level: Callable[[Array], Array]) -> tuple[Array, Array]:
@@ -52,7 +60,7 @@ def split_at_level(corners: Array, level: Callable[[Array], Array]) -> tuple[Arr
     value = np.asarray(level(corners.reshape(-1, d)), dtype=float).reshape(m, count)
     size = np.abs(value).max(axis=1, keepdims=True, initial=0.0)
     value[np.abs(value) <= _ON * size] = 0.0
-    done, signs = [], []
+    done, signs = [corners[:0]], [np.zeros(0)]
     ends = np.array(list(combinations(range(count), 2)))
     while len(corners):
         crossing = value[:, ends[:, 0]] * value[:, ends[:, 1]] < 0.0

@@ -11,8 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from verify.compare.locate import Field, SolutionField
+from verify.compare.body import body_of
+from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion
+from verify.compare.realised import cut_deviation, field_of
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.result import CaseResult, SolveRecord, Status, error_picture, write_result
@@ -82,16 +84,19 @@ def _error_pictures(
     """Write the error field of the finest solution of each solver, if there is a reference."""
     references = solutions.get(REFERENCE, {})
     truth: Field | None = None
+    body = body_of(scene)
     if scene.judged_by_exact:
         truth = ExactMotion(exact).at(scene.analysis.duration)
     elif references:
-        truth = SolutionField(references[max(references)])
+        judged = (own for solver, own in solutions.items() if solver != REFERENCE)
+        deviation = max((cut_deviation(own[max(own)], body) for own in judged), default=0.0)
+        truth = field_of(references[max(references)], body, deviation=deviation)
     pictures: dict[str, Path] = {}
     for solver, own in solutions.items():
         if solver == REFERENCE or truth is None:
             continue
         path = folder / f"error_field_{folder_name(solver)}.vtu"
-        write_error_field(own[max(own)], truth, path)
+        write_error_field(own[max(own)], truth, path, body)
         pictures[error_picture(solver)] = path
     return pictures
 

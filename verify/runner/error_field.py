@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.compare.body import AnyBody
 from verify.compare.locate import Field, SolutionField
+from verify.compare.realised import field_of
 from verify.compare.simplices import simplices
 from verify.solution import Solution
 from verify.whole_files import whole_file
@@ -17,7 +19,9 @@ __all__ = ["nodal_error", "write_error_field"]
 _INTO_CELL = 0.01
 
 
-def nodal_error(solution: Solution, truth: Field) -> NDArray[np.float64]:
+def nodal_error(
+    solution: Solution, truth: Field, body: AnyBody | None = None
+) -> NDArray[np.float64]:
     """Magnitude of the displacement error at the nodes of `solution`, m.
 
     Both fields are taken a hundredth of the way from the node to the centre of its largest cell,
@@ -29,6 +33,9 @@ def nodal_error(solution: Solution, truth: Field) -> NDArray[np.float64]:
         Its last output time counts.
     truth : Field
         The reference or exact field.
+    body : Body, SolidBody or MembraneBody, optional
+        Its cuts as asked: where they are not as realised, the truth is asked on the side of the
+        solution's cell.
 
     Returns
     -------
@@ -43,13 +50,17 @@ def nodal_error(solution: Solution, truth: Field) -> NDArray[np.float64]:
     used = owner >= 0
     centre = shape.corners.mean(axis=1)[owner[used]]
     inside = points[used] + _INTO_CELL * (centre - points[used])
-    own, _ = SolutionField(solution).in_cells(inside, owner[used])
+    field = SolutionField(solution) if body is None else field_of(solution, body)
+    own, _ = field.in_cells(inside, owner[used])
     error = np.zeros(len(points))
-    error[used] = np.linalg.norm(own - truth.displacement(inside, centre), axis=1)
+    beside = field.inner_points(owner[used])
+    error[used] = np.linalg.norm(own - truth.displacement(inside, beside), axis=1)
     return error
 
 
-def write_error_field(solution: Solution, truth: Field, path: Path) -> None:
+def write_error_field(
+    solution: Solution, truth: Field, path: Path, body: AnyBody | None = None
+) -> None:
     """Write the mesh of `solution` with point data ``error`` (m) and ``displacement`` (m)."""
     import meshio
 
@@ -60,7 +71,7 @@ def write_error_field(solution: Solution, truth: Field, path: Path) -> None:
     mesh = meshio.Mesh(
         points,
         [(solution.cell_type, solution.cells)],
-        point_data={"error": nodal_error(solution, truth), "displacement": displacement},
+        point_data={"error": nodal_error(solution, truth, body), "displacement": displacement},
     )
     with whole_file(path) as partial:
         mesh.write(partial, file_format="vtu")

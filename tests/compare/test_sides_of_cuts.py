@@ -1,0 +1,91 @@
+"""Fields are read on the side of the cut as asked, at every place, against winding numbers."""
+
+import numpy as np
+import pytest
+from cut_meshes import scene as plane_scene
+from parted_bodies import moved_parts, parted_cube, parted_square, parts_of, random_square
+
+from verify.compare.body import body_of
+from verify.compare.integration import cut_rules, rules
+from verify.compare.jump_error import displacement_jump
+from verify.compare.realised import cut_deviation, field_of
+from verify.runner.error_field import nodal_error
+from verify.scene import load_scene
+
+_MOVED = 1e-9  # parts are moved by whole numbers
+
+
+def _places_read_wrong(parted, seed, n, volume):
+    """How many places are read from another part than they lie in, and how many were read."""
+    scene, body, solution, there = parted(np.random.default_rng(seed), n)
+    field = field_of(solution, body)
+    cut = cut_rules(body, 1.0 / n, 1)[0]
+    asked = [(cut.points, cut.positive), (cut.points, cut.negative)]
+    if volume:
+        points = rules(body, 1.0 / n, 1)[0].points
+        asked.append((points, points))
+    wrong = count = 0
+    for points, near in asked:
+        part = parts_of(scene, near)
+        read = field.displacement(points, near)[:, 0]
+        # a part smaller than the elements that no cell holds cannot be read
+        known = np.isin(part, list(there))
+        wrong += int((np.abs(read - part)[known] > _MOVED).sum())
+        count += int(known.sum())
+    return wrong, count
+
+
+def _read_wrong(parted, seeds, n, volume):
+    found = [_places_read_wrong(parted, seed, n, volume) for seed in seeds]
+    wrong, count = np.sum(found, axis=0)
+    assert count >= 10_000
+    return wrong
+
+
+def test_every_place_on_arcs_and_s_curves_that_cross_is_read_on_its_side():
+    assert _read_wrong(parted_square, range(6), 10, volume=False) == 0
+
+
+def test_every_place_on_cylinders_and_swept_curves_that_cross_is_read_on_its_side():
+    assert _read_wrong(parted_cube, (0, 3), 5, volume=False) == 0
+
+
+def test_points_of_the_quadrature_lie_in_the_part_in_which_they_are_read():
+    assert _read_wrong(parted_square, (9,), 6, volume=True) == 0
+    assert _read_wrong(parted_cube, (1,), 4, volume=True) == 0
+
+
+@pytest.mark.heavy
+def test_a_hundred_random_bodies_are_read_on_their_sides():
+    assert _read_wrong(parted_square, range(100, 200), 12, volume=True) == 0
+    assert _read_wrong(parted_cube, range(100, 130), 6, volume=True) == 0
+
+
+def test_the_error_map_of_parts_that_moved_alike_is_zero_at_every_node():
+    for seed in (0, 7, 2):
+        random = np.random.default_rng(seed)
+        scene, body, own, there = parted_square(random, 12)
+        other, also = moved_parts(scene, random_square(17, random), 1 / 17)
+        assert there == also
+        truth = field_of(other, body, deviation=cut_deviation(own, body))
+        assert nodal_error(own, truth, body).max() < _MOVED
+
+
+def test_quadrature_points_are_off_the_cut_by_more_than_round_off():
+    # the second rule had points of weight 1e-19 at 1e-16 from this cut
+    body = body_of(load_scene("statics/griffith_inside"))
+    for rule in rules(body, 1 / 8):
+        foot, _ = body.nearest_on_cuts(rule.points)
+        assert np.linalg.norm(rule.points - foot, axis=1).min() > 1e-14 * body.size
+        assert rule.weights.sum() == pytest.approx(body.measure, rel=1e-12)
+
+
+def test_the_ends_of_a_cut_have_no_sides_beyond_them():
+    # an arc that ends in the square: a body that moves as a whole behind it has one value there
+    arc = {"kind": "arc", "centre": [0.5, 0.2], "radius": 0.35, "start": 60.0, "sweep": 50.0}
+    scene = plane_scene([arc])
+    body = body_of(scene)
+    random = np.random.default_rng(5)
+    solution, _ = moved_parts(scene, random_square(12, random), 1 / 12)
+    field = field_of(solution, body)
+    assert np.abs(displacement_jump(field, cut_rules(body, 1 / 12, 1)[0])).max() < _MOVED

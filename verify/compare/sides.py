@@ -1,0 +1,74 @@
+"""Sides of the cuts as asked on which points lie."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.compare.body import AnyBody
+from verify.compare.curves import Piece
+from verify.compare.patches import Patch
+
+__all__ = ["asked_cuts", "asked_sides", "distance_to_cut"]
+
+Array = NDArray[np.float64]
+Sides = NDArray[np.int8]
+AskedCut = Sequence[Piece | Patch]
+
+# Of the body's size: feet on two pieces of a cut that are equally far within it are one corner.
+_SAME = 1e-12
+# A point is beside a piece if the way to its foot is normal to the piece, up to this angle².
+_NORMAL = 1e-9
+
+
+def asked_cuts(body: AnyBody) -> list[AskedCut]:
+    """Pieces of each cut of a body as asked, in the plane curves and in space patches."""
+    return list(body.cuts.values())
+
+
+def asked_sides(cuts: Sequence[AskedCut], points: Array, reach: Array, size: float) -> Sides:
+    """Side (n, c) of each of c cuts on which points (n, d) lie: 1, −1, or 0.
+
+    It is 0 of points farther from the cut than their `reach` (n,) in m, and of those beyond an
+    end of the cut, which lie beside no part of it. At a corner of the cut the side is that of the
+    piece whose plane is farther: the nearer plane is continued into the other side. What lies on
+    the cut to the last bit is on the positive side. `size` is that of the body, m.
+    """
+    sides = np.zeros((len(points), len(cuts)), dtype=np.int8)
+    for k, pieces in enumerate(cuts):
+        sides[:, k] = _sides_of(pieces, points, reach, size)
+    return sides
+
+
+def distance_to_cut(pieces: AskedCut, points: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Distance (n,) of points to a cut as asked, m, and the piece (n,) that is nearest."""
+    away = np.array([_distance(piece, points) for piece in pieces])
+    nearest = np.asarray(away.argmin(axis=0))
+    return away[nearest, np.arange(len(points))], nearest
+
+
+def _distance(piece: Piece | Patch, points: Array) -> Array:
+    return np.asarray(np.linalg.norm(points - piece.foot(points), axis=1))
+
+
+def _sides_of(pieces: AskedCut, points: Array, reach: Array, size: float) -> Sides:
+    found = []
+    nearest = np.full(len(points), np.inf)
+    for piece in pieces:
+        level = piece.level(points)
+        at = np.flatnonzero(np.abs(level) <= reach)  # no foot is nearer than that
+        away = _distance(piece, points[at])
+        found.append((at, level[at], away))
+        nearest[at] = np.minimum(nearest[at], away)
+    met = np.zeros(len(points), dtype=np.int64)
+    height = np.zeros(len(points))
+    for at, level, away in found:
+        tied = away <= nearest[at] + _SAME * size
+        met[at[tied]] += 1
+        higher = tied & (np.abs(level) > np.abs(height[at]))
+        height[at[higher]] = level[higher]
+    with np.errstate(invalid="ignore"):
+        beyond = (met == 1) & (np.abs(height) < (1 - _NORMAL) * nearest - _SAME * size)
+    sides: Sides = np.where(height >= 0.0, 1, -1).astype(np.int8)
+    sides[(met == 0) | (nearest > reach) | beyond] = 0
+    return sides
