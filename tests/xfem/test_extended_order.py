@@ -10,7 +10,7 @@ from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.splitting.split import split_cells
-from verify.xfem.splitting.unknown_nodes import node_sides
+from verify.xfem.splitting.unknown_nodes import PieceSides, node_sides
 from verify.xfem.structured_meshes import box_mesh
 
 ROUND_OFF = 1e-10  # relative residual: thousands of operations on numbers within 1e4 of each other
@@ -118,7 +118,8 @@ def test_the_side_of_an_unknown_is_that_of_its_pieces_if_they_agree_else_of_its_
         cells = rng.integers(0, 12, (15, 4))
         label = rng.integers(-1, 2, (15, 3)).astype(np.int8)
         values = rng.standard_normal((12, 3))
-        side = node_sides(values, cells, label)
+        none = PieceSides(np.zeros(0, np.int64), np.zeros((0, 3), np.int8), np.zeros(0))
+        side = node_sides(values, np.arange(12), cells, label, none)
         for node in range(12):
             for cut in range(3):
                 seen = {int(s) for s in label[(cells == node).any(axis=1), cut] if s != 0}

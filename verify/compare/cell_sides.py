@@ -107,7 +107,7 @@ def _cells_on_facets(
 
 
 def _normals(facets: Array) -> Array:
-    """Unit normals (f, d) of segments in the plane or triangles in space; 0 of a point."""
+    """Return unit normals (f, d) of segments or of triangles in space; 0 of a point."""
     edge = facets[:, 1:] - facets[:, :1]
     if facets.shape[1] == 2:
         normal = np.column_stack([-edge[:, 0, 1], edge[:, 0, 0]])

@@ -87,10 +87,11 @@ def _is_over(x, height, facet, normals, corners):
 @njit(cache=True)
 def allowed(wish, side):
     """Whether sides of cuts do not contradict those that are wished for; 0 is either side."""
+    agreed = True
     for p in range(wish.shape[0]):
         if wish[p] * side[p] < 0:
-            return False
-    return True
+            agreed = False
+    return agreed
 
 
 @njit(cache=True)

@@ -293,6 +293,10 @@ class SpherePatch:
         uv = np.column_stack([np.minimum(polar, self.opening), np.arctan2(second, first)])
         return self.point(uv), rim
 
+    def foot(self, x: Array) -> Array:
+        """Nearest points (n, 3)."""
+        return self.nearest(x)[0]
+
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corner of the bounding box."""
         from_pole = np.arccos(np.clip(self.axes[2], -1.0, 1.0))

@@ -19,7 +19,7 @@ from verify.xfem.cuts.flat import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.joining import PatchSlots, join_slots
 from verify.xfem.splitting.split import Partition, split_cells
-from verify.xfem.splitting.unknown_nodes import node_sides, number_groups
+from verify.xfem.splitting.unknown_nodes import node_sides, number_groups, piece_sides
 from verify.xfem.splitting.zero_points import ZeroPoints
 
 __all__ = ["SubCells", "VirtualMesh", "cut_mesh"]
@@ -122,9 +122,14 @@ class VirtualMesh:
     @cached_property
     def piece_side(self) -> NDArray[np.int8]:
         """(p, cuts) side of each cut on which a piece lies, whether split by it or not."""
-        mean = self.level_sets[self.mesh.cells[self.parent]].sum(axis=1)
-        geometric = np.where(mean >= 0.0, 1, -1).astype(np.int8)
-        return np.where(self.label != 0, self.label, geometric)
+        corners, sub = self.mesh.cells[self.parent], self.sub_cells
+        mean = self.level_sets[corners].sum(axis=1)
+        side = np.where(self.label != 0, self.label, np.where(mean >= 0.0, 1, -1)).astype(np.int8)
+        split = piece_sides(
+            self.level_sets, corners, self.label, sub.piece, sub.barycentric, sub.fraction
+        )
+        side[split.rows] = split.side
+        return side
 
     @cached_property
     def volumes(self) -> _Floats:
@@ -268,17 +273,21 @@ def _virtual_mesh(
         fraction=partition.sub_fraction[thick],
         zero_points=partition.points,
     )
-    values = partition.points.values[node_parent]
-    node_side = node_sides(values, cells[order], label[order])
+    level_sets = partition.points.values[: len(mesh.points)]
+    cells, label, parent = cells[order], label[order], parent[order]
+    sides = piece_sides(
+        level_sets, mesh.cells[parent], label, sub_cells.piece, sub_cells.barycentric,
+        sub_cells.fraction,
+    )  # fmt: skip
     return VirtualMesh(
         mesh=mesh,
-        cells=cells[order],
-        parent=parent[order],
+        cells=cells,
+        parent=parent,
         fraction=share[order],
-        label=label[order],
+        label=label,
         node_parent=node_parent,
-        level_sets=partition.points.values[: len(mesh.points)],
-        node_side=node_side,
+        level_sets=level_sets,
+        node_side=node_sides(level_sets, node_parent, cells, label, sides),
         sub_cells=sub_cells,
         snapped=partition.snapped,
         dropped=int((~solid).sum()),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.cutting.growing_body import GrowingBody
-from verify.xfem.splitting.unknown_nodes import node_sides
+from verify.xfem.splitting.unknown_nodes import node_sides, piece_sides
 from verify.xfem.splitting.zero_points import ZeroPoints
 from verify.xfem.virtual import SubCells, VirtualMesh
 
@@ -34,6 +34,11 @@ def whole_mesh(body: GrowingBody, level_sets: _Floats) -> VirtualMesh:
     used = np.flatnonzero(body.sub_piece.rows >= 0)
     cells, label = body.piece_cells.rows[order], body.piece_label.rows[order]
     node_parent = body.node_parent.rows.copy()
+    sub_cells = _GrownSubCells(body, number, used, level_sets)
+    sides = piece_sides(
+        level_sets, body.mesh.cells[parent[order]], label, sub_cells.piece, sub_cells.barycentric,
+        sub_cells.fraction,
+    )  # fmt: skip
     return VirtualMesh(
         mesh=body.mesh,
         cells=cells,
@@ -42,8 +47,8 @@ def whole_mesh(body: GrowingBody, level_sets: _Floats) -> VirtualMesh:
         label=label,
         node_parent=node_parent,
         level_sets=level_sets,
-        node_side=node_sides(level_sets[node_parent], cells, label),
-        sub_cells=_GrownSubCells(body, number, used, level_sets),
+        node_side=node_sides(level_sets, node_parent, cells, label, sides),
+        sub_cells=sub_cells,
         snapped=int(np.count_nonzero(level_sets == 0.0)),
         dropped=body.dropped,
     )
