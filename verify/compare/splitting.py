@@ -26,9 +26,12 @@ def measures(corners: Array) -> Array:
     if edges.shape[1] == edges.shape[2]:
         size: Array = np.abs(np.linalg.det(edges))
     elif edges.shape[1:] == (2, 3):  # Gram's determinant is a square: it loses thin triangles
-        size = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        opposite = np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2)
+        apex, rows = np.argmax(opposite, axis=1), np.arange(len(corners))
+        at, after, before = (corners[rows, (apex + k) % 3] for k in range(3))
+        size = np.linalg.norm(np.cross(after - at, before - at), axis=1)  # of the shorter edges
     else:
-        size = np.sqrt(np.maximum(np.linalg.det(edges @ np.swapaxes(edges, 1, 2)), 0.0))
+        size = np.linalg.norm(edges[:, 0], axis=1)
     return size / factorial(edges.shape[1])
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from verify.compare.splitting import measures
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange.quadrature import simplex_rule
 from verify.scene import (
@@ -305,7 +306,7 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
     corners = mesh.points[simplices]
     points = np.einsum("qi,kic->kqc", barycentric, corners)
     # a membrane's forces per volume and area count times its thickness
-    measured = _measures(corners)[:, None] * weights * (scene.material.thickness or 1.0)
+    measured = measures(corners)[:, None] * weights * (scene.material.thickness or 1.0)
     history = getattr(load, "history", None)
     if isinstance(load, Gravity) or is_uniform(given):
         constant = np.asarray(given, dtype=float)
@@ -328,15 +329,6 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
 def _weight(scene: Scene, load: Gravity) -> Array:
     assert scene.material.density is not None  # the scene has checked it
     return scene.material.density * np.asarray(load.acceleration, dtype=float)
-
-
-def _measures(corners: Array) -> Array:
-    """Lengths, areas or volumes (k,) of simplices (k, i, d)."""
-    edges = corners[:, 1:] - corners[:, :1]
-    gram = edges @ edges.transpose(0, 2, 1)
-    factorial = {1: 1.0, 2: 2.0, 3: 6.0}[edges.shape[1]]
-    measures: Array = np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / factorial
-    return measures
 
 
 def _outward_normals(corners: Array, inside: Array) -> Array:
