@@ -9,15 +9,17 @@ import numpy as np
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, Scene, Skin, ToolPathCut
 from verify.solution import Solution
-from verify.solvers.xfem_answer import Answer, solution_of
+from verify.solvers.xfem_answer import Answer, joined, solution_of
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_motion import MotionChoice, move
 from verify.solvers.xfem_scene import background_mesh
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
+from verify.solvers.xfem_supports import supports_of
 from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import treat_slivers
+from verify.xfem.specks import join_specks
 from verify.xfem.virtual import cut_mesh
 
 __all__ = ["XfemSolver"]
@@ -201,6 +203,7 @@ def _run(
     slivers = None
     if choice.slivers in ("merge", "drop"):
         virtual, slivers = treat_slivers(virtual, choice.slivers)  # type: ignore[arg-type]
+    virtual, specks = join_specks(virtual, supports_of(scene, virtual, exact))
     enrichment = perf_counter() - start
     penalise = choice.slivers == "penalise"
     found = solve_equilibrium(scene, virtual, exact, choice.basis, choice.load_steps, penalise)
@@ -215,5 +218,5 @@ def _run(
         iterations=found.iterations,
         notes=found.notes,
         slivers=slivers,
-        further=found.regularisations,
+        further=[*found.regularisations, *joined(specks)],
     )

@@ -9,10 +9,11 @@ from verify.scene import Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
 from verify.xfem.slivers import GhostPenalty, SliverReport
+from verify.xfem.specks import Specks
 from verify.xfem.subdivision import Subdivision, subdivide
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Answer", "penalised", "solution_of"]
+__all__ = ["Answer", "joined", "penalised", "solution_of"]
 
 _Floats = NDArray[np.float64]
 
@@ -85,6 +86,14 @@ def penalised(ghost: GhostPenalty | None, share: float | None = None) -> list[Re
         return []
     size, unit = (ghost.factor, "factor") if share is None else (share, "of the strain energy")
     return [Regularisation("face with a ghost penalty", len(ghost.weights), size, unit)]
+
+
+def joined(specks: Specks) -> list[Regularisation]:
+    """Report loose parts of round-off size that move with their neighbours."""
+    if not specks.count:
+        return []
+    kind = "loose part of round-off size joined to its neighbour"
+    return [Regularisation(kind, specks.count, specks.largest, "volume fraction")]
 
 
 def _at_points(body: Subdivision, values: _Floats | None) -> _Floats | None:

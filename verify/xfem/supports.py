@@ -10,9 +10,10 @@ from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import index_array, real_array
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Supports", "UnsupportedBodyError", "check_bodies"]
+__all__ = ["Supports", "UnsupportedBodyError", "check_bodies", "loose_bodies"]
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 # points (k, d) and sides (k, cuts) to displacements (k, d)
 PrescribedField = Callable[[_Floats, NDArray[np.int8]], _Floats]
@@ -127,23 +128,30 @@ def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
         )
     if not np.isfinite(values).all():
         raise XfemError("a prescribed displacement is not finite")
-    points, dim = virtual.node_points, supports.fixed.shape[1]
-    scale = virtual.mesh.extent
-    for body in range(virtual.bodies.max() + 1):
+    for body in loose_bodies(virtual, supports, np.arange(virtual.bodies.max() + 1)):
+        pieces = virtual.bodies[virtual.cells[:, 0]] == body
+        volume = virtual.volumes[pieces].sum()
+        centre = virtual.volumes[pieces] @ virtual.piece_centroids[pieces] / volume
+        unit = "m²" if supports.fixed.shape[1] == 2 else "m³"
+        raise UnsupportedBodyError(
+            f"a piece of {volume:.3g} {unit} around {np.round(centre, 6).tolist()} is not "
+            "held: it can move as a rigid body; support it, or do not cut it off"
+        )
+
+
+def loose_bodies(virtual: VirtualMesh, supports: Supports, bodies: _Ints) -> _Ints:
+    """Those of the given free bodies, by number (k,), that can move rigidly."""
+    points, scale = virtual.node_points, virtual.mesh.extent
+    found = []
+    for body in bodies:
         nodes = np.flatnonzero(virtual.bodies == body)
         modes = _rigid_modes((points[nodes] - points[nodes].mean(axis=0)) / scale)
         held = modes[supports.fixed[nodes]]
         size = np.linalg.norm(modes.reshape(-1, modes.shape[-1]), axis=0)
         gram = (held / size).T @ (held / size)
         if len(held) == 0 or np.linalg.eigvalsh(gram)[0] < 1e-14:
-            pieces = virtual.bodies[virtual.cells[:, 0]] == body
-            volume = virtual.volumes[pieces].sum()
-            centre = virtual.volumes[pieces] @ virtual.piece_centroids[pieces] / volume
-            unit = "m²" if dim == 2 else "m³"
-            raise UnsupportedBodyError(
-                f"a piece of {volume:.3g} {unit} around {np.round(centre, 6).tolist()} is not "
-                "held: it can move as a rigid body; support it, or do not cut it off"
-            )
+            found.append(body)
+    return np.array(found, dtype=np.int64)
 
 
 def _rigid_modes(points: _Floats) -> _Floats:
