@@ -12,9 +12,10 @@ from verify.xfem.bases import (
     transformation,
     transformed_matrix,
 )
-from verify.xfem.cuts import Plane, Polyline
+from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import XfemError
+from verify.xfem.errors import BasisError, XfemError
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
@@ -133,3 +134,16 @@ def test_an_unknown_basis_is_refused():
     virtual = cut_mesh(CASES["through"][0], [CASES["through"][1]])
     with pytest.raises(XfemError, match="expected shifted or heaviside"):
         transformation(virtual, "ramp")
+
+
+def test_two_parts_beyond_one_cut_have_unknowns_of_their_own_and_no_shifted_basis():
+    # a hexagon whose cut takes off two opposite corners: beyond it is not one part, but two
+    turn = np.pi / 3 * np.arange(6)
+    points = np.vstack([[[0.0, 0.0]], np.column_stack([np.cos(turn), np.sin(turn)])])
+    around = np.arange(6)
+    mesh = SimplexMesh(points, np.column_stack([0 * around, 1 + around, 1 + (around + 1) % 6]))
+    virtual = cut_mesh(mesh, [ImplicitCut(lambda x: 0.7 - np.abs(x[:, 0]))])
+    assert np.bincount(virtual.node_parent)[0] == 3
+    assert virtual.bodies.max() == 2  # the middle and both corners
+    with pytest.raises(BasisError, match="node 0 has 3 unknowns"):
+        transformation(virtual, "shifted")
