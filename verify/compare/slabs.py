@@ -70,6 +70,14 @@ class _Monotone:
         half = np.sqrt(np.maximum((1 - height) * (1 + height), 0.0))
         return self.piece.centre[0] + self.bulge * self.piece.radius * half
 
+    def poles(self) -> list[float]:
+        """Heights, at an end or close beyond it, at which x(y) is like a square root."""
+        if isinstance(self.piece, Segment):
+            return []
+        middle, radius = float(self.piece.centre[1]), self.piece.radius
+        reached = [(y - middle) / radius for y in (self.low, self.high)]
+        return [middle + radius * np.sign(s) for s in reached if abs(s) >= 0.95]
+
 
 def area_rule(
     body: Body,
@@ -109,7 +117,7 @@ def area_rule(
     curves = [m for piece, outline in pieces for m in _monotone(piece, outline)]
     singular, tips = body.singular @ turn.T, body.tips @ turn.T
     ends = np.array([[m.low, m.high] for m in curves]).ravel()
-    poles = [p.centre[1] + s * p.radius for p, _ in pieces if isinstance(p, Arc) for s in (-1, 1)]
+    poles = [y for m in curves for y in m.poles()]
     ys = graded_breaks(ends, singular[:, 1], spacing, depth * spacing)
     ys = graded_breaks(ys, tips[:, 1], spacing, depth * spacing, grading)
     if poles:  # x(y) is like a square root there
@@ -118,19 +126,11 @@ def area_rule(
     span = np.array([corners[:, 0].min(), corners[:, 0].max()])
     xs = graded_breaks(span, singular[:, 0], spacing, depth * spacing)
     xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
-    has_arcs = any(isinstance(piece, Arc) for piece, _ in pieces)
+    thinnest = ROUND_OFF * body.size
     cells = [
         cell
         for low, high in pairwise(ys)
-        for cell in _slab(
-            curves,
-            low,
-            high,
-            xs,
-            order,
-            max(order, 6) if has_arcs else order,
-            ROUND_OFF * body.size,
-        )
+        for cell in _slab(curves, low, high, xs, order, thinnest)
     ]
     points = np.vstack([p for p, _ in cells]) @ turn
     return Rule(points, np.concatenate([w for _, w in cells]))
@@ -228,9 +228,8 @@ def _monotone(piece: Piece, outline: bool) -> list[_Monotone]:
 
 
 def _slab(
-    curves: list[_Monotone], low: float, high: float, columns: Array, across: int, along: int,
-    thinnest: float,
-) -> list[tuple[Array, Array]]:  # fmt: skip
+    curves: list[_Monotone], low: float, high: float, columns: Array, order: int, thinnest: float
+) -> list[tuple[Array, Array]]:
     """Quadrature of the body between two heights, one entry per strip between two curves.
 
     A strip thinner than `thinnest`, in m, is round-off, and its points would be on the cut.
@@ -238,14 +237,15 @@ def _slab(
     middle = np.array([0.5 * (low + high)])
     here = [c for c in curves if c.low < middle[0] < c.high]
     here.sort(key=lambda c: float(c.x(middle)[0]))
-    u, wu = _gauss(across)
-    v, wv = _gauss(along)
-    ys, wy = low + (high - low) * v, (high - low) * wv
+    u, wu = _gauss(order)
     found, inside = [], False
     for left, right in pairwise(here):
         inside ^= left.outline
         if not inside:
             continue
+        curved = isinstance(left.piece, Arc) or isinstance(right.piece, Arc)
+        v, wv = _gauss(max(order, 6) if curved else order)
+        ys, wy = low + (high - low) * v, (high - low) * wv
         x0, x1 = left.x(ys), right.x(ys)
         m0, m1 = float(left.x(middle)[0]), float(right.x(middle)[0])
         width = x1 - x0

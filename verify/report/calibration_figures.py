@@ -11,7 +11,6 @@ from verify.report.tables import table
 __all__ = ["calibration_section"]
 
 _COLOURS = ("#0067a5", "#c04a00", "#00785a", "#a3487b", "#8a6a00", "#5b4db5")
-_OTHER = "#333"
 _WASTED = 10.0
 _ROW, _FIRST_ROW = 18, 46
 
@@ -29,7 +28,7 @@ def calibration_section(record: Mapping[str, Any]) -> Markup:
         "Every mark is a number that a reference of three levels states its uncertainty of; above "
         "the line 1 the uncertainty covers the true error, above the line 10 it is wider than it "
         "need be. Open marks are quantities of interest: the error of a single number can vanish "
-        "by chance, and then lies far above. Squares are families that no estimator was tuned on."
+        "by chance, and then lies far above."
     )
     return tag(
         "section",
@@ -50,11 +49,11 @@ def _scatter(trials: Sequence[Mapping[str, Any]], degree: int) -> Markup:
         "true error, relative",
         f"P{degree}: stated uncertainty, relative",
     )
-    colours = _colours(trials)
+    marks = _marks(trials)
     parts = [_line(panel, 1.0), _line(panel, _WASTED)]
-    parts += [_mark(panel, t, colours[t["family"]]) for t in shown]
+    parts += [_mark(panel, t, marks[t["family"]]) for t in shown]
     parts += [
-        _legend(panel, row, t, colours[t["family"]])
+        _legend(panel, row, t["family"], marks[t["family"]])
         for row, t in enumerate({t["family"]: t for t in shown}.values())
     ]
     below = sum(not t["covered"] for t in shown)
@@ -64,22 +63,18 @@ def _scatter(trials: Sequence[Mapping[str, Any]], degree: int) -> Markup:
     return panel.drawn(label, joined(*parts))
 
 
-def _colours(trials: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Give a colour to each field; its variants, named after a comma, have that of the field."""
-    families = list(dict.fromkeys(t["family"] for t in trials))
-    fields = list(dict.fromkeys(_field(name) for name in families))
-    own = dict(zip(fields, _COLOURS, strict=False))
-    return {name: own.get(_field(name), _OTHER) for name in families}
+def _marks(trials: Sequence[Mapping[str, Any]]) -> dict[str, tuple[str, bool]]:
+    """Give a colour to each family, and a square mark to those for which none is left."""
+    families = dict.fromkeys(t["family"] for t in trials)
+    n = len(_COLOURS)
+    return {name: (_COLOURS[i % n], i >= n) for i, name in enumerate(families)}
 
 
-def _field(family: str) -> str:
-    return family.split(",")[0]
-
-
-def _legend(panel: Panel, row: int, trial: Mapping[str, Any], colour: str) -> Markup:
+def _legend(panel: Panel, row: int, family: str, mark: tuple[str, bool]) -> Markup:
+    colour, square = mark
     y = _FIRST_ROW + _ROW * row
-    mark = _shape(panel.gutter + 3, y - 4, trial, fill=colour, stroke=colour)
-    return joined(mark, text(panel.gutter + 12, y, trial["family"], class_="note", fill=colour))
+    shown = _shape(panel.gutter + 3, y - 4, square, fill=colour, stroke=colour)
+    return joined(shown, text(panel.gutter + 12, y, family, class_="note", fill=colour))
 
 
 def _line(panel: Panel, factor: float) -> Markup:
@@ -94,21 +89,21 @@ def _line(panel: Panel, factor: float) -> Markup:
     return joined(tag("path", d=f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}", class_="slope"), end)
 
 
-def _mark(panel: Panel, trial: Mapping[str, Any], colour: str) -> Markup:
+def _mark(panel: Panel, trial: Mapping[str, Any], mark: tuple[str, bool]) -> Markup:
+    colour, square = mark
     norm = trial["quantity"] in ("displacement_l2", "energy_norm", "jump_l2")
     tip = (
-        f"{trial['family']}, {metric_title(trial['quantity'])}, level {trial['level']}: "
+        f"{trial['family']}, scene {trial['scene']}, {metric_title(trial['quantity'])}: "
         f"stated {trial['stated']:.3g}, true {trial['true']:.3g}"
     )
     return _shape(
-        panel.x.at(trial["true"]), panel.y.at(trial["stated"]), trial, tag("title", tip),
+        panel.x.at(trial["true"]), panel.y.at(trial["stated"]), square, tag("title", tip),
         stroke=colour, fill=colour if norm else "#fff", class_="marker",
     )  # fmt: skip
 
 
-def _shape(x: float, y: float, trial: Mapping[str, Any], *tip: Markup, **style: str) -> Markup:
-    """Draw a disc, or a square for a family that no estimator was tuned on."""
-    if not trial.get("held_out"):
+def _shape(x: float, y: float, square: bool, *tip: Markup, **style: str) -> Markup:
+    if not square:
         return tag("circle", *tip, cx=f"{x:.1f}", cy=f"{y:.1f}", r="3.4", **style)
     left, top = f"{x - 3.1:.1f}", f"{y - 3.1:.1f}"
     return tag("rect", *tip, x=left, y=top, width="6.2", height="6.2", **style)
@@ -117,11 +112,20 @@ def _shape(x: float, y: float, trial: Mapping[str, Any], *tip: Markup, **style: 
 def _trials_table(trials: Sequence[Mapping[str, Any]]) -> Markup:
     rows = [
         [
-            t["family"], f"P{t['degree']}", t["level"], metric_title(t["quantity"]),
+            t["family"], t["scene"], f"P{t['degree']}", t["level"], metric_title(t["quantity"]),
             number(t["stated"], 3), number(t["true"], 3),
             t["left_out"] or joined(number(t["ratio"], 3), "" if t["covered"] else " not covered"),
         ]
         for t in trials
     ]  # fmt: skip
-    head = ["case", "degree", "finest level", "number", "stated", "true", "stated over true"]
+    head = [
+        "family",
+        "scene",
+        "degree",
+        "finest level",
+        "number",
+        "stated",
+        "true",
+        "stated over true",
+    ]
     return table(head, rows, "All trials, relative; with those that do not count, and why")

@@ -50,7 +50,12 @@ class Extrapolation:
 
 
 def extrapolate(
-    values: Sequence[float], sizes: Sequence[float], theoretical: float, best: float | None = None
+    values: Sequence[float],
+    sizes: Sequence[float],
+    theoretical: float,
+    best: float | None = None,
+    second: float | None = None,
+    falls: float = inf,
 ) -> Extrapolation:
     """Judge a scalar from at least three levels, coarse to fine.
 
@@ -62,6 +67,12 @@ def extrapolate(
         Order that can be counted on; used where the observed one is not sane.
     best : float, optional
         Largest sane order (default: twice the theoretical one, as for energies).
+    second : float, optional
+        Order that a second estimate gives (twice that of the field's energy norm); used where
+        the observed one is not sane. A single number may be right by accident on one level.
+    falls : float
+        Factor by which the error can at most be counted on to fall between the last two levels,
+        whatever the order of the elements.
 
     Raises
     ------
@@ -79,11 +90,15 @@ def extrapolate(
     order = observed_order(abs(first), abs(last), sizes[-3:]) if first * last > 0 else None
     limit = 2 * theoretical if best is None else best
     if order is not None and 0.5 * theoretical <= order <= limit + 0.5:
-        used = min(order, limit)
-        step = last / (ratio**used - 1)
+        step = last / (min(ratio ** min(order, limit), falls) - 1)
         text = f"observed order {order:.2f}, safety factor 1.25"
         return Extrapolation(fine, fine + step, max(1.25 * abs(step), floor), order, text)
-    width, text = _careful(abs(first), abs(last), ratio, order, theoretical)
+    if second is None:
+        width, text = _careful(abs(first), abs(last), ratio, order, theoretical, falls)
+    else:
+        used = min(second, limit)
+        width = _widest(abs(first), abs(last), min(ratio**used, falls))
+        text = f"{_why(order)}: order {used:.2g} as of the field, safety factor 3"
     return Extrapolation(fine, fine, max(width, floor), order, text)
 
 
@@ -92,6 +107,7 @@ def field_uncertainty(
     sizes: Sequence[float],
     theoretical: float,
     safety: float = 1.25,
+    falls: float = inf,
 ) -> Extrapolation:
     """Estimate the error norm of the finest of several reference fields.
 
@@ -105,6 +121,8 @@ def field_uncertainty(
         Order in this norm that can be counted on.
     safety : float
         Factor where the observed order is sane; 3 elsewhere.
+    falls : float
+        See `extrapolate`.
 
     Returns
     -------
@@ -119,15 +137,19 @@ def field_uncertainty(
         return Extrapolation(0.0, 0.0, 0.0, None, "successive levels are equal")
     order = observed_order(first, last, sizes[-3:])
     if order is not None and 0.5 * theoretical <= order <= 2 * theoretical + 0.5:
-        width = safety * last / (ratio ** min(order, theoretical) - 1)
+        width = safety * last / (min(ratio ** min(order, theoretical), falls) - 1)
         text = f"observed order {order:.2f}, safety factor {safety:g}"
         return Extrapolation(last, 0.0, width, order, text)
-    width, text = _careful(first, last, ratio, order, theoretical)
+    width, text = _careful(first, last, ratio, order, theoretical, falls)
     return Extrapolation(last, 0.0, width, order, text)
 
 
 def place_uncertainty(
-    value: float, differences: Sequence[float], sizes: Sequence[float], theoretical: float
+    value: float,
+    differences: Sequence[float],
+    sizes: Sequence[float],
+    theoretical: float,
+    falls: float = inf,
 ) -> Extrapolation:
     """Estimate the error of a value at one place, from how levels differ around it.
 
@@ -146,8 +168,10 @@ def place_uncertainty(
         Element sizes, coarse to fine, at least three.
     theoretical : float
         Order in L2 that can be counted on.
+    falls : float
+        See `extrapolate`.
     """
-    around = field_uncertainty(differences, sizes, theoretical, _DEVIATIONS)
+    around = field_uncertainty(differences, sizes, theoretical, _DEVIATIONS, falls)
     width = max(around.half_width, _ROUND_OFF * abs(value))
     return Extrapolation(value, value, width, around.order, f"around the place: {around.reason}")
 
@@ -177,20 +201,30 @@ def observed_order(first: float, last: float, sizes: Sequence[float]) -> float |
 
 
 def _careful(
-    first: float, last: float, ratio: float, order: float | None, theoretical: float
+    first: float, last: float, ratio: float, order: float | None, theoretical: float, falls: float
 ) -> tuple[float, str]:
     """Half-width with safety factor 3, and its reason.
 
     An observed order below the theoretical one is believed as far as it makes things worse;
-    where differences grow, no more than order 1 is counted on;
-    the coarser difference counts, scaled down, in case the finer one is small by accident.
+    where differences grow, no more than order 1 is counted on.
     """
-    used = min(theoretical, max(order, 0.25)) if order is not None else theoretical
-    why = "no order" if order is None else f"observed order {order:.2f} is not sane"
+    used, why = theoretical if order is None else min(theoretical, max(order, 0.25)), _why(order)
     if order is None and last > first:  # not even the sign of convergence
         used, why = min(theoretical, 1.0), "differences grow"
-    largest = max(last, first * ratio**-used)
-    return 3 * largest / (ratio**used - 1), f"{why}: order {used:.2g}, safety factor 3"
+    width = _widest(first, last, min(ratio**used, falls))
+    return width, f"{why}: order {used:.2g}, safety factor 3"
+
+
+def _why(order: float | None) -> str:
+    return "no order" if order is None else f"observed order {order:.2f} is not sane"
+
+
+def _widest(first: float, last: float, falls: float) -> float:
+    """Half-width with safety factor 3 where errors fall by a factor from level to level.
+
+    The coarser difference counts, scaled down, in case the finer one is small by accident.
+    """
+    return 3 * max(last, first / falls) / (falls - 1)
 
 
 def _check(values: Sequence[float], sizes: Sequence[float]) -> None:

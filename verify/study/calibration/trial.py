@@ -35,8 +35,8 @@ class Trial:
     Parameters
     ----------
     family : str
-    degree, level : int
-        Degree of the elements, and the finest of the three levels.
+    scene, degree, level : int
+        Which scene of the family, degree of the elements, and the finest of the three levels.
     quantity : str
         An error norm of the finest level, or a quantity of interest.
     stated, true : float
@@ -45,8 +45,6 @@ class Trial:
         How well the true error is known.
     left_out : str
         Why it does not count; empty if it does.
-    held_out : bool
-        Whether no estimator was tuned on the family.
     """
 
     family: str
@@ -57,7 +55,7 @@ class Trial:
     true: float
     known: float
     left_out: str = ""
-    held_out: bool = False
+    scene: int = 0
 
     @property
     def covered(self) -> bool:
@@ -70,9 +68,9 @@ class Trial:
         return self.stated / self.true if self.true > 0.0 else float("inf")
 
 
-def trials(family: Family) -> list[Trial]:
-    """Solve the levels of a family and judge every reference that three of them make."""
-    scene = family.scene()
+def trials(family: Family, index: int) -> list[Trial]:
+    """Solve the levels of a scene and judge every reference that three of them make."""
+    scene = family.scene(index)
     solver = find_solver("reference")
     solutions = {k: solver.solve(scene, k, 0) for k in range(solver.levels(scene))}
     law, exact = law_of(scene), _exact(scene)
@@ -82,16 +80,10 @@ def trials(family: Family) -> list[Trial]:
     for last in range(_LEVELS - 1, len(solutions)):
         levels = {k: solutions[k] for k in range(last - _LEVELS + 1, last + 1)}
         found += [
-            replace(
-                one,
-                family=family.name,
-                degree=family.degree,
-                level=last,
-                held_out=family.held_out,
-            )
+            replace(one, degree=scene.reference.degree, level=last)
             for one in _judged(scene, levels, body, law, exact, truth.quantities)
         ]
-    return [replace(one, left_out=_left_out(one)) for one in found]
+    return [replace(one, family=family.name, scene=index, left_out=_left_out(one)) for one in found]
 
 
 def _judged(
@@ -103,9 +95,9 @@ def _judged(
     values: Mapping[str, tuple[float, float]],
 ) -> list[Trial]:
     finest = levels[max(levels)]
-    stated = conforming_reference(scene, levels, body, law, size_of(finest) / 2)
+    stated = conforming_reference(scene, levels, body, law, size_of(finest))
     own = Measured(finest, body, law, scene).field
-    rules = Rules(body, size_of(finest) / 2, count=2)
+    rules = Rules(body, size_of(finest), count=2)
     found = []
     for name in NORMS:
         if name not in stated.norms:
