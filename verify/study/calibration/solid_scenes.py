@@ -45,9 +45,10 @@ def ball_and_shell(random: Random) -> Content:
     parameters = {**place, "outward": float(random.uniform(0.05, 0.15)), "at": 1.0}
     towards = random.uniform(0.4, 1.0, 3)
     opened = centre + radius * towards / np.linalg.norm(towards)
-    cut = {"kind": "sphere", **place}
+    # facets of the sphere that places are checked against have a corner at its pole
+    cut = {"kind": "sphere", **place, "towards": towards.tolist()}
     at = random.uniform(0.65, 0.9, 3)
-    return _scene(random, ("circular_cut", parameters), cut, at, opened)
+    return _scene(random, ("spherical_cut", parameters), cut, at, opened)
 
 
 def _scene(

@@ -95,9 +95,10 @@ def _judged(
     values: Mapping[str, tuple[float, float]],
 ) -> list[Trial]:
     finest = levels[max(levels)]
-    stated = conforming_reference(scene, levels, body, law, size_of(finest))
+    size = size_of(finest) * (1 if scene.dimension == 2 else 2)  # of the quadrature
+    stated = conforming_reference(scene, levels, body, law, size)
     own = Measured(finest, body, law, scene).field
-    rules = Rules(body, size_of(finest), count=2)
+    rules = Rules(body, size, count=2)
     found = []
     for name in NORMS:
         if name not in stated.norms:
