@@ -57,6 +57,42 @@ def test_a_functional_may_converge_with_twice_the_order_of_its_element():
     assert abs(found.value - 1) <= found.half_width <= 1.5 * abs(found.value - 1)
 
 
+@pytest.mark.parametrize(
+    "errors",
+    [
+        (6.6e-3, 2.3e-4, 1.2e-5),  # order 4.9: the coarsest level is far from its asymptote
+        (4.0e-3, -1.2e-5, -2.7e-6),  # one level is right by accident
+        (5.5e-4, 4.7e-4, 5.2e-5),  # the first difference is small by accident
+    ],
+)
+def test_one_odd_order_does_not_blow_up_a_bar_where_the_field_converges_as_it_should(errors):
+    # K and energies of the tip and Griffith families: bars were 100 to 400 times the error
+    values, sizes = [1 + e for e in errors], [0.4, 0.2, 0.1]
+    found = extrapolate(values, sizes, 2, best=4, second=4)
+    assert abs(errors[-1]) <= found.half_width < 20 * abs(errors[-1])
+    assert "as of the field" in found.reason
+    careful = extrapolate(values, sizes, 2, best=4)
+    assert found.half_width < careful.half_width
+
+
+def test_a_field_that_converges_slowly_does_not_make_a_bar_smaller():
+    values, sizes = [3.0, 3.1, 3.1 + 1e-9], [0.4, 0.2, 0.1]
+    slow = extrapolate(values, sizes, 2, best=4, second=1)
+    assert slow.half_width >= extrapolate(values, sizes, 2, best=4).half_width
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.9])
+def test_what_falls_like_the_facets_of_a_curve_is_bounded_whatever_the_elements_do(share):
+    # elements of order 4 on facets of order 2, of which the coarse level has five, then nine, 17
+    sizes, facets = [0.4, 0.2, 0.1], np.array([5, 9, 17])
+    errors = (1 - share) * (5 / facets) ** 2 + share * np.array([1, 2**-4, 2**-8])
+    falls = (facets[2] / facets[1]) ** 2
+    found = extrapolate(list(2 + errors), sizes, 2, best=4, falls=falls)
+    assert errors[-1] <= found.half_width < 4 * errors[-1]
+    field = field_uncertainty(list(-np.diff(errors)), sizes, 3, falls=falls)
+    assert errors[-1] <= field.half_width < 4 * errors[-1]
+
+
 def test_levels_at_round_off_are_not_extrapolated():
     found = extrapolate([1.0, 1.0 + 2e-16, 1.0 - 2e-16], [0.4, 0.2, 0.1], theoretical=2)
     assert found.order is None

@@ -15,7 +15,6 @@ from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion, Motion
 from verify.compare.near_tip import NEAR, near_radius
-from verify.compare.realised import cut_deviation
 from verify.compare.simplices import simplices
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy
@@ -29,6 +28,7 @@ from verify.scene.acceptance import (
     StressIntensityQuantity,
 )
 from verify.solution import Solution
+from verify.study.error_fall import error_fall
 from verify.study.error_history import ERROR_NAMES, base_of, compared_times, error_history
 from verify.study.local_difference import local_difference
 from verify.study.quantities import Measured, field_quantity
@@ -51,7 +51,6 @@ __all__ = [
     "size_of",
 ]
 
-_ON_THE_CUT = 1e-10  # of the body's size
 _CLOSED_FORM = 1e-11  # relative accuracy of an exact solution's own strain energy
 OTHER = "conforming"  # solver whose levels give a second estimate of quantities, if it was run
 
@@ -208,7 +207,7 @@ def conforming_reference(
     sizes = [size_of(solution) for solution in solutions]
     measured = [Measured(solution, body, law, scene) for solution in solutions]
     order = solutions[-1].order
-    falls = _falls(scene, solutions, sizes, body)
+    falls = error_fall(scene, solutions, sizes, body)
     norms, entries = _field_norms(scene, measured, sizes, order, size, falls)
     field_order = entries["energy_norm"]["order"]
     second = [Measured(s, body, law, scene) for _, s in sorted((others or {}).items())]
@@ -243,23 +242,6 @@ def conforming_reference(
     if missing:
         record["missing"] = missing
     return Reference(measured[-1].motion, source, norms, quantities, record)
-
-
-def _falls(
-    scene: Scene, solutions: Sequence[Solution], sizes: Sequence[float], body: AnyBody
-) -> float:
-    """Factor by which errors that are none of the elements' fall between the last two levels.
-
-    Straight facets approach a curved cut like h²; how far they are off it is measured, since
-    their number along a short arc does not double exactly. Time steps are of second order and
-    halve with the elements.
-    """
-    ratio = sizes[-2] / sizes[-1]
-    found = inf if scene.analysis.kind == "static" else ratio**2
-    before, last = (cut_deviation(solution, body) for solution in solutions[-2:])
-    if last > _ON_THE_CUT * body.size:
-        found = min(found, max(before / last, ratio))
-    return found
 
 
 def known_quantity(
@@ -357,7 +339,7 @@ def _second_opinion(
         values = [one.quantity(asked) for one in others]
         sizes, order = [size_of(one.solution) for one in others], others[-1].solution.order
         solutions = [one.solution for one in others]
-        falls = _falls(scene, solutions, sizes, others[0].body)
+        falls = error_fall(scene, solutions, sizes, others[0].body)
         found = known_quantity(asked, others, values, sizes, falls=falls)
     except (InputError, UnsupportedSceneError):
         return {}
