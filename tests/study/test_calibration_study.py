@@ -41,7 +41,7 @@ def test_a_family_that_is_not_covered_fails_beside_many_that_are():
     found = calibration_findings([*good, *made([2.0] * 54 + [0.5] * 6, "ring")])
     assert {f.verdict for f in found} == {Verdict.PASS}
     found = calibration_findings([*good, *made([2.0] * 53 + [0.5] * 7, "ring")])
-    assert [f.verdict for f in found if "ring" in f.name] == [Verdict.FAIL]
+    assert [f.verdict for f in found if "ring" in f.topic] == [Verdict.FAIL]
     assert found[0].verdict is Verdict.PASS
 
 
