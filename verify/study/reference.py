@@ -220,9 +220,7 @@ def conforming_reference(
             missing[asked.name] = why
             continue
         coarse = len(measured) - len(values)  # levels that do not have it
-        known = known_quantity(
-            asked, measured[coarse:], values, sizes[coarse:], field_order, falls
-        )
+        known = known_quantity(asked, measured[coarse:], values, sizes[coarse:], field_order, falls)
         quantities[asked.name] = known.value, known.half_width
         entry = _entry([*[None] * coarse, *values], known)
         metrics[asked.name] = entry | _second_opinion(scene, asked, second, known)
