@@ -128,9 +128,7 @@ def area_rule(
     xs = graded_breaks(xs, tips[:, 0], spacing, depth * spacing, grading)
     thinnest = ROUND_OFF * body.size
     cells = [
-        cell
-        for low, high in pairwise(ys)
-        for cell in _slab(curves, low, high, xs, order, thinnest)
+        cell for low, high in pairwise(ys) for cell in _slab(curves, low, high, xs, order, thinnest)
     ]
     points = np.vstack([p for p, _ in cells]) @ turn
     return Rule(points, np.concatenate([w for _, w in cells]))
