@@ -9,7 +9,8 @@ from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import CentralDifferences, DynamicBody
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.slivers import treat_slivers
+from verify.xfem.sparsity import body_pattern
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -19,7 +20,7 @@ STRAIN, POISSON = 0.15, 0.3
 
 def rest_step(virtual, mass, stuff):
     force = InternalForce(virtual, stuff, "linear")
-    pattern = block_pattern(virtual.cells, virtual.node_count)
+    pattern = body_pattern(virtual)
     blocks = force.stiffness(pattern, np.zeros_like(virtual.node_points), "frozen")
     return critical_step(pattern.matrix(blocks), mass)
 
@@ -41,6 +42,11 @@ def stretched(points):
 
 def uniform(points):
     return 0.15 * points * np.eye(points.shape[1])[0]
+
+
+def aggregated(virtual):
+    """The body and the report of the default sliver policy, held where `let_go` holds it."""
+    return treat_slivers(virtual, held=virtual.node_points[:, 0] < 1e-9)
 
 
 def let_go(virtual, share, steps, every=10, start=stretched):

@@ -156,7 +156,7 @@ def test_each_policy_says_what_it_did_and_keeps_mass_and_separation(policy):
     assert treated.mass.weights.sum() == pytest.approx(DENSITY, rel=1e-12)
     assert treated.virtual.bodies.max() == 1
     report = treated.slivers
-    counts = {"keep": report.kept, "drop": report.dropped, "merge": report.merged}
+    counts = {"keep": report.kept, "drop": report.dropped, "merge": report.aggregated}
     assert str(counts.get(policy, report.kept)) in treated.summary
     assert max(counts.values()) == (16 if policy != "penalise" else report.kept)
     assert (treated.ghost is not None) == (policy == "penalise")

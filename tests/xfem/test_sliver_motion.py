@@ -6,7 +6,7 @@ A body held at one face is let go from a sine of 15 % nominal strain.
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, material
-from swings import cube, let_go, plate, stretched
+from swings import aggregated, cube, let_go, plate, stretched
 
 from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import element_critical_steps
@@ -17,7 +17,6 @@ from verify.xfem.dynamics import (
     ImplicitEuler,
 )
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -26,8 +25,8 @@ from verify.xfem.virtual import cut_mesh
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_plate_with_slivers_swings_at_nine_tenths_of_the_critical_step(seed):
     """10⁴ steps: no piece inverts, and the energy stays within 5 % of that at the start."""
-    treated, report = treat_slivers(plate(seed))
-    assert report.merged > 0
+    treated, report = aggregated(plate(seed))
+    assert report.aggregated > 0
     largest, inverted = let_go(treated, 0.9, 10_000)
     assert inverted == 0
     assert largest < 1.05
@@ -41,8 +40,8 @@ def test_without_a_policy_slivers_of_the_plate_invert():
 def test_a_cube_with_slivers_swings_at_nine_tenths_like_the_conforming_one(size):
     """Cut ε above a layer of nodes; 10⁴ steps; the energy stays within 2 % of that at the start."""
     cut = Plane([0.5, 0.5, 0.5 + size / 4], [0.0, 0.0, 1.0])
-    treated, report = treat_slivers(cut_mesh(box_mesh((4, 4, 4)), [cut]))
-    assert report.merged == 96
+    treated, report = aggregated(cut_mesh(box_mesh((4, 4, 4)), [cut]))
+    assert report.aggregated == 96
     largest, inverted = let_go(treated, 0.9, 10_000, every=25)
     assert inverted == 0
     assert largest < 1.02
@@ -59,8 +58,8 @@ def test_a_cube_with_slivers_swings_at_seven_tenths_of_the_critical_step(seed):
     as it is for the uncut cube when it is let go from a uniform stretch: not a matter of slivers,
     see `test_nonlinear_steps`.
     """
-    treated, report = treat_slivers(cube(seed))
-    assert report.merged > 0
+    treated, report = aggregated(cube(seed))
+    assert report.aggregated > 0
     largest, inverted = let_go(treated, 0.7, 10_000)
     assert inverted == 0
     assert largest < 1.01

@@ -49,7 +49,7 @@ def test_no_volume_mass_or_load_is_lost_and_points_stay_where_they_are(dim, poli
     for seed in range(6):
         virtual = randomly_cut(dim, seed)
         treated, report = treat_slivers(virtual, policy)
-        absorbed += report.dropped + report.merged
+        absorbed += report.dropped + report.aggregated
         assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-13)
         assert treated.shape_integrals.sum() == pytest.approx(1.0, abs=1e-13)
         assert side_wise_mass(treated, 3.0).weights.sum() == pytest.approx(3.0, abs=1e-12)
@@ -65,10 +65,11 @@ def test_no_volume_mass_or_load_is_lost_and_points_stay_where_they_are(dim, poli
         assert divided.interpolation @ treated.node_points == pytest.approx(
             divided.points, abs=1e-13
         )
-        extended = report.absorption.extension @ treated.node_points
+        extended = report.extension @ treated.node_points
         assert extended == pytest.approx(virtual.node_points, abs=1e-13)
-        # what is left is no sliver, unless it holds parts together
-        assert (treated.fraction < DEFAULT_THRESHOLD).sum() <= report.kept
+        # what is left is no sliver, unless it is said
+        left = (treated.fraction < DEFAULT_THRESHOLD).sum()
+        assert left <= report.kept + report.aggregated
     assert absorbed > 10 * dim
 
 
@@ -99,28 +100,6 @@ def test_the_halves_stay_separate(dim, size, policy):
     )
 
 
-@pytest.mark.parametrize("size", [s for s in SIZES if s != 0.0])
-def test_merging_keeps_the_patch_test_exact(size):
-    """Constant stress along the cut, another one on each side."""
-    treated, report = treat_slivers(body(2, size), "merge")
-    level = 0.5 + size / 8
-
-    def stretched(x, side):
-        strain = np.where(side[:, 0] > 0, 0.1, -0.05)
-        across = np.where(side[:, 0] > 0, 0.0, -0.02) - exact.ETA * strain * (x[:, 1] - level)
-        return np.stack([strain * (x[:, 0] - 0.5), across], axis=1)
-
-    supports = Supports.none(treated).prescribe(treated, boundary_nodes(treated.mesh), stretched)
-    solution = solve_static(treated, isotropic(1.0, 0.3, "plane strain"), supports)
-    want = stretched(treated.node_points, treated.node_side)
-    assert np.abs(solution.displacement - want).max() < 1e-13
-    plane = 1.0 / (1.0 - 0.3**2)
-    energy = 0.5 * plane * (0.1**2 * (1.0 - level) + 0.05**2 * level)
-    assert solution.strain_energy == pytest.approx(energy, rel=1e-12)
-    small = body(2, size).fraction < DEFAULT_THRESHOLD
-    assert report.merged == small.sum()
-
-
 def force_on_smallest_piece(virtual, report):
     """Unit force at the centroid of the smallest piece before the policy, in its new unknowns."""
     smallest = virtual.fraction.argmin()
@@ -129,7 +108,7 @@ def force_on_smallest_piece(virtual, report):
     shape = weights @ virtual.sub_cells.barycentric[rows].mean(axis=1) / weights.sum()
     force = np.zeros_like(virtual.node_points)
     force[virtual.cells[smallest], -1] = shape
-    return report.absorption.extension.T @ force
+    return report.extension.T @ force
 
 
 def compliance(dim, size, policy):
@@ -144,12 +123,12 @@ def compliance(dim, size, policy):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_force_on_the_smallest_piece_does_not_see_how_small_it_is(dim):
     """The piece moves with one that is not small: its response differs from the limit by as much
-    as the body has changed, of the order of ε.
+    as body and place of the force have changed, of the order of ε; roots are continued twofold.
     """
     sizes = np.array([4e-2, 1e-2, 1e-3, 1e-6, 1e-9, 1e-12])
     response = np.array([compliance(dim, size, DEFAULT_POLICY) for size in sizes])
     limit = response[-1]
-    assert (np.abs(response / limit - 1.0) <= 3.0 * sizes + 1e-9).all()
+    assert (np.abs(response / limit - 1.0) <= 6.0 * sizes + 1e-9).all()
 
 
 def test_without_a_policy_the_response_in_space_grows_like_the_inverse_of_the_size():
@@ -159,7 +138,8 @@ def test_without_a_policy_the_response_in_space_grows_like_the_inverse_of_the_si
 
 def solved_f3(mesh, policy):
     virtual = cut_mesh(mesh, [Plane([0.5] * mesh.dim, [-1.0, 3.0, 0.0][: mesh.dim])])
-    treated, report = treat_slivers(virtual, policy)
+    ends = np.isin(np.arange(len(mesh.points)), boundary_nodes(mesh))
+    treated, report = treat_slivers(virtual, policy, held=ends[virtual.node_parent])
 
     def field(points, sides):
         plane = exact.f3(points[:, :2], sides)
@@ -182,39 +162,45 @@ def test_the_displacement_error_grows_by_less_than_two_percent(dim, count, polic
         mesh = shaken(rectangle_mesh((count,) * 2) if dim == 2 else box_mesh((count,) * 3), seed)
         kept, _ = solved_f3(mesh, "keep")
         treated, report = solved_f3(mesh, policy)
-        absorbed += report.dropped + report.merged
+        absorbed += report.dropped + report.aggregated
         assert treated <= 1.02 * kept
     assert absorbed > 10
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_corner_cut_off_by_a_sliver_is_given_back(dim):
-    """It is a body of its own, without a neighbour on its side: the sibling takes it."""
+def test_a_corner_cut_off_by_a_sliver_is_given_back_or_counted(dim):
+    """It is a body of its own, without a root on its side: dropped, or kept and counted."""
     mesh = rectangle_mesh((3, 3)) if dim == 2 else box_mesh((3, 3, 3))
     for size in (1e-1, 1e-4, 1e-12):
         corner = np.ones(dim) - size / 3.0 * np.eye(dim)[0]
         virtual = cut_mesh(mesh, [Plane(corner, np.arange(1.0, dim + 1.0))])
         assert virtual.bodies.max() == 1
-        for policy in ("drop", "merge"):
-            treated, report = treat_slivers(virtual, policy)
-            assert treated.bodies.max() == 0
-            assert report.merged == 0
-            assert report.dropped == (virtual.fraction < DEFAULT_THRESHOLD).sum()
-            # nothing is left of the cut: the uncut mesh again
-            assert treated.node_count == len(mesh.points)
-            assert len(subdivide(treated).cut_facets) == 0
+        small = (virtual.fraction < DEFAULT_THRESHOLD).sum()
+        treated, report = treat_slivers(virtual, "drop")
+        assert treated.bodies.max() == 0
+        assert (report.dropped, report.aggregated) == (small, 0)
+        # nothing is left of the cut: the uncut mesh again
+        assert treated.node_count == len(mesh.points)
+        assert len(subdivide(treated).cut_facets) == 0
+        treated, report = treat_slivers(virtual, "merge")
+        assert treated is virtual
+        assert (report.rootless, report.kept, report.aggregated) == (small, small, 0)
 
 
-def test_a_strip_between_two_cuts_a_sliver_apart_is_taken_out():
+def test_a_strip_between_two_cuts_a_sliver_apart_is_taken_out_or_counted():
     cuts = [Plane([0.0, 0.53 + gap], [0.1, 1.0]) for gap in (0.0, 1e-6)]
     virtual = cut_mesh(rectangle_mesh((8, 8)), cuts)
     assert virtual.bodies.max() == 2
-    for policy in ("drop", "merge"):
-        treated, report = treat_slivers(virtual, policy)
-        assert treated.bodies.max() == 1
-        # the strip has sunk into its siblings: nothing moves but two halves
-        strip = np.bincount(virtual.bodies[virtual.cells[:, 0]], virtual.volumes).min()
-        assert report.volume_share >= strip
+    treated, report = treat_slivers(virtual, "drop")
+    assert treated.bodies.max() == 1
+    # the strip has sunk into its siblings: nothing moves but two halves
+    strip = virtual.bodies[virtual.cells[:, 0]]
+    volumes = np.bincount(strip, virtual.volumes)
+    assert report.volume_share >= volumes.min()
+    # it reaches no root: three parts stay three, and it is counted
+    treated, report = treat_slivers(virtual, "merge")
+    assert treated.bodies.max() == 2
+    assert report.rootless == (strip == volumes.argmin()).sum()
 
 
 @pytest.mark.parametrize("policy", ["drop", "merge"])
@@ -239,7 +225,7 @@ def test_pieces_in_a_chain_are_never_torn_apart():
         virtual = cut_mesh(shaken(rectangle_mesh((8, 8)), seed), cuts)
         for policy in ("drop", "merge"):
             treated, report = treat_slivers(virtual, policy)
-            origin = report.absorption.node
+            origin = report.node
             for number in range(treated.bodies.max() + 1):
                 nodes = np.flatnonzero((origin >= 0) & (treated.bodies[origin] == number))
                 assert len(np.unique(virtual.bodies[nodes])) == 1
@@ -251,15 +237,15 @@ def test_the_report_counts_everything():
     small = virtual.fraction < DEFAULT_THRESHOLD
     treated, report = treat_slivers(virtual)
     assert (report.policy, report.threshold) == (DEFAULT_POLICY, DEFAULT_THRESHOLD)
-    assert (report.dropped, report.merged, report.kept) == (0, small.sum(), 0)
+    assert (report.dropped, report.aggregated, report.kept) == (0, small.sum(), 0)
     assert report.largest == virtual.fraction[small].max()
     assert report.volume_share == pytest.approx(virtual.volumes[small].sum(), rel=1e-12)
     kept, report = treat_slivers(virtual, "keep")
-    assert (report.dropped, report.merged, report.kept) == (0, 0, small.sum())
+    assert (report.dropped, report.aggregated, report.kept) == (0, 0, small.sum())
     assert np.array_equal(kept.cells, virtual.cells)
     again, report = treat_slivers(treated)
-    assert (report.dropped, report.merged) == (0, 0)
-    assert np.array_equal(again.cells, treated.cells)
+    assert report.aggregated == small.sum()
+    assert np.array_equal(again.node_parent, treated.node_parent)
 
 
 @pytest.mark.parametrize(
@@ -305,7 +291,8 @@ def test_any_crossing_and_degenerate_cuts_keep_volume_points_and_bodies(seed):
             assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-12)
             moved = divided.interpolation @ treated.node_points
             assert np.abs(moved - divided.points).max() < 1e-12
-            extended = report.absorption.extension @ treated.node_points
+            extended = report.extension @ treated.node_points
             assert np.abs(extended - virtual.node_points).max() < 1e-12
-            assert np.bincount(treated.cells.ravel(), minlength=treated.node_count).min() > 0
+            used = np.unique(treated.cells)
+            assert np.array_equal(used, np.arange(treated.corners.node_count))
             assert treated.bodies.max() <= virtual.bodies.max()

@@ -27,9 +27,9 @@ def test_dynamics_cuts_a_moving_body_penalises_slivers_and_keeps_pace(capsys):
     assert 0.0 < float(re.findall(r"step of (\S+) s", pace)[0]) <= 0.02
 
 
-def test_slivers_are_merged_and_a_penalty_does_not_change_the_answer_much(capsys):
-    merged, energies = printed_by("xfem-slivers.md", capsys)
-    assert merged.startswith("16 slivers merged")
+def test_slivers_are_aggregated_and_a_penalty_does_not_change_the_answer_much(capsys):
+    aggregated, energies = printed_by("xfem-slivers.md", capsys)
+    assert aggregated.startswith("16 slivers aggregated")
     kept, penalised = map(float, re.findall(r"(\S+) J", energies))
     assert kept > 0.0
     assert penalised == pytest.approx(kept, rel=5e-3)

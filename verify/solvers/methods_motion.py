@@ -8,7 +8,7 @@ from verify.scene import Equilibrium, Scene
 from verify.solvers.xfem_answer import Answer
 from verify.solvers.xfem_motion import MotionChoice, Mover
 from verify.xfem.corotation import InternalForce
-from verify.xfem.dynamics import MotionState
+from verify.xfem.dynamics import DynamicBody, MotionState
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh
 
@@ -63,6 +63,6 @@ class MethodMover(Mover):
         return self._internal_force(self._cut_body.resisting)
 
     def _inherited(
-        self, virtual: VirtualMesh, further: VirtualMesh, state: MotionState
+        self, virtual: VirtualMesh, state: MotionState, further: DynamicBody
     ) -> MotionState:
         return state

@@ -65,8 +65,9 @@ class XfemSolver:
         `verify.xfem.splitting.split.split_cells`.
     slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
-        `verify.xfem.slivers`. A direct static solve does not mind them, so they are kept. The last
-        is a ghost penalty, of linear statics and of motion with the side-wise mass.
+        `verify.xfem.slivers`; "merge" is cell aggregation. A direct static solve does not mind
+        them, so they are kept. The last is a ghost penalty, of linear statics and of motion with
+        the side-wise mass.
     load_steps : int
         Corotational statics: equal parts in which supports and loads grow, halved where the energy
         asks for it; 0: one.
@@ -201,9 +202,11 @@ def _run(
     start = perf_counter()
     virtual = cut_mesh(mesh, cuts_of(scene, size), choice.tip)  # type: ignore[arg-type]
     slivers = None
-    if choice.slivers in ("merge", "drop"):
-        virtual, slivers = treat_slivers(virtual, choice.slivers)  # type: ignore[arg-type]
     virtual, specks = join_specks(virtual, supports_of(scene, virtual, exact))
+    if choice.slivers in ("merge", "drop"):
+        held = supports_of(scene, virtual, exact).fixed.any(axis=1)
+        policy: Any = choice.slivers
+        virtual, slivers = treat_slivers(virtual, policy, held=held)
     enrichment = perf_counter() - start
     penalise = choice.slivers == "penalise"
     found = solve_equilibrium(scene, virtual, exact, choice.basis, choice.load_steps, penalise)
@@ -218,5 +221,6 @@ def _run(
         iterations=found.iterations,
         notes=found.notes,
         slivers=slivers,
+        unknowns=found.displacement.size,
         further=[*found.regularisations, *joined(specks)],
     )

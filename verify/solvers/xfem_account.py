@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics.energy_ledger import Ledger
+from verify.xfem.dynamics import DynamicBody, MotionState
+from verify.xfem.dynamics.energy_ledger import EnergyLedger, Ledger
 
 __all__ = ["Account"]
 
@@ -45,6 +46,19 @@ class Account:
             self._rows.append(row)
         for column, name in _DONE.items():
             self._done[name] += float(getattr(ledger, column)[-1])
+
+    def open(
+        self, body: DynamicBody, state: MotionState, further: DynamicBody, inherited: MotionState
+    ) -> None:
+        """Enter the energy that is lost where a body that is cut further takes over a state.
+
+        Nothing without a sliver policy. It is the scheme's, like what a step dissipates.
+        """
+        before, after = (
+            float(EnergyLedger(*of).close().mechanical[0])
+            for of in ((body, state), (further, inherited))
+        )
+        self._done["algorithmic"] += before - after
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """All entries (t,) by name: energies in J, momenta in kg m/s and kg m²/s."""

@@ -32,6 +32,7 @@ class Answer:
     iterations: dict[str, int]
     notes: dict[str, str]
     slivers: SliverReport | None
+    unknowns: int
     further: list[Regularisation] = field(default_factory=list)
 
 
@@ -67,13 +68,13 @@ def solution_of(
         cut_facets=body.cut_facets,
         cell_sides=_side_labels(virtual.label[body.cell_piece]),
         ledger=answer.ledger,
-        unknowns=answer.displacement[0].size,
+        unknowns=answer.unknowns,
         size=size,
         timings=timings,
         iterations=answer.iterations,
         regularisations=[
             *_regularisations(scene, virtual, body),
-            *_absorbed(answer.slivers),
+            *_treated(answer.slivers),
             *answer.further,
         ],
         notes={**notes, **answer.notes},
@@ -128,13 +129,14 @@ def _regularisations(scene: Scene, virtual: VirtualMesh, body: Subdivision) -> l
     return entries
 
 
-def _absorbed(report: SliverReport | None) -> list[Regularisation]:
-    """Report slivers that a larger piece absorbed, each kind with its largest volume fraction."""
+def _treated(report: SliverReport | None) -> list[Regularisation]:
+    """Report what was done to slivers, each kind with its largest volume fraction."""
     if report is None:
         return []
     counts = {
-        "sliver absorbed by its neighbour on the same side": report.merged,
+        "sliver that follows a root cell (aggregation)": report.aggregated,
         "sliver absorbed across the cut": report.dropped,
+        "sliver without a root cell, kept": report.rootless,
     }
     return [
         Regularisation(kind, count, report.largest, "volume fraction")

@@ -21,7 +21,7 @@ from verify.xfem.bases import (
 )
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import BasisError
-from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.sparsity import body_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
@@ -52,7 +52,7 @@ def solve_in_basis(
     """
     check_bodies(virtual, supports)
     clock = [perf_counter()]
-    pattern = block_pattern(virtual.cells, virtual.node_count)
+    pattern = body_pattern(virtual)
     blocks = LinearStiffness(virtual, material).assemble(pattern)
     matrix = transformed_matrix(virtual, basis, csr_array(pattern.matrix(blocks)))
     known = from_sidewise(virtual, basis, supports.values).ravel()

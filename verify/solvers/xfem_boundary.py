@@ -47,11 +47,11 @@ def own_corners(virtual: VirtualMesh) -> NDArray[np.bool_]:
 
     Behind a cut it does not: the unknown belongs to a node that is beyond.
     """
-    piece, _, in_cell = _solid(virtual)
-    own = np.zeros(virtual.node_count, dtype=bool)
-    simplex, vertex = np.nonzero(in_cell.max(axis=2) == 1.0)
-    own[virtual.cells[piece[simplex], in_cell[simplex, vertex].argmax(axis=1)]] = True
-    return own
+    piece, barycentric, _ = virtual.solid_simplices
+    own = np.zeros(virtual.corners.node_count, dtype=bool)
+    simplex, vertex = np.nonzero(barycentric.max(axis=2) == 1.0)
+    own[virtual.cells[piece[simplex], barycentric[simplex, vertex].argmax(axis=1)]] = True
+    return own[virtual.node_corner]
 
 
 def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
@@ -60,14 +60,15 @@ def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
     Returns
     -------
     unknowns : (k,) int array
-        Unknown nodes at the nodes of a facet, on the side of the part.
+        Unknown nodes at the nodes of a facet, on the side of the part; nodes that follow a root
+        cell have none.
     points : (k, space) array
         Centroid of the part, m.
     """
     mesh = virtual.mesh
-    piece, cell, in_cell = _solid(virtual)
+    piece, in_cell, _ = virtual.solid_simplices
     cut = virtual.split[piece]
-    piece, cell, in_cell = piece[cut], cell[cut], in_cell[cut]
+    piece, cell, in_cell = piece[cut], virtual.parent[piece[cut]], in_cell[cut]
     facets = mesh.boundary_facets
     unknowns, points = [], []
     corners = mesh.dim + 1
@@ -84,12 +85,5 @@ def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
             centroid = np.einsum("ki,kij->kj", middle, nodes)
             unknowns.append(virtual.cells[piece[on_facet]][:, rest].ravel())
             points.append(np.repeat(centroid, mesh.dim, axis=0))
-    return np.concatenate(unknowns), np.concatenate(points)
-
-
-def _solid(virtual: VirtualMesh) -> tuple[_Ints, _Ints, NDArray[np.float64]]:
-    """Simplices of the material in their own cells: piece, cell, barycentric corners there."""
-    piece, _, _ = virtual.solid_simplices
-    cell, in_cell = virtual.solid_places
-    home = virtual.parent[piece] == cell  # what a neighbour has absorbed has no unknowns there
-    return piece[home], cell[home], in_cell[home]
+    node = virtual.corner_node[np.concatenate(unknowns)]
+    return node[node >= 0], np.concatenate(points)[node >= 0]

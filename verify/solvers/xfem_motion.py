@@ -132,9 +132,11 @@ class Mover:
         for k, start in enumerate(starts):
             count = sum(opens <= start for opens in self.opens)
             if count > opened:
-                further = self._cut(count)
-                state = self._inherited(virtual, further, state)
-                virtual, body, opened = further, self._body(further), count
+                further = self._body(self._cut(count))
+                inherited = self._inherited(virtual, state, further)
+                self.account.open(body, state, further, inherited)
+                body, state, opened = further, inherited, count
+                virtual = body.force.virtual
             last = k == len(starts) - 1
             end = float(self.times[-1]) if last else starts[k + 1]
             wanted = self.times[(self.times >= start) & ((self.times < end) | last)]
@@ -156,7 +158,8 @@ class Mover:
         policy: Any = self.choice.slivers
         virtual = cut_mesh(self.mesh, self.cuts[:count], tip)
         if count and policy in ("merge", "drop"):
-            virtual, self.slivers = treat_slivers(virtual, policy)
+            held = motion_of_supports(self.scene, virtual, self.exact).fixed.any(axis=1)
+            virtual, self.slivers = treat_slivers(virtual, policy, held=held)
         self.timings["enrichment"] += perf_counter() - clock
         return virtual
 
@@ -236,10 +239,10 @@ class Mover:
         ).displacement
 
     def _inherited(
-        self, virtual: VirtualMesh, further: VirtualMesh, state: MotionState
+        self, virtual: VirtualMesh, state: MotionState, further: DynamicBody
     ) -> MotionState:
         try:
-            return inherit_state(virtual, further, state)
+            return inherit_state(virtual, further.force.virtual, state, further)
         except XfemError as error:
             raise InputError(
                 f"the state at {state.time:g} s cannot be handed on to the body that is cut "
@@ -319,17 +322,18 @@ class Mover:
     def _answer(self, virtual: VirtualMesh, fields: list["_Output"]) -> Answer:
         olds = {id(one.virtual): one.virtual for one in fields if one.virtual is not virtual}
         sources = {key: ancestors(old, virtual) for key, old in olds.items()}
-        shape = (len(fields), *virtual.node_points.shape)
+        # before a cut opens nothing follows a root cell there: corners say it all
+        shape = (len(fields), *virtual.corners.node_points.shape)
         displacement, velocity, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
         balanced = True
         for k, one in enumerate(fields):
             source = sources.get(id(one.virtual), slice(None))
-            displacement[k] = one.state.displacement[source]
-            velocity[k] = one.state.velocity[source]
+            displacement[k] = one.virtual.extend(one.state.displacement)[source]
+            velocity[k] = one.virtual.extend(one.state.velocity)[source]
             if one.acceleration is None:
                 balanced = False
             else:
-                acceleration[k] = one.acceleration[source]
+                acceleration[k] = one.virtual.extend(one.acceleration)[source]
         sizes = sorted(self.step_sizes)
         notes = {
             "scheme": self.choice.scheme,
@@ -343,7 +347,7 @@ class Mover:
         if self.solves:
             iterations["newton"] = self.solves
         return Answer(
-            virtual,
+            virtual.corners,
             self.times[: len(fields)],
             displacement,
             velocity,
@@ -353,5 +357,6 @@ class Mover:
             iterations,
             notes,
             self.slivers,
+            virtual.node_points.size,
             penalised(self.penalty),
         )

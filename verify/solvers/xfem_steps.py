@@ -87,7 +87,7 @@ def largest_step(
 
 def _critical(body: DynamicBody, material: Material, density: float, explicit: bool) -> float:
     virtual = body.force.virtual
-    if not explicit or body.mass.diagonal is not None:
+    if not explicit or body.mass.keeps_element_steps:
         # side-wise mass: no cut makes it smaller than that of the smallest uncut element
         strain = _REACH if body.force.turning else 0.0
         step = float(element_critical_steps(virtual.mesh, material, density, strain).min())

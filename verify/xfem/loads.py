@@ -36,15 +36,15 @@ def body_force(virtual: VirtualMesh, density: ArrayLike | Density, degree: int =
         Polynomial degree of density times shape function that is integrated exactly on each
         piece, if `density` is a function.
     """
-    load = np.zeros_like(virtual.node_points)
+    load = np.zeros_like(virtual.corners.node_points)
     if not callable(density):
         force = _vector(density, load.shape[1])
         np.add.at(load, virtual.cells, virtual.shape_integrals[:, :, None] * force)
-        return load
+        return virtual.restrict(load)
     piece, barycentric, share = virtual.solid_simplices
     volume = share * virtual.mesh.measures[virtual.parent[piece]]
     _integrate(virtual, load, piece, barycentric, volume, density, degree)
-    return load
+    return virtual.restrict(load)
 
 
 def traction(
@@ -81,13 +81,13 @@ def traction(
         chosen.min() < 0 or chosen[:, 0].max() >= len(mesh.cells) or chosen[:, 1].max() > mesh.dim
     ):
         raise XfemError("a loaded facet is not a pair (cell, local node) of the mesh")
-    load = np.zeros_like(virtual.node_points)
+    load = np.zeros_like(virtual.corners.node_points)
     function = density if callable(density) else _constant(_vector(density, load.shape[1]))
     for local in range(mesh.dim + 1):
         cells = chosen[chosen[:, 1] == local, 0]
         piece, corners, area = _facet_parts(virtual, cells, local)
         _integrate(virtual, load, piece, corners, area, function, degree)
-    return load
+    return virtual.restrict(load)
 
 
 def _vector(density: ArrayLike, dim: int) -> _Floats:
@@ -111,13 +111,13 @@ def _facet_parts(virtual: VirtualMesh, cells: _Ints, local: int) -> tuple[_Ints,
     wanted = np.zeros(len(mesh.cells), dtype=bool)
     wanted[cells] = True
     piece, barycentric, _ = virtual.solid_simplices
-    cell, in_cell = virtual.solid_places
+    cell = virtual.parent[piece]
     here = np.flatnonzero(wanted[cell])
     found_piece, found_corners, found_area = [], [], []
     for opposite in range(mesh.dim + 1):
         rest = [k for k in range(mesh.dim + 1) if k != opposite]
-        on_facet = here[(in_cell[here][:, rest, local] == 0.0).all(axis=1)]
-        share = np.abs(np.linalg.det(in_cell[on_facet][:, rest][:, :, others]))
+        on_facet = here[(barycentric[here][:, rest, local] == 0.0).all(axis=1)]
+        share = np.abs(np.linalg.det(barycentric[on_facet][:, rest][:, :, others]))
         found_piece.append(piece[on_facet])
         found_corners.append(barycentric[on_facet][:, rest])
         found_area.append(share * area[cell[on_facet]])

@@ -18,15 +18,15 @@ from scipy.sparse.linalg import splu
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import real_array
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import BlockPattern, block_pattern
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.sparsity import body_pattern, find_places, pattern_places
+from verify.xfem.virtual import Aggregation, VirtualMesh
 
 __all__ = [
+    "AggregatedMass",
     "Mass",
     "cell_densities",
     "consistent_mass",
-    "coupled_pattern",
-    "pattern_places",
     "second_moments",
     "side_wise_mass",
 ]
@@ -59,6 +59,11 @@ class Mass:
         """(N,) the diagonal if the matrix is one, else None."""
         rows, columns, _ = self.entries
         return None if (rows != columns).any() else np.asarray(self.matrix.diagonal())
+
+    @property
+    def keeps_element_steps(self) -> bool:
+        """Whether no cut makes the explicit step smaller than that of the smallest element."""
+        return self.diagonal is not None
 
     @cached_property
     def entries(self) -> tuple[_Ints, _Ints, _Floats]:
@@ -115,8 +120,9 @@ class Mass:
             rows, columns, _ = self.entries
             upper = rows < columns
             pairs = np.stack([rows[upper], columns[upper]], axis=1)
-            own = np.concatenate([own, pairs[_uncoupled(virtual, pairs)]])
-        return coupled_pattern(virtual, own)
+            _, found = find_places(body_pattern(virtual), pairs[:, 0], pairs[:, 1])
+            own = np.concatenate([own, pairs[~found]])
+        return body_pattern(virtual, own)
 
     def places(self, pattern: BlockPattern) -> _Ints:
         """Block of each of the `entries` in a pattern.
@@ -132,43 +138,67 @@ class Mass:
         return pattern_places(pattern, rows, columns)
 
 
-def coupled_pattern(virtual: VirtualMesh, couplings: _Ints) -> BlockPattern:
-    """Sparsity of a body and of further couplings (k, 2) between its unknown nodes."""
-    if len(couplings) == 0:
-        return block_pattern(virtual.cells, virtual.node_count)
-    corners = virtual.cells.shape[1]
-    extra = couplings[:, [0] + [1] * (corners - 1)]
-    return block_pattern(np.concatenate([virtual.cells, extra]), virtual.node_count)
+@dataclass(frozen=True)
+class AggregatedMass(Mass):
+    """CᵀMC: the mass of the corners on unknowns that some of them follow, u = C û.
 
+    Not diagonal where a root cell carries others, else it is if M is. Lumped anew it would be no
+    bound of the explicit step any more: K ≤ ω²M gives CᵀKC ≤ ω²CᵀMC, and no other mass.
 
-def pattern_places(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> _Ints:
-    """Blocks at the given rows and columns.
-
-    Raises
-    ------
-    XfemError
-        If the pattern lacks one.
+    Attributes
+    ----------
+    of_corners : Mass
+        M.
+    aggregation : Aggregation
     """
-    at, found = _find(pattern, rows, columns)
-    if not found.all():
-        raise XfemError(
-            "the pattern lacks couplings of this mass or penalty; expected that of the body"
-        )
-    return at
 
+    of_corners: Mass
+    aggregation: Aggregation
 
-def _find(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> tuple[_Ints, NDArray[np.bool_]]:
-    of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
-    keys = of_row * pattern.node_count + pattern.columns
-    wanted = rows * pattern.node_count + columns
-    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return at, keys[at] == wanted
+    @staticmethod
+    def of(of_corners: Mass, aggregation: Aggregation) -> "AggregatedMass":
+        """Aggregate a mass of the corners."""
+        extension, back = aggregation.extension, aggregation.restriction
+        matrix = csr_array(back @ of_corners.matrix @ extension)
+        matrix.sum_duplicates()
+        return AggregatedMass(matrix, None, back @ of_corners.weights, of_corners, aggregation)
 
+    @property
+    def keeps_element_steps(self) -> bool:
+        """Whether no cut makes the explicit step smaller than that of the smallest element."""
+        return self.of_corners.keeps_element_steps
 
-def _uncoupled(virtual: VirtualMesh, pairs: _Ints) -> NDArray[np.bool_]:
-    """Which pairs of unknown nodes no cell contains."""
-    _, found = _find(block_pattern(virtual.cells, virtual.node_count), pairs[:, 0], pairs[:, 1])
-    return ~found
+    def solve(self, forces: _Floats) -> _Floats:
+        """M⁻¹ times (N, d) forces: blocks of coupled unknowns are factorised once."""
+        coupled, factor = self._coupled
+        found = forces / self.matrix.diagonal()[:, None]
+        if len(coupled):
+            found[coupled] = factor.solve(forces[coupled])
+        return found
+
+    @cached_property
+    def _coupled(self):
+        """Unknowns that the matrix couples, and the factor of their block."""
+        rows, columns, _ = self.entries
+        coupled = np.unique(rows[rows != columns])
+        if len(coupled) == 0:
+            return coupled, None
+        return coupled, splu(csc_array(self.matrix[coupled][:, coupled]))
+
+    def project(self, corner_values: _Floats, held: NDArray[np.bool_], values: _Floats) -> _Floats:
+        """Values (N, d) nearest to those at the corners in the mass, given where held (N, d).
+
+        Of a velocity: linear and angular momentum of every part without a support stay.
+        """
+        moment = self.aggregation.restriction @ self.of_corners.apply(corner_values)
+        found = np.where(held, values, 0.0)
+        moment -= self.apply(found)
+        for axis in range(found.shape[1]):
+            free = np.flatnonzero(~held[:, axis])
+            if len(free):
+                factor = splu(csc_array(self.matrix[free][:, free]))
+                found[free, axis] = factor.solve(moment[free, axis])
+        return found
 
 
 def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> _Floats:
@@ -222,6 +252,8 @@ def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     density : float or (m,) array_like
         In kg/m³; for membranes times the thickness.
     """
+    if virtual.aggregation is not None:
+        return AggregatedMass.of(side_wise_mass(virtual.corners, density), virtual.aggregation)
     densities = np.ascontiguousarray(cell_densities(virtual.mesh, density))
     weights = np.zeros(virtual.node_count)
     _add_shares(virtual.cells, virtual.parent, virtual.volumes, densities, weights)
@@ -262,6 +294,8 @@ def consistent_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
 
     Its explicit step vanishes with the smallest piece.
     """
+    if virtual.aggregation is not None:
+        return AggregatedMass.of(consistent_mass(virtual.corners, density), virtual.aggregation)
     moments = second_moments(virtual)
     moments *= cell_densities(virtual.mesh, density)[virtual.parent][:, None, None]
     rows = np.broadcast_to(virtual.cells[:, :, None], moments.shape)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from verify.xfem.errors import XfemError
-from verify.xfem.mass import Mass, cell_densities, second_moments, side_wise_mass
+from verify.xfem.mass import AggregatedMass, Mass, cell_densities, second_moments, side_wise_mass
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["ShiftedLumping", "shifted_mass"]
@@ -45,6 +45,9 @@ def shifted_mass(virtual: VirtualMesh, density: ArrayLike, lumping: ShiftedLumpi
     """
     if lumping not in ("enrichment", "row sum", "weighted diagonal"):
         raise XfemError(f"lumping '{lumping}'; expected enrichment, row sum or weighted diagonal")
+    if virtual.aggregation is not None:
+        whole = shifted_mass(virtual.corners, density, lumping)
+        return AggregatedMass.of(whole, virtual.aggregation)
     count, nodes = virtual.node_count, len(virtual.mesh.points)
     unknowns = np.bincount(virtual.node_parent)
     if unknowns.max() > 2:

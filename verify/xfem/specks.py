@@ -44,6 +44,7 @@ def join_specks(virtual: VirtualMesh, supports: Supports) -> tuple[VirtualMesh, 
     Parameters
     ----------
     virtual : VirtualMesh
+        Before a sliver policy.
     supports : Supports
         Of its unknowns: a part that they hold is left alone.
 

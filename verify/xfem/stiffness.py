@@ -58,15 +58,18 @@ class LinearStiffness:
             blocks[:] = 0.0
         v = self.virtual
         targets = pattern.targets[: len(v.cells)]
+        added = pattern.unfold(blocks)
         add_stiffness(
-            targets, v.mesh.gradients, self.normals, v.parent, v.volumes, self.lam, self.mu, blocks
+            targets, v.mesh.gradients, self.normals, v.parent, v.volumes, self.lam, self.mu, added
         )
+        pattern.fold(added, blocks)
         return blocks
 
     def force(self, displacement: _Floats) -> tuple[_Floats, float]:
         """Apply to a displacement (N, d): internal force (N, d) and strain energy, in N and J."""
         v = self.virtual
-        force = np.zeros_like(displacement)
+        extended = v.extend(displacement)
+        force = np.zeros_like(extended)
         energy = linear_force(
             v.cells,
             v.mesh.gradients,
@@ -75,10 +78,10 @@ class LinearStiffness:
             v.volumes,
             self.lam,
             self.mu,
-            displacement,
+            extended,
             force,
         )
-        return force, float(energy)
+        return v.restrict(force), float(energy)
 
 
 def _unit_normals(mesh: SimplexMesh) -> _Floats:

@@ -6,7 +6,7 @@ edges, so that no hanging node is left. The piecewise linear field on this mesh 
 field itself, not an interpolation of it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,15 +51,18 @@ class Subdivision:
 
 def subdivide(virtual: VirtualMesh) -> Subdivision:
     """Make the conforming sub-division of a cut mesh."""
+    if virtual.aggregation is not None:
+        divided = subdivide(virtual.corners)
+        interpolation = csr_array(divided.interpolation @ virtual.aggregation.extension)
+        return replace(divided, interpolation=interpolation)
     mesh, zero = virtual.mesh, virtual.sub_cells.zero_points
     simplices = _conforming(virtual)
     source, ids, barycentric = simplices.source, simplices.points, simplices.barycentric
     piece = virtual.solid_simplices[0][source]
 
-    # a mesh node moves with one unknown, a point of the cut with those of its edge, and a node
-    # of a neighbour that was absorbed with all unknowns of the piece
+    # a mesh node moves with one unknown, a point of the cut with those of its edge
     unknowns = virtual.cells[piece]
-    row, corner = np.nonzero((ids >= len(mesh.points)) | ((barycentric != 0.0).sum(axis=2) > 1))
+    row, corner = np.nonzero(ids >= len(mesh.points))
     node = np.take_along_axis(unknowns, barycentric.argmax(axis=2), axis=1)
     weights, columns = barycentric[row, corner], unknowns[row]
     support = np.sort(np.where(weights != 0.0, columns, -1), axis=1)
@@ -89,7 +92,7 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
         points=points,
         cells=_oriented(points, cells),
         cell_piece=piece,
-        cell_parent=virtual.solid_places[0][source],
+        cell_parent=virtual.parent[piece],
         interpolation=interpolation,
         cut_facets=_cut_facets(points, cells, ids),
     )

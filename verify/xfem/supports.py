@@ -56,7 +56,8 @@ class Supports:
         ----------
         virtual : VirtualMesh
         nodes : (k,) array_like of int, or (n,) of bool
-            Nodes of the *uncut* mesh; every unknown node there is prescribed.
+            Nodes of the *uncut* mesh; every unknown node there is prescribed. None may follow a
+            root cell (aggregation): its value would be what the root says.
         values : float, (d,) array_like, or callable
             A function is called with the positions (k, d) and the sides (k, cuts) of the unknown
             nodes, so that a field that jumps across a cut is evaluated on the right side.
@@ -66,8 +67,8 @@ class Supports:
         Raises
         ------
         XfemError
-            If these supports are of another body, nodes or components do not exist, or values
-            have a wrong shape or are not finite.
+            If these supports are of another body, nodes or components do not exist, a node has
+            material that follows a root cell, or values have a wrong shape or are not finite.
         """
         count, dim = len(virtual.mesh.points), self.fixed.shape[1]
         if self.fixed.shape != virtual.node_points.shape:
@@ -84,6 +85,12 @@ class Supports:
                 raise XfemError(f"supported node outside 0..{count - 1}")
         mark = np.zeros(count, dtype=bool)
         mark[chosen] = True
+        following = virtual.corners.node_parent[virtual.corner_node < 0]
+        if mark[following].any():
+            raise XfemError(
+                f"{int(mark[following].sum())} nodes of slivers at supported nodes follow a root "
+                "cell, so that no value can be prescribed there; say held= to the sliver policy"
+            )
         at = np.flatnonzero(mark[virtual.node_parent])
         axes = range(dim) if components is None else components
         if not isinstance(axes, Sequence) or any(axis not in range(dim) for axis in axes):
@@ -129,7 +136,7 @@ def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
     if not np.isfinite(values).all():
         raise XfemError("a prescribed displacement is not finite")
     for body in loose_bodies(virtual, supports, np.arange(virtual.bodies.max() + 1)):
-        pieces = virtual.bodies[virtual.cells[:, 0]] == body
+        pieces = virtual.corners.bodies[virtual.cells[:, 0]] == body
         volume = virtual.volumes[pieces].sum()
         centre = virtual.volumes[pieces] @ virtual.piece_centroids[pieces] / volume
         unit = "m²" if supports.fixed.shape[1] == 2 else "m³"

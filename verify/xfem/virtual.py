@@ -6,12 +6,12 @@ Heaviside enrichment (2.48), in side-wise unknowns. After that nothing downstrea
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.cuts.crossing import TipRule
@@ -22,7 +22,7 @@ from verify.xfem.splitting.split import Partition, split_cells
 from verify.xfem.splitting.unknown_nodes import node_sides, number_groups, piece_sides
 from verify.xfem.splitting.zero_points import ZeroPoints
 
-__all__ = ["SubCells", "VirtualMesh", "cut_mesh"]
+__all__ = ["Aggregation", "SubCells", "VirtualMesh", "cut_mesh"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -44,12 +44,6 @@ class SubCells:
         Share in the volume of the parent cell, positive.
     zero_points : ZeroPoints
         Positions of all numbered points, and the edges on which the new ones lie.
-    cell : (k,) int array, optional
-        Cell of the uncut mesh in which each lies, if a piece reaches out of its parent cell
-        because it has absorbed a neighbour; `barycentric` and `fraction` still count in the
-        parent cell.
-    in_cell : (k, d + 1, d + 1) float array, optional
-        Barycentric coordinates of the vertices in that cell.
     """
 
     piece: _Ints
@@ -57,24 +51,51 @@ class SubCells:
     barycentric: _Floats
     fraction: _Floats
     zero_points: ZeroPoints
-    cell: _Ints | None = None
-    in_cell: _Floats | None = None
+
+
+@dataclass(frozen=True)
+class Aggregation:
+    """Corners of a cut mesh that have no unknown of their own.
+
+    Attributes
+    ----------
+    corners : VirtualMesh
+        The same body with an unknown node for each corner.
+    extension : (N_corners, N) csr_array
+        Corner values from those of the unknown nodes; it reproduces linear fields.
+    node : (N_corners,) int array
+        Unknown node of each corner; −1 for one that follows others.
+    """
+
+    corners: "VirtualMesh"
+    extension: csr_array
+    node: _Ints
+
+    @cached_property
+    def restriction(self) -> csr_array:
+        """(N, N_corners) transpose of the extension."""
+        return csr_array(self.extension.T)
 
 
 @dataclass(frozen=True)
 class VirtualMesh:
     """A cut mesh. "Unknown node" means: one displacement vector.
 
+    With cell aggregation (`verify.xfem.slivers.aggregation`) some corners of the pieces have no
+    unknown of their own but follow others: `cells` counts corners, and everything else here that
+    has N rows is of the unknown nodes. `extend` and `restrict` lead from one to the other.
+
     Attributes
     ----------
     mesh : SimplexMesh
         The mesh before the cut.
     cells : (p, d + 1) int array
-        Unknown nodes of each piece (virtual cell), ordered by parent.
+        Corners of each piece (virtual cell), ordered by parent: unknown nodes if nothing is
+        aggregated.
     parent : (p,) int array
         Cell of the uncut mesh.
     fraction : (p,) float array
-        V_piece / V_parent, in (0, 1]; above 1 if the piece has absorbed a neighbour.
+        V_piece / V_parent, in (0, 1].
     label : (p, cuts) int8 array
         Side of each cut that splits the parent; 0 where the cut does not split it.
     node_parent : (N,) int array
@@ -90,6 +111,8 @@ class VirtualMesh:
         Nodal level-set values within round-off taken as exactly zero.
     dropped : int
         Pieces left out because their volume is exactly zero.
+    aggregation : Aggregation, optional
+        Corners that follow the unknown nodes of a root cell.
     """
 
     mesh: SimplexMesh
@@ -103,11 +126,49 @@ class VirtualMesh:
     sub_cells: SubCells
     snapped: int
     dropped: int
+    aggregation: "Aggregation | None" = None
 
     @property
     def node_count(self) -> int:
         """Number of unknown nodes."""
         return len(self.node_parent)
+
+    @property
+    def corners(self) -> "VirtualMesh":
+        """The same body with an unknown node for each corner; itself if nothing is aggregated."""
+        return self if self.aggregation is None else self.aggregation.corners
+
+    @cached_property
+    def corner_node(self) -> _Ints:
+        """(N_corners,) the unknown node of each corner; −1 for those that have none."""
+        if self.aggregation is None:
+            return np.arange(self.node_count)
+        return self.aggregation.node
+
+    @cached_property
+    def node_corner(self) -> _Ints:
+        """(N,) the corner that each unknown node is."""
+        own = np.flatnonzero(self.corner_node >= 0)
+        corner = np.empty(self.node_count, dtype=np.int64)
+        corner[self.corner_node[own]] = own
+        return corner
+
+    def following(self, aggregation: "Aggregation", old_of_new: _Ints) -> "VirtualMesh":
+        """Leave the unknown nodes `old_of_new` (N,) alone, which the other corners follow."""
+        return replace(
+            self,
+            node_parent=self.node_parent[old_of_new],
+            node_side=self.node_side[old_of_new],
+            aggregation=aggregation,
+        )
+
+    def extend(self, values: _Floats) -> _Floats:
+        """Corner values (N_corners, d) of nodal values (N, d)."""
+        return values if self.aggregation is None else self.aggregation.extension @ values
+
+    def restrict(self, forces: _Floats) -> _Floats:
+        """Nodal forces (N, d) that do the same work as forces at the corners (N_corners, d)."""
+        return forces if self.aggregation is None else self.aggregation.restriction @ forces
 
     @cached_property
     def node_points(self) -> _Floats:
@@ -161,6 +222,8 @@ class VirtualMesh:
     @cached_property
     def node_piece_points(self) -> _Floats:
         """(N, space) a point inside the material of each unknown: centroid of its largest piece."""
+        if self.aggregation is not None:
+            return self.corners.node_piece_points[self.node_corner]
         corners = self.cells.shape[1]
         flat, piece = self.cells.ravel(), np.repeat(np.arange(len(self.cells)), corners)
         order = np.lexsort([self.volumes[piece], flat])
@@ -184,22 +247,10 @@ class VirtualMesh:
         )
 
     @cached_property
-    def solid_places(self) -> tuple[_Ints, _Floats]:
-        """Cell of the uncut mesh and barycentric corners in it, of each of the simplices above."""
-        piece, barycentric, _ = self.solid_simplices
-        cell = self.parent[piece]
-        sub = self.sub_cells
-        if sub.cell is None or sub.in_cell is None:
-            return cell, barycentric
-        whole = len(piece) - len(sub.piece)
-        return (
-            np.concatenate([cell[:whole], sub.cell]),
-            np.concatenate([barycentric[:whole], sub.in_cell]),
-        )
-
-    @cached_property
     def bodies(self) -> _Ints:
         """(N,) number of the free body to which each unknown node belongs."""
+        if self.aggregation is not None:
+            return self.corners.bodies[self.node_corner]
         first, others = self.cells[:, :1], self.cells[:, 1:]
         row = np.broadcast_to(first, others.shape).ravel()
         size = self.node_count

@@ -29,7 +29,7 @@ from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
-from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.sparsity import body_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
@@ -114,7 +114,7 @@ def fall(lumping: str, scheme: str, offset: float = 0.5) -> Fall:
     )
     steps = _IMPLICIT_STEPS
     if scheme in _EXPLICIT:
-        pattern = block_pattern(virtual.cells, virtual.node_count)
+        pattern = body_pattern(virtual)
         stiffness = pattern.matrix(LinearStiffness(virtual, stiff).assemble(pattern))
         steps = int(np.ceil(_DURATION / (0.5 * critical_step(stiffness, mass))))
     step = _DURATION / steps

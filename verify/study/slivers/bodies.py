@@ -110,8 +110,19 @@ class SweptBody:
         return InternalForce(self.virtual, material, kinematics)
 
 
-def swept_body(mesh: SimplexMesh, placement: Placement, size: float, treatment: str) -> SweptBody:
+def swept_body(
+    mesh: SimplexMesh, placement: Placement, size: float, treatment: str, hung: bool = False
+) -> SweptBody:
     """Cut a mesh `size` elements from where the cut would be degenerate, and treat the slivers.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    placement, size, treatment
+        As in `verify.study.slivers.measurement.Measurement`.
+    hung : bool
+        Whether the body is going to be held at the side where the first coordinate is zero:
+        nodes there keep their unknowns.
 
     Raises
     ------
@@ -131,8 +142,9 @@ def swept_body(mesh: SimplexMesh, placement: Placement, size: float, treatment: 
     if treatment == "ghost penalty":
         return replace(whole, ghost=GhostPenalty(cut_body, soft(dim)))
     if treatment in ("drop", "merge"):
-        treated, report = treat_slivers(cut_body, treatment)  # type: ignore[arg-type]
-        return replace(whole, virtual=treated, extension=report.absorption.extension)
+        held = hung & (cut_body.node_points[:, 0] < 1e-9)
+        treated, report = treat_slivers(cut_body, treatment, held=held)  # type: ignore[arg-type]
+        return replace(whole, virtual=treated, extension=report.extension)
     if treatment == "keep":
         return whole
     opened = conforming_peer(mesh, cuts, treatment)

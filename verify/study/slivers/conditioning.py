@@ -17,7 +17,7 @@ from verify.study.slivers.bodies import SweptBody, soft
 from verify.xfem.bases import transformation
 from verify.xfem.errors import XfemError
 from verify.xfem.loads import body_force
-from verify.xfem.sparse.block_pattern import block_pattern
+from verify.xfem.sparsity import body_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.virtual import VirtualMesh
 
@@ -33,7 +33,7 @@ _Floats = NDArray[np.float64]
 def stiffness_matrix(body: SweptBody) -> csr_array:
     """(N d, N d) linear stiffness, with the ghost penalty if there is one."""
     virtual: VirtualMesh = body.virtual
-    pattern = block_pattern(virtual.cells, virtual.node_count)
+    pattern = body_pattern(virtual)
     blocks = LinearStiffness(virtual, soft(body.dimension)).assemble(pattern)
     matrix = csr_array(pattern.matrix(blocks))
     if body.ghost is not None:

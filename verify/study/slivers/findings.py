@@ -217,8 +217,8 @@ def _accuracy(r: Results) -> Iterator[Finding]:
             "3D compliance of the smallest piece",
             f"Under a force on it the smallest kept piece yields with exponent "
             f"{exponent_text(r.growth('compliance'))} (cut along faces) and {exponent_text(law)} "
-            f"(through vertices); merged, {exponent_text(merged)}.",
-            "−1 if kept, 0 if merged",
+            f"(through vertices); aggregated, {exponent_text(merged)}.",
+            "−1 if kept, 0 if aggregated",
             worst(
                 [
                     expects(r.growth("compliance"), -1.02, -0.98),
@@ -289,7 +289,7 @@ def _large_strain(r: Results) -> Iterator[Finding]:
     yield Finding(
         f"{d}D large strain, explicit",
         "Let go from 15 % strain: " + "; ".join(said) + ".",
-        "merged slivers neither invert nor blow up",
+        "aggregated slivers neither invert nor blow up",
         kept_by_all(sound),
     )
     said = []

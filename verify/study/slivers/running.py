@@ -63,7 +63,7 @@ def run_measurements(mesh: SimplexMesh, quick: bool) -> Iterator[Measurement]:
             yield from _explicit(body, uncut, quick)
     for treatment in _POLICIES:
         for size in (1e-1, 1e-3) if quick else (0.5, 1e-1, 1e-2, 1e-3, 1e-6, 1e-12, 0.0):
-            body = swept_body(mesh, "along faces", size, treatment)
+            body = swept_body(mesh, "along faces", size, treatment, hung=True)
             yield from _at_large_strain(body, quick)
             if treatment != "drop":
                 yield from _implicit(body, uncut, quick)
@@ -72,6 +72,7 @@ def run_measurements(mesh: SimplexMesh, quick: bool) -> Iterator[Measurement]:
             for size in (1e-3,) if quick else (1e-3, 1e-6, 1e-12):
                 body = swept_body(mesh, placement, size, treatment)
                 yield from _explicit(body, uncut, quick, bisected=False)
+                body = swept_body(mesh, placement, size, treatment, hung=True)
                 yield from _at_large_strain(body, quick)
                 if not quick and size in _IMPLICIT_SIZES:
                     yield from _implicit(body, uncut, quick)

@@ -130,20 +130,24 @@ class InternalForce:
             self._check("velocity", velocity)
         force = np.empty(self._shape) if out is None else out
         force[:] = 0.0
-        v = self.virtual
+        v, extended, corner_force = self.virtual, self.virtual.extend(displacement), force
+        if v.aggregation is not None:
+            corner_force = np.zeros_like(extended)
         if self.turning:
             self._kernels.turn(
-                v.cells, self._gradients, v.parent, self._normals, displacement,
+                v.cells, self._gradients, v.parent, self._normals, extended,
                 self._quaternions, self._rotations,
             )  # fmt: skip
             self._swept = False
         energy = self._kernels.internal_force(
-            v.cells, *self.geometry, self._rotations, displacement, force
+            v.cells, *self.geometry, self._rotations, extended, corner_force
         )
         if velocity is not None and scale != 0.0:
             self._kernels.frozen_product(
-                v.cells, *self.geometry, self._rotations, velocity, scale, force
+                v.cells, *self.geometry, self._rotations, v.extend(velocity), scale, corner_force
             )
+        if v.aggregation is not None:
+            force += v.restrict(corner_force)
         return force, float(energy)
 
     def _check(self, name: str, values: _Floats) -> None:
@@ -159,8 +163,13 @@ class InternalForce:
 
     def prepare(self, pattern: BlockPattern) -> None:
         """Do what `linearise` does otherwise when it is first called with a sparsity."""
-        if self.virtual.mesh.dim == 3:
+        if self._is_swept:
             self._sweep = self._sweep_over(pattern)
+
+    @property
+    def _is_swept(self) -> bool:
+        """Whether one sweep gives force and stiffness: of tetrahedra with unknowns of their own."""
+        return self.virtual.mesh.dim == 3 and self.virtual.aggregation is None
 
     def _sweep_over(self, pattern: BlockPattern) -> Linearisation:
         if self._sweep is not None and self._sweep.pattern is pattern:
@@ -210,8 +219,7 @@ class InternalForce:
         ):
             self._check(name, values)
         self._check_blocks(pattern, blocks)
-        mesh = self.virtual.mesh
-        if mesh.dim < 3:
+        if not self._is_swept:
             self.evaluate(displacement, force, velocity, implicit)
             blocks[:] = 0.0
             self.add_stiffness(pattern, blocks, scale)
@@ -230,9 +238,14 @@ class InternalForce:
         """
         self._check("vector", vector)
         self._check("force", out)
+        v = self.virtual
+        extended = v.extend(vector)
+        corner_force = out if v.aggregation is None else np.zeros_like(extended)
         self._kernels.frozen_product(
-            self.virtual.cells, *self.geometry, self.rotations, vector, scale, out
+            v.cells, *self.geometry, self.rotations, extended, scale, corner_force
         )
+        if v.aggregation is not None:
+            out += v.restrict(corner_force)
 
     def add_stiffness(
         self,
@@ -264,21 +277,22 @@ class InternalForce:
         self._check_blocks(pattern, blocks)
         if kind not in ("frozen", "tensioned", "exact"):
             raise XfemError(f"stiffness '{kind}'; expected frozen, tensioned or exact")
-        targets = pattern.targets[: len(self.virtual.cells)]
-        self._kernels.add_frozen_stiffness(targets, *self.geometry, self.rotations, scale, blocks)
-        if kind == "frozen" or not self.turning:
-            return
-        if displacement is None:
-            raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
-        self._check("displacement", displacement)
-        if kind == "tensioned":
-            if self.is_membrane:
-                nothing = np.zeros(self._shape)
-                self.add_tension(pattern, displacement, nothing, 0.0, scale, nothing, blocks)
-            return
-        self.left_out = self._kernels.add_spin_stiffness(
-            self.virtual.cells, targets, *self.geometry, self.rotations, displacement, scale, blocks
-        )
+        if kind != "frozen" and self.turning:
+            if displacement is None:
+                raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
+            self._check("displacement", displacement)
+        v, added = self.virtual, pattern.unfold(blocks)
+        targets = pattern.targets[: len(v.cells)]
+        self._kernels.add_frozen_stiffness(targets, *self.geometry, self.rotations, scale, added)
+        if kind == "exact" and self.turning and displacement is not None:
+            self.left_out = self._kernels.add_spin_stiffness(
+                v.cells, targets, *self.geometry, self.rotations, v.extend(displacement), scale,
+                added,
+            )  # fmt: skip
+        pattern.fold(added, blocks)
+        if kind == "tensioned" and self.is_membrane and displacement is not None:
+            nothing = np.zeros(self._shape)
+            self.add_tension(pattern, displacement, nothing, 0.0, scale, nothing, blocks)
 
     def add_tension(
         self,
@@ -317,10 +331,16 @@ class InternalForce:
         for name, values in (("displacement", displacement), ("vector", vector), ("force", force)):
             self._check(name, values)
         self._check_blocks(pattern, blocks)
+        v, added = self.virtual, pattern.unfold(blocks)
+        extended = v.extend(displacement)
+        corner_force = force if v.aggregation is None else np.zeros_like(extended)
         add_tension(
-            self.virtual.cells, pattern.targets[: len(self.virtual.cells)], *self.geometry,
-            self.rotations, displacement, vector, share, scale, least, force, blocks,
+            v.cells, pattern.targets[: len(v.cells)], *self.geometry, self.rotations, extended,
+            v.extend(vector), share, scale, least, corner_force, added,
         )  # fmt: skip
+        pattern.fold(added, blocks)
+        if v.aggregation is not None:
+            force += v.restrict(corner_force)
 
     def stiffness(
         self, pattern: BlockPattern, displacement: _Floats, kind: TangentKind = "exact"
@@ -362,7 +382,7 @@ class InternalForce:
         """Deformation gradients (p, d, d) of the pieces; of a membrane zero across its plane."""
         self._check("displacement", displacement)
         v = self.virtual
-        F = np.einsum("pik,pil->pkl", displacement[v.cells], v.mesh.gradients[v.parent])
+        F = np.einsum("pik,pil->pkl", v.extend(displacement)[v.cells], v.mesh.gradients[v.parent])
         F += np.eye(self._shape[1])
         if self.is_membrane:
             normals = self._normals[v.parent]

@@ -30,10 +30,10 @@ class _Explicit:
         self.step_size = check_step(step_size)
         self._solvers = None
         if body.mass.diagonal is None and body.fixed.any():
-            if body.moving:
+            if body.moving and _couples_supports(body):
                 raise XfemError(
-                    "explicit step with moving supports and a mass that is not diagonal; use the "
-                    "side-wise mass"
+                    "explicit step with moving supports whose nodes the mass couples to free ones; "
+                    "use the side-wise mass, and hold slivers there on their own or keep them"
                 )
             self._solvers = [_supported(body, k) for k in range(body.shape[1])]
 
@@ -74,6 +74,12 @@ def acceleration_of(body: DynamicBody, state: MotionState) -> _Floats:
     """
     check_state(state, body.shape)
     return _Explicit(body, 1.0)._acceleration(state.displacement, state.velocity, state.time)[0]
+
+
+def _couples_supports(body: DynamicBody) -> bool:
+    """Whether an acceleration of held components moves free ones through the mass."""
+    rows, columns, _ = body.mass.entries
+    return bool((body.fixed[rows] & ~body.fixed[columns]).any())
 
 
 def _supported(body: DynamicBody, component: int) -> SuperLU:

@@ -103,18 +103,21 @@ class EnergyMomentum(NewtonIntegrator):
         body, start = self.body, self._start
         force = body.force
         force.evaluate(displacement)
-        internal = np.zeros(body.shape)
+        v = force.virtual
+        internal = np.zeros(v.corners.node_points.shape)
         self._evaluations += 1
         if self._evaluations <= _FREE_EVALUATIONS:
             self.substituted[:] = False
         if force.turning:
             averaged_force(
-                force.virtual.cells, *force.geometry, self._first, force.rotations,
-                start.displacement, displacement, self.substituted, internal,
+                v.cells, *force.geometry, self._first, force.rotations,
+                v.extend(start.displacement), v.extend(displacement), self.substituted, internal,
             )  # fmt: skip
+            internal = v.restrict(internal)
             if isinstance(force, PenalisedForce):
                 force.add_penalty(0.5 * (start.displacement + displacement), 1.0, internal)
         else:
+            internal = np.zeros(body.shape)
             force.add_frozen_product(0.5 * (start.displacement + displacement), 1.0, internal)
         middle = start.time + 0.5 * self.step_size
         viscous = body.viscous(0.5 * (start.velocity + velocity))
@@ -125,10 +128,13 @@ class EnergyMomentum(NewtonIntegrator):
         if not force.turning:
             super()._add_stiffness(displacement, kind)
             return
+        v, pattern = force.virtual, self.body.pattern
+        added = pattern.unfold(self._blocks)
         add_averaged_stiffness(
-            force.virtual.cells, self.body.pattern.targets[: len(force.virtual.cells)],
-            *force.geometry, self._first, force.rotations,
-            self._start.displacement, displacement, self.substituted, self._blocks,
+            v.cells, pattern.targets[: len(v.cells)], *force.geometry, self._first,
+            force.rotations, v.extend(self._start.displacement), v.extend(displacement),
+            self.substituted, added,
         )  # fmt: skip
+        pattern.fold(added, self._blocks)
         if isinstance(force, PenalisedForce):
             force.ghost.add_stiffness(self.body.pattern, self._blocks, self.share)

@@ -3,20 +3,28 @@
 The parts of a piece start with the motion of that piece: every new unknown node takes over the
 value of the unknown node that the same corner had before (a = 0 and ȧ = 0 in the thesis' terms).
 The field does not change, so energy and momenta do not either.
+
+Where cells are aggregated the inherited field is not in the space: nodes that follow a root cell
+from now on are where it puts them. The velocity is the nearest one in the mass, so that every part
+keeps its momenta; displacements of the other nodes stay. Kinetic energy is lost, strain energy
+changes, both by what the field of the slivers was off the root's.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics.body import MotionState
+from verify.xfem.dynamics.body import DynamicBody, MotionState
 from verify.xfem.dynamics.integrator import check_state
 from verify.xfem.errors import XfemError
+from verify.xfem.mass import AggregatedMass
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["ancestors", "inherit_state"]
 
 
-def inherit_state(old: VirtualMesh, new: VirtualMesh, state: MotionState) -> MotionState:
+def inherit_state(
+    old: VirtualMesh, new: VirtualMesh, state: MotionState, body: DynamicBody | None = None
+) -> MotionState:
     """State of motion of a body that has been cut further.
 
     Parameters
@@ -26,19 +34,31 @@ def inherit_state(old: VirtualMesh, new: VirtualMesh, state: MotionState) -> Mot
         grown.
     state : MotionState
         Of the old body.
+    body : DynamicBody, optional
+        The new one; needed if cells of it are aggregated.
 
     Raises
     ------
     XfemError
-        As `ancestors`, or if the state is not one of the old body.
+        As `ancestors`, if the state is not one of the old body, or the body is missing or another.
     """
     check_state(state, old.node_points.shape)
     source = ancestors(old, new)
-    return MotionState(state.displacement[source], state.velocity[source], state.time)
+    displacement = old.extend(state.displacement)[source]
+    velocity = old.extend(state.velocity)[source]
+    if new.aggregation is None:
+        return MotionState(displacement, velocity, state.time)
+    if body is None or body.force.virtual is not new or not isinstance(body.mass, AggregatedMass):
+        raise XfemError("state of a body with aggregated cells; expected that body with its mass")
+    own = new.node_corner
+    velocity = body.mass.project(velocity, body.fixed, velocity[own])
+    return MotionState(displacement[own], velocity, state.time)
 
 
 def ancestors(old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
-    """(N,) unknown node of the old body from which each one of the new body comes.
+    """Corner of the old body from which each corner (N_corners,) of the new one comes.
+
+    Corners are unknown nodes where no cells are aggregated.
 
     Raises
     ------
@@ -56,7 +76,7 @@ def ancestors(old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
             "the old body before any others"
         )
     piece = _parts_of(old, new, cuts)
-    source = np.full(new.node_count, -1)
+    source = np.full(new.corners.node_count, -1)
     source[new.cells] = old.cells[piece]
     if (source[new.cells] != old.cells[piece]).any():
         where = int(np.argmax((source[new.cells] != old.cells[piece]).any(axis=1)))

@@ -1,6 +1,6 @@
 """From a cut mesh to what moves, with one choice of what becomes of its slivers.
 
-Three policies change the mesh (`verify.xfem.slivers`); the fourth leaves it as it is and penalises
+Three policies change the space (`verify.xfem.slivers`); the fourth leaves it as it is and penalises
 jumps of the gradient beside the cut (its module `ghost_penalty`), in the stiffness and, which is
 what keeps the explicit step, in the mass.
 """
@@ -41,9 +41,9 @@ class TreatedBody:
     force : InternalForce
         With the penalty if there is one.
     mass : Mass
-        Side-wise lumped; with a penalty not diagonal.
+        Side-wise lumped; with a penalty, or where cells are aggregated, not diagonal.
     slivers : SliverReport
-        What was absorbed and what was kept.
+        What was aggregated or dropped and what was kept.
     ghost : GhostPenalty or None
         The penalty: its `factor`, and one entry of `weights` per face penalised.
     """
@@ -64,8 +64,9 @@ class TreatedBody:
                 f"{report.kept} slivers below {report.threshold:g} of their cell kept"
             )
         return (
-            f"{report.merged} slivers merged, {report.dropped} dropped, {report.kept} kept; "
-            f"{report.volume_share:.3g} of the volume absorbed"
+            f"{report.aggregated} slivers aggregated, {report.dropped} dropped, {report.kept} kept "
+            f"({report.rootless} of them without a root cell); {report.volume_share:.3g} of the "
+            "volume"
         )
 
 
@@ -77,6 +78,7 @@ def treat_moving_body(
     threshold: float = DEFAULT_THRESHOLD,
     factor: float = DEFAULT_FACTOR,
     kinematics: Kinematics = "corotational",
+    held: NDArray[np.bool_] | None = None,
 ) -> TreatedBody:
     """Apply a sliver policy and build force and mass of what moves.
 
@@ -92,6 +94,8 @@ def treat_moving_body(
     factor : float
         Of the ghost penalty; read by "penalise" alone.
     kinematics : {"corotational", "linear"}
+    held : (N,) bool array, optional
+        Unknown nodes that a support is going to hold; see `treat_slivers`.
 
     Raises
     ------
@@ -102,7 +106,7 @@ def treat_moving_body(
         expected = ", ".join(get_args(MotionPolicy))
         raise XfemError(f"sliver policy '{policy}'; expected one of {expected}")
     if policy != "penalise":
-        treated, report = treat_slivers(virtual, policy, threshold)
+        treated, report = treat_slivers(virtual, policy, threshold, held)
         force = InternalForce(treated, material, kinematics)
         return TreatedBody(treated, force, side_wise_mass(treated, density), report, None)
     treated, report = treat_slivers(virtual, "keep", threshold)

@@ -14,9 +14,10 @@ from scipy.sparse import coo_array, csr_array
 
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
-from verify.xfem.mass import Mass, cell_densities, coupled_pattern, pattern_places
+from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.slivers.piece_contacts import face_contacts
 from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.sparsity import body_pattern, pattern_places
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["DEFAULT_FACTOR", "GhostPenalty"]
@@ -60,6 +61,8 @@ class GhostPenalty:
     ) -> None:
         if not (isinstance(factor, int | float | np.floating) and 0.0 < factor < np.inf):
             raise XfemError(f"ghost penalty with factor {factor!r}; expected a positive one")
+        if virtual.aggregation is not None:
+            raise XfemError("ghost penalty of a body with aggregated cells; expected one or other")
         if virtual.mesh.dim < virtual.mesh.space:
             raise XfemError("ghost penalty of a membrane in space; expected a body that fills it")
         lam, mu = material.of_cells(len(virtual.mesh.cells))
@@ -103,7 +106,7 @@ class GhostPenalty:
 
     def pattern(self) -> BlockPattern:
         """Sparsity of stiffness and penalty; its first cells are those of the body."""
-        return coupled_pattern(self.virtual, self.couplings)
+        return body_pattern(self.virtual, self.couplings)
 
     def add_stiffness(self, pattern: BlockPattern, blocks: _Floats, scale: float = 1.0) -> None:
         """Add `scale` times the penalty to nodal blocks (B, d, d) of a pattern.

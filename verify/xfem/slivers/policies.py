@@ -3,18 +3,18 @@
 Scaling by nodal blocks, which the iterative solver does anyway, bounds the condition number
 whatever the slivers. What it does not cure is the compliance of a piece that hangs on a tiny share
 of an element (like 1/ε in space under a force on it) and that such a piece inverts in motion. Two
-policies do, both by letting a larger piece absorb the sliver (`verify.xfem.slivers.absorption`):
+policies do:
 
 "drop"
-    Its sibling across the cut absorbs it: the realised cut moves to the nearest element faces.
-    The halves stay separate, because no unknowns are joined.
+    Its sibling across the cut absorbs it (`verify.xfem.slivers.absorption`): the realised cut
+    moves to the nearest element faces. The halves stay separate, because no unknowns are joined.
+    A sliver that holds together parts of the body that nothing else does is kept.
 "merge"
-    The neighbour on its own side of the cut absorbs it (cell agglomeration): the realised cut
-    stays, the displacement of the sliver is the neighbour's, continued. A sliver without such a
-    neighbour is a body of its own, and is dropped.
+    Cell aggregation (`verify.xfem.slivers.aggregation`): nodes that only slivers use follow the
+    linear field of a root cell on their own side of the cut, u = C û. Everything stays in its
+    place, every part of the body stays one of its own. A sliver that reaches no root is kept.
 
-A sliver that holds together parts of the body that nothing else does is kept, and counted. Ghost
-penalties are another remedy, see `verify.xfem.slivers.ghost_penalty`; measurements in
+Ghost penalties are another remedy, see `verify.xfem.slivers.ghost_penalty`; measurements in
 ``docs/xfem-slivers.md``.
 """
 
@@ -23,9 +23,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, identity
 
 from verify.xfem.errors import XfemError
-from verify.xfem.slivers.absorption import Absorption, absorb
+from verify.xfem.slivers.absorption import absorb
+from verify.xfem.slivers.aggregation import aggregate
 from verify.xfem.slivers.piece_contacts import Bridges, face_contacts, sibling_contacts
 from verify.xfem.virtual import VirtualMesh
 
@@ -38,6 +40,7 @@ DEFAULT_THRESHOLD = 0.1
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -49,32 +52,42 @@ class SliverReport:
     policy : {"keep", "drop", "merge"}
     threshold : float
         Volume fraction below which a piece is a sliver.
-    dropped, merged : int
-        Slivers that the sibling across the cut, or the neighbour on the same side, absorbed.
+    dropped : int
+        Slivers that the sibling across the cut absorbed.
+    aggregated : int
+        Slivers with a node that follows a root cell.
     kept : int
-        Slivers that were left alone: all with "keep", else those that hold parts together.
+        Slivers that were left alone: all with "keep"; those that hold parts together with "drop";
+        with "merge" those whose nodes all belong to larger pieces too, to a support, or to no root.
+    rootless : int
+        Of those kept by "merge", slivers with a node of their own that reaches no root cell.
     largest : float
-        Largest volume fraction, in its cell, of an absorbed sliver.
+        Largest volume fraction, in its cell, of a dropped or aggregated sliver.
     volume_share : float
-        Volume of all absorbed slivers over that of the body.
-    absorption : Absorption
-        Where pieces and unknowns went.
+        Volume of all dropped or aggregated slivers over that of the body.
+    extension : (N_old, N) csr_array
+        Unknowns before the policy from those after it; its transpose carries nodal forces.
+    node : (N_old,) int array
+        Unknown after the policy of each one before, −1 if it is gone.
     """
 
     policy: SliverPolicy
     threshold: float
     dropped: int
-    merged: int
+    aggregated: int
     kept: int
+    rootless: int
     largest: float
     volume_share: float
-    absorption: Absorption
+    extension: csr_array
+    node: _Ints
 
 
 def treat_slivers(
     virtual: VirtualMesh,
     policy: SliverPolicy = DEFAULT_POLICY,
     threshold: float = DEFAULT_THRESHOLD,
+    held: _Bools | None = None,
 ) -> tuple[VirtualMesh, SliverReport]:
     """Apply a sliver policy to a cut mesh.
 
@@ -84,46 +97,56 @@ def treat_slivers(
     policy : {"keep", "drop", "merge"}
     threshold : float
         Volume fraction in (0, ½) below which a piece is a sliver.
+    held : (N,) bool array, optional
+        Unknown nodes that a support is going to hold. Aggregation leaves them their unknown, so
+        that a prescribed value is what they have; elsewhere a root decides.
 
     Raises
     ------
     XfemError
-        If the policy is unknown or the threshold outside its bounds.
+        If the policy is unknown, the threshold outside its bounds, or `held` of another body.
     """
     if policy not in ("keep", "drop", "merge"):
         raise XfemError(f"sliver policy '{policy}'; expected keep, drop or merge")
     if not (isinstance(threshold, float | np.floating) and 0.0 < threshold < 0.5):
         raise XfemError(f"sliver threshold {threshold!r}; expected a volume fraction in (0, 0.5)")
+    virtual = virtual.corners
+    kept_nodes = np.zeros(virtual.node_count, dtype=bool) if held is None else np.asarray(held)
+    if kept_nodes.shape != (virtual.node_count,) or kept_nodes.dtype != bool:
+        raise XfemError(
+            f"held nodes: {kept_nodes.dtype} array of shape {kept_nodes.shape}; expected bool and "
+            f"({virtual.node_count},)"
+        )
     small = virtual.fraction < threshold
     # a cell of many pieces keeps its largest one whatever its size
     small[_largest_siblings(virtual)] = False
-    into = np.arange(len(virtual.cells))
-    crosswise = np.zeros(len(into), dtype=bool)
-    if policy != "keep" and small.any():
-        contacts = face_contacts(virtual, near=True)
-        absorbed = small & ~_bridges(virtual, contacts, small)
-        if policy == "merge":
-            into = _neighbours(virtual, contacts, absorbed)
-        crosswise = absorbed & (into == np.arange(len(into)))
-        into[crosswise] = _siblings(virtual, crosswise)[crosswise]
-        into = _roots(into)  # a sibling may itself have gone to its neighbour
-    gone = into != np.arange(len(into))
-    treated, absorption = absorb(virtual, into)
+    nothing = np.zeros_like(small)
+    treated, dropped, following, rootless = virtual, nothing, nothing, nothing
+    extension, node = csr_array(identity(virtual.node_count)), np.arange(virtual.node_count)
+    if policy == "drop" and small.any():
+        dropped = small & ~_bridges(virtual, face_contacts(virtual, near=True), small)
+        treated, extension, node = absorb(virtual, _siblings(virtual, dropped))
+    elif policy == "merge" and small.any():
+        treated, roots = aggregate(virtual, small, kept_nodes)
+        following, rootless = roots.following, roots.rootless
+        if treated.aggregation is not None:
+            extension, node = treated.aggregation.extension, treated.aggregation.node
+    changed = dropped | following
     return treated, SliverReport(
         policy=policy,
         threshold=threshold,
-        dropped=int(crosswise.sum()),
-        merged=int((gone & ~crosswise).sum()),
-        kept=int((small & ~gone).sum()),
-        largest=float(virtual.fraction[gone].max(initial=0.0)),
-        volume_share=float(virtual.volumes[gone].sum() / virtual.volumes.sum()),
-        absorption=absorption,
+        dropped=int(dropped.sum()),
+        aggregated=int(following.sum()),
+        kept=int((small & ~changed).sum()),
+        rootless=int((rootless & ~following).sum()),
+        largest=float(virtual.fraction[changed].max(initial=0.0)),
+        volume_share=float(virtual.volumes[changed].sum() / virtual.volumes.sum()),
+        extension=extension,
+        node=node,
     )
 
 
-def _bridges(
-    virtual: VirtualMesh, contacts: tuple[_Ints, _Ints], small: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def _bridges(virtual: VirtualMesh, contacts: tuple[_Ints, _Ints], small: _Bools) -> _Bools:
     """Which small pieces hold parts of the body together; the whole body only if need be."""
     suspects = Bridges(virtual, contacts).among(small)
     if not suspects.any():
@@ -140,7 +163,7 @@ def _largest_siblings(virtual: VirtualMesh) -> _Ints:
     return largest
 
 
-def _siblings(virtual: VirtualMesh, small: NDArray[np.bool_]) -> _Ints:
+def _siblings(virtual: VirtualMesh, small: _Bools) -> _Ints:
     """(p,) the sibling that absorbs each small piece: among the larger ones, most in contact."""
     largest = np.full(len(virtual.mesh.cells), -1)
     best = _largest_siblings(virtual)
@@ -155,29 +178,10 @@ def _siblings(virtual: VirtualMesh, small: NDArray[np.bool_]) -> _Ints:
     order = np.lexsort([total, pairs[0]])
     last = np.diff(pairs[0][order], append=-1) != 0
     into[pairs[0][order[last]]] = pairs[1][order[last]]
-    return into
+    return _followed_to_the_end(into)
 
 
-def _neighbours(
-    virtual: VirtualMesh, contacts: tuple[_Ints, _Ints], small: NDArray[np.bool_]
-) -> _Ints:
-    """(p,) the neighbour that absorbs each small piece: the largest, layer by layer inwards."""
-    first, second = np.concatenate(contacts), np.concatenate(contacts[::-1])
-    into = np.arange(len(small))
-    open_ = small.copy()
-    while True:
-        meets = open_[first] & ~open_[second]
-        one, other = first[meets], second[meets]
-        if len(one) == 0:
-            return into
-        order = np.lexsort([virtual.volumes[other], one])
-        last = np.diff(one[order], append=-1) != 0
-        into[one[order[last]]] = other[order[last]]
-        open_[one] = False
-
-
-def _roots(into: _Ints) -> _Ints:
-    """Follow chains to their ends."""
+def _followed_to_the_end(into: _Ints) -> _Ints:
     while True:
         further = into[into]
         if np.array_equal(further, into):

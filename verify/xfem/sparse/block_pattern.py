@@ -6,13 +6,14 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 from verify.xfem.arrays.short_sort import sort_short
 from verify.xfem.errors import XfemError
 
 __all__ = ["BlockPattern", "block_pattern"]
 
+_Floats = NDArray[np.float64]
 _Ints = NDArray[np.int32]
 
 
@@ -27,12 +28,31 @@ class BlockPattern:
     columns : (B,) int array
         Column of each block, ascending in a row.
     targets : (p, c, c) int array
-        Block to which the pair (row corner, column corner) of each cell adds.
+        Block to which the pair (row corner, column corner) of each cell adds; B and more are
+        blocks aside that `fold` takes to others.
+    folding : (B, S) csr_array, optional
+        Share of each of the S blocks aside in those of the pattern.
     """
 
     starts: _Ints
     columns: _Ints
     targets: _Ints
+    folding: csr_array | None = None
+
+    def unfold(self, blocks: _Floats) -> _Floats:
+        """Return what elements are to be added to: the blocks themselves if none lie aside."""
+        if self.folding is None:
+            return blocks
+        return np.zeros((len(self.columns) + self.folding.shape[1], *blocks.shape[1:]))
+
+    def fold(self, added: _Floats, blocks: _Floats) -> None:
+        """Add what `unfold` has given, and elements have added to, to the blocks (B, d, d)."""
+        if self.folding is None:
+            return
+        count = len(self.columns)
+        blocks += added[:count]
+        aside = added[count:].reshape(len(added) - count, -1)
+        blocks += (self.folding @ aside).reshape(blocks.shape)
 
     @property
     def node_count(self) -> int:

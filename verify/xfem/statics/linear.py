@@ -11,9 +11,10 @@ from verify.xfem.assembly_kernels import constrain
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
-from verify.xfem.sparse.block_pattern import BlockPattern, block_pattern
+from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
+from verify.xfem.sparsity import body_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
@@ -104,7 +105,7 @@ def solve_static(
     method, limit = _method(solver, virtual, ghost)
     stiffness = LinearStiffness(virtual, material)
     clock = [perf_counter()]
-    pattern = ghost.pattern() if ghost else block_pattern(virtual.cells, virtual.node_count)
+    pattern = ghost.pattern() if ghost else body_pattern(virtual)
     inverse = _inverse(method, pattern, supports, limit)
     clock.append(perf_counter())
     blocks, right = _system(stiffness, ghost, pattern, supports, force)

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
 from verify.xfem.corotation.internal_force import InternalForce
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
 from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
+from verify.xfem.sparsity import body_pattern
 from verify.xfem.statics.linear import ITERATE_FROM
 
 __all__ = ["Descent", "Newton", "NotInEquilibriumError", "Place"]
@@ -70,7 +70,7 @@ class Newton:
         self._tolerance, self._iterations = tolerance, iterations
         virtual = force.virtual
         space = virtual.mesh.space
-        self._pattern = block_pattern(virtual.cells, virtual.node_count)
+        self._pattern = body_pattern(virtual)
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
         large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
         self.solvers: set[str] = set()

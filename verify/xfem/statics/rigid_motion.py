@@ -43,7 +43,8 @@ class RigidMotions:
         inside = np.argsort(bodies, kind="stable")
         size = np.bincount(bodies)
         self._nodes = [inside[end - n : end] for end, n in zip(np.cumsum(size), size, strict=True)]
-        self._edges = _edges_within(virtual.cells, whole)
+        # corners that follow others have number −1: not held
+        self._edges = _edges_within(virtual.corner_node[virtual.cells], np.append(whole, False))
 
     def follow(self, displacement: _Floats, change: _Floats) -> _Floats:
         """Displacement (N, d) after each body has followed the `change` (N, d) of its supports.

@@ -1,0 +1,274 @@
+"""Aggregated cells in motion: the mass CᵀMC, what falls, turns and is cut on the way."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, GRAVITY, material, rotation
+from test_cell_aggregation import mesh_of, near_nodes
+from test_sliver_policies import degenerate_cuts
+from time_schemes import SCHEMES
+
+from verify.xfem.critical_step import critical_step, element_critical_steps
+from verify.xfem.cuts import Plane
+from verify.xfem.dynamics import (
+    CentralDifferences,
+    DynamicBody,
+    EnergyMomentum,
+    ForwardEuler,
+    MotionState,
+    MovingSupports,
+    RealTimeEuler,
+    ancestors,
+    inherit_state,
+    treat_moving_body,
+)
+from verify.xfem.dynamics.energy_ledger import EnergyLedger, run
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.slivers import treat_slivers
+from verify.xfem.sparsity import body_pattern
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+
+def moving(virtual, top_held=False, **options):
+    """Body with its default treatment, perhaps held at the top and under its weight."""
+    last = virtual.node_points[:, -1]
+    # behind the cut nodes at the top belong to the lower part
+    held = top_held & (last > 1.0 - 1e-9) & (virtual.bodies == virtual.bodies[last.argmax()])
+    dim = virtual.mesh.dim
+    treated = treat_moving_body(virtual, material(dim), DENSITY, held=held, **options)
+    v = treated.virtual
+    assert v.aggregation is not None
+    fixed = np.repeat(held[v.node_corner][:, None], dim, axis=1)
+    weight = treated.mass.weight(-GRAVITY * np.eye(dim)[-1])
+    supports = Supports(fixed, np.zeros(fixed.shape))
+    return DynamicBody(treated.force, treated.mass, weight=weight, supports=supports)
+
+
+def split(dim, size=1e-3):
+    """Body cut through above its middle layer of nodes, with slivers of all shapes."""
+    return near_nodes(dim, size)
+
+
+@pytest.mark.parametrize("lumping", [side_wise_mass, consistent_mass, "row sum"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_mass_of_every_part_is_its_own(dim, lumping):
+    """CᵀMC moves rigid parts as M does: mass, first and second moments of each part."""
+    virtual = split(dim)
+    treated, _ = treat_slivers(virtual)
+    found, want = (
+        shifted_mass(v, DENSITY, lumping) if lumping == "row sum" else lumping(v, DENSITY)
+        for v in (treated, virtual)
+    )
+    for part in range(virtual.bodies.max() + 1):
+        fields = []
+        for v in (treated, virtual):
+            here = (v.bodies == part)[:, None]
+            fields.append(here * np.column_stack([np.ones(v.node_count), v.node_points]))
+        moments = [f.T @ m.apply(f) for f, m in zip(fields, (found, want), strict=True)]
+        assert moments[0] == pytest.approx(moments[1], abs=1e-12 * DENSITY)
+        pulled = [f.T @ m.weights for f, m in zip(fields, (found, want), strict=True)]
+        assert pulled[0] == pytest.approx(pulled[1], abs=1e-12 * DENSITY)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_critical_step_is_never_below_that_of_the_smallest_element(seed):
+    """Up to four cuts at random. K ≤ ω²M for every piece, hence CᵀKC ≤ ω²CᵀMC."""
+    dim = 2 + seed % 2
+    mesh = mesh_of(dim, 5 if dim == 2 else 3, seed // 2)
+    virtual = cut_mesh(mesh, degenerate_cuts(mesh, seed))
+    treated, _ = treat_slivers(virtual)
+    pattern = body_pattern(treated)
+    K = pattern.matrix(LinearStiffness(treated, material(dim)).assemble(pattern))
+    mass = side_wise_mass(treated, DENSITY)
+    bound = element_critical_steps(mesh, material(dim), DENSITY).min()
+    assert mass.keeps_element_steps
+    # eigenvalues of dense matrices to 1e-12
+    assert critical_step(K, mass) >= (1.0 - 1e-9) * bound
+
+
+def test_a_mass_lumped_anew_would_not_keep_the_step():
+    """Why the mass is not diagonal: its row sums are no bound of it."""
+    treated, _ = treat_slivers(split(2))
+    mass = side_wise_mass(treated, DENSITY).matrix.toarray()
+    least = np.linalg.eigvalsh(np.diag(mass.sum(axis=1)) - mass)[0]
+    assert least < -1e-6 * mass.max()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_freed_half_falls_with_g_and_the_account_closes(dim, scheme):
+    """The upper half is held, the lower one falls from rest: to round-off as a rigid body."""
+    body = moving(split(dim), top_held=True)
+    v, state = body.force.virtual, body.rest()
+    free = v.bodies != v.bodies[body.fixed.any(axis=1)][0]
+    h, count = 0.002, 20
+    account = run(scheme(body, h), body, state, count)
+    assert state.velocity[free] == pytest.approx(
+        np.broadcast_to(-GRAVITY * h * count * np.eye(dim)[-1], (free.sum(), dim)), abs=1e-11
+    )
+    fallen = {"SymplecticEuler": count + 1, "ForwardEuler": count - 1}
+    steps = fallen.get(scheme.__name__, count)
+    if scheme in (RealTimeEuler,) or scheme.__name__ == "ImplicitEuler":
+        steps = count + 1
+    assert state.displacement[free, -1] == pytest.approx(
+        -0.5 * GRAVITY * h**2 * count * steps, rel=1e-10
+    )
+    size = np.ptp(account.gravity) + account.kinetic.max()
+    assert np.ptp(account.balance) <= 1e-10 * size
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("scheme", [s for s in SCHEMES if s is not ForwardEuler])
+def test_a_free_body_keeps_its_momenta_part_by_part(dim, scheme):
+    """Turning and deforming at random; central differences keep the angular momentum, too."""
+    body = moving(split(dim))
+    body.weight = np.zeros(body.shape)
+    v, state = body.force.virtual, body.rest()
+    random = np.random.default_rng(0)
+    state.velocity[:] = 0.1 * random.normal(size=body.shape)
+    state.velocity += v.node_points @ (rotation(dim, 0.5) - np.eye(dim)).T
+
+    def momenta():
+        momentum = body.mass.apply(state.velocity)
+        parts = [v.bodies == k for k in range(v.bodies.max() + 1)]
+        return np.array([momentum[part].sum(axis=0) for part in parts])
+
+    before = momenta()
+    account = run(scheme(body, 0.002), body, state, 30)
+    # C reproduces translations: forces inside a part sum to zero, whatever follows whatever
+    assert momenta() == pytest.approx(before, abs=1e-10 * DENSITY)
+    if scheme in (EnergyMomentum, CentralDifferences):
+        assert np.ptp(account.angular_momentum, axis=0).max() < 1e-9 * DENSITY
+    if scheme is EnergyMomentum:
+        assert account.drift < 1e-10
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("held", [False, True])
+def test_a_cut_midway_keeps_momenta_and_loses_what_slivers_moved_otherwise(dim, held):
+    """Momenta of each part of the new body; energy by a share of the order of the slivers'."""
+    new = split(dim)
+    old = cut_mesh(new.mesh, [])
+    random = np.random.default_rng(1)
+    waves = np.sin(3.0 * old.node_points + random.uniform(0.0, 3.0, dim))
+    state = MotionState(0.05 * waves, 0.3 * waves[:, ::-1].copy())
+    body = moving(new, top_held=held)
+    v = body.force.virtual
+    source = ancestors(old, new)
+    still = source[v.node_corner][body.fixed[:, 0]]
+    state.displacement[still] = state.velocity[still] = 0.0
+    after = inherit_state(old, v, state, body)
+    assert np.array_equal(ancestors(old, v), source)
+    # nodes with an unknown stay where they are
+    assert np.array_equal(after.displacement, state.displacement[source][v.node_corner])
+    assert not held or (after.velocity[body.fixed] == 0.0).all()
+    corner_mass = side_wise_mass(new, DENSITY)
+    before = corner_mass.apply(state.velocity[source])
+    momentum = body.mass.apply(after.velocity)
+    place = v.extend(v.node_points + after.displacement)
+    for part in range(new.bodies.max() + 1):
+        if held and body.fixed[v.bodies == part].any():
+            continue  # its supports take up momentum
+        mine, here = new.bodies == part, v.bodies == part
+        assert momentum[here].sum(axis=0) == pytest.approx(
+            before[mine].sum(axis=0), abs=1e-11 * DENSITY
+        )
+        # about the same places: Σ x ∧ p as antisymmetric part of Σ x pᵀ
+        first = place[mine].T @ before[mine]
+        second = (v.node_points + after.displacement)[here].T @ momentum[here]
+        assert second - second.T == pytest.approx(first - first.T, abs=1e-11 * DENSITY)
+    kinetic = 0.5 * np.sum(state.velocity[source] * before)
+    strain = treat_moving_body(new, material(dim), DENSITY, "keep").force.evaluate(
+        state.displacement[source]
+    )[1]
+    rows = EnergyLedger(body, after).close()
+    assert rows.kinetic[0] <= kinetic * (1.0 + 1e-12) or held
+    assert rows.kinetic[0] == pytest.approx(kinetic, rel=0.02)
+    assert rows.strain[0] == pytest.approx(strain, rel=0.02)
+
+
+def test_a_linear_motion_is_inherited_as_it_is():
+    """What is linear on each side is in the space: nothing jumps."""
+    for dim in (2, 3):
+        new = split(dim)
+        old = cut_mesh(new.mesh, [])
+        state = MotionState(0.1 * old.node_points, 0.3 * old.node_points[:, ::-1].copy())
+        body = moving(new)
+        v = body.force.virtual
+        after = inherit_state(old, v, state, body)
+        source = ancestors(old, new)
+        for got, was in (
+            (after.displacement, state.displacement),
+            (after.velocity, state.velocity),
+        ):
+            assert v.extend(got) == pytest.approx(was[source], abs=1e-12)
+        with pytest.raises(XfemError, match="that body with its mass"):
+            inherit_state(old, v, state)
+
+
+def test_inherited_twice_what_is_aggregated_stays_where_it_is():
+    """The same cuts once more: nothing changes."""
+    body = moving(split(2))
+    v = body.force.virtual
+    random = np.random.default_rng(0)
+    state = MotionState(*random.normal(scale=0.02, size=(2, *body.shape)))
+    after = inherit_state(v, v, state, body)
+    assert np.array_equal(after.displacement, state.displacement)
+    assert after.velocity == pytest.approx(state.velocity, abs=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_linearised_step_has_the_force_and_the_stiffness_of_the_body(dim):
+    body = moving(split(dim))
+    force, pattern = body.force, body.pattern
+    random = np.random.default_rng(3)
+    u, w = 0.02 * random.normal(size=(2, *body.shape))
+    blocks, got = np.empty((len(pattern.columns), dim, dim)), np.empty(body.shape)
+    force.linearise(pattern, u, w, 0.3, 2.0, got, blocks)
+    want = force.evaluate(u)[0]
+    K = pattern.matrix(force.stiffness(pattern, u, "frozen"))
+    want = want + 0.3 * (K @ w.ravel()).reshape(body.shape)
+    assert got == pytest.approx(want, rel=1e-10, abs=1e-10 * np.abs(want).max())
+    assert np.abs(pattern.matrix(blocks) - 2.0 * K).max() < 1e-10 * np.abs(K).max()
+
+
+def test_an_explicit_step_moves_supports_that_no_root_shares_and_refuses_others():
+    virtual = split(2)
+    treated = moving(virtual)
+    v = treated.force.virtual
+    coupled = np.unique(treated.mass.entries[0][treated.mass.entries[0] != treated.mass.entries[1]])
+
+    def driven(nodes):
+        fixed = np.zeros(v.node_points.shape, dtype=bool)
+        fixed[nodes] = True
+        rest = np.zeros(v.node_points.shape)
+        supports = MovingSupports(fixed, lambda t: (rest + 0.1 * t, rest + 0.1))
+        return DynamicBody(treated.force, treated.mass, supports=supports)
+
+    apart = np.setdiff1d(np.flatnonzero(v.node_points[:, -1] > 1.0 - 1e-9), coupled)
+    body = driven(apart)
+    state = body.rest()
+    account = run(CentralDifferences(body, 1e-3), body, state, 20)
+    assert state.displacement[apart] == pytest.approx(0.002, rel=1e-12)
+    assert np.ptp(account.balance) < 1e-10 * account.kinetic.max()
+    with pytest.raises(XfemError, match="couples to free ones"):
+        CentralDifferences(driven(coupled[:1]), 1e-3)
+
+
+def test_a_part_without_a_root_keeps_its_unknowns_and_falls_too():
+    """A strip a thousandth of an element thin, cut off along the whole body: counted."""
+    mesh = mesh_of(2, 6, 0)
+    cuts = [Plane([0.5, 0.55 + gap], [0.1, 1.0]) for gap in (0.0, 1e-3 / 6)]
+    virtual = cut_mesh(mesh, cuts)
+    treated = treat_moving_body(virtual, material(2), DENSITY)
+    strip = virtual.bodies[virtual.cells[:, 0]]
+    thin = np.bincount(strip, virtual.volumes).argmin()
+    assert treated.slivers.rootless == (strip == thin).sum()
+    assert f"({treated.slivers.rootless} of them without a root cell)" in treated.summary
+    body = DynamicBody(treated.force, treated.mass, weight=treated.mass.weight([0.0, -GRAVITY]))
+    state = body.rest()
+    run(CentralDifferences(body, 1e-3), body, state, 10)
+    assert state.velocity[:, 1] == pytest.approx(-GRAVITY * 1e-2, rel=1e-9)

@@ -1,0 +1,161 @@
+"""Cell aggregation: nodes that only slivers use follow the linear field of a root cell.
+
+Badia, Verdugo & Martín, *The aggregated unfitted finite element method for elliptic problems*,
+Comput. Methods Appl. Mech. Engrg. 336 (2018), for the cut-cell parts of a body: a part that is
+small reaches a root, a part that is not, through the faces that it shares with its neighbours on
+its own side of all cuts. The field stays continuous on each side and every affine field stays in
+the space, so that patch tests hold and rigid motion costs nothing. Differences: there a node
+follows the root of the one cell that owns it; here, of the roots of all small parts around it, the
+one that continues its field over the shortest way. And a small part that reaches no root keeps its
+unknowns.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from verify.xfem.slivers.absorption import renumber
+from verify.xfem.slivers.piece_contacts import face_contacts
+from verify.xfem.virtual import Aggregation, VirtualMesh
+
+__all__ = ["Roots", "aggregate"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+
+_ROUND_OFF = 1e-12  # of a barycentric coordinate; of positions, over the size of the cell
+_DIGITS = 9  # to which extrapolations are compared: symmetric meshes have many that are equal
+
+
+@dataclass(frozen=True)
+class Roots:
+    """What became of the small parts.
+
+    Attributes
+    ----------
+    following : (p,) bool array
+        Small parts with a node that follows a root cell.
+    rootless : (p,) bool array
+        Small parts with a node that only small parts use, and that follows none.
+    """
+
+    following: _Bools
+    rootless: _Bools
+
+
+def aggregate(virtual: VirtualMesh, small: _Bools, held: _Bools) -> tuple[VirtualMesh, Roots]:
+    """Let nodes that only small parts use follow root cells.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+        Without aggregation.
+    small : (p,) bool array
+    held : (N,) bool array
+        Unknown nodes that keep their unknown, such as those that a support holds.
+
+    Returns
+    -------
+    aggregated : VirtualMesh
+        `virtual` itself if no node follows a root.
+    roots : Roots
+    """
+    alone = np.ones(virtual.node_count, dtype=bool)
+    alone[virtual.cells[~small]] = False
+    alone &= ~held
+    sliver, root = _reached(virtual, small)
+    node, weights, cell = _continued(virtual, alone, sliver, root)
+    followed = np.full(virtual.node_count, -1)
+    followed[node] = np.arange(len(node))
+    of_corner = followed[virtual.cells]
+    has_own = (alone[virtual.cells] & (of_corner < 0)).any(axis=1)
+    roots = Roots(small & (of_corner >= 0).any(axis=1), small & has_own)
+    if len(node) == 0:
+        return virtual, roots
+    return _aggregated(virtual, followed, weights, cell), roots
+
+
+def _reached(virtual: VirtualMesh, small: _Bools) -> tuple[_Ints, _Ints]:
+    """Pairs (k,), (k,) of small parts and a root each, layer by layer away from the roots.
+
+    A part takes the root from which its own corners are continued over the shortest way, among
+    those of its neighbours one layer closer.
+    """
+    contacts = face_contacts(virtual, near=True)
+    first, second = np.concatenate(contacts), np.concatenate(contacts[::-1])
+    into = np.where(small, -1, np.arange(len(small)))
+    while True:
+        meets = (into[first] < 0) & (into[second] >= 0)
+        one, root = first[meets], into[second[meets]]
+        if len(one) == 0:
+            found = np.flatnonzero(small & (into >= 0))
+            return found, into[found]
+        corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent[one]]]
+        reach = np.abs(_coordinates(virtual, corners, root)).sum(axis=2).max(axis=1)
+        best = _best(virtual, one, root, reach)
+        into[one[best]] = root[best]
+
+
+def _best(virtual: VirtualMesh, key: _Ints, root: _Ints, reach: _Floats) -> _Ints:
+    """Row of the best root for each key: least reach, then largest, then by place."""
+    place = virtual.piece_centroids[root]
+    place = np.round(place / virtual.mesh.extent, _DIGITS)
+    size = np.round(virtual.fraction[root], _DIGITS)
+    order = np.lexsort([*place.T, -size, np.round(reach, _DIGITS), key])
+    return order[np.diff(key[order], prepend=-1) != 0]
+
+
+def _coordinates(virtual: VirtualMesh, points: _Floats, root: _Ints) -> _Floats:
+    """(q, k, d + 1) barycentric coordinates of points (q, k, space) in the cells of the roots."""
+    mesh, cell = virtual.mesh, virtual.parent[root]
+    origin = mesh.points[mesh.cells[cell, 0]]
+    at = np.einsum("qks,qis->qki", points - origin[:, None], mesh.gradients[cell])
+    at[:, :, 0] += 1.0
+    return at
+
+
+def _continued(
+    virtual: VirtualMesh, alone: _Bools, sliver: _Ints, root: _Ints
+) -> tuple[_Ints, _Floats, _Ints]:
+    """Nodes (k,) that follow a root, weights (k, d + 1) of its corners, and the root (k,).
+
+    Off the plane of the root triangle of a membrane there is no such field: nodes there are left
+    alone.
+    """
+    row, corner = np.nonzero(alone[virtual.cells[sliver]])
+    node, root = virtual.cells[sliver[row], corner], root[row]
+    points = virtual.node_points[node][:, None]
+    weights = _coordinates(virtual, points, root)[:, 0]
+    weights[np.abs(weights) < _ROUND_OFF] = 0.0
+    largest = np.abs(weights).argmax(axis=1)[:, None]
+    rest = weights.sum(axis=1, keepdims=True) - np.take_along_axis(weights, largest, 1)
+    np.put_along_axis(weights, largest, 1.0 - rest, 1)
+    mesh = virtual.mesh
+    if mesh.dim < mesh.space:
+        corners = mesh.points[mesh.cells[virtual.parent[root]]]
+        off = np.linalg.norm(np.einsum("qi,qis->qs", weights, corners) - points[:, 0], axis=1)
+        flat = off <= _ROUND_OFF * mesh.extent
+        node, root, weights = node[flat], root[flat], weights[flat]
+    best = _best(virtual, node, root, np.abs(weights).sum(axis=1))
+    return node[best], weights[best], root[best]
+
+
+def _aggregated(
+    virtual: VirtualMesh, followed: _Ints, weights: _Floats, root: _Ints
+) -> VirtualMesh:
+    """Return the mesh without the unknowns of nodes that follow others."""
+    own = followed < 0
+    node_parent, node, old_of_new = renumber(virtual, own)
+    kept = np.flatnonzero(own)
+    gone = np.flatnonzero(~own)
+    at = followed[gone]
+    columns = node[virtual.cells[root[at]]]
+    rows = np.broadcast_to(gone[:, None], columns.shape)
+    entries = np.concatenate([np.ones(len(kept)), weights[at].ravel()])
+    places = np.concatenate([kept, rows.ravel()]), np.concatenate([node[kept], columns.ravel()])
+    extension = csr_array((entries, places), shape=(len(own), len(node_parent)))
+    extension.eliminate_zeros()
+    return virtual.following(Aggregation(virtual, extension, node), old_of_new)

@@ -1,0 +1,108 @@
+"""Sparsity of the stiffness of a cut body, with couplings that no cell makes.
+
+Without aggregation it is that of the cells. With it a corner without an unknown of its own couples
+all that it follows: the elements around such corners add to blocks of their own, from which
+`BlockPattern.fold` takes them to those of the unknowns.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from verify.xfem.errors import XfemError
+from verify.xfem.sparse.block_pattern import BlockPattern, block_pattern
+from verify.xfem.virtual import Aggregation, VirtualMesh
+
+__all__ = ["body_pattern", "find_places", "pattern_places"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+def body_pattern(virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockPattern:
+    """Sparsity of a body; its first cells are the pieces.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    couplings : (k, 2) int array, optional
+        Further pairs of unknown nodes that are to be coupled.
+    """
+    extra = np.empty((0, 2), dtype=np.int64) if couplings is None else couplings
+    if virtual.aggregation is None:
+        return block_pattern(_with_pairs(virtual.cells, extra), virtual.node_count)
+    own = virtual.corner_node[virtual.cells]
+    around = np.flatnonzero((own < 0).any(axis=1))
+    nodes, weights = _followed(virtual.aggregation, virtual.cells[around])
+    # a corner that follows others is represented by one of them
+    own[around] = np.take_along_axis(nodes, np.abs(weights).argmax(axis=2)[:, :, None], 2)[:, :, 0]
+    pairs = np.concatenate([extra, _pairs(nodes.reshape(len(around), -1), virtual.node_count)])
+    plain = block_pattern(_with_pairs(own, pairs), virtual.node_count)
+    count, corners = len(plain.columns), virtual.cells.shape[1]
+    targets = plain.targets.copy()
+    places = np.arange(len(around) * corners**2)
+    targets[around] = count + places.reshape(-1, corners, corners)
+    # entry (a, b) of the unknowns gets w_ia w_jb of the block (i, j) of a piece
+    shape = (len(around), corners, corners, nodes.shape[2], nodes.shape[2])
+    weight = (weights[:, :, None, :, None] * weights[:, None, :, None, :]).ravel()
+    row = np.broadcast_to(nodes[:, :, None, :, None], shape).ravel()
+    column = np.broadcast_to(nodes[:, None, :, None, :], shape).ravel()
+    source = np.repeat(places, nodes.shape[2] ** 2)
+    real = weight != 0.0
+    at = pattern_places(plain, row[real], column[real])
+    matrix = csr_array((weight[real], (at, source[real])), shape=(count, len(places)))
+    return BlockPattern(plain.starts, plain.columns, targets, matrix)
+
+
+def _followed(aggregation: Aggregation, cells: _Ints) -> tuple[_Ints, _Floats]:
+    """Unknown nodes (q, c, m) and weights of the corners of some pieces, padded with weight 0."""
+    starts = aggregation.extension.indptr
+    count = np.diff(starts)[cells]
+    most = count.max(initial=1)
+    within = np.minimum(np.arange(most), count[:, :, None] - 1)
+    at = starts[cells][:, :, None] + within
+    nodes = aggregation.extension.indices[at].astype(np.int64)
+    weights = np.where(np.arange(most) < count[:, :, None], aggregation.extension.data[at], 0.0)
+    return nodes, weights
+
+
+def _pairs(nodes: _Ints, count: int) -> _Ints:
+    """All pairs (k, 2) of different nodes in a row of `nodes` (q, m), each once."""
+    first, second = np.triu_indices(nodes.shape[1], 1)
+    pairs = np.sort(np.stack([nodes[:, first].ravel(), nodes[:, second].ravel()]), axis=0)
+    key = np.unique(pairs[0] * count + pairs[1])
+    pairs = np.stack([key // count, key % count], axis=1)
+    return pairs[pairs[:, 0] != pairs[:, 1]]
+
+
+def _with_pairs(cells: _Ints, pairs: _Ints) -> _Ints:
+    if len(pairs) == 0:
+        return cells
+    return np.concatenate([cells, pairs[:, [0] + [1] * (cells.shape[1] - 1)]])
+
+
+def pattern_places(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> _Ints:
+    """Blocks at the given rows and columns.
+
+    Raises
+    ------
+    XfemError
+        If the pattern lacks one.
+    """
+    at, found = find_places(pattern, rows, columns)
+    if not found.all():
+        raise XfemError(
+            "the pattern lacks couplings of this mass or penalty; expected that of the body"
+        )
+    return at
+
+
+def find_places(
+    pattern: BlockPattern, rows: _Ints, columns: _Ints
+) -> tuple[_Ints, NDArray[np.bool_]]:
+    """Blocks at the given rows and columns, and whether the pattern has them."""
+    of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
+    keys = of_row * pattern.node_count + pattern.columns
+    wanted = rows * pattern.node_count + columns
+    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    return at, keys[at] == wanted
