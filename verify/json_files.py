@@ -1,4 +1,4 @@
-"""JSON files that are whole or not there."""
+"""JSON files that are whole or not there; those of others are read within limits."""
 
 import json
 import math
@@ -7,9 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.whole_files import write_whole
+from verify.printable import words_of
+from verify.whole_files import read_bounded, write_whole
 
-__all__ = ["plain", "read_json", "write_json"]
+__all__ = ["deeper_than", "parse_json", "plain", "read_json", "write_json"]
+
+_DEEPEST = 60  # levels of nesting; none of our files has more than a dozen
+_LONGEST = 40  # digits of a whole number
 
 
 def write_json(content: Any, path: Path) -> None:
@@ -23,23 +27,64 @@ def write_json(content: Any, path: Path) -> None:
     write_whole(path, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path, what: str = "a JSON file") -> dict[str, Any]:
     """Read a JSON object.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        What is expected there, for the message.
 
     Raises
     ------
     InputError
-        If the file is missing, damaged, or not an object.
+        If the file is missing, damaged, larger or deeper than such a file is, or no object.
+    """
+    return parse_json(read_bounded(path, what), str(path))
+
+
+def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
+    """Read a JSON object from text or from bytes in UTF-8.
+
+    Raises
+    ------
+    InputError
+        As `read_json`; `where` is said in it.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("no such file", str(path)) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not a JSON file ({error})", str(path)) from None
+        content = json.loads(text, parse_int=_whole)
+    except RecursionError:
+        text = f"nested too deep; expected at most {_DEEPEST} levels"
+        raise InputError(f"not a JSON file ({text})", where) from None
+    except ValueError as error:  # JSONDecodeError and UnicodeDecodeError are
+        raise InputError(f"not a JSON file ({words_of(error)})", where) from None
     if not isinstance(content, dict):
-        raise InputError("not a JSON object", str(path))
+        raise InputError("not a JSON object", where)
+    if deeper_than(content, _DEEPEST):
+        raise InputError(f"nested too deep; expected at most {_DEEPEST} levels", where)
     return content
+
+
+def deeper_than(content: Any, most: int) -> bool:
+    """Whether lists and mappings are nested in each other more than `most` times."""
+    level = [content]
+    for _ in range(most + 1):
+        level = [
+            entry
+            for one in level
+            for entry in (one.values() if isinstance(one, dict) else one)
+            if isinstance(entry, dict | list)
+        ]
+        if not level:
+            return False
+    return True
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > _LONGEST:
+        raise ValueError(f"a whole number of {len(digits)} digits; expected at most {_LONGEST}")
+    return int(digits)
 
 
 def plain(value: Any, lost: dict[str, str] | None = None, place: str = "") -> Any:

@@ -4,14 +4,15 @@
 or timed-out solve is a record like any other, with its reason.
 """
 
-import json
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import plain, write_json
+from verify.json_files import plain, read_json, write_json
+from verify.printable import one_line, words_of
 
 __all__ = [
     "COMPILING",
@@ -27,6 +28,7 @@ __all__ = [
     "Status",
     "Verdict",
     "VerdictRecord",
+    "checked",
     "error_picture",
     "read_result",
     "write_result",
@@ -310,41 +312,52 @@ def read_result(path: Path) -> CaseResult:
     InputError
         If the file is missing, damaged, or of another schema version.
     """
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("no such file; expected a result", str(path)) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not a JSON file ({error})", str(path)) from None
-    if not isinstance(record, dict) or record.get("schema") != SCHEMA_VERSION:
+    record = read_json(path, "a result")
+    if record.get("schema") != SCHEMA_VERSION:
         raise InputError(f"not a result of schema version {SCHEMA_VERSION}", str(path))
     try:
         for place, number in record.pop("not_finite", {}).items():
             _put(record, place, float(number))
-        record["solves"] = [
-            SolveRecord(
-                **{
-                    **s,
-                    "status": Status(s["status"]),
-                    "metrics": [Metric(**m) for m in s["metrics"]],
-                }
-            )
-            for s in record["solves"]
-        ]
-        record["rates"] = [Rate(**rate) for rate in record["rates"]]
-        record["verdicts"] = [
-            VerdictRecord(**{**v, "verdict": Verdict(v["verdict"])}) for v in record["verdicts"]
-        ]
-        record["notices"] = [
-            Notice(**{**n, "kind": NoticeKind(n["kind"])}) for n in record.get("notices", [])
-        ]
-        record["openings"] = [
-            OpeningProfile(**{**o, "curves": [OpeningCurve(**c) for c in o["curves"]]})
-            for o in record.get("openings", [])
-        ]
-        return CaseResult(**record)
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise InputError(f"not a readable result ({error})", str(path)) from None
+    except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+        raise InputError(f"not a readable result ({words_of(error)})", str(path)) from None
+    return checked(CaseResult, record, "result", str(path))
+
+
+def checked[Kind](kind: type[Kind], content: Any, what: str, where: str) -> Kind:
+    """Make one of the records of this module, or of what holds them, from plain values.
+
+    Parameters
+    ----------
+    kind : type
+        A dataclass.
+    content : object
+    what : str
+        What it is called in the message.
+    where : str
+
+    Raises
+    ------
+    InputError
+        If a value is missing, of another type, or unknown; the first such is named.
+    """
+    from pydantic import ValidationError
+
+    make: Any = kind
+    try:
+        made: Kind = _adapter(make).validate_python(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        said = one_line(f"{place}: {first['msg']}")
+        raise InputError(f"not a readable {what} ({said})", where) from None
+    return made
+
+
+@cache
+def _adapter(kind: Any) -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
 def _put(record: Any, place: str, number: float) -> None:

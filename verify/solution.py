@@ -12,7 +12,7 @@ the file exchange for programs that are not written in Python.
 import contextlib
 import io
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.handed_over import check_accounts, check_cells, check_field, check_vectors
+from verify.json_files import read_json
 from verify.whole_files import whole_file, write_whole
 
-__all__ = ["SCHEMA_VERSION", "Regularisation", "Solution", "read_solution", "write_solution"]
+__all__ = [
+    "SCHEMA_VERSION", "Regularisation", "Solution", "handed_over", "read_solution",
+    "write_solution",
+]  # fmt: skip
 
 SCHEMA_VERSION = 1
 
@@ -135,39 +140,42 @@ class Solution:
     notes: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check shapes, so that a wrong solver fails where it hands over, not later."""
+        """Refuse what is no solution, so that a wrong solver fails where it hands over, not later.
+
+        Raises
+        ------
+        InputError
+            Naming the field, what it is, and what was expected.
+        """
+        check_field("points", self.points, (None, None))
         n, d = self.points.shape
-        t = len(self.times)
-        if (d, self.order) not in _CELL_TYPES:
-            text = f"a solution of dimension {d} and order {self.order}"
+        if isinstance(self.order, bool) or (d, self.order) not in _CELL_TYPES:
+            text = f"a solution of dimension {d} and order {self.order!r}"
             raise InputError(f"{text}; expected 2 or 3, and 1 or 2")
         fit = dict.fromkeys(_CELL_TYPES[k, self.order] for k in (d, 2))
-        if self.cells.ndim != 2 or self.cells.shape[1] not in map(_NODES_PER_CELL.get, fit):
-            text = f"cells of shape {self.cells.shape}"
-            wanted = " or ".join(f"(m, {_NODES_PER_CELL[name]}) for {name}" for name in fit)
-            raise InputError(f"{text}; expected {wanted}")
-        if len(self.cells) == 0:
-            raise InputError("a solution without cells")
-        if self.cells.min() < 0 or self.cells.max() >= n:
-            raise InputError(f"cell nodes outside 0..{n - 1}")
-        if self.displacement.shape != (t, n, d):
-            shape = self.displacement.shape
-            raise InputError(f"displacement of shape {shape}; expected {(t, n, d)}")
-        if not np.isfinite(self.displacement).all():
-            raise InputError("displacement has values that are not finite")
-        if self.velocity is not None and self.velocity.shape != (t, n, d):
-            raise InputError(f"velocity of shape {self.velocity.shape}; expected {(t, n, d)}")
-        if self.acceleration is not None and self.acceleration.shape != (t, n, d):
-            shape = self.acceleration.shape
-            raise InputError(f"acceleration of shape {shape}; expected {(t, n, d)}")
-        if self.acceleration is not None and not np.isfinite(self.acceleration).all():
-            raise InputError("acceleration has values that are not finite")
-        if not np.isfinite(self.times).all() or (np.diff(self.times) <= 0.0).any():
-            raise InputError(f"times {self.times.tolist()}; expected ascending and finite")
+        check_cells(self.points, self.cells, {_NODES_PER_CELL[name]: name for name in fit})
+        check_field("times", self.times, (None,))
+        t = len(self.times)
+        if not t or (np.diff(self.times) <= 0.0).any():
+            raise InputError(f"times {self.times.tolist()[:20]}; expected ascending, at least one")
+        check_field("displacement", self.displacement, (t, n, d))
+        if self.velocity is not None:
+            check_field("velocity", self.velocity, (t, n, d))
+        if self.acceleration is not None:
+            check_field("acceleration", self.acceleration, (t, n, d))
+        check_vectors("cut_facets", self.cut_facets, [(self.cell_dimension, d)])
+        if self.cell_sides is not None:
+            check_field("cell_sides", self.cell_sides, (len(self.cells),))
         for name, column in self.ledger.items():
-            if np.shape(column) != (t,):
-                text = f"ledger '{name}' of shape {np.shape(column)}"
-                raise InputError(f"{text}; expected ({t},), one value per time")
+            check_field(f"ledger '{name}'", np.asarray(column), (t,))
+        check_accounts(
+            self.size, self.unknowns, self.timings, self.iterations, self.quantities, self.notes
+        )
+        entries: list[Any] = list(self.regularisations)
+        for entry in entries:
+            if not isinstance(entry, Regularisation):
+                text = f"regularisations: of type '{type(entry).__name__}'"
+                raise InputError(f"{text}; expected Regularisation")
 
     @property
     def dimension(self) -> int:
@@ -183,6 +191,20 @@ class Solution:
     def cell_type(self) -> str:
         """VTK (meshio) name of the cells."""
         return _CELL_TYPES[self.cell_dimension, self.order]
+
+
+def handed_over(answer: Any) -> Solution:
+    """Return what a solver answered, checked anew: its arrays may have changed since it was made.
+
+    Raises
+    ------
+    InputError
+        If it is no `Solution`, or not a whole one.
+    """
+    if not isinstance(answer, Solution):
+        kind = "None" if answer is None else f"a '{type(answer).__name__}'"
+        raise InputError(f"the solver returned {kind}; expected a verify.solution.Solution")
+    return Solution(**{entry.name: getattr(answer, entry.name) for entry in fields(Solution)})
 
 
 def write_solution(solution: Solution, path: Path) -> None:
@@ -259,13 +281,7 @@ def read_solution(path: Path) -> Solution:
         If a file is missing, damaged or not of this form.
     """
     source = path.with_suffix(".json")
-    try:
-        record: Any = json.loads(source.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        text = "no such file; expected the JSON half of a solution"
-        raise InputError(text, str(source)) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not a JSON file ({error})", str(source)) from None
+    record = read_json(source, "the JSON half of a solution")
     _check_record(record, str(source))
     try:
         d, order, files = int(record["dimension"]), int(record["order"]), record["files"]
@@ -310,8 +326,6 @@ def read_solution(path: Path) -> Solution:
 
 def _check_record(record: Any, where: str) -> None:
     """Refuse what is not of this schema, lacks a mandatory key or has an unknown one."""
-    if not isinstance(record, dict):
-        raise InputError("not a JSON object", where)
     if record.get("schema") != SCHEMA_VERSION:
         raise InputError(f"schema {record.get('schema')!r}; expected {SCHEMA_VERSION}", where)
     if missing := [key for key in _MANDATORY if key not in record]:

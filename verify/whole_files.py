@@ -1,14 +1,18 @@
-"""Files that are whole or not there: a reader, or a kill at any time, never sees half of one."""
+"""Files that are whole or not there: a reader, or a kill at any time, never sees half of one.
+
+And files of others, which may be pipes, devices, or larger than memory: read within limits.
+"""
 
 import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from verify.errors import InputError
 
-__all__ = ["DISK_FAILURES", "asked_place", "whole_file", "write_whole"]
+__all__ = ["DISK_FAILURES", "asked_place", "read_bounded", "whole_file", "write_whole"]
 
 DISK_FAILURES = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 
@@ -46,6 +50,42 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Write text (UTF-8) or bytes by `whole_file`."""
     with whole_file(path) as partial:
         partial.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def read_bounded(path: Path, what: str, largest: int = 2**28) -> bytes:
+    """Read a file that somebody else may have made.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        What is expected there, for the message: "a case file".
+    largest : int
+        Bytes.
+
+    Raises
+    ------
+    InputError
+        If it is missing, no plain file (a pipe would be waited for), too large, or unreadable.
+    """
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(f"is a directory; expected {what}", str(path))
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"is a pipe or a device; expected {what}", str(path))
+        if status.st_size > largest:
+            size = f"{status.st_size / 1e6:.3g} MB"
+            text = f"has {size}; expected {what}, which has {largest / 1e6:.3g} MB at most"
+            raise InputError(text, str(path))
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"no such file; expected {what}", str(path)) from None
+    except (OSError, ValueError) as error:  # a null byte in a name is a ValueError
+        if isinstance(error, InputError):
+            raise
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot be read ({why})", str(path)) from None
 
 
 @contextmanager

@@ -53,7 +53,7 @@ def test_a_killed_run_lists_what_had_finished_and_what_had_not_started(root):
     [
         ("{", "not a JSON file"),
         ("", "not a JSON file"),
-        ("[]", "not a result of schema version 1"),
+        ("[]", "not a JSON object"),
         ('{"schema": 99}', "not a result of schema version 1"),
         ('{"schema": 1}', "not a readable result"),
         ("\ud800".encode("utf-8", "surrogatepass"), "not a JSON file"),
@@ -82,7 +82,7 @@ def test_a_result_with_a_wrong_type_in_it_is_a_row_too(root, spoil):
     result = json.loads(result_of(root).read_text())
     spoil(result)
     result_of(root).write_text(json.dumps(result))
-    assert "result.json is not readable" in said(root)
+    assert "not a readable result" in said(root)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 0.0, -1.0, 1e-320, 1e300])

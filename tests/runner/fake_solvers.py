@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import UnsupportedSceneError
 from verify.solution import Solution
 
 
@@ -92,11 +92,6 @@ class RefusingLate(Instant):
 class Raising(Instant):
     def solve(self, scene, level, repetitions=1, **parameters):
         raise ZeroDivisionError("the pivot is zero")
-
-
-class BadInput(Instant):
-    def refuses(self, scene):
-        raise InputError("its mesh has a hole", "body.msh")
 
 
 class Crashing(Instant):

@@ -85,7 +85,6 @@ def test_timings_of_solves_that_ran_side_by_side_are_marked(verify):
         ("fake_solvers:Brittle", "could not be loaded: RuntimeError: no licence"),
         ("fake_solvers:Nobody", "no 'Nobody' in module 'fake_solvers'"),
         ("no_such_module:Solver", "needs 'no_such_module', which is not installed"),
-        ("fake_solvers:BadInput", "body.msh: its mesh has a hole"),
     ],
 )
 def test_a_solver_that_was_asked_for_and_does_not_work_is_bad_input(verify, solver, said):

@@ -161,6 +161,7 @@ def test_no_solve_at_all_is_still_a_result():
 def test_a_relative_error_against_zero_is_left_out_with_a_note():
     class Still:
         singular_points = EXACT.singular_points
+        strain_energy = EXACT.strain_energy
 
         def displacement(self, points, near=None):
             return np.zeros_like(points)
@@ -210,6 +211,7 @@ def test_an_uncut_body_has_no_jump_metric():
 
     class Linear:
         singular_points = np.zeros((0, 2))
+        strain_energy = EXACT.strain_energy
 
         def displacement(self, points, near=None):
             return 0.1 * points
@@ -223,3 +225,40 @@ def test_an_uncut_body_has_no_jump_metric():
     result = assess_accuracy(asked, rows, {"xfem": {0: one}}, Linear())
     assert result.solves[0].metric("jump_l2") is None
     assert result.solves[0].metric("energy_norm").value < 1e-13
+
+
+def test_a_solution_beside_the_body_is_not_measured_but_named():
+    """Its fields would be those of the cells nearest to the body."""
+    whole = LEVELS[0]
+    moved = solution(whole.points + 3.0, whole.cells, whole.displacement[0], size=whole.size)
+    result = assess([BOUND], {"xfem": {0: moved}}, EXACT)
+    assert result.verdicts[0].verdict is Verdict.ERROR
+    assert "1 of the volume of the solution lies outside the body" in result.verdicts[0].reason
+
+
+def test_a_solution_that_cannot_be_compared_costs_nobody_else_a_verdict(monkeypatch):
+    import verify.study.accuracy as accuracy
+
+    real = accuracy.Measured
+
+    def breaking(given, *rest):
+        if given.unknowns == 13:
+            raise FloatingPointError("overflow encountered in multiply")
+        return real(given, *rest)
+
+    monkeypatch.setattr(accuracy, "Measured", breaking)
+    wild = replace(LEVELS[0], unknowns=13)
+    result = assess([BOUND], {"guest": {0: wild}, "xfem": {0: LEVELS[0]}}, EXACT)
+    guest = next(solve for solve in result.solves if solve.solver == "guest")
+    assert guest.status is Status.FAILED
+    assert guest.reason.startswith("its solution cannot be compared: FloatingPointError")
+    assert result.verdicts[0].observed == pytest.approx(0.0986, rel=0.01)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 0.125, 1e6])
+def test_a_size_that_is_not_that_of_its_cells_costs_no_time_and_changes_no_error(size):
+    stated = replace(LEVELS[0], size=size)
+    found = assess([BOUND], {"xfem": {0: stated}}, EXACT).solves[0].metric("displacement_l2")
+    known = assess([BOUND], {"xfem": {0: LEVELS[0]}}, EXACT).solves[0].metric("displacement_l2")
+    # other places of the same integrals: as precise as the comparison states of itself
+    assert found.value == pytest.approx(known.value, rel=0.05)

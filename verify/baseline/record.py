@@ -1,13 +1,12 @@
 """The baseline file: JSON, sorted, made to be committed and read in a review."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
 
 from verify.errors import InputError
-from verify.json_files import write_json
+from verify.json_files import read_json, write_json
 from verify.scene.messages import first_fault
 from verify.scene.strict import Finite, NonNegative, Positive, Strict
 
@@ -92,17 +91,7 @@ def read_baseline(path: Path) -> Baseline:
     InputError
         If it is missing or not of this form; with the key and what was expected there.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        text = "no such file; `verify baseline save RUN --file FILE` makes one"
-        raise InputError(text, str(path)) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not a JSON file ({error})", str(path)) from None
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", str(path)) from None
-    if not isinstance(content, dict):
-        raise InputError("not a JSON object", str(path))
+    content = read_json(path, "a baseline; `verify baseline save RUN --file FILE` makes one")
     try:
         return Baseline.model_validate(content)
     except ValidationError as error:

@@ -52,7 +52,7 @@ def _row(cache: ReferenceCache, entry: Entry) -> dict[str, Any]:
         "unknowns": entry.record.unknowns,
         "bytes": cache.size(entry),
         "made": entry.made,
-        "dolfinx": entry.origin.get("versions", {}).get("dolfinx"),
+        "dolfinx": entry.dolfinx,
         "commit": entry.origin.get("commit"),
         "outdated": entry.outdated,
         "key": entry.key,

@@ -99,6 +99,10 @@ class Body:
         """Whether anything is cut."""
         return bool(self.parts)
 
+    def inside(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points (n, 2) lie inside the body."""
+        return _inside(points, self.loops)
+
     def tip_distance(self, points: Array) -> Array:
         """Distance (n,) of points (n, 2) to the nearest tip; infinite without one."""
         return np.asarray(distance_to_segments(points, self.tips, self.tips))

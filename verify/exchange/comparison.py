@@ -5,9 +5,8 @@ reference, are run by `verify.runner`; then the answers are put beside them as s
 of their own, and the comparison of the runner judges all of them together.
 """
 
-import os
 import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from time import sleep
 from typing import Any
@@ -16,15 +15,14 @@ from verify.errors import InputError
 from verify.exchange.answers import Answers
 from verify.json_files import read_json, write_json
 from verify.provenance import provenance
-from verify.result import CaseResult, SolveRecord, Status, read_result
+from verify.result import CaseResult, SolveRecord, Status
 from verify.runner import Options, Progress, run_cases
 from verify.runner.checking import check_scene
-from verify.runner.child import POLL_SECONDS, Child
-from verify.runner.directory import RunDirectory, claimed, write_run
+from verify.runner.child import POLL_SECONDS
+from verify.runner.comparing import Comparison
+from verify.runner.directory import RunDirectory, claimed, emptied, write_run
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.runner.job import Job, solution_files, store_record
-from verify.runner.log import telling_line
-from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, write_solution
 from verify.solvers import solver_names
@@ -157,9 +155,7 @@ def _store(scene: Scene, answers: Answers, name: str, directory: RunDirectory) -
     """Store every answer, and every missing one, as a solve of `name`."""
     for level in sorted({*answers.solutions, *answers.missing}):
         folder = directory.solve_folder(scene.name, name, level)
-        folder.mkdir(parents=True, exist_ok=True)
-        for leftover in folder.iterdir():
-            leftover.unlink()
+        emptied(folder)
         job = Job(scene.name, name, level, 0, "", folder)
         if level in answers.missing:
             store_record(job, job.blank(*answers.missing[level]))
@@ -192,28 +188,16 @@ def _assess(
     folder = directory.case_folder(scene.name)
     write_json(scene_content(scene), folder / "scene.json")
     solves = sorted(path.parent for path in folder.glob("*/record.json"))
-    question = {
-        "key": digest_of([scene_content(scene), [file_digest(s / "record.json") for s in solves]]),
-        "judge_only": [],
-        "folders": [os.path.relpath(solve, directory.root) for solve in solves],
-        "root": str(directory.root.resolve()),
-        "provenance": origin,
-    }
-    for stale in ("judged.json", "result.json"):
-        (folder / stale).unlink(missing_ok=True)
-    write_json(question, folder / "judge.json")
+    (folder / "result.json").unlink(missing_ok=True)
+    key = digest_of([scene_content(scene), [file_digest(s / "record.json") for s in solves]])
     memory = options.memory or 0.8 * origin["memory"]
-    log, timeout = folder / "judge-log.txt", max(options.timeout, 60.0)
-    child = Child("verify.runner.assess", folder / "judge.json", log, timeout, memory)
+    comparison = Comparison(
+        scene, key, (), solves, folder, directory.root, origin, options.timeout, memory
+    )
     try:
-        while (ending := child.poll()) is None:
+        while (result := comparison.poll()) is None:
             sleep(POLL_SECONDS)
     except BaseException:
-        child.kill()
+        comparison.kill()
         raise
-    if (folder / "judged.json").is_file():
-        return read_result(folder / "result.json")
-    why = f"killed for {ending.killed_for}" if ending.killed_for else telling_line(log)
-    result = unjudged_result(scene, solves, f"comparison failed: {why}", origin)
-    write_json(asdict(result), folder / "result.json")
     return result

@@ -13,6 +13,7 @@ from verify.report.markup import Markup, joined, tag
 __all__ = ["HEIGHT", "WIDTH", "Axis", "Panel", "log_range", "text"]
 
 WIDTH, HEIGHT = 372, 268
+_MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
 _LEFT, _RIGHT, _TOP, _BOTTOM = 46, 106, 34, 40
 
 
@@ -20,7 +21,7 @@ def log_range(values: list[float], room: float = 0.08) -> tuple[float, float]:
     """Return a range around positive `values`, at least a factor of two wide."""
     low, high = math.log10(min(values)), math.log10(max(values))
     widen = max(room * (high - low), (math.log10(2) - (high - low)) / 2, 0.04)
-    return 10 ** (low - widen), 10 ** (high + widen)
+    return 10 ** max(low - widen, -_MOST), 10 ** min(high + widen, _MOST)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from verify.report.tables import (
 )
 from verify.result import CaseResult
 
-__all__ = ["case_section"]
+__all__ = ["case_section", "failed_section"]
 
 _TURN = (
     "Drag to turn; click first, then the wheel or two fingers zoom, arrow keys turn, 0 goes back. "
@@ -64,6 +64,13 @@ def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup
 def _whose(result: CaseResult | None) -> str:
     failing = ", ".join(map(solver_title, result.failing)) if result else ""
     return f" {failing}" if failing else ""
+
+
+def failed_section(index: int, entry: CaseEntry, reason: str) -> Markup:
+    """Return what can be said of a case whose section cannot be made."""
+    head = tag("h2", entry.name)
+    said = f"This case cannot be shown: {reason}. Its numbers are in results.json."
+    return tag("section", head, tag("p", said, class_="warning"), id=anchor(index), class_="case")
 
 
 def _body(result: CaseResult, pictures: CasePictures) -> Markup:

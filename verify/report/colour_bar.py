@@ -11,6 +11,7 @@ from verify.report.view import View
 
 __all__ = ["colour_bar"]
 
+_LEAST = 1e-300  # below, numbers lose their digits
 _WIDTH, _BAR, _SIDE, _STRIPES = 300, 9, 26, 60
 
 
@@ -30,7 +31,8 @@ def colour_bar(view: View, title: str) -> Markup:
         )
         for i in range(_STRIPES)
     ]
-    power = math.floor(math.log10(high))
+    drawable = math.isfinite(high) and high > _LEAST
+    power = math.floor(math.log10(high)) if drawable else 0
     shown = 0 if -3 <= power < 4 else power
     unit = f"{title} (m)" if not shown else f"{title} ("
     head = [unit]
@@ -40,7 +42,7 @@ def colour_bar(view: View, title: str) -> Markup:
         parts = [exponent, tag("tspan", " m)", dy="5")]
         head = [f"{title} (10"]
     ticks = []
-    for value in _ticks(high):
+    for value in _ticks(high) if drawable else []:
         x = _SIDE + inside * (value - low) / (high - low)
         label = f"{value / 10.0**shown:.4g}"
         ticks.append(text(x, 16 + _BAR + 16, label, text_anchor="middle"))

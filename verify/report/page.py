@@ -2,12 +2,13 @@
 
 from importlib.resources import files
 
-from verify.report.case_section import case_section
+from verify.printable import words_of
+from verify.report.case_section import case_section, failed_section
 from verify.report.markup import Markup, joined, tag
 from verify.report.origin import origin_section, reading_guide
 from verify.report.pictures import CasePictures
 from verify.report.ranking_section import ranking_section
-from verify.report.run_directory import Run
+from verify.report.run_directory import CaseEntry, Run
 from verify.report.summary import summary, verdict_table
 from verify.report.turntable import turntable_script
 
@@ -35,7 +36,10 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
     )
     started = run.record.get("started")
     when = f"Run of {started}" if started else "Run of unknown date"
-    which = ranking_section(run.ranking)
+    try:
+        which = ranking_section(run.ranking)
+    except Exception as error:
+        which = tag("p", f"The ranking cannot be shown: {words_of(error)}.", class_="warning")
     links = [("#reading", "how to read this"), ("#provenance", "provenance")]
     if which is not None:
         links.insert(0, ("#which", "which solver"))
@@ -51,7 +55,7 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
         class_="top",
     )
     sections = [
-        case_section(index, entry, shown)
+        _section(index, entry, shown)
         for index, (entry, shown) in enumerate(zip(run.entries, pictures, strict=True))
     ]
     body = tag(
@@ -68,3 +72,11 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
     script = turntable_script() if turned else None
     whole = tag("html", head, tag("body", top, body, script), lang="en")
     return joined(Markup("<!DOCTYPE html>\n"), whole)
+
+
+def _section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup:
+    """Return the section of a case; if that fails, the others are shown all the same."""
+    try:
+        return case_section(index, entry, pictures)
+    except Exception as error:
+        return failed_section(index, entry, words_of(error))

@@ -33,6 +33,8 @@ _VTK = [sys.executable, "-m", "verify.report.draw_with_vtk"]
 _SECONDS = 60.0  # to start VTK
 _SECONDS_EACH = 20.0
 _MOST = 4  # bodies side by side
+_STILL = 1e-200  # of the body's diagonal: displacements below are none
+_WILD = 1e3  # times the smallest displacement beside it: what moves farther is not drawn
 _OPENING_SHOWN = 0.15  # of the body's diagonal: what the largest displacement is scaled to
 
 
@@ -96,6 +98,7 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         except InputError as error:
             where = f"{solver_title(solve.solver)}, level {solve.level}"
             pictures.notes.append(f"No picture of {where}: {error.what}.")
+    shown = _without_wild(pictures, shown)
     dimensions = {solution.dimension for _, solution in shown}
     if len(dimensions) > 1:
         pictures.notes.append("No pictures side by side: the solutions differ in dimension.")
@@ -170,11 +173,31 @@ def _finest_solves(result: CaseResult) -> list[SolveRecord]:
     return sorted(finest.values(), key=place)
 
 
+def _without_wild(
+    pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]
+) -> list[tuple[SolveRecord, Solution]]:
+    """Leave out, with a note, what would make the others invisible: all share view and colours."""
+    moved = [float(np.abs(solution.displacement[-1]).max()) for _, solution in shown]
+    least = min((length for length in moved if length > 0.0), default=0.0)
+    kept = []
+    for (solve, solution), length in zip(shown, moved, strict=True):
+        defect = solve.notes.get("comparison", "") if not solve.metrics else ""
+        if length > _WILD * least:
+            defect = f"it moves by up to {number_text(length)} m, the others by far less"
+        if not defect:
+            kept.append((solve, solution))
+            continue
+        where = f"{solver_title(solve.solver)}, level {solve.level}"
+        pictures.notes.append(f"No picture of {where}: {defect}.")
+    return kept
+
+
 def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> None:
     everything = np.concatenate([solution.points for _, solution in shown])
     diagonal = float(np.linalg.norm(np.ptp(everything, axis=0)))
     largest = max(float(np.abs(solution.displacement[-1]).max()) for _, solution in shown)
-    pictures.scale = _round_scale(_OPENING_SHOWN * diagonal / largest) if largest > 0 else 1.0
+    moves = largest > _STILL * diagonal
+    pictures.scale = _round_scale(_OPENING_SHOWN * diagonal / largest) if moves else 1.0
     bodies = [deformed_body(solution, pictures.scale) for _, solution in shown]
     view = common_view(bodies, DISPLACEMENT_COLOURS)
     for (solve, solution), body in zip(shown, bodies, strict=True):

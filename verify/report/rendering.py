@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+from verify.printable import words_of
 from verify.report.exports import csv_rows, json_document, junit_document
 from verify.report.markdown import markdown
 from verify.report.page import page
 from verify.report.pictures import CasePictures, case_pictures, drawn
 from verify.report.printing import print_page
-from verify.report.run_directory import load_run
+from verify.report.run_directory import CaseEntry, load_run
 from verify.whole_files import write_whole
 
 __all__ = ["render", "render_markdown", "render_pdf"]
@@ -34,7 +35,7 @@ def render(directory: Path) -> Path:
         If the files cannot be written.
     """
     run = load_run(directory)
-    pictures = [case_pictures(run.root, entry) for entry in run.entries]
+    pictures = [_pictures(run.root, entry) for entry in run.entries]
     notes = []
     if reason := drawn([picture for shown in pictures for picture in shown.all]):
         notes.append(f"pictures were drawn by matplotlib because {reason}.")
@@ -48,6 +49,14 @@ def render(directory: Path) -> Path:
     target = directory / "report.html"
     write_whole(target, text)
     return target
+
+
+def _pictures(root: Path, entry: CaseEntry) -> CasePictures:
+    """Prepare the pictures of a case; if that fails, nothing else of the report does."""
+    try:
+        return case_pictures(root, entry)
+    except Exception as error:
+        return CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
 
 
 def render_markdown(directory: Path) -> Path:

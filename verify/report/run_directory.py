@@ -3,21 +3,20 @@
 What is missing or damaged becomes a sentence of the report, never an omission.
 """
 
-import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from verify.errors import InputError
+from verify.json_files import read_json
+from verify.printable import words_of
 from verify.ranking import Ranking
-from verify.result import CaseResult, SolveRecord, read_result
+from verify.result import CaseResult, SolveRecord, checked, read_result
 
 __all__ = ["CaseEntry", "Run", "load_run"]
 
-_RESULT = TypeAdapter(CaseResult)
-_SOLVE = TypeAdapter(SolveRecord)
 _RANKING = TypeAdapter(Ranking)
 
 
@@ -99,10 +98,10 @@ def _ranking(path: Path, cases: list[str]) -> tuple[dict[str, Any] | None, list[
     if not path.is_file():
         return None, []
     try:
-        found = json.loads(path.read_bytes())
+        found = read_json(path)
         _RANKING.validate_python(found)
-    except (OSError, ValueError) as error:  # ValidationError is one
-        return None, [f"ranking.json cannot be read ({str(error).splitlines()[0]})"]
+    except ValueError as error:  # InputError and ValidationError are
+        return None, [f"ranking.json cannot be read ({words_of(error)})"]
     if set(found["cases"]) != set(cases):
         return None, ["ranking.json is of other cases: no ranking is shown"]
     return found, []
@@ -111,12 +110,12 @@ def _ranking(path: Path, cases: list[str]) -> tuple[dict[str, Any] | None, list[
 def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:
     """Return the content of ``run.json`` in a form that can be relied on, and its defects."""
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}, ["run.json is missing"]
-    except (json.JSONDecodeError, UnicodeDecodeError, OSError) as error:
-        return {}, [f"run.json cannot be read ({error})"]
-    if not isinstance(record, dict) or record.get("schema") != 1:
+        record = read_json(path)
+    except InputError as error:
+        return {}, [
+            f"run.json {'cannot be read' if path.exists() else 'is missing'} ({error.what})"
+        ]
+    if record.get("schema") != 1:
         return {}, ["run.json is not of schema version 1"]
     names = record.get("cases")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
@@ -128,17 +127,10 @@ def _entry(folder: Path) -> CaseEntry:
     name = folder.name.replace("__", "/")
     try:
         result = read_result(folder / "result.json")
-        result = _RESULT.validate_python(asdict(result))
     except InputError as error:
         defect = str(error.what)
         if not (folder / "result.json").exists():
             defect = "not judged: the run was stopped before its comparison"
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        defect = f"result.json is not readable ({where}: {first['msg']})"
-    except OSError as error:
-        defect = f"result.json cannot be read ({error.strerror})"
     else:
         return CaseEntry(result.case, folder, result)
     return CaseEntry(name, folder, None, defect, _finished_solves(folder))
@@ -149,9 +141,8 @@ def _finished_solves(folder: Path) -> list[SolveRecord]:
     records = []
     for path in sorted(folder.glob("*/record.json")):
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            records.append(_SOLVE.validate_python(content["record"]))
-        except (OSError, ValueError, KeyError, TypeError):  # ValidationError is a ValueError
+            records.append(checked(SolveRecord, read_json(path).get("record"), "record", str(path)))
+        except InputError:
             continue
     return sorted(records, key=lambda record: (record.solver, record.level))
 

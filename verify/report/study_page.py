@@ -1,12 +1,13 @@
 """The page of a study: findings as sentences, then maps and curves, then where it comes from."""
 
-import json
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
+from verify.json_files import read_json
+from verify.printable import shown
 from verify.report.budget_figures import budget_section
 from verify.report.calibration_figures import calibration_section
 from verify.report.cost_study_figures import cost_section
@@ -43,17 +44,13 @@ def render_study(directory: Path, kind: str) -> Path:
         If the record is not there, is no record of this kind, or has another schema version.
     """
     source = directory / f"{kind}.json"
-    try:
-        record = json.loads(source.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"no {kind}.json: the {kind} study has not run", str(directory)) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as problem:
-        raise InputError(f"not JSON ({problem})", str(source)) from None
+    if not source.exists():
+        raise InputError(f"no {kind}.json: the {kind} study has not run", str(directory))
+    record = read_json(source)
     expected = {"schema": _SCHEMA, "kind": f"{kind} study"}
     for key, value in expected.items():
-        if not isinstance(record, dict) or record.get(key) != value:
-            found = record.get(key) if isinstance(record, dict) else type(record).__name__
-            raise InputError(f"{key} is {found!r}; expected {value!r}", str(source))
+        if (found := record.get(key)) != value:
+            raise InputError(f"{key} is {shown(found)}; expected {value!r}", str(source))
     target = directory / f"{kind}.html"
     write_whole(target, _page(record, kind))
     return target

@@ -12,6 +12,8 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 52, 96, 34, 40
 _COLOURS = ("#c04a00", "#0067a5", "#00785a", "#4d4d4d", "#7a3e9d")
 _DASHES = (None, "6 3", "2 2", "8 2 2 2", "1 4")
 
+_DRAWABLE = 1e200  # what is larger, or no number, leaves a gap
+
 
 def time_panel(
     title: str,
@@ -39,7 +41,7 @@ def time_panel(
         Lower and upper edge of a grey band below the curves.
     """
     drawn = [curve for _, curve in curves] + list(band or ())
-    values = [v for curve in drawn for v in curve if math.isfinite(v)]
+    values = [v for curve in drawn for v in curve if abs(v) < _DRAWABLE]
     low, high = min([0.0, *values]), max([*values, 0.0])
     room = 0.04 * (high - low) or 1.0
     low, high = low - room, high + room
@@ -71,7 +73,7 @@ def time_panel(
         line = f"M{x(mark):.1f} {y0}V{y1}"
         parts.append(tag("path", tag("title", f"cut at {mark:.3g} s"), d=line, class_="floor-edge"))
     for (name, curve), colour, dash in zip(curves, _COLOURS, _DASHES, strict=False):
-        known = [(x(t), y(v)) for t, v in zip(time, curve, strict=True) if math.isfinite(v)]
+        known = [(x(t), y(v)) for t, v in zip(time, curve, strict=True) if abs(v) < _DRAWABLE]
         nodes = "L".join(f"{a:.1f} {b:.1f}" for a, b in known)
         parts.append(
             tag("path", tag("title", name), d=f"M{nodes}", class_="curve", stroke=colour,

@@ -6,10 +6,13 @@ was compared.
 """
 
 import sys
-from collections.abc import Sequence
+import traceback
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from verify.compare.body import body_of
 from verify.compare.locate import Field
@@ -17,19 +20,31 @@ from verify.compare.motion import ExactMotion
 from verify.compare.realised import cut_deviation, field_of
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.result import CaseResult, SolveRecord, Status, error_picture, write_result
-from verify.runner.childhood import die_with_parent
+from verify.printable import words_of
+from verify.result import (
+    CaseResult,
+    Notice,
+    NoticeKind,
+    SolveRecord,
+    Status,
+    error_picture,
+    write_result,
+)
+from verify.runner.childhood import JUDGING, die_with_parent
 from verify.runner.directory import folder_name
 from verify.runner.error_field import write_error_field
-from verify.runner.job import load_record
+from verify.runner.job import check_files, load_record
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
+from verify.solvers.interface import is_built_in
 from verify.study.accuracy import assess_accuracy
 from verify.study.closing import with_openings
+from verify.whole_files import write_whole
 
 __all__ = ["main"]
 
 REFERENCE = "reference"
+_WILD = 1e3  # sizes of its body: a solution that moves farther has no openings to look at
 
 
 def main(question_file: Path) -> None:
@@ -38,10 +53,18 @@ def main(question_file: Path) -> None:
     question, folder = read_json(question_file), question_file.parent
     root = Path(question["root"])
     scene = restore_scene(read_json(folder / "scene.json"))
-    records, solutions = _stored(root, question["folders"])
+
+    def announce(record: SolveRecord) -> None:
+        write_whole(folder / JUDGING, at.get((record.solver, record.level), ""))
+
+    records, solutions, at = _stored(root, question["folders"], question["unfit"], folder / JUDGING)
     exact = _exact(scene)
-    result: CaseResult = assess_accuracy(scene, records, solutions, exact, question["judge_only"])
-    result = with_openings(result, scene, solutions, exact)
+    result: CaseResult = assess_accuracy(
+        scene, records, solutions, exact, question["judge_only"], announce
+    )
+    (folder / JUDGING).unlink(missing_ok=True)
+    solutions = _comparable(result, solutions)
+    result = _with_openings(result, scene, solutions, exact)
     result = replace(result, provenance=question["provenance"])
     drawn = _error_pictures(scene, solutions, exact, folder)
     pictures = {name: str(path.relative_to(root)) for name, path in drawn.items()}
@@ -51,15 +74,23 @@ def main(question_file: Path) -> None:
 
 
 def _stored(
-    root: Path, folders: Sequence[str]
-) -> tuple[list[SolveRecord], dict[str, dict[int, Solution]]]:
-    """Read records and solutions; a solution that cannot be read is a failed solve."""
+    root: Path, folders: Sequence[str], unfit: Mapping[str, str], at: Path
+) -> tuple[list[SolveRecord], dict[str, dict[int, Solution]], dict[tuple[str, int], str]]:
+    """Read records and solutions; a solution that cannot be read is a failed solve.
+
+    Each folder is written into the file `at` before its solution is read. The third that is
+    returned is the folder by solver and level.
+    """
     records: list[SolveRecord] = []
     solutions: dict[str, dict[int, Solution]] = {}
     for name in folders:
+        write_whole(at, name)
         record = load_record(root / name)
         if record.status is Status.SOLVED:
             try:
+                if name in unfit:
+                    raise InputError(unfit[name])
+                check_files(root / name)
                 solution = read_solution(root / name / "solution")
             except InputError as error:
                 record = replace(record, status=Status.FAILED, reason=str(error))
@@ -67,7 +98,42 @@ def _stored(
                 record = replace(record, solution=f"{name}/solution")
                 solutions.setdefault(record.solver, {})[record.level] = solution
         records.append(record)
-    return records, solutions
+    at.unlink()
+    where = {(r.solver, r.level): name for r, name in zip(records, folders, strict=True)}
+    return records, solutions, where
+
+
+def _with_openings(
+    result: CaseResult, scene: Scene, solutions: dict[str, dict[int, Solution]], exact: Any
+) -> CaseResult:
+    """Add openings and overlaps; those of a guest may not cost the others theirs."""
+    own = {name: one for name, one in solutions.items() if is_built_in(name)}
+    for given in (solutions, own):
+        try:
+            return with_openings(result, scene, given, exact)
+        except Exception as error:
+            traceback.print_exc()
+            text = f"cannot be had: {words_of(error)}"
+            about = Notice(NoticeKind.UNAVAILABLE, "openings and overlaps", None, text)
+            result = replace(result, notices=[*result.notices, about])
+    return result
+
+
+def _comparable(
+    result: CaseResult, solutions: dict[str, dict[int, Solution]]
+) -> dict[str, dict[int, Solution]]:
+    """Leave out the solutions that could not be compared, or move out of all proportion."""
+    fit = {(s.solver, s.level) for s in result.solves if s.status is Status.SOLVED and s.metrics}
+    kept = {
+        name: {k: s for k, s in own.items() if (name, k) in fit and not _is_wild(s)}
+        for name, own in solutions.items()
+    }
+    return {name: own for name, own in kept.items() if own}
+
+
+def _is_wild(solution: Solution) -> bool:
+    size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
+    return bool(np.abs(solution.displacement).max() > _WILD * size)
 
 
 def _exact(scene: Scene) -> Any:
@@ -96,7 +162,11 @@ def _error_pictures(
         if solver == REFERENCE or truth is None:
             continue
         path = folder / f"error_field_{folder_name(solver)}.vtu"
-        write_error_field(own[max(own)], truth, path, body)
+        try:
+            write_error_field(own[max(own)], truth, path, body)
+        except Exception:  # a solution that cannot be drawn costs nobody else a picture
+            traceback.print_exc()
+            continue
         pictures[error_picture(solver)] = path
     return pictures
 

@@ -1,9 +1,12 @@
-"""A process of our own making, watched: wall time, resident memory, and its whole group killed.
+"""A process of our own making, watched: wall time, memory, length of its log; killed as a whole.
 
 Memory is limited by watching the resident set instead of ``RLIMIT_AS`` or ``RLIMIT_DATA``.
 Those count what a process reserves, and LLVM, OpenBLAS and MPI reserve gigabytes that they
 never touch; and a solver that hits them dies in an unlucky place with an unclear message. The
 watch looks fifty times a second, so that a solve may overshoot by what it can touch in 20 ms.
+
+Its end is the end of everything that it started: of its process group, and of processes that
+left the group, which are found as its descendants and by a mark in their environment.
 """
 
 import contextlib
@@ -14,6 +17,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from uuid import uuid4
 
 from verify.threads import ONE_THREAD
 
@@ -21,6 +25,10 @@ __all__ = ["PARENT_VARIABLE", "POLL_SECONDS", "Child", "Ending"]
 
 POLL_SECONDS = 0.02
 PARENT_VARIABLE = "VERIFY_RUNNER_PID"
+_MARK_VARIABLE = "VERIFY_CHILD"
+_LONGEST_LOG = 64 * 2**20  # bytes; beyond, only its beginning and what comes next are kept
+_BEGINNING = 2**20
+_ROUNDS = 50  # of killing: what forks meanwhile is found in the next
 
 
 @dataclass(frozen=True)
@@ -28,13 +36,15 @@ class Ending:
     """How a process ended.
 
     `killed_for` is ``"timeout"`` or ``"memory"`` if the watch killed it; `peak` is the largest
-    resident memory seen (bytes), `wall` its life time (s).
+    resident memory seen (bytes), `wall` its life time (s). `starved` says whether the system
+    killed some process for want of memory meanwhile; None where it does not tell.
     """
 
     returncode: int
     wall: float
     peak: float
     killed_for: str = ""
+    starved: bool = False
 
 
 class Child:
@@ -55,13 +65,15 @@ class Child:
     ) -> None:
         environment = {**os.environ, **ONE_THREAD}
         environment[PARENT_VARIABLE] = str(os.getpid())
+        self._mark = environment[_MARK_VARIABLE] = uuid4().hex
         self.log, self.timeout, self.memory = log, timeout, memory
         self.peak, self.killed_for = 0.0, ""
-        self.start = time.monotonic()
-        run = [module, str(argument)]
+        self.start, self._starved_before = time.monotonic(), _starved()
+        run = [module, str(argument.resolve())]  # a solver may change the working directory
         if ranks > 1:
             run = ["verify.runner.ranks", str(ranks), *run]
-        with log.open("wb") as stream:
+        log.unlink(missing_ok=True)
+        with log.open("ab") as stream:  # appending, so that it can be cut from outside
             self._process = subprocess.Popen(
                 # -P: a stray numpy.py in the working directory is not imported
                 [sys.executable, "-P", "-X", "faulthandler", "-m", *run],
@@ -77,8 +89,10 @@ class Child:
         returncode = self._process.poll()
         wall = time.monotonic() - self.start
         if returncode is not None:
-            self._kill_group()  # compilers and the like that it left behind
-            return Ending(returncode, wall, self.peak, self.killed_for)
+            self._kill_all()  # compilers and the like that it left behind
+            starved = _starved() > self._starved_before
+            return Ending(returncode, wall, self.peak, self.killed_for, starved)
+        _shorten(self.log)
         resident = _resident_memory(self._process.pid)
         self.peak = max(self.peak, resident)
         if not self.killed_for:
@@ -87,30 +101,73 @@ class Child:
             elif wall > self.timeout:
                 self.killed_for = "timeout"
             if self.killed_for:
-                self._kill_group()
+                self._kill_all()
         return None
 
     def kill(self) -> None:
         """Kill it and everything that it started, and wait for it."""
-        self._kill_group()
+        self._kill_all()
         self._process.wait()
 
-    def _kill_group(self) -> None:
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)  # it leads its own session and group
+    def _kill_all(self) -> None:
+        """Kill its group, its descendants, and what bears its mark, until nothing is left."""
+        mark = f"{_MARK_VARIABLE}={self._mark}".encode()
+        for _ in range(_ROUNDS):
+            found = {*_descendants(self._process.pid), *_marked(mark)}
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)  # it leads its own session and group
+            for pid in found - {self._process.pid}:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.kill(pid, signal.SIGKILL)
+            if not found - {self._process.pid}:
+                return
+
+
+def _descendants(pid: int) -> list[int]:
+    """Process `pid` and all that it started and that has not been orphaned."""
+    found, waiting = [], [pid]
+    while waiting:
+        found.append(waiting.pop())
+        with contextlib.suppress(OSError, ValueError):
+            for task in Path("/proc", str(found[-1]), "task").iterdir():
+                waiting += map(int, (task / "children").read_text().split())
+    return found
+
+
+def _marked(mark: bytes) -> list[int]:
+    """Living processes with `mark` in the environment that they were started with."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError, ValueError):  # a zombie has no environment
+            if mark in (folder / "environ").read_bytes():
+                found.append(int(folder.name))
+    return found
 
 
 def _resident_memory(pid: int) -> float:
     """Resident memory in bytes of a process and its descendants (0 if it has gone)."""
     total = 0.0
-    waiting = [str(pid)]
-    while waiting:
-        folder = Path("/proc", waiting.pop())
-        try:
-            pages = int((folder / "statm").read_bytes().split()[1])
-            for task in (folder / "task").iterdir():
-                waiting += (task / "children").read_text().split()
-        except (OSError, IndexError, ValueError):
-            continue
-        total += pages * os.sysconf("SC_PAGE_SIZE")
+    for one in _descendants(pid):
+        with contextlib.suppress(OSError, IndexError, ValueError):
+            pages = int(Path("/proc", str(one), "statm").read_bytes().split()[1])
+            total += pages * os.sysconf("SC_PAGE_SIZE")
     return total
+
+
+def _starved() -> int:
+    """Count how often this machine, or this container, has killed for want of memory."""
+    total = 0
+    for file in ("/proc/vmstat", "/sys/fs/cgroup/memory.events"):
+        with contextlib.suppress(OSError, ValueError):
+            for line in Path(file).read_text().splitlines():
+                name, _, count = line.partition(" ")
+                total += int(count) if name == "oom_kill" else 0
+    return total
+
+
+def _shorten(log: Path) -> None:
+    with contextlib.suppress(OSError):
+        if log.stat().st_size > _LONGEST_LOG:
+            os.truncate(log, _BEGINNING)
+            with log.open("ab") as stream:
+                stream.write(b"\n... (cut here by the runner: too long) ...\n")

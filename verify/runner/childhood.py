@@ -8,7 +8,10 @@ from pathlib import Path
 
 from verify.runner.child import PARENT_VARIABLE
 
-__all__ = ["die_with_parent", "peak_memory", "under_a_launcher"]
+__all__ = ["ANSWER", "ASKING", "JUDGING", "die_with_parent", "peak_memory", "under_a_launcher"]
+
+# files by which a process says where it is, for the case that it dies there
+ANSWER, ASKING, JUDGING = "answer.json", "asking", "judging"
 
 _PR_SET_PDEATHSIG = 1
 _LAUNCHER = "launcher"  # instead of a number: started by something that the runner started

@@ -13,6 +13,7 @@ import errno
 import fcntl
 import os
 import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +23,7 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.whole_files import asked_place
 
-__all__ = ["RUN_SCHEMA", "RunDirectory", "claimed"]
+__all__ = ["RUN_SCHEMA", "RunDirectory", "claimed", "emptied", "write_run"]
 
 RUN_SCHEMA = 1
 _IDENTITY = ("cases", "options_of_result")
@@ -91,6 +92,16 @@ def claimed(root: Path, identity: dict[str, Any]) -> Iterator[RunDirectory]:
         yield RunDirectory(root)
     finally:
         os.close(lock)
+
+
+def emptied(folder: Path) -> None:
+    """Make `folder`, or remove all that is in it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for leftover in folder.iterdir():
+        if leftover.is_dir() and not leftover.is_symlink():
+            shutil.rmtree(leftover)
+        else:
+            leftover.unlink()
 
 
 def write_run(directory: RunDirectory, record: dict[str, Any]) -> None:

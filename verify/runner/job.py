@@ -1,15 +1,24 @@
 """One solve as a unit of work: what identifies it, how its record is stored and found again."""
 
+import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.result import Metric, SolveRecord, Status
+from verify.result import SolveRecord, Status, checked
 from verify.runner.fingerprint import file_digest
 
-__all__ = ["Job", "load_record", "record_of", "solution_files", "store_record", "stored_record"]
+__all__ = [
+    "Job",
+    "check_files",
+    "load_record",
+    "record_of",
+    "solution_files",
+    "store_record",
+    "stored_record",
+]
 
 
 @dataclass(frozen=True)
@@ -62,6 +71,21 @@ def load_record(folder: Path) -> SolveRecord:
     return _stored(read_json(folder / "record.json"), folder)
 
 
+def check_files(folder: Path) -> None:
+    """Raise `InputError` if a file of the solution in `folder` is not as it was stored."""
+    where = folder / "record.json"
+    files = read_json(where).get("files", {})
+    if not isinstance(files, dict) or not all(map(is_file_name, files)):
+        raise InputError("names no files", str(where))
+    for name, digest in files.items():
+        try:
+            same = file_digest(folder / name) == digest
+        except OSError as error:
+            raise InputError(f"cannot be read ({error.strerror})", str(folder / name)) from None
+        if not same:
+            raise InputError("was changed after it was stored", str(folder / name))
+
+
 def stored_record(job: Job) -> SolveRecord | None:
     """Return the record of an earlier, solved run of this very job whose files are whole."""
     try:
@@ -79,10 +103,17 @@ def stored_record(job: Job) -> SolveRecord | None:
 def solution_files(folder: Path) -> list[Path]:
     """Return the files of the solution in `folder`: its JSON half and those that it names."""
     names = read_json(folder / "solution.json").get("files", [])
+    if not isinstance(names, list) or not all(map(is_file_name, names)):
+        raise InputError("names no files", str(folder / "solution.json"))
     return [folder / "solution.json", *(folder / name for name in names)]
 
 
-def record_of(entry: dict[str, Any], where: str) -> SolveRecord:
+def is_file_name(name: Any) -> bool:
+    """Whether `name` is that of a file beside others, and nothing that leads elsewhere."""
+    return isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9_][\w.+-]{0,200}", name) is not None
+
+
+def record_of(entry: Any, where: str) -> SolveRecord:
     """Make a record from its plain values.
 
     Raises
@@ -90,11 +121,7 @@ def record_of(entry: dict[str, Any], where: str) -> SolveRecord:
     InputError
         If they are not those of a record.
     """
-    try:
-        status, metrics = Status(entry["status"]), [Metric(**m) for m in entry["metrics"]]
-        return SolveRecord(**{**entry, "status": status, "metrics": metrics})
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"not a readable record ({error})", where) from None
+    return checked(SolveRecord, entry, "record", where)
 
 
 def _stored(content: dict[str, Any], folder: Path) -> SolveRecord:

@@ -3,17 +3,20 @@
 import re
 from pathlib import Path
 
+from verify.printable import one_line
+
 __all__ = ["telling_line"]
 
 _FATAL = re.compile(r"^Fatal Python error: (.+)")  # faulthandler's headline of a crash
 _TELLING = re.compile(r"error|exception|abort|killed|fail|cannot|not found", re.IGNORECASE)
 _LONGEST = 300
+_READ = 2**18
 
 
 def telling_line(log: Path) -> str:
     """Return the line of `log` that says most about a death: a crash, an error, the last one."""
     try:
-        text = log.read_text(encoding="utf-8", errors="replace")
+        text = _ends(log)
     except OSError:
         return "left no log"
     lines = [line.strip() for line in text.splitlines() if line.strip()]
@@ -21,7 +24,16 @@ def telling_line(log: Path) -> str:
         return "said nothing"
     for line in lines:
         if match := _FATAL.match(line):
-            return match.group(1)
+            return one_line(match.group(1), _LONGEST)
     tail = lines[-30:]
     line = next((line for line in reversed(tail) if _TELLING.search(line)), lines[-1])
-    return line[:_LONGEST]
+    return one_line(line, _LONGEST)
+
+
+def _ends(log: Path) -> str:
+    """Return the beginning and the end of a log that may be very long."""
+    with log.open("rb") as stream:
+        head = stream.read(_READ)
+        size = stream.seek(0, 2)
+        stream.seek(max(_READ, size - _READ))
+        return (head + b"\n" + stream.read()).decode("utf-8", errors="replace")

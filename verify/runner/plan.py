@@ -1,30 +1,27 @@
 """From cases to solves: which solvers, which levels, what they refuse."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import sleep
 from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
 from verify.result import SolveRecord, Status
-from verify.runner.child import POLL_SECONDS, Child
+from verify.runner.asking import Asking
+from verify.runner.child import POLL_SECONDS
 from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.interruption import StopRequest
 from verify.runner.job import Job
-from verify.runner.log import telling_line
 from verify.runner.options import Options
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
-from verify.scene import Scene, scene_content
+from verify.scene import Scene
 from verify.scene.nearest import nearest
 
 __all__ = ["CasePlan", "Survey", "check_judged", "plan_case", "solvers_of", "survey_solvers"]
-
-_SURVEY_SECONDS = 300.0
 
 Survey = dict[str, dict[str, Any]]
 
@@ -76,7 +73,8 @@ def survey_solvers(
     InputError
         If a scene names something bad (a mesh file), the bundle lacks a scene, or `options`
         name a solver that does not work here, or a parameter that it does not have. A solver
-        that only the cases want may be missing: its solves fail, with that reason.
+        that only the cases want may be missing: its solves fail, with that reason. One that hangs,
+    dies or answers nonsense when it is asked fails on that case.
     RunStoppedError
         If a signal came.
     """
@@ -91,25 +89,28 @@ def survey_solvers(
         answers[REFERENCE] = {"error": None, "cases": cases}
     with tempfile.TemporaryDirectory(prefix="verify-") as folder:
         waiting = list(asked)
-        running: dict[str, Child] = {}
+        running: dict[str, Asking] = {}
         try:
             while waiting or running:
                 stop.check()
                 while waiting and len(running) < options.jobs:
                     name = waiting.pop(0)
-                    running[name] = _ask(
+                    running[name] = Asking(
                         name,
                         asked[name],
                         options.parameters.get(name, {}),
                         Path(folder, str(len(asked) - len(waiting))),
+                        options.timeout,
+                        options.memory,
                     )
-                for name, child in list(running.items()):
-                    if child.poll() is not None:
-                        answers[name] = _answer(running.pop(name))
+                for name, asking in list(running.items()):
+                    if (answer := asking.poll()) is not None:
+                        answers[name] = answer
+                        del running[name]
                 sleep(POLL_SECONDS)
         finally:
-            for child in running.values():
-                child.kill()
+            for asking in running.values():
+                asking.kill()
     for name, answer in answers.items():
         if answer["error"] and name in options.solvers:
             raise InputError(answer["error"], "--solver")
@@ -159,26 +160,12 @@ def plan_case(
         ]
         if answer["error"]:
             plan.refused.append((jobs[0], jobs[0].blank(Status.FAILED, answer["error"])))
+        elif failure := asked.get("failure"):
+            status = Status(asked.get("status", Status.FAILED))
+            plan.refused.append((jobs[0], jobs[0].blank(status, failure)))
         elif asked["refusal"]:
             plan.refused.append((jobs[0], jobs[0].blank(Status.REFUSED, asked["refusal"])))
         else:
             plan.jobs += jobs[:planned]
             plan.spare += jobs[planned:most]
     return plan
-
-
-def _ask(name: str, scenes: Sequence[Scene], parameters: Mapping[str, Any], folder: Path) -> Child:
-    folder.mkdir()
-    question = folder / "question.json"
-    contents = [scene_content(scene) for scene in scenes]
-    write_json({"solver": name, "scenes": contents, "parameters": list(parameters)}, question)
-    return Child(
-        "verify.runner.survey", question, folder / "log.txt", _SURVEY_SECONDS, float("inf")
-    )
-
-
-def _answer(child: Child) -> dict[str, Any]:
-    answer = child.log.parent / "answer.json"
-    if answer.exists():
-        return read_json(answer)
-    return {"error": f"could not be loaded: {telling_line(child.log)}"}

@@ -9,11 +9,13 @@ physics changed is not found, which is an error and not a reason to compute some
 
 import json
 import zipfile
-import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from verify.errors import InputError
+from verify.json_files import parse_json
+from verify.printable import words_of
 from verify.result import SolveRecord
 from verify.runner.fingerprint import bytes_digest, digest_of, file_digest, physics_digest
 from verify.runner.job import Job
@@ -25,6 +27,8 @@ __all__ = ["ReferenceBundle", "write_bundle"]
 
 BUNDLE_SCHEMA = 1
 _CONTENTS = "bundle.json"
+# what is read of others: a bundle of ours unpacks to some ten times its size
+_LARGEST_CONTENTS, _LARGEST_FILE, _MOST_TIMES = 2**26, 2**31, 200
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the same references give the same bytes
 
 
@@ -86,17 +90,19 @@ class ReferenceBundle:
     def __init__(self, path: Path) -> None:
         self.path = path
         where = str(path)
-        try:
-            with zipfile.ZipFile(path) as archive:
-                contents = json.loads(archive.read(_CONTENTS))
-            self.digest = file_digest(path)
-        except FileNotFoundError:
-            raise InputError("no such file; expected a bundle of references", where) from None
-        except (OSError, zipfile.BadZipFile, KeyError, ValueError) as error:
-            raise InputError(f"not a bundle of references ({error})", where) from None
-        if not isinstance(contents, dict) or contents.get("schema") != BUNDLE_SCHEMA:
+        with _opened(path) as archive:
+            contents = parse_json(_read(archive, _CONTENTS, _LARGEST_CONTENTS), where)
+            unpacked = sum(member.file_size for member in archive.infolist())
+        if unpacked > _MOST_TIMES * path.stat().st_size + _LARGEST_CONTENTS:
+            text = f"unpacks to {unpacked / 1e6:.3g} MB, more than {_MOST_TIMES} times its size"
+            raise InputError(f"not a bundle of references ({text})", where)
+        self.digest = file_digest(path)
+        if contents.get("schema") != BUNDLE_SCHEMA:
             raise InputError(f"not a bundle of schema {BUNDLE_SCHEMA}", where)
-        self._entries = [read_entry(entry, where) for entry in contents["entries"]]
+        entries = contents.get("entries")
+        if not isinstance(entries, list):
+            raise InputError("not a bundle of references ('entries' is no list)", where)
+        self._entries = [read_entry(entry, where) for entry in entries]
 
     def levels(self, scene: Scene) -> int:
         """Return how many levels of the reference of `scene` it holds, all of them whole.
@@ -138,11 +144,8 @@ class ReferenceBundle:
 
     def _read(self, entry: Entry, name: str) -> bytes:
         member = f"{entry.key}/{name}"
-        try:
-            with zipfile.ZipFile(self.path) as archive:
-                data = archive.read(member)
-        except (OSError, zipfile.BadZipFile, zlib.error, KeyError) as error:
-            raise InputError(f"is damaged ({error})", str(self.path)) from None
+        with _opened(self.path) as archive:
+            data = _read(archive, member, _LARGEST_FILE)
         if bytes_digest(data) != entry.files[name]:
             raise InputError(f"'{member}' is damaged", str(self.path))
         return data
@@ -151,3 +154,31 @@ class ReferenceBundle:
         physics = physics_digest(scene)
         own = {entry.level: entry for entry in self._entries if entry.physics == physics}
         return [own[level] for level in sorted(own)]
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open a zip file; whatever is wrong with it is one error."""
+    where = str(path)
+    if not path.exists():
+        raise InputError("no such file; expected a bundle of references", where)
+    if not path.is_file():
+        raise InputError("is no plain file; expected a bundle of references", where)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            yield archive
+    except InputError as error:
+        raise error if error.where else InputError(error.what, where) from None
+    except Exception as error:  # zipfile has a kind for each damaged field: struct.error, …
+        raise InputError(f"not a bundle of references ({words_of(error)})", where) from None
+
+
+def _read(archive: zipfile.ZipFile, name: str, largest: int) -> bytes:
+    try:
+        member = archive.getinfo(name)
+    except KeyError:
+        raise InputError(f"is damaged (there is no '{name}' in it)") from None
+    if member.file_size > largest:
+        text = f"'{name}' has {member.file_size / 1e6:.3g} MB; expected {largest / 1e6:.3g} at most"
+        raise InputError(text)
+    return archive.read(member)

@@ -12,9 +12,11 @@ takes up room until `remove` is asked for it.
 """
 
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,10 +25,11 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
+from verify.printable import one_line, shown
 from verify.provenance import provenance
-from verify.result import SolveRecord, Status
+from verify.result import SolveRecord, Status, checked
 from verify.runner.fingerprint import code_of_solver, digest_of, file_digest, physics_digest
-from verify.runner.job import Job, record_of, solution_files
+from verify.runner.job import Job, is_file_name, solution_files
 from verify.scene import Scene
 from verify.whole_files import whole_file
 
@@ -83,8 +86,14 @@ class Entry:
         return replace(self.record, case=job.case, notes=notes)
 
     def _by(self) -> str:
-        dolfinx = self.origin.get("versions", {}).get("dolfinx")
-        return f" with DOLFINx {dolfinx}" if dolfinx else ""
+        return f" with DOLFINx {self.dolfinx}" if self.dolfinx else ""
+
+    @property
+    def dolfinx(self) -> str | None:
+        """Version of DOLFINx that solved it, if it is known."""
+        versions = self.origin.get("versions")
+        found = versions.get("dolfinx") if isinstance(versions, dict) else None
+        return None if found is None else one_line(found, 40)
 
 
 def cache_folder() -> Path:
@@ -100,7 +109,7 @@ def current_key(scene: Scene, level: int, parameters: dict[str, Any]) -> str:
     return digest_of([physics_digest(scene), level, parameters, code_of_solver(REFERENCE)])
 
 
-def read_entry(content: dict[str, Any], where: str) -> Entry:
+def read_entry(content: Any, where: str) -> Entry:
     """Make an entry from what `Entry.as_json` gave.
 
     Raises
@@ -108,15 +117,20 @@ def read_entry(content: dict[str, Any], where: str) -> Entry:
     InputError
         If it is not one.
     """
-    try:
-        if content["schema"] != ENTRY_SCHEMA:
-            raise InputError(
-                f"a stored reference of schema {content['schema']}; expected {ENTRY_SCHEMA}", where
-            )
-        fields = {name: content[name] for name in Entry.__dataclass_fields__ if name != "record"}
-        return Entry(**fields, record=record_of(content["record"], where))
-    except (KeyError, TypeError) as error:
-        raise InputError(f"not a stored reference ({error})", where) from None
+    if not isinstance(content, dict) or content.get("schema") != ENTRY_SCHEMA:
+        found = content.get("schema") if isinstance(content, dict) else content
+        text = f"a stored reference of schema {shown(found)}; expected {ENTRY_SCHEMA}"
+        raise InputError(text, where)
+    fields = {name: value for name, value in content.items() if name != "schema"}
+    entry = checked(Entry, fields, "stored reference", where)
+    if not re.fullmatch(r"[0-9a-f]{8,64}", entry.key):
+        raise InputError(f"not a stored reference (key {shown(entry.key)})", where)
+    if entry.level < 0 or "solution.json" not in entry.files:
+        raise InputError(f"not a stored reference (level {entry.level}, no solution)", where)
+    for name in entry.files:
+        if not is_file_name(name):
+            raise InputError(f"not a stored reference (a file called {shown(name)})", where)
+    return entry
 
 
 class ReferenceCache:
@@ -194,7 +208,9 @@ class ReferenceCache:
 
     def size(self, entry: Entry) -> int:
         """Bytes that an entry takes up."""
-        return sum(f.stat().st_size for f in (self.root / entry.key).iterdir())
+        with suppress(OSError):  # another run may remove it
+            return sum(f.stat().st_size for f in (self.root / entry.key).iterdir())
+        return 0
 
     def find(self, scene: Scene) -> list[Entry]:
         """Return the current entries of `scene`, by level."""

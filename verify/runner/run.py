@@ -1,8 +1,7 @@
 """The run: solves in parallel processes, then the comparison of each finished case."""
 
-import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from time import sleep
@@ -10,25 +9,27 @@ from typing import Any, Protocol
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
+from verify.printable import one_line
 from verify.provenance import provenance
-from verify.result import CaseResult, SolveRecord, Status, read_result
+from verify.result import CaseResult, SolveRecord, Status
 from verify.runner.checking import check_scene
-from verify.runner.child import POLL_SECONDS, Child, Ending
+from verify.runner.child import POLL_SECONDS, Ending
 from verify.runner.cluster import ClusterEngine
+from verify.runner.comparing import Comparison, stored_result
 from verify.runner.deepening import further_level, take_up_known_levels
-from verify.runner.directory import RunDirectory, claimed, write_run
+from verify.runner.directory import RunDirectory, claimed, emptied, write_run
 from verify.runner.engine import Engine, LocalEngine, Running
 from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.interruption import StopRequest, listening
-from verify.runner.job import Job, store_record, stored_record
-from verify.runner.log import telling_line
+from verify.runner.job import Job, load_record, store_record, stored_record
 from verify.runner.options import Options
+from verify.runner.outcome import death, outcome_in
 from verify.runner.plan import CasePlan, check_judged, plan_case, survey_solvers
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
-from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene, scene_content
+from verify.whole_files import write_whole
 
 __all__ = ["Progress", "RunSummary", "run_cases"]
 
@@ -144,8 +145,10 @@ class _Work:
         self.open = {name: len(plan.jobs) for name, plan in self.plans.items()}
         self.to_judge = [name for name, count in self.open.items() if not count]
         self.running: dict[Running, Job] = {}
-        self.comparing: dict[Child, str] = {}
+        self.comparing: list[Comparison] = []
         self.results: dict[str, CaseResult] = {}
+        self.records: dict[Path, bytes] = {}  # as they were written
+        self.again: set[Path] = set()
         side_by_side = max(1, min(options.jobs, len(self.waiting)))
         self.memory = options.memory or 0.8 * origin["memory"] / side_by_side
         self.engine: Engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)
@@ -167,14 +170,16 @@ class _Work:
                     if (ending := solve.poll()) is not None:
                         del self.running[solve]
                         self._ended(job, solve, ending)
-                for child, case in list(self.comparing.items()):
-                    if (ending := child.poll()) is not None:
-                        del self.comparing[child]
-                        self._judged(case, child, ending)
+                for comparison in list(self.comparing):
+                    if (result := comparison.poll()) is not None:
+                        self.comparing.remove(comparison)
+                        self._case_done(result)
                 sleep(POLL_SECONDS)
         finally:
-            for started in (*self.running, *self.comparing):
-                started.kill()
+            for solve in self.running:
+                solve.kill()
+            for comparison in self.comparing:
+                comparison.kill()
             self.engine.close()
         return [self.results[name] for name in self.plans]
 
@@ -194,8 +199,7 @@ class _Work:
         folder.mkdir(parents=True, exist_ok=True)
         write_json(scene_content(plan.scene), folder / "scene.json")
         for job, record in plan.refused:
-            job.folder.mkdir(exist_ok=True)
-            store_record(job, record)
+            self._kept(job, record)
             self.progress.solved(job.label, record, reused=False)
 
     def _start(self) -> None:
@@ -205,15 +209,13 @@ class _Work:
         job = self.waiting.pop(0)
         if (record := stored_record(job)) is not None:
             self.reused += 1
+            self.records[job.folder] = (job.folder / "record.json").read_bytes()
             self._solve_done(job, record, reused=True)
             return
-        job.folder.mkdir(exist_ok=True)
-        for leftover in job.folder.iterdir():
-            leftover.unlink()
+        emptied(job.folder)
         if (record := self._known(job)) is not None:
             self.reused += 1
-            store_record(job, record)
-            self._solve_done(job, record, reused=True)
+            self._solve_done(job, self._kept(job, record), reused=True)
             return
         content = {
             "scene": scene_content(self.plans[job.case].scene),
@@ -246,35 +248,35 @@ class _Work:
             trouble = self.cache.keep(self.plans[job.case].scene, job, record)
             if trouble:
                 record.notes["cache"] = trouble
-        store_record(job, record)
+        record = self._kept(job, record)
         self._solve_done(job, record, reused=False)
 
+    def _kept(self, job: Job, record: SolveRecord) -> SolveRecord:
+        """Store a record; its solution may be gone, or be removed by a solver later."""
+        job.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            store_record(job, record)
+        except (InputError, FileNotFoundError) as error:
+            reason = f"its solution is not there any more ({one_line(error)})"
+            record = job.blank(Status.FAILED, reason)
+            store_record(job, record)
+        self.records[job.folder] = (job.folder / "record.json").read_bytes()
+        return record
+
     def _record(self, job: Job, child: Running, ending: Ending) -> SolveRecord:
-        outcome: dict[str, Any] = {}
-        if not ending.killed_for and (job.folder / "outcome.json").exists():
-            outcome = read_json(job.folder / "outcome.json")
-        if outcome:
-            status, reason = Status(outcome.pop("status")), outcome.pop("reason")
+        outcome = outcome_in(job.folder)
+        if outcome is None:
+            blank = job.blank(*death(child.log, ending, self.options.timeout, self.memory))
+            record = replace(blank, wall=ending.wall, peak_memory=ending.peak)
         else:
-            status, reason = self._death(child, ending)
-        peak = max(ending.peak, outcome.pop("peak_memory", None) or 0.0)
-        record = replace(job.blank(status, reason), wall=ending.wall, peak_memory=peak, **outcome)
+            peak = max(ending.peak, outcome.pop("peak_memory", None) or 0.0)
+            blank = job.blank(outcome.pop("status"), outcome.pop("reason"))
+            record = replace(blank, wall=ending.wall, peak_memory=peak, **outcome)
+            if ending.killed_for:
+                record.notes["ended"] = f"had answered, and was killed for its {ending.killed_for}"
         if note := self._contention():
             record.notes["timing"] = note
         return record
-
-    def _death(self, child: Running, ending: Ending) -> tuple[Status, str]:
-        """Explain an end without an outcome."""
-        if ending.killed_for == "timeout":
-            return Status.TIMEOUT, f"killed after {self.options.timeout:g} s"
-        if ending.killed_for == "memory":
-            return Status.MEMORY, f"killed above {self.memory / 2**30:.3g} GiB"
-        said = telling_line(child.log)
-        if ending.returncode == -9:
-            return Status.MEMORY, "killed by the system, which was probably out of memory"
-        code = ending.returncode
-        how = f"signal {-code}" if code < 0 else f"exit code {code}"
-        return Status.FAILED, f"{said} ({how})"
 
     def _contention(self) -> str:
         if self.options.cluster:
@@ -291,49 +293,54 @@ class _Work:
         if not self.open[job.case]:
             self.to_judge.append(job.case)
 
+    def _restore(self, plan: CasePlan, jobs: Sequence[Job]) -> None:
+        """Write anew what a solver may have removed or changed: the scene and the records."""
+        folder = self.directory.case_folder(plan.scene.name)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_json(scene_content(plan.scene), folder / "scene.json")
+        for job in jobs:
+            job.folder.mkdir(parents=True, exist_ok=True)
+            write_whole(job.folder / "record.json", self.records[job.folder])
+
+    def _lost(self, jobs: Sequence[Job]) -> list[Job]:
+        """Those whose solution a solver has removed or changed; to be solved again, once."""
+        lost = [
+            job
+            for job in jobs
+            if job.folder not in self.again
+            and load_record(job.folder).status is Status.SOLVED
+            and stored_record(job) is None
+        ]
+        self.again |= {job.folder for job in lost}
+        return lost
+
     def _judge(self, case: str) -> None:
         plan, folder = self.plans[case], self.directory.case_folder(case)
         jobs = [*plan.jobs, *(job for job, _ in plan.refused)]
+        self._restore(plan, jobs)
+        if lost := self._lost(jobs):
+            self.waiting = [*lost, *self.waiting]
+            self.open[case] += len(lost)
+            return
         records = [digest_of(read_json(job.folder / "record.json")) for job in jobs]
-        judge_only = list(self.options.judge_only)
+        judge_only = self.options.judge_only
         key = digest_of([records, scene_content(plan.scene), judge_only, code_of_comparison()])
-        question = {
-            "key": key,
-            "judge_only": judge_only,
-            "folders": [os.path.relpath(job.folder, self.directory.root) for job in jobs],
-            "root": str(self.directory.root.resolve()),
-            "provenance": self.origin,
-        }
-        if (result := _stored_result(folder, key)) is not None:
+        if (result := stored_result(folder, key)) is not None:
             self._case_done(result)
             return
-        (folder / "judged.json").unlink(missing_ok=True)
-        write_json(question, folder / "judge.json")
-        child = Child(
-            "verify.runner.assess",
-            folder / "judge.json",
-            folder / "judge-log.txt",
-            max(self.options.timeout, 60.0),
+        comparison = Comparison(
+            plan.scene,
+            key,
+            judge_only,
+            [job.folder for job in jobs],
+            folder,
+            self.directory.root,
+            self.origin,
+            self.options.timeout,
             self.memory,
         )
-        self.comparing[child] = case
+        self.comparing.append(comparison)
         self.progress.started(f"{case} · comparison")
-
-    def _judged(self, case: str, child: Child, ending: Ending) -> None:
-        folder, plan = self.directory.case_folder(case), self.plans[case]
-        key = read_json(folder / "judge.json")["key"]
-        if (result := _stored_result(folder, key)) is None:
-            _, why = self._death(child, ending)
-            jobs = [*plan.jobs, *(job for job, _ in plan.refused)]
-            result = unjudged_result(
-                plan.scene,
-                [job.folder for job in jobs],
-                f"comparison failed: {why}",
-                self.origin,
-                self.options.judge_only,
-            )
-            write_json(asdict(result), folder / "result.json")
-        self._case_done(result)
 
     def _case_done(self, result: CaseResult) -> None:
         if (job := further_level(self.plans[result.case], result)) is not None:
@@ -342,16 +349,6 @@ class _Work:
             return
         self.results[result.case] = result
         self.progress.judged(result)
-
-
-def _stored_result(folder: Path, key: str) -> CaseResult | None:
-    """Return the result that a comparison with this `key` left."""
-    try:
-        if read_json(folder / "judged.json").get("key") == key:
-            return read_result(folder / "result.json")
-    except InputError:
-        pass
-    return None
 
 
 def _now() -> str:

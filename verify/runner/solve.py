@@ -15,6 +15,7 @@ from typing import Any
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.json_files import read_json, write_json
+from verify.printable import one_line, words_of
 from verify.result import COMPILING, Status
 from verify.runner.childhood import die_with_parent, peak_memory
 from verify.runner.ranks import give_up, world
@@ -22,11 +23,13 @@ from verify.runner.ranks import give_up, world
 __all__ = ["main", "solve_job"]
 
 _WORTH_SAYING = 0.5  # seconds of compilation
+_LONGEST = 400  # characters of a reason
 
 
 def main(job_file: Path) -> None:
     """Solve what `job_file` says and write down how it went."""
     die_with_parent()
+    job_file = job_file.resolve()  # a solver may change the working directory
     job, folder = read_json(job_file), job_file.parent
     try:
         comm = world() if job.get("ranks", 1) > 1 else None
@@ -50,40 +53,49 @@ def solve_job(job: dict[str, Any], folder: Path, store: bool = True) -> dict[str
     try:
         return _solved(job, folder, store)
     except UnsupportedSceneError as refusal:
-        return {"status": Status.REFUSED, "reason": str(refusal)}
+        return {"status": Status.REFUSED, "reason": one_line(refusal, _LONGEST)}
     except InputError as error:
-        return {"status": Status.FAILED, "reason": str(error)}
+        return {"status": Status.FAILED, "reason": one_line(error, _LONGEST)}
     except MemoryError:
-        traceback.print_exc()
+        _leave_traceback()
         return {"status": Status.MEMORY, "reason": "the solver could not allocate memory"}
     except OSError as error:
-        traceback.print_exc()
-        reason = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else str(error)
+        _leave_traceback()
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        reason = "the disk is full" if full else one_line(error, _LONGEST)
         return {"status": Status.FAILED, "reason": reason}
-    except (Exception, SystemExit) as error:
+    except BaseException as error:  # a solver may raise anything
+        _leave_traceback()
+        return {"status": Status.FAILED, "reason": words_of(error, _LONGEST)}
+
+
+def _leave_traceback() -> None:
+    """Leave the traceback in the log, if the solver has left the log open."""
+    with contextlib.suppress(Exception):
         traceback.print_exc()
-        line = str(error).strip().splitlines()
-        reason = f"{type(error).__name__}{': ' + line[0] if line else ''}"
-        return {"status": Status.FAILED, "reason": reason}
 
 
 def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
     from verify.calibration import calibration_note
     from verify.compile_times import compile_times
     from verify.scene import restore_scene
-    from verify.solution import write_solution
+    from verify.solution import handed_over, write_solution
     from verify.solvers import find_solver
+    from verify.solvers.interface import checked_refusal
 
     if ":" in job["solver"]:  # a class of the user's own, found from where the run was started
         sys.path.append(os.getcwd())
     scene = restore_scene(job["scene"])
     solver = find_solver(job["solver"])
-    if refusal := solver.refuses(scene):
+    if refusal := checked_refusal(solver.refuses(scene)):
         raise UnsupportedSceneError(refusal)
     with compile_times() as compiled:
-        solution = solver.solve(
-            scene, job["level"], repetitions=job["repetitions"], **job["parameters"]
+        solution = handed_over(
+            solver.solve(scene, job["level"], repetitions=job["repetitions"], **job["parameters"])
         )
+    if solution.dimension != scene.dimension:
+        text = f"a solution in {solution.dimension}D; expected {scene.dimension}D, as the case is"
+        raise InputError(text)
     if store:
         write_solution(solution, folder / "solution")
     return {

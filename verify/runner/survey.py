@@ -6,41 +6,63 @@ In a process of its own, because to ask a solver means to import it, and some st
 import inspect
 import os
 import sys
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.json_files import read_json, write_json
-from verify.runner.childhood import die_with_parent
+from verify.printable import one_line, words_of
+from verify.runner.childhood import ANSWER, ASKING, die_with_parent
 from verify.runner.fingerprint import file_digest
+from verify.whole_files import write_whole
 
 __all__ = ["main", "survey"]
 
 
 def main(question: Path) -> None:
-    """Answer the `question` in the file ``answer.json`` beside it."""
+    """Answer the `question` in the file ``answer.json`` beside it.
+
+    Before each case its number goes into the file ``asking``: if no answer comes, that is the
+    case at which the solver hangs or dies.
+    """
     die_with_parent()
+    question = question.resolve()  # a solver may change the working directory
     asked = read_json(question)
-    write_json(
-        survey(asked["solver"], asked["scenes"], asked["parameters"]),
-        question.parent / "answer.json",
+    answers = survey(
+        asked["solver"],
+        asked["scenes"],
+        asked["parameters"],
+        lambda number: write_whole(question.with_name(ASKING), str(number)),
     )
+    write_json(answers, question.with_name(ANSWER))
 
 
 def survey(
-    name: str, scenes: list[dict[str, Any]], parameters: Sequence[str] = ()
+    name: str,
+    scenes: list[dict[str, Any]],
+    parameters: Sequence[str] = (),
+    asking: Callable[[int], None] = lambda number: None,
 ) -> dict[str, Any]:
     """Ask the solver `name` about `scenes` and the names of `parameters`.
+
+    Parameters
+    ----------
+    name : str
+    scenes : list of dict
+        As `verify.scene.scene_content` gives them.
+    parameters : sequence of str
+    asking : callable
+        Is told the number of each scene before the solver is asked about it.
 
     Returns
     -------
     dict
         ``error`` (why there is no such solver here), ``bad_parameter`` (which it does not have),
         or ``source`` (hash of the file that defines it) and ``cases``: by name ``levels``,
-        ``refusal`` and ``bad_input``.
+        ``refusal``, ``bad_input`` (of the case) and ``failure`` (of the solver).
     """
-    from verify.scene import restore_scene
     from verify.solvers import check_parameters, find_solver
 
     if ":" in name:
@@ -54,18 +76,38 @@ def survey(
     except InputError as error:
         return {"error": None, "bad_parameter": str(error)}
     cases: dict[str, Any] = {}
-    for content in scenes:
-        answer: dict[str, Any] = {"levels": 0, "refusal": None, "bad_input": None}
-        try:
-            scene = restore_scene(content)
-            answer["refusal"] = solver.refuses(scene)
-            if not answer["refusal"]:
-                answer["levels"] = solver.levels(scene)
-        except InputError as error:
-            answer["bad_input"] = str(error)
-        cases[content["name"]] = answer
-    source = inspect.getsourcefile(type(solver))
-    return {"error": None, "source": file_digest(Path(source)) if source else "", "cases": cases}
+    for number, content in enumerate(scenes):
+        asking(number)
+        cases[content["name"]] = _answer(name, solver, content)
+    return {"error": None, "source": _source(solver), "cases": cases}
+
+
+def _answer(name: str, solver: Any, content: dict[str, Any]) -> dict[str, Any]:
+    from verify.scene import restore_scene
+    from verify.solvers.interface import checked_levels, checked_refusal, is_built_in
+
+    answer: dict[str, Any] = dict.fromkeys(("refusal", "bad_input", "failure")) | {"levels": 0}
+    try:
+        scene = restore_scene(content)
+        answer["refusal"] = checked_refusal(solver.refuses(scene))
+        if not answer["refusal"]:
+            answer["levels"] = checked_levels(solver.levels(scene))
+    except InputError as error:  # of a guest we do not know whose fault it is
+        answer["bad_input" if is_built_in(name) else "failure"] = one_line(error)
+    except UnsupportedSceneError as error:
+        answer["refusal"] = one_line(error)
+    except BaseException as error:  # a solver may raise anything
+        traceback.print_exc()
+        answer["failure"] = words_of(error)
+    return answer
+
+
+def _source(solver: Any) -> str:
+    try:
+        source = inspect.getsourcefile(type(solver))
+        return file_digest(Path(source)) if source else ""
+    except (OSError, TypeError):  # of no file, or of one that is not there
+        return ""
 
 
 if __name__ == "__main__":

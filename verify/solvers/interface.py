@@ -6,12 +6,18 @@ from importlib.metadata import entry_points
 from inspect import Parameter, signature
 from typing import Any, Protocol
 
+import numpy as np
+
 from verify.errors import InputError
+from verify.printable import shown
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Solution
 
-__all__ = ["Solver", "check_parameters", "find_solver", "solver_names"]
+__all__ = [
+    "Solver", "check_parameters", "checked_levels", "checked_refusal", "find_solver",
+    "is_built_in", "solver_names",
+]  # fmt: skip
 
 # module:class, imported only when asked for, so that one solver's missing dependency
 # (FEniCSx, say) does not hinder the others
@@ -28,6 +34,7 @@ _METHODS = (
 )  # fmt: skip
 _BUILT_IN |= dict.fromkeys(_METHODS, "verify.solvers.methods_adapter:MethodSolver")
 _GROUP = "verify.solvers"
+_MOST_LEVELS = 32  # the coarsest cell halved so often is of round-off size
 
 
 class Solver(Protocol):
@@ -57,6 +64,39 @@ class Solver(Protocol):
             If something that the scene names (a mesh file) is bad.
         """
         ...
+
+
+def checked_refusal(answer: Any) -> str | None:
+    """Return what `Solver.refuses` answered.
+
+    Raises
+    ------
+    InputError
+        If it is neither a sentence nor None.
+    """
+    if answer is not None and not isinstance(answer, str):
+        raise InputError(f"refuses() gave {shown(answer)}; expected a sentence, or None")
+    return answer or None
+
+
+def checked_levels(answer: Any) -> int:
+    """Return what `Solver.levels` answered.
+
+    Raises
+    ------
+    InputError
+        If it is no number of mesh levels.
+    """
+    whole = isinstance(answer, int | np.integer) and not isinstance(answer, bool)
+    if not whole or not 1 <= answer <= _MOST_LEVELS:
+        wanted = f"a whole number from 1 to {_MOST_LEVELS}"
+        raise InputError(f"levels() gave {shown(answer)}; expected {wanted}")
+    return int(answer)
+
+
+def is_built_in(name: str) -> bool:
+    """Whether the solver called `name` comes with the project."""
+    return name in _BUILT_IN
 
 
 def solver_names() -> list[str]:

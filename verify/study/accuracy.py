@@ -3,7 +3,8 @@
 A pure function of the scene and the stored solutions: it solves nothing and writes nothing.
 """
 
-from collections.abc import Mapping, Sequence
+import traceback
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from verify.compare.hooke import Law, law_of
 from verify.compare.integration import spread_of
 from verify.compare.locate import ROUND_OFF
 from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import one_line
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 from verify.scene import Scene, scene_hash
 from verify.solution import Solution
@@ -26,9 +28,9 @@ from verify.study.reference import (
     OTHER,
     ExactField,
     Reference,
+    compared_size,
     conforming_reference,
     exact_reference,
-    size_of,
 )
 from verify.study.sufficiency import sufficiency
 from verify.study.unavailable import unavailable_quantities
@@ -50,6 +52,7 @@ def assess_accuracy(
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: ExactField | None = None,
     judge_only: Sequence[str] = (),
+    announce: Callable[[SolveRecord], None] = lambda record: None,
 ) -> CaseResult:
     """Measure all solutions of a case and judge its requirements.
 
@@ -65,6 +68,8 @@ def assess_accuracy(
         The exact solution that the scene names.
     judge_only : sequence of str
         Solvers that are judged; empty: all that were asked and do not refuse the case.
+    announce : callable
+        Is told of each solve before it is measured.
 
     Returns
     -------
@@ -88,11 +93,16 @@ def assess_accuracy(
             measured = [_noted(r, _named(scene, missing)) for r in measured]
         elif own:
             # the same points for all solvers of a level: their errors are compared
-            rules = Rules(body, min(size_of(s) for s in own.values())) if reference else None
+            finest = min(compared_size(s, body) for s in own.values())
+            rules = Rules(body, finest) if reference else None
             judge_of = replace(reference, motion=reference.motion.afresh()) if reference else None
             for i, solution in own.items():
-                one = Measured(solution, body, law, scene)
-                measured[i] = _measure(records[i], one, judge_of, missing, rules)
+                announce(records[i])
+                try:
+                    one = Measured(solution, body, law, scene)
+                    measured[i] = _measure(records[i], one, judge_of, missing, rules)
+                except Exception as problem:  # of this one: the others are measured all the same
+                    measured[i] = _incomparable(records[i], problem)
     rates = _rates(scene, measured)
     record = reference.record if reference else {"kind": "none", "reason": missing}
     if record["kind"] == "conforming":
@@ -129,7 +139,8 @@ def _reference(
             return exact_reference(scene, exact, body, law), "", body
         levels = solutions.get(REFERENCE, {})
         judged = [s for name, own in solutions.items() if name != REFERENCE for s in own.values()]
-        finest = min((size_of(s) for s in judged or levels.values()), default=body.size / 50)
+        sizes = (compared_size(s, body) for s in judged or levels.values())
+        finest = min(sizes, default=body.size / 50)
         others = solutions.get(OTHER)
         return conforming_reference(scene, levels, body, law, finest, others), "", body
     except InputError as problem:
@@ -140,6 +151,13 @@ def _named(scene: Scene, reason: str) -> dict[str, str]:
     """Say of everything that the case asks about why it was not measured."""
     asked = [c.metric for c in scene.acceptance] + [q.name for q in scene.quantities]
     return dict.fromkeys(["comparison", *asked], reason)
+
+
+def _incomparable(record: SolveRecord, problem: Exception) -> SolveRecord:
+    traceback.print_exception(problem)  # for the log
+    why = one_line(f"{type(problem).__name__}: {problem}")
+    reason = f"its solution cannot be compared: {why}"
+    return replace(record, status=Status.FAILED, reason=reason, metrics=[])
 
 
 def _solved(
@@ -195,6 +213,8 @@ def _defect(scene: Scene, one: Measured) -> str:
         return f"the cells of the solution cover {covered:.4g} of the body"
     if one.motion.off_surface > _ON_SURFACE * one.body.size:
         return f"the solution lies up to {one.motion.off_surface:.3g} m off the surface of the body"
+    if (outside := one.outside) > _COVERED:
+        return f"{outside:.4g} of the volume of the solution lies outside the body"
     duration = scene.analysis.duration
     if duration is not None and abs(times[-1] - duration) > _SAME_TIME * duration:
         return f"the solution ends at {times[-1]:.6g} s; the scene at {duration:.6g} s"

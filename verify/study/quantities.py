@@ -5,6 +5,7 @@ import numpy as np
 from verify.compare.body import AnyBody
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
+from verify.compare.membrane_body import MembraneBody
 from verify.compare.motion import SolutionMotion
 from verify.compare.opening import opening
 from verify.compare.point_displacement import point_displacement
@@ -23,6 +24,8 @@ from verify.solution import Solution
 from verify.study.stress_intensity import solution_intensity
 
 __all__ = ["Measured", "field_quantity", "unit_of"]
+
+_LOOKED_AT = 20_000  # cells
 
 
 class Measured:
@@ -53,6 +56,19 @@ class Measured:
         """Volume of the cells over that of the body: 1, or something is missing or twice there."""
         shape = simplices(self.solution.points, self.solution.cells)
         return float(shape.volume.sum()) / self.body.measure
+
+    @property
+    def outside(self) -> float:
+        """Share of the volume of the cells whose centres lie outside the body; 0 of membranes.
+
+        Of many cells, some are looked at.
+        """
+        if isinstance(self.body, MembraneBody):  # how far it is off its surface is known otherwise
+            return 0.0
+        cells = self.solution.cells
+        shape = simplices(self.solution.points, cells[:: 1 + len(cells) // _LOOKED_AT])
+        inside = self.body.inside(shape.corners.mean(axis=1))
+        return float(shape.volume[~inside].sum() / shape.volume.sum())
 
     def quantity(self, asked: Quantity) -> float:
         """Value of a quantity of interest, in the unit that `unit_of` gives.

@@ -45,6 +45,7 @@ from verify.study.time_to_accuracy import time_to_accuracy
 __all__ = [
     "ExactField",
     "Reference",
+    "compared_size",
     "conforming_reference",
     "exact_reference",
     "known_quantity",
@@ -53,6 +54,9 @@ __all__ = [
 
 _CLOSED_FORM = 1e-11  # relative accuracy of an exact solution's own strain energy
 OTHER = "conforming"  # solver whose levels give a second estimate of quantities, if it was run
+
+# of the mean and of the largest cell: so fine, so coarse a solution may state itself to be
+_FINER, _COARSER = 0.25, 2.0
 
 
 class ExactField(Field, Protocol):
@@ -97,9 +101,25 @@ def size_of(solution: Solution) -> float:
     """Element size of a solution, m; from the mean cell volume where it says none."""
     if np.isfinite(solution.size) and solution.size > 0:
         return float(solution.size)
+    return _sizes_of_cells(solution)[0]
+
+
+def compared_size(solution: Solution, body: AnyBody) -> float:
+    """Element size that the quadrature of a comparison goes by, m.
+
+    A solution is not believed a size beyond that of its largest cell, or far below that of the
+    mean one: all solvers of a level are compared at the same points, as many as the finest needs.
+    """
+    mean, largest = (min(size, body.size) for size in _sizes_of_cells(solution))
+    return float(np.clip(size_of(solution), _FINER * mean, _COARSER * largest))
+
+
+def _sizes_of_cells(solution: Solution) -> tuple[float, float]:
+    """Sizes of the mean and of the largest cell: of the legs of a right simplex of its volume."""
     d = solution.cell_dimension
     volume = simplices(solution.points, solution.cells).volume
-    return float((factorial(d) * volume.sum() / len(volume)) ** (1 / d))
+    mean, largest = float(volume.sum()) / len(volume), float(volume.max())
+    return (factorial(d) * mean) ** (1 / d), (factorial(d) * largest) ** (1 / d)
 
 
 def exact_reference(scene: Scene, exact: ExactField, body: AnyBody, law: Law) -> Reference:

@@ -1,6 +1,7 @@
 """Whether the reference is good enough for the errors that it has to judge."""
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any
 
 from verify.result import Metric, SolveRecord, Status
@@ -46,7 +47,7 @@ def sufficiency(
         f"{name} of {solve.solver}, level {solve.level}": _row(metric)
         for solve in finest.values()
         for name in names
-        if (metric := solve.metric(name)) is not None and metric.source
+        if (metric := solve.metric(name)) is not None and metric.source and isfinite(metric.value)
     }
     rows = dict(sorted(rows.items(), key=lambda item: -(item[1]["ratio"] or 0.0)))
     if not rows:

@@ -1,0 +1,111 @@
+"""Whatever numbers a solver has left in the records, the run ends with a report."""
+
+import json
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic_run import cut_square, make_run, write_error_field
+
+from verify.report import render
+from verify.report.colour_bar import colour_bar
+from verify.report.pictures import case_pictures
+from verify.report.run_directory import load_run
+from verify.report.view import View
+from verify.solution import write_solution
+
+ABSURD = (
+    0.0, -0.0, 1.0, -1.0, 1e300, -1e300, 1.7976931348623157e308, 5e-324, 1e-300, 1e17, 10**30, -5,
+    None,
+)  # fmt: skip
+LOST = ("nan", "inf", "-inf")
+
+
+def spoilt(value, chance, rng, place, lost):
+    """Numbers of a result replaced by others, some of them by what JSON has no word for."""
+    if isinstance(value, dict):
+        return {
+            k: v if k == "level" else spoilt(v, chance, rng, f"{place}/{_key(k)}", lost)
+            for k, v in value.items()
+        }
+    if isinstance(value, list):
+        return [spoilt(v, chance, rng, f"{place}/{i}", lost) for i, v in enumerate(value)]
+    if isinstance(value, bool) or not isinstance(value, int | float) or rng.random() > chance:
+        return value
+    if isinstance(value, float) and rng.random() < 0.3:
+        lost[place] = rng.choice(LOST)
+        return None
+    return rng.choice([n for n in ABSURD if isinstance(value, float) or isinstance(n, int)])
+
+
+def _key(key):
+    return key.replace("~", "~0").replace("/", "~1")
+
+
+def spoil(root, seed):
+    rng = random.Random(seed)
+    chance = rng.choice((0.02, 0.2, 1.0))
+    for file in sorted(root.glob("cases/*/result.json")):
+        content, lost = json.loads(file.read_text()), {}
+        kept = {key: content[key] for key in ("schema", "scene")}
+        content = spoilt(content, chance, rng, "", lost) | kept
+        lost = {place: word for place, word in lost.items() if not place.startswith("/scene/")}
+        file.write_text(json.dumps({**content, "not_finite": lost}))
+
+
+def assert_whole(text):
+    assert "</html>" in text
+    assert "cannot be shown" not in text
+    assert "pictures of this case failed" not in text
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_numbers_of_any_size_are_reported(tmp_path, seed):
+    root = make_run(tmp_path / "run", pictures=False)
+    spoil(root, seed)
+    assert_whole(render(root).read_text())
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(6, 120))
+def test_numbers_of_any_size_are_reported_again_and_again(tmp_path, seed):
+    root = make_run(tmp_path / "run", pictures=False)
+    spoil(root, seed)
+    assert_whole(render(root).read_text())
+
+
+@pytest.mark.parametrize("largest", [0.0, 5e-324, 1e-300, 1.0, 1e99, 1e300, np.inf, np.nan])
+def test_a_colour_bar_takes_any_limit(largest):
+    view = View((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 0, 1), (9, 9), "cividis", (0.0, largest))
+    assert "<svg" in str(colour_bar(view, "displacement"))
+
+
+@pytest.mark.parametrize("factor", [0.0, 1e-320, 1e-200, 1e95])
+def test_pictures_are_described_whatever_the_displacements(tmp_path, factor):
+    root = make_run(tmp_path / "run", pictures=False)
+    body = cut_square(4)
+    wild = replace(body, displacement=body.displacement * factor)
+    for folder in root.glob("cases/*"):
+        for level in (2, 3):
+            write_solution(wild, folder / f"xfem-{level}" / "solution")
+        write_error_field(wild, folder / "error_field.vtu", np.full(len(body.points), factor))
+    assert_whole(render(root).read_text())
+
+
+def test_a_case_that_cannot_be_drawn_is_said_and_the_others_are_shown(tmp_path, monkeypatch):
+    import verify.report.rendering as rendering
+
+    root = make_run(tmp_path / "run", pictures=False)
+    real = rendering.case_pictures
+
+    def failing(place, entry):
+        if "griffith" in entry.name:
+            raise OverflowError("cannot convert float infinity to integer")
+        return real(place, entry)
+
+    monkeypatch.setattr(rendering, "case_pictures", failing)
+    text = render(root).read_text()
+    assert "cannot convert float infinity" in text
+    assert all(entry.name in text for entry in load_run(root).entries)
+    assert case_pictures(root, load_run(root).entries[0]) is not None

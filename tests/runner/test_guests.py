@@ -1,0 +1,158 @@
+"""What a guest does is a row with its reason: nobody else loses a verdict, the run ends."""
+
+import os
+import time
+from pathlib import Path
+
+import guests
+import pytest
+
+from verify.result import Status, read_result
+from verify.runner.solve import solve_job
+from verify.runner.survey import survey
+from verify.scene import load_scene, scene_content
+
+# reasons, as they begin
+ANSWERS = {
+    "Nothing": "the solver returned None; expected a verify.solution.Solution",
+    "Text": "the solver returned a 'str'; expected",
+    "Lying": "the solver returned a 'Solution'; expected a verify.solution.Solution",
+    "Spoiling": "displacement has values that are not finite",
+    "Huge": "displacement has 1e+300; expected less than 1e+100",
+    "Collapsed": "no cell has a volume",
+    "Negative": "size -1.0 m; expected a positive number",
+    "InSpace": "a solution in 3D; expected 2D, as the case is",
+    "Escaping": r"ValueError: \x1b[31mred\x1b]0;title\x07",
+    "Unspeakable": "Mute",
+    "Exiting": "SystemExit: 0",
+    "Interrupting": "KeyboardInterrupt",
+    "Recursive": "RecursionError: maximum recursion depth exceeded",
+}
+ASKED = {
+    "TextLevels": "levels() gave '3'; expected a whole number from 1 to",
+    "NoLevels": "levels() gave 0; expected a whole number from 1 to",
+    "NegativeLevels": "levels() gave -3; expected a whole number from 1 to",
+    "EndlessLevels": "levels() gave 1000000000; expected a whole number from 1 to",
+    "TrueRefusal": "refuses() gave True; expected a sentence, or None",
+    "RaisingRefusal": "SystemExit: not today",
+    "Blaming": "body.msh: its mesh has a hole",
+}
+# of solvers that are compared: how they end, and what is said of them
+COMPARED = {
+    "Large": (Status.SOLVED, ""),
+    "TinySize": (Status.SOLVED, ""),
+    "HugeSize": (Status.SOLVED, ""),
+    "Twice": (Status.SOLVED, ""),
+    "FarAway": (Status.SOLVED, ""),
+    "Needle": (Status.SOLVED, ""),
+}
+PROCESSES = {
+    "Elsewhere": (Status.SOLVED, ""),
+    "Quitting": (Status.FAILED, "said nothing (exit code 0, without an answer)"),
+    "Silent": (Status.FAILED, "ZeroDivisionError: the pivot is zero"),
+    "Killed": (Status.FAILED, "killed from outside (signal 9), not for memory"),
+    "Removing": (Status.SOLVED, ""),
+    "DyingRefusal": (Status.FAILED, "died when asked about the case: said nothing (exit code 0)"),
+}
+SLOW = {
+    "Talkative": (Status.SOLVED, ""),
+    "Staying": (Status.SOLVED, ""),
+    "Stopping": (Status.TIMEOUT, "killed after 20 s"),
+    "Leaving": (Status.TIMEOUT, "killed after 20 s"),
+    "Undecided": (Status.TIMEOUT, "killed after 20 s without saying whether it takes the case"),
+}
+
+
+@pytest.fixture
+def scene(tmp_path, case_text):
+    (tmp_path / "square.toml").write_text(case_text)
+    return load_scene(tmp_path / "square.toml")
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_an_answer_that_is_none_has_its_reason(tmp_path, monkeypatch, scene, name):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    job = {"scene": scene_content(scene), "solver": f"guests:{name}", "level": 0}
+    outcome = solve_job({**job, "repetitions": 1, "parameters": {}}, tmp_path)
+    assert (outcome["status"], outcome["reason"][: len(ANSWERS[name])]) == ("failed", ANSWERS[name])
+    assert len(outcome["reason"]) < 500
+    assert outcome["reason"].isprintable()
+    assert not (tmp_path / "solution.json").exists()
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_nonsense_when_it_is_asked_has_its_reason(scene, name):
+    answer = survey(f"guests:{name}", [scene_content(scene)])
+    assert answer["cases"]["square"]["failure"].startswith(ASKED[name])
+
+
+def run(verify, names, *options):
+    """Run guests beside a solver that works; return the result, with all in their rows."""
+    verify.environment["GUEST_SIGNS"] = str(verify.folder)
+    solvers = [f"--solver=guests:{name}" for name in names]
+    done = verify(
+        "run", "square.toml", "--out", "out", "--solver=fake_solvers:Instant", *solvers,
+        "--repetitions=1", "--no-conform", "-j2", *options,
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    result = read_result(verify.folder / "out/cases/square/result.json")
+    solves = {(s.solver.partition(":")[2], s.level): s for s in result.solves}
+    for level in (0, 1):  # who works beside them keeps its numbers
+        assert solves["Instant", level].status is Status.SOLVED
+        assert solves["Instant", level].metric("displacement_l2").value < 1e-12
+    return result, {name: solves[name, 0] for name in names}, done
+
+
+def assert_rows(rows, expected):
+    for name, (status, reason) in expected.items():
+        assert (rows[name].status, rows[name].reason) == (status, reason), name
+
+
+def test_whatever_it_does_to_its_process_it_is_a_row(verify):
+    names = ["Quitting", "Elsewhere", "Removing"]
+    _, rows, done = run(verify, names)
+    assert_rows(rows, {name: PROCESSES[name] for name in names})
+    assert done.returncode == 3
+    assert sorted(path.name for path in verify.folder.iterdir()) == ["out", "square.toml"]
+
+
+@pytest.mark.heavy
+def test_every_process_that_misbehaves_is_a_row(verify):
+    _, rows, done = run(verify, PROCESSES)
+    assert_rows(rows, PROCESSES)
+    assert done.returncode == 3
+
+
+@pytest.mark.heavy
+def test_numbers_that_are_absurd_are_compared_beside_the_others(verify):
+    result, rows, _ = run(verify, COMPARED)
+    assert_rows(rows, COMPARED)
+    # a size of its own makes no answer wrong
+    assert rows["TinySize"].metric("displacement_l2").value < 1e-12
+    assert rows["HugeSize"].metric("displacement_l2").value < 1e-12
+    assert rows["Large"].metric("displacement_l2").value > 1e90
+    assert "cover 2 of the body" in rows["Twice"].notes["comparison"]
+    assert "outside the body" in rows["FarAway"].notes["comparison"]
+    assert result.verdicts == [] or all(v.solver for v in result.verdicts)
+
+
+@pytest.mark.heavy
+def test_who_hangs_is_stopped_with_all_that_it_started(verify):
+    start = time.monotonic()
+    _, rows, _ = run(verify, SLOW, "--timeout=20")
+    assert time.monotonic() - start < 400
+    assert_rows(rows, SLOW)
+    pids = (verify.folder / "pids").read_text().split()
+    assert len(pids) == 2
+    assert not [pid for pid in pids if Path("/proc", pid, "exe").exists()]
+    log = verify.folder / "out/cases/square/guests_Talkative-0/log.txt"
+    assert log.stat().st_size < 200 * 2**20
+    assert rows["Staying"].notes["ended"].startswith("had answered")
+    assert os.getcwd() != "/"
+
+
+def test_guests_are_all_listed():
+    own = {
+        n for n, c in vars(guests).items() if isinstance(c, type) and issubclass(c, guests.Guest)
+    }
+    assert own - {"Guest"} == {*ANSWERS, *ASKED, *COMPARED, *PROCESSES, *SLOW}

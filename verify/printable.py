@@ -1,0 +1,56 @@
+"""Text from elsewhere, made fit for a terminal: no escapes, no hidden marks, a bounded length.
+
+Titles, reasons and names come from case files, solvers and archives. An escape sequence in them
+could clear the screen, set its title or hide a verdict; a mark of direction could turn it round.
+"""
+
+import unicodedata
+
+__all__ = ["one_line", "shown", "visible", "words_of"]
+
+_LONGEST = 2000  # characters of a message; more is no message
+# ESC and the like; marks of direction, which reorder what stands beside them; lone surrogates
+_HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
+_KEPT = "\n\t"
+
+
+def visible(text: str) -> str:
+    r"""Write what does not print, or moves what does, as ``\x1b``; lines and tabs stay."""
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(
+        mark
+        if mark in _KEPT or unicodedata.category(mark) not in _HIDDEN
+        else mark.encode("unicode_escape").decode("ascii")
+        for mark in text
+    )
+
+
+def one_line(text: object, longest: int = _LONGEST) -> str:
+    """Return `text` on one line that a terminal can be given, with its middle left out if long."""
+    whole = str(text)
+    if len(whole) > 4 * longest:  # before the work of splitting it
+        whole = f"{whole[: 2 * longest]} {whole[-2 * longest :]}"
+    line = visible(" ".join(whole.split()))
+    if len(line) <= longest:
+        return line
+    half = (longest - 3) // 2
+    return f"{line[:half]} … {line[-half:]}"
+
+
+def shown(value: object, longest: int = 60) -> str:
+    """Return the ``repr`` of a value that a message quotes, cut to `longest` characters."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of more digits than Python prints
+        return f"a value of type '{type(value).__name__}' that cannot be written out"
+    return text if len(text) <= longest else f"{text[: longest - 3]}…"
+
+
+def words_of(error: BaseException, longest: int = _LONGEST) -> str:
+    """Return kind and first line of an error; to say it may fail in its turn."""
+    try:
+        said = str(error).strip().partition("\n")[0]
+    except Exception:
+        said = ""
+    return one_line(f"{type(error).__name__}{': ' if said else ''}{said}", longest)

@@ -1,0 +1,118 @@
+"""The comparison of a finished case, under way in a process of its own.
+
+It says which solve it is at. If it dies there, that solve is taken out, with the reason, and the
+others are compared again: a solution that cannot be compared costs nobody else a verdict.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from verify.errors import InputError
+from verify.json_files import read_json, write_json
+from verify.result import CaseResult, read_result
+from verify.runner.child import Child, Ending
+from verify.runner.childhood import JUDGING
+from verify.runner.outcome import death
+from verify.runner.unjudged import unjudged_result
+from verify.scene import Scene
+
+__all__ = ["Comparison", "stored_result"]
+
+_LEAST_SECONDS = 60.0
+
+
+class Comparison:
+    """The comparison of the solves in `folders` with the truth, and what is made of it.
+
+    Parameters
+    ----------
+    scene : Scene
+    key : str
+        What identifies the comparison.
+    judge_only : sequence of str
+        Solvers that are judged; empty: all.
+    folders : sequence of Path
+        Of the solves.
+    folder : Path
+        Of the case.
+    root : Path
+        Run directory.
+    origin : dict
+        Provenance of the run.
+    timeout, memory : float
+        Limits, s and bytes.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        key: str,
+        judge_only: Sequence[str],
+        folders: Sequence[Path],
+        folder: Path,
+        root: Path,
+        origin: dict[str, Any],
+        timeout: float,
+        memory: float,
+    ) -> None:
+        self.scene, self._folder, self._folders = scene, folder, list(folders)
+        self._timeout, self._memory = max(timeout, _LEAST_SECONDS), memory
+        self._unfit: dict[str, str] = {}
+        self._question: dict[str, Any] = {
+            "key": key,
+            "judge_only": list(judge_only),
+            "folders": [os.path.relpath(one, root) for one in folders],
+            "root": str(root.resolve()),
+            "provenance": origin,
+            "unfit": self._unfit,
+        }
+        self._child = self._started()
+
+    def poll(self) -> CaseResult | None:
+        """Look once; return the result when it is there."""
+        ending = self._child.poll()
+        if ending is None:
+            return None
+        result = stored_result(self._folder, self._question["key"])
+        return self._without_result(ending) if result is None else result
+
+    def kill(self) -> None:
+        """End it."""
+        self._child.kill()
+
+    def _started(self) -> Child:
+        for stale in ("judged.json", JUDGING):
+            (self._folder / stale).unlink(missing_ok=True)
+        question = self._folder / "judge.json"
+        write_json(self._question, question)
+        log = self._folder / "judge-log.txt"
+        return Child("verify.runner.assess", question, log, self._timeout, self._memory)
+
+    def _without_result(self, ending: Ending) -> CaseResult | None:
+        _, why = death(self._child.log, ending, self._timeout, self._memory)
+        try:
+            at = (self._folder / JUDGING).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError):
+            at = ""
+        if at in self._question["folders"] and at not in self._unfit:
+            self._unfit[at] = f"its solution cannot be compared: {why}"
+            self._child = self._started()
+            return None
+        reason, origin = f"comparison failed: {why}", self._question["provenance"]
+        judged = self._question["judge_only"]
+        result = unjudged_result(self.scene, self._folders, reason, origin, judged)
+        write_json(asdict(result), self._folder / "result.json")
+        return result
+
+
+def stored_result(folder: Path, key: str) -> CaseResult | None:
+    """Return the result that a comparison with this `key` left in the `folder` of a case."""
+    try:
+        if read_json(folder / "judged.json").get("key") == key:
+            return read_result(folder / "result.json")
+    except InputError:
+        pass
+    return None

@@ -1,0 +1,49 @@
+"""How a process ended, in words: by the outcome that it left, or by its death."""
+
+from pathlib import Path
+from typing import Any
+
+from verify.errors import InputError
+from verify.json_files import read_json
+from verify.result import SolveRecord, Status
+from verify.runner.child import Ending
+from verify.runner.log import telling_line
+
+__all__ = ["death", "outcome_in"]
+
+
+def outcome_in(folder: Path) -> dict[str, Any] | None:
+    """Return what a solve left in `folder` as fields of a record, with ``peak_memory``.
+
+    None if it left nothing, or something else.
+    """
+    try:
+        outcome = read_json(folder / "outcome.json")
+        outcome["status"] = Status(outcome["status"])
+        SolveRecord(case="", solver="", level=0, **outcome)
+    except (InputError, KeyError, TypeError, ValueError):
+        return None
+    return outcome
+
+
+def death(log: Path, ending: Ending, timeout: float, memory: float) -> tuple[Status, str]:
+    """Explain the end of a process that left no outcome.
+
+    Parameters
+    ----------
+    log : Path
+    ending : Ending
+    timeout, memory : float
+        The limits that it had, s and bytes.
+    """
+    if ending.killed_for == "timeout":
+        return Status.TIMEOUT, f"killed after {timeout:g} s"
+    if ending.killed_for == "memory":
+        return Status.MEMORY, f"killed above {memory / 2**30:.3g} GiB"
+    if ending.returncode == -9:
+        if ending.starved:
+            return Status.MEMORY, "killed by the system, which was out of memory"
+        return Status.FAILED, "killed from outside (signal 9), not for memory"
+    code = ending.returncode
+    how = f"signal {-code}" if code < 0 else f"exit code {code}"
+    return Status.FAILED, f"{telling_line(log)} ({how}{'' if code else ', without an answer'})"
