@@ -13,6 +13,7 @@ from verify.whole_files import read_bounded, write_whole
 __all__ = ["deeper_than", "parse_json", "plain", "read_json", "write_json"]
 
 _DEEPEST = 60  # levels of nesting; none of our files has more than a dozen
+_TOO_DEEP = f"not a JSON file of ours (nested too deep; expected at most {_DEEPEST} levels)"
 _LONGEST = 40  # digits of a whole number
 
 
@@ -55,14 +56,13 @@ def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
     try:
         content = json.loads(text, parse_int=_whole)
     except RecursionError:
-        text = f"nested too deep; expected at most {_DEEPEST} levels"
-        raise InputError(f"not a JSON file ({text})", where) from None
+        raise InputError(_TOO_DEEP, where) from None
     except ValueError as error:  # JSONDecodeError and UnicodeDecodeError are
         raise InputError(f"not a JSON file ({words_of(error)})", where) from None
     if not isinstance(content, dict):
         raise InputError("not a JSON object", where)
     if deeper_than(content, _DEEPEST):
-        raise InputError(f"nested too deep; expected at most {_DEEPEST} levels", where)
+        raise InputError(_TOO_DEEP, where)
     return content
 
 

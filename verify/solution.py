@@ -9,8 +9,6 @@ Stored as one VTU file (mesh, fields) and one JSON file beside it (the rest). Th
 the file exchange for programs that are not written in Python.
 """
 
-import contextlib
-import io
 import json
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
@@ -23,6 +21,7 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.handed_over import check_accounts, check_cells, check_field, check_vectors
 from verify.json_files import read_json
+from verify.read_mesh import read_with_meshio
 from verify.whole_files import whole_file, write_whole
 
 __all__ = [
@@ -342,16 +341,7 @@ def _check_record(record: Any, where: str) -> None:
 
 def _read_vtu(path: Path, cell_type: str) -> Any:
     """Read a VTU file with cells of one type and a displacement at its points."""
-    import meshio
-
-    if not path.is_file():
-        raise InputError("no such file; expected the VTU half of a solution", str(path))
-    try:
-        # meshio reports some bad files by printing and leaving the interpreter
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            mesh = meshio.read(path, file_format="vtu")
-    except (Exception, SystemExit) as error:
-        raise InputError(f"not a VTU file ({type(error).__name__}: {error})", str(path)) from None
+    mesh = read_with_meshio(path, "vtu", "the VTU half of a solution")
     found = sorted({block.type for block in mesh.cells if len(block.data)})
     if cell_type not in mesh.cells_dict:
         raise InputError(f"has {', '.join(found) or 'no cells'}; expected {cell_type}", str(path))

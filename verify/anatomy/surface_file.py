@@ -1,13 +1,12 @@
 """Triangulated surfaces from files: STL, OBJ, PLY, VTU, MSH and what else meshio reads."""
 
-import contextlib
-import io
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.read_mesh import read_with_meshio
 
 __all__ = ["border_loops", "outer_border", "read_surface"]
 
@@ -25,18 +24,7 @@ def read_surface(path: Path) -> tuple[_Floats, _Ints]:
     InputError
         If the file is missing, unreadable, or no oriented surface of triangles.
     """
-    import meshio
-
-    if not path.is_file():
-        raise InputError("geometry.file: no such surface file", str(path))
-    try:
-        # meshio reports some bad files by printing and leaving the interpreter
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:
-        raise InputError(
-            f"not a surface that meshio can read ({type(error).__name__})", str(path)
-        ) from None
+    mesh = read_with_meshio(path, what="a surface")
     kinds = {block.type for block in mesh.cells if len(block.data)} - {"vertex", "line"}
     if kinds != {"triangle"}:
         found = ", ".join(sorted(kinds)) or "no cells"

@@ -5,6 +5,7 @@ import json
 import sys
 
 from verify.errors import InputError
+from verify.printable import one_line
 from verify.runner.checking import check_scene
 from verify.scene import load_scene
 
@@ -30,5 +31,5 @@ def _row(file: str) -> dict[str, str | None]:
         scene = load_scene(file)
         check_scene(scene)
     except InputError as error:
-        return {"file": file, "title": None, "error": " ".join(str(error).split())}
+        return {"file": file, "title": None, "error": one_line(error)}
     return {"file": file, "title": scene.title, "error": None}

@@ -5,7 +5,9 @@ import sys
 from collections.abc import Sequence
 
 from verify.cli.parser import build_parser
+from verify.cli.streams import printable_streams
 from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import one_line
 from verify.threads import pin_to_one_thread
 from verify.whole_files import DISK_FAILURES
 
@@ -15,6 +17,11 @@ __all__ = ["main"]
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line `argv` (default: that of the process) and return its exit code."""
     pin_to_one_thread()
+    with printable_streams():
+        return _run(argv)
+
+
+def _run(argv: Sequence[str] | None) -> int:
     arguments = build_parser().parse_args(argv)
     try:
         code: int = arguments.command(arguments)
@@ -48,5 +55,5 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _fail(message: str, code: int) -> int:
-    print(f"verify: error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"verify: error: {one_line(message)}", file=sys.stderr)
     return code

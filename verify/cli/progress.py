@@ -5,6 +5,8 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import Any, Protocol, TextIO
 
+from verify.cli.streams import unfiltered
+from verify.printable import one_line
 from verify.result import COMPILING, CaseResult, SolveRecord, Status
 from verify.runner import Progress
 
@@ -37,7 +39,7 @@ def _solve_text(label: str, record: SolveRecord, reused: bool) -> str:
         took += f", of them {record.notes[COMPILING]} compiling kernels (first use)"
     if record.status is Status.SOLVED:
         return f"{label}: solved, {record.unknowns} unknowns{took}"
-    return f"{label}: {record.status}{took}: {record.reason}"
+    return one_line(f"{label}: {record.status}{took}: {record.reason}")
 
 
 def _case_text(result: CaseResult) -> str:
@@ -88,7 +90,7 @@ class _Bars:
             TimeElapsedColumn(),
             TextColumn("{task.description}", markup=False),
         )
-        self.bars = RichProgress(*columns, console=Console(file=stream), transient=True)
+        self.bars = RichProgress(*columns, console=Console(file=unfiltered(stream)), transient=True)
         self.task: Any = None
         self.running: dict[str, float] = {}
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+from verify.printable import one_line
 from verify.result import CaseResult, Notice, Status, Verdict, VerdictRecord
 
 __all__ = ["notice_text", "verdict_lines"]
@@ -20,10 +21,12 @@ def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
         for record in result.verdicts:
             if record.verdict is not Verdict.PASS:
                 known = f" (known finding: {record.known})" if record.known else ""
-                yield f"    {record.verdict}: {_check(record)}: {record.reason}{known}"
+                said = f"{record.verdict}: {_check(record)}: {record.reason}{known}"
+                yield f"    {one_line(said)}"
         for solve in result.solves:
             if solve.status is not Status.SOLVED:
-                yield f"    {solve.solver}, level {solve.level}: {solve.status}: {solve.reason}"
+                said = f"{solve.solver}, level {solve.level}: {solve.status}: {solve.reason}"
+                yield f"    {one_line(said)}"
 
 
 def notice_text(notice: Notice) -> str:

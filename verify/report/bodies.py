@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.read_mesh import read_with_meshio
 from verify.solution import Solution, read_solution
 
 __all__ = ["Body", "deformed_body", "error_body", "read_stored"]
@@ -79,13 +80,7 @@ def error_body(path: Path) -> Body:
     InputError
         If the file is not a mesh of simplices with point or cell data ``error``.
     """
-    import meshio
-
-    try:
-        mesh = meshio.read(path, file_format="vtu")
-    except (Exception, SystemExit) as error:  # meshio exits on unreadable files
-        said = f"the error field cannot be read ({type(error).__name__}: {error})"
-        raise InputError(said, str(path)) from None
+    mesh = read_with_meshio(path, "vtu", "an error field")
     for kind in ("tetra10", "tetra", "triangle6", "triangle"):
         if kind in mesh.cells_dict:
             break

@@ -1,7 +1,5 @@
 """The report for programs: results as JSON, as CSV rows, and as JUnit test cases."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Iterator
@@ -10,6 +8,7 @@ from statistics import median
 from typing import Any
 from xml.etree import ElementTree
 
+from verify.csv_files import csv_text
 from verify.report.curves import duration
 from verify.report.markup import printable
 from verify.report.run_directory import CaseEntry, Run
@@ -73,23 +72,20 @@ def csv_rows(run: Run) -> str:
 
     A notice is a row whose status is its kind, without level and value.
     """
-    buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    for entry in run.entries:
-        for solve in entry.result.solves if entry.result else entry.unjudged:
-            writer.writerows(_rows(entry, solve))
-        for notice in entry.result.notices if entry.result else []:
-            writer.writerow(
-                {
-                    "case": printable(entry.name),
-                    "solver": printable(notice.solver or ""),
-                    "status": str(notice.kind),
-                    "metric": printable(notice.about),
-                    "reason": printable(notice.text),
-                }
-            )
-    return buffer.getvalue()
+    return csv_text(COLUMNS, (row for entry in run.entries for row in _rows_of(entry)))
+
+
+def _rows_of(entry: CaseEntry) -> Iterator[dict[str, Any]]:
+    for solve in entry.result.solves if entry.result else entry.unjudged:
+        yield from _rows(entry, solve)
+    for notice in entry.result.notices if entry.result else []:
+        yield {
+            "case": printable(entry.name),
+            "solver": printable(notice.solver or ""),
+            "status": str(notice.kind),
+            "metric": printable(notice.about),
+            "reason": printable(notice.text),
+        }
 
 
 def junit_document(run: Run) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 from verify.conformance import conform, exit_code_of
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
+from verify.printable import words_of
 from verify.result import CaseResult, Status
 from verify.runner.fingerprint import code_of_solver, digest_of
 from verify.solvers import solver_names
@@ -77,7 +78,13 @@ def rank_run(
             found[solver] = {"key": key, **_checked(solver, own, min(timeout, _SECONDS))}
         else:
             found[solver] = {"unchecked": "not asked for: --conform"}
-    write_json(rank_solvers(results, found), target)
+    try:
+        ranked = rank_solvers(results, found)
+    except Exception as error:  # the report is made all the same
+        announce(f"the solvers cannot be ranked: {words_of(error)}")
+        target.unlink(missing_ok=True)
+        return None
+    write_json(ranked, target)
     return target
 
 

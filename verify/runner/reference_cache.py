@@ -117,8 +117,9 @@ def read_entry(content: Any, where: str) -> Entry:
     InputError
         If it is not one.
     """
-    if not isinstance(content, dict) or content.get("schema") != ENTRY_SCHEMA:
-        found = content.get("schema") if isinstance(content, dict) else content
+    if not isinstance(content, dict):
+        raise InputError(f"not a stored reference ({shown(content)})", where)
+    if (found := content.get("schema")) != ENTRY_SCHEMA:
         text = f"a stored reference of schema {shown(found)}; expected {ENTRY_SCHEMA}"
         raise InputError(text, where)
     fields = {name: value for name, value in content.items() if name != "schema"}

@@ -58,7 +58,7 @@ class DisplacementQuantity(Strict):
     """A displacement component at a point of the body, m."""
 
     kind: Literal["displacement"]
-    name: str
+    name: Line
     point: Vector = Field(description="material coordinates, m; not on a cut")
     component: Literal["x", "y", "z"]
     time: Time = None
@@ -68,7 +68,7 @@ class MaximumDisplacementQuantity(Strict):
     """The largest length of the displacement over the body, m."""
 
     kind: Literal["maximum_displacement"]
-    name: str = "maximum_displacement"
+    name: Line = "maximum_displacement"
     time: Time = None
 
 
@@ -76,7 +76,7 @@ class OpeningQuantity(Strict):
     """The displacement jump (positive minus negative side) at a point of a cut, m."""
 
     kind: Literal["opening"]
-    name: str
+    name: Line
     cut: str = "cut"
     at: float | None = Field(
         default=None,
@@ -94,7 +94,7 @@ class StressIntensityQuantity(Strict):
     """A stress-intensity factor at an end of a plane cut, Pa √m."""
 
     kind: Literal["stress_intensity"]
-    name: str
+    name: Line
     cut: str = "cut"
     end: Literal["start", "end"] = Field(description="which end of the cut")
     mode: Literal["I", "II"] = "I"
@@ -174,7 +174,7 @@ class ValueCheck(_Check):
     check: Literal["value"]
     equals: Finite
     relative_tolerance: Positive
-    source: str = Field(description="where the value comes from")
+    source: Line = Field(description="where the value comes from")
 
 
 Acceptance = Annotated[

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from verify.scene.planar import polyline_defect
 from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
-from verify.scene.strict import Finite, NonNegative, Point2, Positive, Strict
+from verify.scene.strict import Finite, Line, NonNegative, Point2, Positive, Strict
 from verify.scene.tool_path import ToolPathCut
 
 __all__ = ["ArcCut", "Cut", "PlaneCut", "PolylineCut"]
@@ -18,7 +18,7 @@ class PolylineCut(Strict):
     """A polyline in the plane; what lies left of its direction is its positive side."""
 
     kind: Literal["polyline"]
-    name: str = "cut"
+    name: Line = "cut"
     points: list[Point2] = Field(min_length=2, description="points in order, m")
     expected: Literal["through", "edge", "inner"] | None = Field(
         default=None,
@@ -47,7 +47,7 @@ class ArcCut(Strict):
     """A circular arc in the plane, counter-clockwise; its centre is on the positive side."""
 
     kind: Literal["arc"]
-    name: str = "cut"
+    name: Line = "cut"
     centre: Point2 = Field(description="m")
     radius: Positive = Field(description="m")
     start: Finite = Field(default=0.0, description="angle of the first end, degrees")

@@ -2,17 +2,23 @@
 
 import hashlib
 import json
+import re
 import tomllib
+import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from verify.errors import InputError
+from verify.json_files import deeper_than
+from verify.printable import one_line, words_of
 from verify.scene.geometry import MeshFile
 from verify.scene.messages import first_fault
 from verify.scene.nearest import nearest
 from verify.scene.scene import Scene
+from verify.whole_files import read_bounded
 
 __all__ = [
     "case_folder",
@@ -24,6 +30,12 @@ __all__ = [
     "scene_hash",
     "scene_schema",
 ]
+
+_LARGEST = 2**23  # bytes; the longest case that comes with the project has 6 kB
+_DEEPEST, _PARTS = 20, 20
+# a dotted key takes tomllib the square of the number of its parts
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"""(?<![\w."'-])(?:{_PART}[ \t]*+\.[ \t]*+){{{_PARTS}}}""")
 
 
 def case_folder() -> Path:
@@ -67,25 +79,44 @@ def load_scene(source: str | Path) -> Scene:
         if text not in known:
             raise InputError(f"no case '{text}'{nearest(text, known)}")
         name, path = text, known[text]
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError("no such file; expected a case file", str(path)) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read ({error})", str(path)) from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not valid TOML: {error}", str(path)) from None
+    content = _content(path)
     file, cases = path.resolve(), case_folder().resolve()
     if file.is_relative_to(cases):
         name = file.relative_to(cases).with_suffix("").as_posix()
     try:
-        scene = Scene.model_validate(content)
+        with warnings.catch_warnings():  # of numpy, about numbers that the error is about
+            warnings.simplefilter("ignore")
+            scene = Scene.model_validate(content)
     except ValidationError as error:
         raise InputError(first_fault(error, content, scene_schema()), str(path)) from None
+    except (ArithmeticError, MemoryError, RecursionError, np.linalg.LinAlgError) as error:
+        text = f"its numbers cannot be computed with ({words_of(error)})"
+        raise InputError(text, str(path)) from None
     scene._file, scene._name = file, name
     if isinstance(scene.geometry, MeshFile) and not mesh_path(scene).is_file():
         raise InputError(f"geometry.file: no mesh file '{scene.geometry.file}'", str(path))
     return scene
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """Read TOML within limits."""
+    data = read_bounded(path, "a case file", _LARGEST)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"cannot be read ({error})", str(path)) from None
+    if _LONG_KEY.search(text):
+        raise InputError(f"not a case: a key of more than {_PARTS} parts", str(path))
+    too_deep = f"nested too deep; expected at most {_DEEPEST} levels"
+    try:
+        content = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"not valid TOML: {too_deep}", str(path)) from None
+    except ValueError as error:  # TOMLDecodeError is one, and so is that of too many digits
+        raise InputError(f"not valid TOML: {one_line(error)}", str(path)) from None
+    if deeper_than(content, _DEEPEST):
+        raise InputError(f"not a case: {too_deep}", str(path))
+    return content
 
 
 def scene_content(scene: Scene) -> dict[str, Any]:

@@ -1,12 +1,10 @@
 """Reading the mesh file of a scene: simplices in any format that meshio knows."""
 
-import contextlib
-import io
-
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
+from verify.read_mesh import read_with_meshio
 from verify.scene.geometry import MeshFile
 from verify.scene.loading import mesh_path
 from verify.scene.scene import Scene
@@ -38,20 +36,11 @@ def read_mesh(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         If the file is missing, unreadable, not simplicial, or degenerate, or if cells overlap that
         share a facet.
     """
-    import meshio
-
     assert isinstance(scene.geometry, MeshFile)
     path, d, k = mesh_path(scene), scene.dimension, scene.cell_dimension
     if not path.is_file():
         raise InputError(f"geometry.file: no mesh file '{path}'", str(scene.file or ""))
-    try:
-        # meshio reports some bad files by printing and leaving the interpreter
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:
-        why = str(error).strip().splitlines()
-        reason = f"{type(error).__name__}{': ' + why[0] if why and why[0] != '1' else ''}"
-        raise InputError(f"not a mesh that meshio can read ({reason})", str(path)) from None
+    mesh = read_with_meshio(path)
     kinds = {block.type for block in mesh.cells if len(block.data)}
     strange = kinds - _BELOW[k] - {_SIMPLEX[k]}
     if strange or _SIMPLEX[k] not in kinds:

@@ -5,6 +5,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from verify.printable import shown
 from verify.scene.nearest import nearest
 
 __all__ = ["first_fault"]
@@ -48,7 +49,7 @@ def _sentence(found: Any, same: list[Any], key: str, schema: dict[str, Any]) -> 
             message = found["msg"].removeprefix("Value error, ")
             return f"{key}: {message}" if key else message
     wanted = " or ".join(dict.fromkeys(_wanted(fault) for fault in same))
-    return f"{key}: expected {wanted}, got {_shown(found['input'])}"
+    return f"{key}: expected {wanted}, got {shown(found['input'])}"
 
 
 def _tags(found: Any, schema: dict[str, Any]) -> str:
@@ -74,6 +75,8 @@ def _wanted(fault: Any) -> str:
             return "a text in quotes"
         case "string_too_short" | "string_pattern_mismatch":
             return "one line of text"
+        case "string_too_long":
+            return f"at most {context['max_length']} characters"
         case "list_type" | "tuple_type":
             table = isinstance(fault["input"], dict)
             return "a list of tables ([[…]], not […])" if table else "a list in brackets"
@@ -89,11 +92,6 @@ def _wanted(fault: Any) -> str:
         case "literal_error":
             return str(context["expected"])
     return str(fault["msg"]).removeprefix("Input should be ")
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}…"
 
 
 def _key(fault: Any, content: Any) -> str:

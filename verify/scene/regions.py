@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Region = Callable[[Array], NDArray[np.bool_]]
 Expression = Callable[[Array], Array]
 
+_LONGEST = 2000  # characters
 _COORDINATES = ("x", "y", "z")
 _ARITHMETIC = {
     ast.Add: operator.add,
@@ -67,6 +68,7 @@ def parse_region(text: str, dimension: int) -> Region:
     A comparison holds at no point where one of its sides is no finite number: 1/x > 10 not at
     x = 0, sqrt(x - 0.5) >= 0 not at x < 0.5. Such a number without x, y, z is an error.
     """
+    _check_length(text)
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -105,6 +107,7 @@ def parse_expression(text: str, dimension: int) -> Expression:
     InputError
         If the text is not such a formula; the message names the part that is not.
     """
+    _check_length(text)
     try:
         tree = ast.parse(text.strip(), mode="eval").body
         _check_number(tree, text, dimension, _FORMULA)
@@ -125,6 +128,11 @@ def parse_expression(text: str, dimension: int) -> Expression:
         return values
 
     return expression
+
+
+def _check_length(text: str) -> None:
+    if len(text) > _LONGEST:
+        raise InputError(f"has {len(text)} characters; expected at most {_LONGEST}")
 
 
 def _reject(node: ast.AST, text: str, meaning: str = _MEANING) -> InputError:

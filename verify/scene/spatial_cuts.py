@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from verify.scene.planar import polygon_defect, polyline_defect
 from verify.scene.spatial import ear_clipping, frame
-from verify.scene.strict import Finite, NonNegative, Point3, Positive, Strict
+from verify.scene.strict import Finite, Line, NonNegative, Point3, Positive, Strict
 
 __all__ = ["CylinderCut", "DiscCut", "PolygonCut", "SpatialCut", "SphereCut", "SweptCut"]
 
@@ -19,7 +19,7 @@ _TURN = 64  # points on a full circle, where no spacing is asked for
 
 
 class _SpatialCut(Strict):
-    name: str = "cut"
+    name: Line = "cut"
     expected: Literal["through", "edge", "inner"] | None = Field(
         default=None,
         description="how it meets the body: checked if given (through: its rim is nowhere inside "

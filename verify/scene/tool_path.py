@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from verify.scene.planar import polyline_defect
-from verify.scene.strict import NonNegative, Point3, Positive, Strict, Vector
+from verify.scene.strict import Line, NonNegative, Point3, Positive, Strict, Vector
 
 __all__ = ["ToolPathCut"]
 
@@ -27,7 +27,7 @@ class ToolPathCut(Strict):
     """
 
     kind: Literal["tool_path"]
-    name: str = "cut"
+    name: Line = "cut"
     points: list[Vector] = Field(min_length=2, description="points of the tip in order, m")
     times: list[NonNegative] | None = Field(
         default=None, description="when the tip is at each point, s; or a speed"

@@ -1,12 +1,11 @@
 """What a study leaves on disk: a versioned JSON record and the same numbers as CSV."""
 
-import csv
-import io
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
+from verify.csv_files import csv_text
 from verify.errors import InputError
 from verify.json_files import write_json
 from verify.provenance import provenance
@@ -59,12 +58,9 @@ def write_study(
     }
     target = directory / f"{kind}.json"
     write_json(document, target)
-    buffer = io.StringIO()
     listed = list(rows)
-    writer = csv.DictWriter(buffer, list(listed[0]) if listed else [], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(listed)
-    write_whole(directory / f"{kind}.csv", buffer.getvalue())
+    table = csv_text(list(listed[0]) if listed else [], listed)
+    write_whole(directory / f"{kind}.csv", table)
     return target
 
 

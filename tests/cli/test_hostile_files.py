@@ -1,0 +1,244 @@
+"""Files made to do harm: one clear line within seconds, exit code 2, nothing left behind."""
+
+import json
+import os
+import time
+import zipfile
+from contextlib import suppress
+
+import pytest
+
+from verify.cli import main
+from verify.csv_files import csv_text
+from verify.errors import InputError
+from verify.printable import one_line, visible
+from verify.runner.reference_bundle import ReferenceBundle
+from verify.runner.reference_cache import ReferenceCache
+from verify.scene import case_folder
+
+PATCH = (case_folder() / "statics" / "f1_patch.toml").read_text()
+BOX = (case_folder() / "statics" / "f1_3d.toml").read_text()
+NESTED = '{"a":' * 90_000
+DEEP = '{"schema": 1, "scene": ' + '{"a": ' * 700 + "1" + "}" * 701
+UPPER = "upper = [1.0, 1.0]"
+
+CASES = {
+    "nested 900 deep": (UPPER, f"upper = {'[' * 900}{']' * 900}", "nested too deep; expected at"),
+    "nested 200 deep": (UPPER, f"upper = {'[' * 200}{']' * 200}", "nested too deep; expected at"),
+    "5000 digits": ("poisson = 0.3", f"poisson = {'9' * 5000}", "not valid TOML: Exceeds the limit"),
+    "300 digits": ("poisson = 0.3", f"poisson = {'9' * 300}", "material.poisson: expected a"),
+    "1e308": (UPPER, "upper = [1.0, 1e308]", "geometry.upper[1]: expected a number ≤ 1e+60"),
+    "dotted key": ("[material]", ".".join("a" * 20_000) + " = 1\n[material]", "a key of more than"),
+    "quoted key": ("[material]", ".".join(['"a b"'] * 20_000) + " = 1\n[material]", "a key of more"),
+    "key of 10 MB": ("[material]", f"{'a' * 10**7} = 1\n[material]", "has 10 MB; expected a case"),
+    "key of 1 MB": ("[material]", f"{'a' * 10**6} = 1\n[material]", "unknown key"),
+    "long inequality": (
+        'where = "boundary"',
+        f'where = "{" or ".join(["x < 1"] * 100_000)}"',
+        "characters; expected at most 2000",
+    ),
+    "escape in the title": ('title = "', 'title = "\\u001b[2J', "title: expected one line of text"),
+    "mark of direction": ('title = "', 'title = "\\u202e', "title: expected one line of text"),
+    "title of 100 kB": ('title = "', f'title = "{"x" * 10**5}', "title: expected at most 2000"),
+}  # fmt: skip
+
+
+def refused(capsys, arguments, said, code=2):
+    """One line on standard error, in time."""
+    start = time.process_time()
+    try:
+        found = main([str(argument) for argument in arguments])
+    except SystemExit as leaving:
+        found = leaving.code
+    assert time.process_time() - start < 15
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.err.count("\n") == 1
+    assert len(captured.err) < 5000
+    assert "\x1b" not in captured.err
+    assert captured.out == ""
+    assert found == code
+
+
+@pytest.mark.parametrize("fault", CASES)
+def test_a_hostile_case_file_is_refused(tmp_path, monkeypatch, capsys, fault):
+    old, new, said = CASES[fault]
+    assert old in PATCH
+    (tmp_path / "own.toml").write_text(PATCH.replace(old, new, 1))
+    monkeypatch.chdir(tmp_path)
+    refused(capsys, ["run", "own.toml", "--out", "out"], said)
+    assert [path.name for path in tmp_path.iterdir()] == ["own.toml"]
+
+
+def test_numbers_that_overflow_in_space_are_refused(tmp_path, capsys):
+    upper = next(line for line in BOX.splitlines() if line.startswith("upper"))
+    (tmp_path / "own.toml").write_text(BOX.replace(upper, "upper = [1.0, 1.0, 1e308]"))
+    refused(capsys, ["check", tmp_path / "own.toml"], "geometry.upper[2]: expected a number ≤")
+
+
+def test_a_pipe_is_not_waited_for(tmp_path, capsys):
+    os.mkfifo(tmp_path / "own.toml")
+    refused(capsys, ["check", tmp_path / "own.toml"], "is a pipe or a device; expected a case file")
+
+
+@pytest.mark.parametrize(
+    "name, content, said",
+    [
+        ("body.ply", "ply", "that meshio can read"),
+        ("body.ply", "ply\n", "that meshio can read"),
+        ("body.bdf", "BEGIN BULK\n", "that meshio can read"),
+        ("body.nas", "$ cut\nBEGIN BULK", "that meshio can read"),
+        ("body.vtk", "# vtk DataFile Version 3.0\n", "that meshio can read"),
+    ],
+)
+def test_a_mesh_file_that_is_cut_off_is_not_read_for_ever(tmp_path, capsys, name, content, said):
+    rectangle = f'kind = "rectangle"\nlower = [0.0, 0.0]\n{UPPER}'
+    text = PATCH.replace(rectangle, f'kind = "file"\nfile = "{name}"')
+    text = text.replace("cells = [[8, 8], [16, 16]]", 'pattern = "given"')
+    assert text.count(name) == 1
+    (tmp_path / "own.toml").write_text(text)
+    (tmp_path / name).write_text(content)
+    refused(capsys, ["check", tmp_path / "own.toml"], said)
+
+
+@pytest.mark.parametrize("content", [NESTED, DEEP, '{"schema": 1, "n": ' + "9" * 5000 + "}"])
+def test_json_that_is_too_deep_or_too_long_is_one_line(tmp_path, capsys, content):
+    run, answers = tmp_path / "run", tmp_path / "answers" / "level-0"
+    for folder in (run / "cases" / "a", answers):
+        folder.mkdir(parents=True)
+    for file in (run / "run.json", tmp_path / "base.json", answers / "solution.json"):
+        file.write_text(content)
+    refused(capsys, ["baseline", "check", run, "--file", tmp_path / "base.json"], "base.json: ")
+    refused(
+        capsys,
+        ["run", "statics/f1_patch", "--out", run, "--solver", "conforming"],
+        "run.json: not a JSON file",
+    )
+    (run / "run.json").write_text('{"schema": 1, "finished": "now", "cases": ["a"]}')
+    (run / "cases" / "a" / "result.json").write_text(content)
+    refused(capsys, ["baseline", "diff", run, run], "result.json: not a JSON file")
+
+
+# of a bundle: how its list of contents is changed
+SPOILT = {
+    "entries": lambda b: b.pop("entries"),
+    "entries of numbers": lambda b: b.update(entries=[1, None]),
+    "entries no list": lambda b: b.update(entries={"a": 1}),
+    "no files": lambda b: b["entries"][0].pop("files"),
+    "files a list": lambda b: b["entries"][0].update(files=["solution.json"]),
+    "level a text": lambda b: b["entries"][0].update(level="first"),
+    "level negative": lambda b: b["entries"][0].update(level=-1),
+    "origin null": lambda b: b["entries"][0].update(origin=None),
+    "notes a list": lambda b: b["entries"][0]["record"].update(notes=["a"]),
+    "record null": lambda b: b["entries"][0].update(record=None),
+    "member '.'": lambda b: b["entries"][0]["files"].update({".": "0"}),
+    "member '..'": lambda b: b["entries"][0]["files"].update({"..": "0"}),
+    "member ''": lambda b: b["entries"][0]["files"].update({"": "0"}),
+    "member elsewhere": lambda b: b["entries"][0]["files"].update({"../../x": "0"}),
+    "key elsewhere": lambda b: b["entries"][0].update(key="../../.."),
+}
+
+
+def entry():
+    record = {"case": "statics/f1_patch", "solver": "reference", "level": 0, "status": "solved"}
+    return {
+        "schema": 1, "key": "a" * 24, "physics": "b" * 24, "code": "c" * 24, "level": 0,
+        "case": "statics/f1_patch", "record": record, "files": {"solution.json": "d" * 24},
+        "origin": {"versions": {}}, "made": "2026-01-01",
+    }  # fmt: skip
+
+
+def bundle(path, content, *members):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("bundle.json", content)
+        for name, data in members:
+            archive.writestr(name, data)
+
+
+@pytest.fixture
+def run_by(tmp_path, capsys):
+    def check(said):
+        command = ["run", "statics/griffith_inside", "--references", tmp_path / "b.zip"]
+        refused(capsys, [*command, "--out", tmp_path / "out"], said)
+        assert [path.name for path in tmp_path.iterdir()] == ["b.zip"]
+
+    return check
+
+
+@pytest.mark.parametrize("fault", SPOILT)
+def test_a_bundle_with_wrong_contents_is_refused(tmp_path, run_by, fault):
+    content = {"schema": 1, "entries": [entry()]}
+    SPOILT[fault](content)
+    bundle(tmp_path / "b.zip", json.dumps(content))
+    run_by("b.zip: not a")
+
+
+def test_a_bundle_that_unpacks_to_much_more_is_not_unpacked(tmp_path, run_by):
+    content = {"schema": 1, "entries": [entry()]}
+    bundle(tmp_path / "b.zip", json.dumps(content), ("a", bytes(2 * 10**8)))
+    run_by("unpacks to 200 MB")
+
+
+def test_a_list_of_contents_that_is_too_deep_is_refused(tmp_path, run_by):
+    bundle(tmp_path / "b.zip", NESTED)
+    run_by("not a JSON file")
+
+
+@pytest.mark.parametrize("place", range(0, 130, 3))
+def test_a_flipped_byte_in_a_zip_is_one_line(tmp_path, place):
+    bundle(tmp_path / "b.zip", json.dumps({"schema": 1, "entries": [entry()]}))
+    data = bytearray((tmp_path / "b.zip").read_bytes())
+    for at in (place, -1 - place):
+        flipped = bytearray(data)
+        flipped[at] ^= 0xFF
+        (tmp_path / "b.zip").write_bytes(flipped)
+        with suppress(InputError):
+            ReferenceBundle(tmp_path / "b.zip")
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda e: json.dumps({**e, "origin": None}),
+        lambda e: json.dumps({**e, "origin": {"versions": 3}}),
+        lambda e: json.dumps({**e, "record": {**e["record"], "unknowns": "many"}}),
+        lambda e: json.dumps({**e, "files": {"..": "0"}}),
+        lambda e: NESTED,
+        lambda e: DEEP,
+    ],
+)
+def test_a_damaged_entry_of_the_cache_is_passed_over_and_cleared(
+    tmp_path, monkeypatch, capsys, spoil
+):
+    monkeypatch.setenv("VERIFY_CACHE", str(tmp_path))
+    for key, text in (("a" * 24, spoil(entry())), ("b" * 24, json.dumps(entry()))):
+        (tmp_path / key).mkdir()
+        (tmp_path / key / "entry.json").write_text(text)
+        (tmp_path / key / "solution.json").write_text("{}")
+    assert main(["cache", "list"]) == 0
+    assert main(["cache", "list", "--json"]) == 0
+    assert ReferenceCache(tmp_path).entries() is not None
+    assert main(["cache", "clear"]) == 0
+    assert list(tmp_path.iterdir()) == []
+    assert capsys.readouterr().err == ""
+
+
+def test_no_escape_of_others_reaches_the_terminal(tmp_path, capsys):
+    (tmp_path / "\x1b[2Jown.toml").write_text("title = 3")
+    assert main(["check", str(tmp_path / "\x1b[2Jown.toml")]) == 2
+    said = capsys.readouterr().err
+    assert "\x1b" not in said
+    assert r"\x1b[2Jown.toml" in said
+
+
+def test_what_is_printed_is_visible_and_short():
+    assert visible("a\x1b[31m\u202eb\x9b\n\tü\ud800") == "a\\x1b[31m\\u202eb\\x9b\n\tü\\ud800"
+    assert one_line("a\r\nb  c") == "a b c"
+    assert len(one_line("x" * 10**7)) <= 2000
+
+
+def test_no_cell_of_a_table_is_a_formula():
+    rows = [{"a": '=HYPERLINK("http://x","y")', "b": -1.0}, {"a": " @SUM(A1)", "b": "-2"}]
+    text = csv_text(["a", "b"], rows)
+    assert text.splitlines()[1] == '"\'=HYPERLINK(""http://x"",""y"")",-1.0'
+    assert text.splitlines()[2] == "' @SUM(A1),'-2"
