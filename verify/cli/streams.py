@@ -32,10 +32,7 @@ class _Printable:
 def printable_streams() -> Iterator[None]:
     """Filter what is printed meanwhile: titles, reasons and names come from others' files."""
     before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = (
-        stream if stream is None else _Printable(stream)  # type: ignore[assignment]
-        for stream in before
-    )
+    sys.stdout, sys.stderr = (stream if stream is None else _Printable(stream) for stream in before)
     try:
         yield
     finally:

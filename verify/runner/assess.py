@@ -123,7 +123,11 @@ def _comparable(
     result: CaseResult, solutions: dict[str, dict[int, Solution]]
 ) -> dict[str, dict[int, Solution]]:
     """Leave out the solutions that could not be compared, or move out of all proportion."""
-    fit = {(s.solver, s.level) for s in result.solves if s.status is Status.SOLVED and s.metrics}
+    fit = {
+        (s.solver, s.level)
+        for s in result.solves
+        if s.status is Status.SOLVED and (s.metrics or "comparison" not in s.notes)
+    }
     kept = {
         name: {k: s for k, s in own.items() if (name, k) in fit and not _is_wild(s)}
         for name, own in solutions.items()
