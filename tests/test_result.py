@@ -134,7 +134,7 @@ def damaged(change):
         (damaged(lambda r: r.pop("solves")), "not a readable result"),
         (
             damaged(lambda r: r["solves"][0].update(status="asleep")),
-            "'asleep' is not a valid Status",
+            "solves.0.status: Input should be 'solved'",
         ),
         (damaged(lambda r: r["solves"][0].update(colour="red")), "not a readable result"),
         (damaged(lambda r: r["verdicts"][0].pop("limit")), "not a readable result"),

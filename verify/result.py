@@ -38,6 +38,12 @@ SCHEMA_VERSION = 1
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
 
 
+def _closed[Kind](kind: Kind) -> Kind:
+    """Have unknown keys refused where a record is made from plain values."""
+    kind.__pydantic_config__ = {"extra": "forbid"}  # type: ignore[attr-defined]
+    return kind
+
+
 class Status(StrEnum):
     """How a solve ended."""
 
@@ -57,6 +63,7 @@ class Verdict(StrEnum):
     ERROR = "ERROR"  # could not be judged because a solve did not finish
 
 
+@_closed
 @dataclass(frozen=True)
 class Metric:
     """A number that was measured, with what is known about its truth.
@@ -88,6 +95,7 @@ class Metric:
     source: str = ""
 
 
+@_closed
 @dataclass(frozen=True)
 class SolveRecord:
     """One solve: one solver on one mesh level of one case.
@@ -123,6 +131,7 @@ class SolveRecord:
         return next((metric for metric in self.metrics if metric.name == name), None)
 
 
+@_closed
 @dataclass(frozen=True)
 class Rate:
     """Observed order of an error under refinement, or why there is none.
@@ -150,6 +159,7 @@ class Rate:
     pairwise: list[float] = field(default_factory=list)
 
 
+@_closed
 @dataclass(frozen=True)
 class VerdictRecord:
     """The verdict on one acceptance check of a case, made of one solver.
@@ -184,6 +194,7 @@ class NoticeKind(StrEnum):
     UNAVAILABLE = "unavailable"  # a quantity that was asked for and cannot be had
 
 
+@_closed
 @dataclass(frozen=True)
 class Notice:
     """A sentence that a reader of a case must not miss, beside its verdicts.
@@ -205,6 +216,7 @@ class Notice:
     text: str
 
 
+@_closed
 @dataclass(frozen=True)
 class OpeningCurve:
     """The displacement jump of one field along a line on a cut.
@@ -222,6 +234,7 @@ class OpeningCurve:
     tangential_band: list[float] = field(default_factory=list)
 
 
+@_closed
 @dataclass(frozen=True)
 class OpeningProfile:
     """Jumps along a line on a cut, of all solvers (their finest levels) and the reference.
@@ -251,6 +264,7 @@ class OpeningProfile:
     curves: list[OpeningCurve]
 
 
+@_closed
 @dataclass(frozen=True)
 class CaseResult:
     """All that is known about one case of a run."""

@@ -24,10 +24,10 @@ def telling_line(log: Path) -> str:
         return "said nothing"
     for line in lines:
         if match := _FATAL.match(line):
-            return one_line(match.group(1), _LONGEST)
+            return one_line(match.group(1)[:_LONGEST])
     tail = lines[-30:]
     line = next((line for line in reversed(tail) if _TELLING.search(line)), lines[-1])
-    return one_line(line, _LONGEST)
+    return one_line(line[:_LONGEST])
 
 
 def _ends(log: Path) -> str:
