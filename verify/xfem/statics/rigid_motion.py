@@ -85,6 +85,8 @@ class RigidMotions:
 
         Bodies that turn by little are left to the linear response.
         """
+        if not change.any():
+            return
         for held, nodes in zip(self._held, self._nodes, strict=True):
             if len(held) == 0:
                 continue
@@ -100,7 +102,7 @@ class RigidMotions:
 
         Parts that turn against one another by an angle θ make it 2 sin(θ/4) or less.
         """
-        if len(self._edges) == 0:
+        if len(self._edges) == 0 or not change.any():
             return 0.0
         first, second = self._edges.T
         moved = self.follow(displacement, change)
