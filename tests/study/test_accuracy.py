@@ -64,7 +64,8 @@ def test_interpolants_of_a_smooth_field_converge_with_orders_two_and_one(tmp_pat
     ]
     solvers = {"xfem": LEVELS, "conforming": LEVELS}
     result = assess(checks, solvers, EXACT, quantities=quantities)
-    assert [v.verdict for v in result.verdicts] == [Verdict.PASS] * 5
+    # four checks of each of both solvers, and the ratio of the one to the other
+    assert [v.verdict for v in result.verdicts] == [Verdict.PASS] * 9
     finest = result.solves[2]
     assert finest.metric("corner").value == pytest.approx(0.3, abs=1e-14)
     assert finest.metric("corner").reference == pytest.approx(0.3, abs=1e-14)
