@@ -113,8 +113,10 @@ def _turning(virtual: VirtualMesh, kind: State) -> None:
 def _without_slivers(
     body: Callable[[], tuple[VirtualMesh, State]], use: Callable[[VirtualMesh, State], None]
 ) -> None:
+    # what is aggregated assembles at the corners, by the same loops: the untreated body has them all
     virtual, kind = body()
-    use(treat_slivers(virtual)[0], kind)
+    treat_slivers(virtual)
+    use(virtual, kind)
 
 
 def _scalpel(mesh: SimplexMesh, kind: State) -> None:

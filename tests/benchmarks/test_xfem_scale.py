@@ -64,7 +64,7 @@ def cube():
 @cache
 def system():
     """Body, pattern, internal force, and matrix and load of a step of 10 ms under gravity."""
-    virtual, _ = treat_slivers(cut_mesh(cube(), [CUT]))
+    virtual, _ = treat_slivers(cut_mesh(cube(), [CUT]), "keep")
     pattern = block_pattern(virtual.cells, virtual.node_count)
     force = InternalForce(virtual, MATERIAL)
     force.evaluate(np.zeros_like(virtual.node_points))
