@@ -113,7 +113,7 @@ def _turning(virtual: VirtualMesh, kind: State) -> None:
 def _without_slivers(
     body: Callable[[], tuple[VirtualMesh, State]], use: Callable[[VirtualMesh, State], None]
 ) -> None:
-    # what is aggregated assembles at the corners, by the same loops: the untreated body has them all
+    # what is aggregated assembles at corners, by the same loops: the untreated body has them all
     virtual, kind = body()
     treat_slivers(virtual)
     use(virtual, kind)
