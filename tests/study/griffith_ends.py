@@ -73,7 +73,7 @@ class Crack:
         self._rule = rules(self.body, self.size, 1)[0]
         points = self._rule.points
         self._true = self.exact.displacement(points, points)
-        advances = tip_advances(self.exact, self.body.outline)
+        advances = tip_advances(self.exact, self.body.loops[0])
         self._advances = np.array([one.displacement(points, points) for one in advances])
         self.gram = (
             np.einsum("iqd,jqd,q->ij", self._advances, self._advances, self._rule.weights)

@@ -59,7 +59,7 @@ def test_the_derivative_by_an_end_is_held_at_the_outline_and_singular_as_the_cra
     scene = crack_scene(ends_at(1, 20.0, 0.25), 20.0, {"cells": [[16, 16]]})
     parameters = scene.exact.parameters
     crack = exact_solution("griffith", parameters, scene.material)
-    outline = body_of(scene).outline
+    outline = body_of(scene).loops[0]
     first, second = tip_advances(crack, outline)[:2]
     share = np.linspace(0.0, 1.0, 57)[:, None]
     next_corner = np.roll(outline, -1, axis=0)
