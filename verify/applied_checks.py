@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from verify.result import SolveRecord, Status
+from verify.result import SolveRecord, Status, Verdict, VerdictRecord
+from verify.scene import BoundCheck, RateCheck, RatioCheck, ValueCheck
 
-__all__ = ["REFERENCE", "AppliedCheck", "applied_checks", "judged_by"]
+__all__ = ["REFERENCE", "AppliedCheck", "applied_checks", "judged_by", "limit_text", "unjudged"]
 
 REFERENCE = "reference"  #: judges the others; judged itself only by a check that names it
 
@@ -78,3 +79,29 @@ def applied_checks(
                 yield AppliedCheck(one, f"the run was not asked for solver '{missing[0]}'")
             else:
                 yield AppliedCheck(one)
+
+
+def unjudged(check: Any, verdict: Verdict, reason: str) -> VerdictRecord:
+    """Return the verdict on a check, made of one solver, for which nothing was observed."""
+    limit = limit_text(check)
+    return VerdictRecord(
+        check.check, check.solver or "", check.metric, verdict, None, None, None, limit, reason
+    )
+
+
+def limit_text(check: Any) -> str:
+    """Say what a check demands."""
+    match check:
+        case RateCheck(at_least=float(least)):
+            return f"order ≥ {least:g}"
+        case RateCheck():
+            return f"order {check.equals:g} ± {check.within:g}"
+        case BoundCheck():
+            return f"relative error ≤ {check.at_most:g}"
+        case RatioCheck(at_most=float(most)):
+            return f"error ≤ {most:g} × that of {check.to}, on every level"
+        case RatioCheck():
+            return f"error ratio to {check.to} within 1 ± {check.within:g}, on every level"
+        case ValueCheck():
+            return f"{check.equals:.10g} ± {check.relative_tolerance:g} (relative)"
+    raise TypeError(f"{check!r} is no acceptance check")

@@ -9,14 +9,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
-from verify.applied_checks import applied_checks
+from verify.applied_checks import applied_checks, limit_text, unjudged
 from verify.result import Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 from verify.study.energy_account import ACCOUNT
 from verify.study.error_history import ERROR_NAMES
 from verify.study.rates import ROUND_OFF
 
-__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge", "unjudged"]
+__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge"]
 
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
 
@@ -84,11 +84,6 @@ def judge(
         except NotMeasuredError as problem:
             verdicts.append(unjudged(check, Verdict.ERROR, str(problem)))
     return [_marked(scene, verdict) for verdict in verdicts]
-
-
-def unjudged(check: Check, verdict: Verdict, reason: str) -> VerdictRecord:
-    """Return the verdict on a check, made of one solver, for which nothing was observed."""
-    return _record(check, verdict, None, _limit(check), reason)
 
 
 def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:
@@ -162,16 +157,16 @@ def _judge_ratio(
         b = _error(other, check.metric)
         if one.size and other.size and abs(one.size / other.size - 1) > _SAME_SIZE:
             text = f"level {one.level}: mesh sizes {one.size:.3g} and {other.size:.3g} m differ"
-            return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
+            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
         if max(a.value, b.value) <= ROUND_OFF:
             text = f"level {one.level}: both errors ({a.value:.1e}, {b.value:.1e}) are round-off"
-            return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
+            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
         if b.low <= 0.0:
             text = (
                 f"level {one.level}: the uncertainty {b.half_width:.1e} is not below the error "
                 f"{b.value:.1e} of {check.to}"
             )
-            return _record(check, Verdict.UNDECIDED, None, _limit(check), text)
+            return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
         found.append((one.level, Interval(a.value / b.value, a.low / b.high, a.high / b.low)))
     all_levels = ", ".join(f"{ratio.value:.4g}" for _, ratio in found)
     decided = [
@@ -203,12 +198,12 @@ def _judge_rate(
         return _decide(check, found, low, high, f"slopes {slopes}")
     if rate.reason.startswith("diverging") and max(rate.pairwise) < low:
         worst = Interval(rate.pairwise[-1], min(rate.pairwise), max(rate.pairwise))
-        return _record(check, Verdict.FAIL, worst, _limit(check), rate.reason)
-    return _record(check, Verdict.UNDECIDED, None, _limit(check), rate.reason)
+        return _record(check, Verdict.FAIL, worst, limit_text(check), rate.reason)
+    return _record(check, Verdict.UNDECIDED, None, limit_text(check), rate.reason)
 
 
 def _decide(check: Check, found: Interval, low: float, high: float, text: str) -> VerdictRecord:
-    limit = _limit(check)
+    limit = limit_text(check)
     if not isfinite(found.value):
         return _record(check, Verdict.FAIL, None, limit, f"{text}: not finite")
     if low <= found.low and found.high <= high:
@@ -235,22 +230,6 @@ def _record(
     return VerdictRecord(
         check.check, solver, check.metric, verdict, value, low, high, limit, reason
     )
-
-
-def _limit(check: Check) -> str:
-    match check:
-        case RateCheck(at_least=float(least)):
-            return f"order ≥ {least:g}"
-        case RateCheck():
-            return f"order {check.equals:g} ± {check.within:g}"
-        case BoundCheck():
-            return f"relative error ≤ {check.at_most:g}"
-        case RatioCheck(at_most=float(most)):
-            return f"error ≤ {most:g} × that of {check.to}, on every level"
-        case RatioCheck():
-            return f"error ratio to {check.to} within 1 ± {check.within:g}, on every level"
-        case ValueCheck():
-            return f"{check.equals:.10g} ± {check.relative_tolerance:g} (relative)"
 
 
 def _levels(records: Sequence[SolveRecord], solver: str | None) -> list[SolveRecord]:

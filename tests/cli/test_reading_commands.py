@@ -79,7 +79,7 @@ def test_describe_says_the_requirement_and_every_check(case, capsys):
     scene = load_scene(case)
     assert scene.requirement in text
     for check in scene.acceptance:
-        assert f"{check.metric} of {check.solver}" in text
+        assert f"{check.metric} of {check.solver or 'each solver'}" in text
     assert main(["describe", case, "--json"]) == 0
     content = json.loads(capsys.readouterr().out)
     # all defaults are written out, nothing is lost

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from verify.applied_checks import applied_checks
+from verify.applied_checks import applied_checks, unjudged
 from verify.result import CaseResult, SolveRecord, Verdict
 from verify.runner.job import load_record
 from verify.scene import Scene, scene_hash
-from verify.verdict import unjudged
 
 __all__ = ["unjudged_result"]
 
