@@ -117,6 +117,9 @@ def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:
         ]
     if record.get("schema") != 1:
         return {}, ["run.json is not of schema version 1"]
+    for key in ("options", "provenance"):
+        if not isinstance(record.get(key, {}), dict):
+            record = {**record, key: {}}
     names = record.get("cases")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         return {**record, "cases": []}, ["run.json has no list of case names"]
