@@ -19,7 +19,7 @@ from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
-from verify.solution import Solution
+from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, move, natural_step
 
@@ -285,6 +285,15 @@ def _stability(finite: LargeStrainSolve) -> str:
     return f"{said}; an unstable state of {finite.dismissed:.6g} J on another path was left"
 
 
+def _specks(mesh: ConformingMesh) -> list[Regularisation]:
+    """State the parts of round-off size that were left joined to a neighbour."""
+    if not len(mesh.specks):
+        return []
+    kind = "loose part of round-off size joined to its neighbour"
+    largest = float(mesh.specks.max())
+    return [Regularisation(kind, len(mesh.specks), largest, "volume fraction of the body")]
+
+
 def _solution(
     mesh: ConformingMesh, result: _Answer, size: float, timings: dict[str, list[float]]
 ) -> Solution:
@@ -299,6 +308,7 @@ def _solution(
         order=space.degree,
         cut_facets=mesh.realised_cut,
         cell_sides=mesh.pieces,
+        regularisations=_specks(mesh),
         ledger=result.ledger,
         unknowns=result.displacement[0].size,
         size=size,
