@@ -112,9 +112,8 @@ def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:
     try:
         record = read_json(path)
     except InputError as error:
-        return {}, [
-            f"run.json {'cannot be read' if path.exists() else 'is missing'} ({error.what})"
-        ]
+        said = f"cannot be read ({error.what})" if path.exists() else "is missing"
+        return {}, [f"run.json {said}"]
     if record.get("schema") != 1:
         return {}, ["run.json is not of schema version 1"]
     for key in ("options", "provenance"):
