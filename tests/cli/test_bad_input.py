@@ -17,7 +17,11 @@ BROKEN_CASES = {
     "cut through itself": ("[1.1, 0.7]]", "[1.1, 0.7], [0.5, 0.9], [0.5, 0.1]]", "intersects"),
     "exact solution": ('solution = "patch"', 'solution = "pitch"', "did you mean 'patch'?"),
     "parameter of it": ("slope = ", "slop = ", "exact: 'patch' has no parameter 'slop'"),
-    "solver of a check": ('solver = "conforming"', 'solver = "conformist"', "mean 'conforming'?"),
+    "solver of a check": (
+        'metric = "strain_energy"',
+        'metric = "strain_energy"\nsolver = "conformist"',
+        "mean 'conforming'?",
+    ),
 }  # fmt: skip
 BROKEN_MESHES = {
     "not there": (None, "geometry.file: no mesh file 'body.vtk'"),
