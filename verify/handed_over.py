@@ -126,8 +126,9 @@ def _any_volume(points: NDArray[np.float64], cells: NDArray[np.int64], dimension
     corners = points[cells[:, : dimension + 1]]
     edges = corners[:, 1:] - corners[:, :1]
     with np.errstate(over="ignore"):
-        gram = edges @ edges.transpose(0, 2, 1)
-        return bool((np.linalg.det(gram) > 0.0).any())
+        if edges.shape[1] == edges.shape[2]:
+            return bool(np.linalg.det(edges).any())
+        return bool(np.cross(edges[:, 0], edges[:, 1]).any())
 
 
 def _is_number(value: Any) -> bool:

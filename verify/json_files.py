@@ -60,7 +60,7 @@ def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
     except ValueError as error:  # JSONDecodeError and UnicodeDecodeError are
         raise InputError(f"not a JSON file ({words_of(error)})", where) from None
     if not isinstance(content, dict):
-        raise InputError("not a JSON object", where)
+        raise InputError("not a JSON object; expected one in braces", where)
     if deeper_than(content, _DEEPEST):
         raise InputError(_TOO_DEEP, where)
     return content

@@ -121,7 +121,7 @@ def test_a_surface_of_ones_own_becomes_a_membrane_or_a_solid(suffix, tmp_path) -
 
 
 def test_a_bad_surface_file_is_one_clear_line(tmp_path) -> None:
-    with pytest.raises(InputError, match="no such surface file"):
+    with pytest.raises(InputError, match="no such file; expected a surface"):
         read_surface(tmp_path / "none.stl")
     (tmp_path / "bad.obj").write_text("nonsense", encoding="utf-8")
     with pytest.raises(InputError):

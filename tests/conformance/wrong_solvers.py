@@ -101,6 +101,7 @@ class ForgetsOutputs(XfemSolver):
             times=solution.times[-1:],
             displacement=solution.displacement[-1:],
             velocity=None,
+            acceleration=None,
             ledger={},
         )
 

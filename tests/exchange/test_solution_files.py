@@ -109,7 +109,7 @@ def test_a_fault_in_the_vtu_half_is_named(answer, vtu, said):
 def test_a_file_that_is_no_vtu_is_an_error_and_does_not_leave_the_interpreter(answer, tmp_path):
     path = answer(LEAST)
     (tmp_path / "u.vtu").write_text("not a mesh")
-    with pytest.raises(InputError, match=r"u\.vtu: not a VTU file"):
+    with pytest.raises(InputError, match=r"u\.vtu: not the VTU half of a solution"):
         read_solution(path)
 
 

@@ -69,7 +69,7 @@ def test_a_missing_broken_or_foreign_record_is_refused(tmp_path):
     with pytest.raises(InputError, match="has not run"):
         render_study(tmp_path, "slivers")
     (tmp_path / "slivers.json").write_text("{")
-    with pytest.raises(InputError, match="not JSON"):
+    with pytest.raises(InputError, match="not a JSON file"):
         render_study(tmp_path, "slivers")
     for record in ({"schema": 2, "kind": "slivers study"}, {"schema": 1, "kind": "other"}, []):
         (tmp_path / "slivers.json").write_text(json.dumps(record))

@@ -70,7 +70,8 @@ def acceleration_of(body: DynamicBody, state: MotionState) -> _Floats:
     Raises
     ------
     XfemError
-        If supports move and the mass is not diagonal, or the state is not one of the body.
+        If supports move and the mass couples their nodes to free ones, or the state is not one of
+        the body.
     """
     check_state(state, body.shape)
     return _Explicit(body, 1.0)._acceleration(state.displacement, state.velocity, state.time)[0]
