@@ -74,14 +74,13 @@ def summary(run: Run) -> Markup:
     errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
     if errors := list(dict.fromkeys(errors)):
         said.append(joined(tag("b", "Not judged"), ": ", _listed(errors), ". "))
-    doubtful = [
-        f"{e.name} ({w.about}{f' of {solver_title(w.solver)}' if w.solver else ''}): "
-        f"{_clause(w.text)}"
-        for e in run.entries
-        if e.result
-        for w in e.result.warnings
-    ]
-    if doubtful:
+    warned: dict[str, list[str]] = {}
+    for e in run.entries:
+        for w in e.result.warnings if e.result else []:
+            whose = solver_title(w.solver) if w.solver else "every solver"
+            warned.setdefault(f"{w.about} in {e.name}", []).append(whose)
+    if warned:  # the text of each stands on top of its case
+        doubtful = [f"{about} ({', '.join(whose)})" for about, whose in warned.items()]
         said.append(joined(tag("b", "Warned of"), ": ", _listed(doubtful), ". "))
     without = [e.name for e in run.entries if e.result and not e.result.verdicts]
     if without:
