@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx, polyline, square
+from solid_scenes import cube, polygon
 
 from reference.rigid_motion import best_rotation
 
@@ -35,6 +36,35 @@ def turned(seed, degrees, size=0.2, degree=2):
     )
 
 
+def turned_in_space(seed, degrees):
+    """A box with an inclined plane cut, its upper part turned about an odd axis and moved."""
+    random = np.random.default_rng(seed)
+    tilt = random.uniform(-0.1, 0.1, 2)
+    corners = np.array([[-0.2, -0.2], [1.5, -0.2], [1.5, 1.2], [-0.2, 1.2]])
+    heights = random.uniform(0.45, 0.55) + (corners - 0.5) @ tilt
+    return cube(
+        [polygon("cut", *np.column_stack([corners, heights]).tolist())],
+        geometry={"kind": "box", "lower": [0, 0, 0], "upper": [1.3, 1, 1]},
+        mesh={"cells": [[3, 3, 3]]},  # the conforming mesh is made anew for the inclined cut
+        material={"young": YOUNG, "poisson": 0.42},
+        analysis={"kinematics": "finite_rotation"},
+        supports=[
+            {"where": "z < 0.2", "displacement": [0.0, 0.0, 0.0]},
+            {
+                "where": "z > 0.8",
+                "displacement": [0.2, 0.15, 0.1],
+                "rotation": {
+                    "angle": degrees,
+                    "centre": [0.6, 0.5, 0.5],
+                    "axis": random.normal(size=3).tolist(),
+                },
+            },
+        ],
+        loads=[],
+        reference={"size": random.uniform(0.4, 0.6), "degree": 1},
+    )
+
+
 def energy(scene, solver):
     from verify.solvers import find_solver
 
@@ -56,6 +86,14 @@ def test_a_part_that_is_turned_rigidly_stores_nothing(degrees) -> None:
 def test_a_part_that_is_turned_rigidly_stores_nothing_at_every_angle(solver, seed) -> None:
     for degrees in range(15, 346, 15):
         assert energy(turned(seed, float(degrees), degree=1 + seed % 2), solver) < LEAST
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("solver", ["conforming", "reference"])
+def test_a_part_that_is_turned_rigidly_in_space_stores_nothing_at_every_angle(solver, seed) -> None:
+    for degrees in range(15, 346, 15):
+        assert energy(turned_in_space(seed, float(degrees)), solver) < LEAST
 
 
 def solve(points, cells, fixed, prescribed, load=None, first_step=0.25):
