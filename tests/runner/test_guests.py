@@ -109,17 +109,25 @@ def assert_rows(rows, expected):
 
 
 def test_whatever_it_does_to_its_process_it_is_a_row(verify):
-    names = ["Quitting", "Elsewhere", "Removing"]
+    names = ["Quitting", "Elsewhere"]
     _, rows, done = run(verify, names)
     assert_rows(rows, {name: PROCESSES[name] for name in names})
     assert done.returncode == 3
     assert sorted(path.name for path in verify.folder.iterdir()) == ["out", "square.toml"]
 
 
+def test_what_it_removes_of_solves_that_are_finished_costs_nobody_a_verdict(verify):
+    # one at a time: a solve whose folder goes while it writes there is lost, and a row that says so
+    _, rows, done = run(verify, ["Removing"], "-j1")
+    assert_rows(rows, {"Removing": PROCESSES["Removing"]})
+    assert done.returncode == 0
+
+
 @pytest.mark.heavy
 def test_every_process_that_misbehaves_is_a_row(verify):
-    _, rows, done = run(verify, PROCESSES)
-    assert_rows(rows, PROCESSES)
+    names = [name for name in PROCESSES if name != "Removing"]
+    _, rows, done = run(verify, names)
+    assert_rows(rows, {name: PROCESSES[name] for name in names})
     assert done.returncode == 3
 
 
