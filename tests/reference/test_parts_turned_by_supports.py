@@ -36,7 +36,7 @@ def turned(seed, degrees, size=0.2, degree=2):
     )
 
 
-def turned_in_space(seed, degrees):
+def turned_in_space(seed, degrees, mesh=None):
     """A box with an inclined plane cut, its upper part turned about an odd axis and moved."""
     random = np.random.default_rng(seed)
     tilt = random.uniform(-0.1, 0.1, 2)
@@ -45,7 +45,8 @@ def turned_in_space(seed, degrees):
     return cube(
         [polygon("cut", *np.column_stack([corners, heights]).tolist())],
         geometry={"kind": "box", "lower": [0, 0, 0], "upper": [1.3, 1, 1]},
-        mesh={"cells": [[3, 3, 3]]},  # the conforming mesh is made anew for the inclined cut
+        mesh=mesh
+        or {"cells": [[3, 3, 3]]},  # the conforming mesh is made anew for the inclined cut
         material={"young": YOUNG, "poisson": 0.42},
         analysis={"kinematics": "finite_rotation"},
         supports=[
@@ -86,6 +87,11 @@ def test_a_part_that_is_turned_rigidly_stores_nothing(degrees) -> None:
 def test_a_part_that_is_turned_rigidly_stores_nothing_at_every_angle(solver, seed) -> None:
     for degrees in range(15, 346, 15):
         assert energy(turned(seed, float(degrees), degree=1 + seed % 2), solver) < LEAST
+
+
+def test_a_box_without_a_structured_mesh_is_meshed_anew_and_turned_alike() -> None:
+    mesh = {"pattern": "unstructured", "sizes": [0.4]}
+    assert energy(turned_in_space(0, 105.0, mesh), "conforming") < LEAST
 
 
 @pytest.mark.heavy

@@ -83,6 +83,8 @@ def not_imprinted(scene: Scene) -> str | None:
     for cut in scene.cuts:
         if not isinstance(cut, PolylineCut | PolygonCut | SweptCut):
             return f"a {cut.kind} cut is not plane in parts: it is not imprinted on a given mesh"
+    if isinstance(scene.geometry, Box) and scene.mesh.pattern == "unstructured":
+        return "a box has no unstructured background mesh that cuts could be imprinted on"
     return None
 
 
