@@ -54,7 +54,7 @@ def tips(scene: Scene) -> list[Tip]:
     """Tips of the cuts of a plane scene: ends inside the body at which nothing else is met."""
     return [
         _tip(scene, cut, end)
-        for cut in scene.cuts
+        for cut in scene.final_cuts
         for end in _ENDS
         if isinstance(cut, ArcCut | PolylineCut) and no_tip(scene, cut.name, end) is None
     ]
@@ -63,7 +63,7 @@ def tips(scene: Scene) -> list[Tip]:
 def no_tip(scene: Scene, name: str, end: End) -> str | None:
     """Why an end of a cut of a plane scene is no tip, or None if it is one."""
     assert isinstance(scene.geometry, Rectangle | Polygon)
-    cut = next(cut for cut in scene.cuts if cut.name == name)
+    cut = next(cut for cut in scene.final_cuts if cut.name == name)
     assert isinstance(cut, ArcCut | PolylineCut)
     vertices, outline = cut.vertices(), scene.geometry.outline()
     said = f"the {end} of cut '{name}' is no tip:"

@@ -62,7 +62,7 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
     try:
         with gmsh_session() as gmsh:
             surface = _add_outline(gmsh, (outline - origin) / scale)
-            curves = [tag for cut in scene.cuts for tag in _add_cut(gmsh, cut, origin, scale)]
+            curves = [tag for cut in scene.final_cuts for tag in _add_cut(gmsh, cut, origin, scale)]
             cut_curves = _fragment(gmsh, surface, curves)
             _set_sizes(gmsh, grading, features, origin, scale)
             gmsh.option.setNumber("Mesh.Algorithm", 5 if len(grading.points) else 6)
@@ -73,7 +73,7 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         raise
     except Exception as error:  # gmsh raises bare Exception
         raise InputError(f"gmsh could not mesh the body with its cuts ({error})", where) from None
-    if scene.cuts and not len(facets):
+    if scene.final_cuts and not len(facets):
         raise InputError("cuts: none of them lies inside the body", where)
     points = points * scale + origin
     if grading.smallest < grading.meshed:

@@ -85,7 +85,7 @@ def plane_features(scene: Scene) -> list[Feature]:
     found = [
         Feature("the boundary", a, b) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)
     ]
-    for cut in scene.cuts:
+    for cut in scene.final_cuts:
         name = f"cut '{cut.name}'"
         if isinstance(cut, PolylineCut):
             found += [Feature(name, a, b) for a, b in pairwise(cut.vertices())]

@@ -114,8 +114,8 @@ def singular_points(scene: Scene) -> Array:
     assert isinstance(geometry, Rectangle | Polygon)
     outline = geometry.outline()
     cuts = [feature for feature in plane_features(scene) if feature.name != "the boundary"]
-    found = [_tips_and_kinks(cut, outline) for cut in scene.cuts]
-    if len(scene.cuts) > 1:
+    found = [_tips_and_kinks(cut, outline) for cut in scene.final_cuts]
+    if len(scene.final_cuts) > 1:
         found.append(_inner(_junctions(cuts), outline))
     if not any(support.displacement == "exact" for support in scene.supports):
         found.append(_corners(scene))
@@ -138,7 +138,7 @@ def clear_radii(scene: Scene, points: Array) -> Array:
     apart = np.linalg.norm(points[:, None] - points, axis=2)
     away = np.concatenate([features, apart])
     nearest = np.where(away > touching, away, np.inf).min(axis=0, initial=np.inf)
-    cuts: dict[str, Any] = {cut.name: cut for cut in scene.cuts}
+    cuts: dict[str, Any] = {cut.name: cut for cut in scene.final_cuts}
     asked = [
         cuts[one.cut].vertices()[0 if one.end == "start" else -1]
         for one in scene.quantities

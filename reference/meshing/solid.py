@@ -46,10 +46,12 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         with gmsh_session() as gmsh:
             body = int(gmsh.model.occ.addBox(0, 0, 0, *((upper - lower) / scale)))
             faces = {
-                tag: cut.name for cut in scene.cuts for tag in add_surface(gmsh, cut, lower, scale)
+                tag: cut.name
+                for cut in scene.final_cuts
+                for tag in add_surface(gmsh, cut, lower, scale)
             }
             cut = imprint_surfaces(gmsh, body, faces, _add_lines(gmsh, (lines - lower) / scale))
-            if scene.cuts and not cut.faces:
+            if scene.final_cuts and not cut.faces:
                 raise InputError("cuts: none of them lies inside the body", where)
             graded = []
             if grading.curves:

@@ -140,7 +140,7 @@ def body_of(scene: Scene, singular: Array | None = None) -> AnyBody:
         return solid_of(scene)
     loops = _loops(scene)
     cuts = {}
-    for cut in scene.cuts:
+    for cut in scene.final_cuts:
         if not isinstance(cut, PolylineCut | ArcCut):
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
         cuts[cut.name] = cut_pieces(cut)

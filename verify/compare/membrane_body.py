@@ -68,7 +68,7 @@ class MembraneBody(SimplexBody):
 
 def membrane_of(scene: Scene) -> MembraneBody:
     """Take the body of a scene whose geometry is a surface; see `cut_membrane`."""
-    return cut_membrane(*read_mesh(scene), scene.cuts)
+    return cut_membrane(*read_mesh(scene), scene.final_cuts)
 
 
 def cut_membrane(points: Array, cells: NDArray[np.int64], asked: Sequence[Cut]) -> MembraneBody:

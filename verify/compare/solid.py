@@ -66,7 +66,7 @@ def solid_of(scene: Scene) -> SolidBody:
     corners, box, inside = _material(scene)
     size = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
     cuts, fronts = {}, [np.zeros((0, 2, 3))]
-    for cut in scene.cuts:
+    for cut in scene.final_cuts:
         if not isinstance(cut, PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut):
             raise UnsupportedSceneError(f"a cut of kind '{cut.kind}' cannot be compared on yet")
         cuts[cut.name] = patches_of(cut)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.errors import InputError
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity
-from verify.scene.cuts import ArcCut
+from verify.scene.cuts import ArcCut, whole_cut
 from verify.scene.geometry import Box, Polygon, Rectangle
 from verify.scene.planar import (
     distance_to_outline,
@@ -39,11 +40,22 @@ _ON_CUT = 1e-3  # of the body: the cut that a point is held against is triangula
 
 def check_cuts(scene: "Scene") -> None:
     """Raise ValueError if a cut lies outside the body, other than expected, or on another."""
-    for i, cut in enumerate(scene.cuts):
+    for i, cut in enumerate(_known(scene)):
         _check_cut(scene, cut, f"cuts[{i}] ('{cut.name}')")
-    for a, b in combinations(scene.cuts, 2):
+    for a, b in combinations(_known(scene), 2):
         if common := _common(a, b):
             raise ValueError(f"cuts: '{a.name}' and '{b.name}' lie on each other over {common}")
+
+
+def _known(scene: "Scene") -> list[Any]:
+    """Return the final cuts; a blade that sweeps no known surface stays a tool path."""
+    known: list[Any] = []
+    for cut in scene.cuts:
+        try:
+            known.append(whole_cut(cut))
+        except InputError:  # played only: the solvers say so
+            known.append(cut)
+    return known
 
 
 def _check_cut(scene: "Scene", cut: Any, place: str) -> None:
@@ -108,7 +120,7 @@ def check_points(scene: "Scene") -> None:
         if isinstance(asked, DisplacementQuantity):
             place, point = f"quantities[{i}].point:", np.array(asked.point, dtype=float)
         elif isinstance(asked, OpeningQuantity) and scene.dimension == 2:
-            cut: Any = next(cut for cut in scene.cuts if cut.name == asked.cut)
+            cut: Any = next(cut for cut in _known(scene) if cut.name == asked.cut)
             place = f"quantities[{i}].at: {asked.at} of cut '{asked.cut}' is at"
             point = point_along(cut.vertices(), asked.at or 0.0)
         elif isinstance(asked, OpeningQuantity):
@@ -160,7 +172,7 @@ def _holds(scene: "Scene", point: Array, tolerance: float) -> bool:
 def _cut_distances(scene: "Scene", point: Array) -> dict[str, float]:
     """Distance of a point to every cut whose shape is known, by the name of the cut."""
     found = {}
-    for cut in scene.cuts:
+    for cut in _known(scene):
         if isinstance(cut, SpatialCut):
             found[cut.name] = distance_to_triangles(point, cut.surface())
         elif cut.dimension == 2:

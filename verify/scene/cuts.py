@@ -1,83 +1,21 @@
-"""Cuts: geometric objects in the material frame; here those of plane scenes."""
+"""Cuts: geometric objects in the material frame, of every kind that a scene may have."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from verify.scene.planar import polyline_defect
+from verify.scene.plane_cuts import ArcCut, PlaneCut, PolylineCut
 from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
-from verify.scene.strict import Finite, Line, NonNegative, Point2, Positive, Strict
 from verify.scene.tool_path import ToolPathCut
 
-__all__ = ["ArcCut", "Cut", "PlaneCut", "PolylineCut"]
+__all__ = ["ArcCut", "Cut", "PlaneCut", "PolylineCut", "whole_cut"]
 
-
-class PolylineCut(Strict):
-    """A polyline in the plane; what lies left of its direction is its positive side."""
-
-    kind: Literal["polyline"]
-    name: Line = "cut"
-    points: list[Point2] = Field(min_length=2, description="points in order, m")
-    expected: Literal["through", "edge", "inner"] | None = Field(
-        default=None,
-        description="how it meets the body: checked if given (through: both ends outside or on "
-        "the boundary; edge: one end; inner: none)",
-    )
-    opens_at: NonNegative = Field(default=0.0, description="time at which it opens, s")
-
-    @model_validator(mode="after")
-    def _is_simple(self) -> "PolylineCut":
-        if defect := polyline_defect(np.array(self.points, dtype=float)):
-            raise ValueError(f"the polyline {defect}")
-        return self
-
-    @property
-    def dimension(self) -> int:
-        """Space dimension."""
-        return 2
-
-    def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
-        """Vertices (n, 2) of the polyline; `spacing` does not matter to straight segments."""
-        return np.array(self.points, dtype=float)
-
-
-class ArcCut(Strict):
-    """A circular arc in the plane, counter-clockwise; its centre is on the positive side."""
-
-    kind: Literal["arc"]
-    name: Line = "cut"
-    centre: Point2 = Field(description="m")
-    radius: Positive = Field(description="m")
-    start: Finite = Field(default=0.0, description="angle of the first end, degrees")
-    sweep: float = Field(
-        strict=True, default=360.0, gt=0.0, le=360.0, description="angle covered, degrees"
-    )
-    expected: Literal["through", "edge", "inner"] | None = None
-    opens_at: NonNegative = Field(default=0.0, description="time at which it opens, s")
-
-    @property
-    def dimension(self) -> int:
-        """Space dimension."""
-        return 2
-
-    def vertices(self, spacing: float | None = None) -> NDArray[np.float64]:
-        """Points (n, 2) on the arc, at most `spacing` apart (default: a 256th of a turn)."""
-        length = np.deg2rad(self.sweep) * self.radius
-        step = spacing or 2 * np.pi * self.radius / 256
-        n = max(4, int(np.ceil(length / step)))
-        angle = np.deg2rad(self.start) + np.deg2rad(self.sweep) * np.arange(n + 1) / n
-        ring = np.asarray(self.centre) + self.radius * np.column_stack(
-            [np.cos(angle), np.sin(angle)]
-        )
-        if self.sweep == 360.0:
-            ring[-1] = ring[0]
-        return ring
-
-
-PlaneCut = PolylineCut | ArcCut
 Cut = Annotated[
     PolylineCut | ArcCut | PolygonCut | DiscCut | CylinderCut | SphereCut | SweptCut | ToolPathCut,
     Field(discriminator="kind"),
 ]
+
+
+def whole_cut(cut: Cut) -> Cut:
+    """Return the cut that is there in the end: of a tool path, all that its blade sweeps."""
+    return cut.whole() if isinstance(cut, ToolPathCut) else cut

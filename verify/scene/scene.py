@@ -7,7 +7,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from verify.scene.acceptance import Acceptance, KnownFinding, Quantity, StrainEnergyQuantity
 from verify.scene.contact import Contact
-from verify.scene.cuts import Cut
+from verify.scene.cuts import Cut, whole_cut
 from verify.scene.geometry import Geometry, MeshFile
 from verify.scene.initial import AtRest, Initial
 from verify.scene.mesh import MeshLevels, ReferenceLevels
@@ -85,6 +85,17 @@ class Scene(Strict):
         membrane = isinstance(self.geometry, MeshFile) and self.geometry.cells == "surface"
         membrane |= isinstance(self.geometry, Skin) and self.geometry.is_membrane
         return 2 if membrane else self.dimension
+
+    @property
+    def final_cuts(self) -> list[Cut]:
+        """Cuts that are there in the end: of a tool path, all that its blade sweeps.
+
+        Raises
+        ------
+        InputError
+            If a blade sweeps what is no cut of another kind; see `ToolPathCut.whole`.
+        """
+        return [whole_cut(cut) for cut in self.cuts]
 
     @property
     def played_only(self) -> str | None:

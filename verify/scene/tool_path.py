@@ -1,20 +1,29 @@
 """A cut made by a tool on its way: where its tip is at what time, and in space how deep it reaches.
 
-It goes through the semi-progressive algorithm: an element is separated when the tool has crossed
-it through, not before.
+A facet of a conforming mesh, or an element of an unfitted one, is separated at the first step
+that begins after the blade has passed all of it. What it passed before the time 0 is open from
+the start.
 """
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from verify.errors import InputError
 from verify.scene.planar import polyline_defect
-from verify.scene.strict import Line, NonNegative, Point3, Positive, Strict, Vector
+from verify.scene.plane_cuts import PolylineCut
+from verify.scene.spatial_cuts import PolygonCut, SweptCut
+from verify.scene.strict import Finite, Line, Point3, Positive, Strict, Vector
 
 __all__ = ["ToolPathCut"]
+
+Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
+
+_SAME = 1e-9  # of a length: two this close are one
+_SEARCHES = 20  # Newton steps to a place that a turning blade sweeps
 
 Directions = Annotated[list[Point3], Field(min_length=1)]
 
@@ -29,12 +38,13 @@ class ToolPathCut(Strict):
     kind: Literal["tool_path"]
     name: Line = "cut"
     points: list[Vector] = Field(min_length=2, description="points of the tip in order, m")
-    times: list[NonNegative] | None = Field(
-        default=None, description="when the tip is at each point, s; or a speed"
+    times: list[Finite] | None = Field(
+        default=None, description="when the tip is at each point, s, before 0 too; or a speed"
     )
     speed: Positive | None = Field(default=None, description="of the tip, m/s; or times")
-    starts_at: NonNegative = Field(
-        default=0.0, description="with a speed: when the tip is at its first point, s"
+    starts_at: Finite = Field(
+        default=0.0,
+        description="with a speed: when the tip is at its first point, s; before 0 too",
     )
     depth: Positive | None = Field(default=None, description="3D: length of the blade, m")
     direction: Point3 | Directions | None = Field(
@@ -66,7 +76,7 @@ class ToolPathCut(Strict):
             raise ValueError(f"{len(self.times)} times for {len(self.points)} points")
         if any(b < a for a, b in pairwise(self.times)):
             raise ValueError("times: time runs backwards")
-        if self.starts_at > 0.0:
+        if self.starts_at != 0.0:
             raise ValueError("starts_at belongs to a speed; times say when it starts")
 
     def _check_blade(self) -> None:
@@ -124,5 +134,102 @@ class ToolPathCut(Strict):
         moves = np.linalg.norm(np.diff(tips, axis=0), axis=1) > 0.0
         return tips[np.concatenate([[True], moves])]
 
+    def surface(self, spacing: float | None = None) -> Surface:
+        """Triangulate what the blade sweeps; as of `verify.scene.spatial_cuts`."""
+        whole = self.whole()
+        assert not isinstance(whole, PolylineCut)
+        return whole.surface(spacing)
+
+    def whole(self) -> PolylineCut | SweptCut | PolygonCut:
+        """Return the final cut, all that the blade sweeps, on the same side.
+
+        Raises
+        ------
+        InputError
+            If the blade turns on its way and sweeps no plane: no other kind of cut is that.
+        """
+        shared: dict[str, Any] = {"name": self.name, "expected": self.expected}
+        tips = self.vertices()
+        if self.dimension == 2:
+            points = [(float(x), float(y)) for x, y in tips]
+            return PolylineCut(kind="polyline", points=points, **shared)
+        blades = self.blade
+        try:
+            if np.allclose(blades, blades[0], rtol=0.0, atol=_SAME * (self.depth or 0.0)):
+                line = [(float(x), float(y), float(z)) for x, y, z in tips]
+                x, y, z = map(float, blades[0])
+                return SweptCut(kind="swept", points=line, along=(x, y, z), **shared)
+            outline = [*self._tips(), *(self._tips() + blades)[::-1]]
+            corners = [(float(x), float(y), float(z)) for x, y, z in _distinct(outline)]
+            return PolygonCut(kind="polygon", points=corners, **shared)
+        except ValidationError as error:
+            reason = str(error.errors()[0]["msg"]).removeprefix("Value error, ")
+            raise InputError(
+                f"cut '{self.name}': what the blade sweeps is no cut to be solved with: {reason}; "
+                "expected a blade that keeps its direction, or sweeps a plane"
+            ) from None
+
+    def passed_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give the times (n,) in s at which the blade is first at points (n, d) of the cut, in m.
+
+        A point off the cut has the time of the nearest place that the search finds on it.
+        """
+        tips, moments, blades = self._tips(), self.moments, self._blades()
+        points = np.asarray(points, dtype=float)
+        nearest = np.full(len(points), np.inf)
+        times = np.full(len(points), np.inf)
+        for k in range(len(tips) - 1):
+            if not (tips[k] != tips[k + 1]).any() and not (blades[k] != blades[k + 1]).any():
+                continue
+            share, distance = _place_in_patch(points, tips[k : k + 2], blades[k : k + 2])
+            closer = distance < nearest - _SAME * np.linalg.norm(np.ptp(tips, axis=0))
+            nearest = np.where(closer, distance, nearest)
+            reached = moments[k] + share * (moments[k + 1] - moments[k])
+            times = np.where(closer, reached, times)
+        return times
+
+    def _blades(self) -> NDArray[np.float64]:
+        """Blade (n, d) of any dimension; in the plane it is a point."""
+        return self.blade if self.dimension == 3 else np.zeros((len(self.points), 2))
+
+    def _tips(self) -> NDArray[np.float64]:
+        return np.array(self.points, dtype=float)
+
     def _directions(self) -> NDArray[np.float64]:
         return np.array(self.direction, dtype=float).reshape(-1, 3)
+
+
+def _place_in_patch(
+    points: NDArray[np.float64], tips: NDArray[np.float64], blades: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Share (n,) of a move at which the blade is nearest to points, and its distance (n,) then.
+
+    The move sweeps tip(s) + r · blade(s), both linear in s, with s and r from 0 to 1.
+    """
+    tip, move = tips[0], tips[1] - tips[0]
+    blade, turn = blades[0], blades[1] - blades[0]
+    s, r = np.full(len(points), 0.5), np.full(len(points), 0.5)
+    for _ in range(_SEARCHES):
+        along = move + r[:, None] * turn
+        across = blade + s[:, None] * turn
+        left = points - tip - s[:, None] * move - r[:, None] * across
+        a, b, c = _dot(along, along), _dot(along, across), _dot(across, across)
+        f, g = _dot(along, left), _dot(across, left)
+        flat = a * c - b * b <= _SAME**2 * a * c  # in the plane, where the blade is a point
+        determinant = np.where(flat, 1.0, a * c - b * b)
+        s_new = s + np.where(flat, f / np.where(a > 0.0, a, 1.0), (c * f - b * g) / determinant)
+        r_new = r + np.where(flat, 0.0, (a * g - b * f) / determinant)
+        s, r = np.clip(s_new, -1.0, 2.0), np.clip(r_new, -1.0, 2.0)
+    s, r = np.clip(s, 0.0, 1.0), np.clip(r, 0.0, 1.0)
+    place = tip + s[:, None] * move + r[:, None] * (blade + s[:, None] * turn)
+    return s, np.linalg.norm(points - place, axis=1)
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.einsum("nd,nd->n", a, b)
+
+
+def _distinct(points: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """Leave out points that repeat the one before them, round and round."""
+    pairs = zip(points, [points[-1], *points], strict=False)
+    return [point for point, before in pairs if (point != before).any()]

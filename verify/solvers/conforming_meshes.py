@@ -80,7 +80,7 @@ def structure(scene: Scene, level: int) -> Structure:
 
 def not_imprinted(scene: Scene) -> str | None:
     """Why the cuts cannot be imprinted on a given mesh, or None if they can."""
-    for cut in scene.cuts:
+    for cut in scene.final_cuts:
         if not isinstance(cut, PolylineCut | PolygonCut | SweptCut):
             return f"a {cut.kind} cut is not plane in parts: it is not imprinted on a given mesh"
     if isinstance(scene.geometry, Box) and scene.mesh.pattern == "unstructured":
@@ -151,10 +151,12 @@ def _background(scene: Scene, level: Structure) -> tuple[Array, Cells]:
 
 def _realised(scene: Scene, level: Structure) -> Realised | None:
     """Imprint cuts that are triangles which fit the scene's own mesh, or give None."""
-    triangles = [c.points for c in scene.cuts if isinstance(c, PolygonCut) and len(c.points) == 3]
+    triangles = [
+        c.points for c in scene.final_cuts if isinstance(c, PolygonCut) and len(c.points) == 3
+    ]
     given = isinstance(scene.geometry, MeshFile) or level.counts is not None
     membrane = scene.cell_dimension < scene.dimension
-    if membrane or not given or not triangles or len(triangles) < len(scene.cuts):
+    if membrane or not given or not triangles or len(triangles) < len(scene.final_cuts):
         return None
     try:
         found = imprint_facets(*_background(scene, level), np.array(triangles, dtype=float))
@@ -170,8 +172,10 @@ def _imprinted(scene: Scene, level: Structure) -> tuple[Array, Cells, Cells]:
         return realised[:3]
     points, cells = _background(scene, level)
     if scene.dimension == 2:
-        return imprint(points, cells, [c.vertices() for c in scene.cuts if c.kind == "polyline"])
-    polygons = [p for cut in scene.cuts for p in _polygons(cut)]
+        return imprint(
+            points, cells, [c.vertices() for c in scene.final_cuts if c.kind == "polyline"]
+        )
+    polygons = [p for cut in scene.final_cuts for p in _polygons(cut)]
     membrane = scene.cell_dimension < scene.dimension
     return (imprint_surface if membrane else imprint_polygons)(points, cells, polygons)
 

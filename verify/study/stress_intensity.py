@@ -37,7 +37,7 @@ def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     if duration is None:
         return None
     slack, time = _SAME_TIME * duration, _time(scene, asked)
-    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+    cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
     opens = float(getattr(cut, "opens_at", 0.0))
     still_closed = "closed" if opens > 0.0 or time == 0.0 else ""
     if scene.analysis.damping[1]:
@@ -103,7 +103,7 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
 def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) -> float | None:
     """Factor that an exact solution states, Pa √m; None if it states none."""
     if hasattr(exact, "intensity_at"):  # its tips differ
-        cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+        cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
         assert isinstance(cut, PolylineCut | ArcCut)  # the scene is plane
         stated = exact.intensity_at(cut.vertices()[0 if asked.end == "start" else -1])
     else:
