@@ -4,6 +4,7 @@ from verify.xfem.dynamics import (
     CentralDifferences,
     EnergyMomentum,
     ForwardEuler,
+    GeneralisedAlpha,
     ImplicitEuler,
     RealTimeEuler,
     SymplecticEuler,
@@ -18,4 +19,5 @@ SCHEMES = [
     ImplicitEuler,
     Trapezoidal,
     EnergyMomentum,
+    GeneralisedAlpha,
 ]

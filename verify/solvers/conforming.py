@@ -21,7 +21,7 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
-from verify.solvers.conforming_motion import SCHEMES, move, natural_step
+from verify.solvers.conforming_motion import SCHEMES, TimeScheme, move, natural_step
 
 __all__ = ["ConformingSolver", "ReferenceSolver"]
 
@@ -59,7 +59,7 @@ class _Answer(NamedTuple):
 class _Motion(NamedTuple):
     """Scheme of a dynamic scene, and its largest step (s) on a level of an element size (m)."""
 
-    scheme: str
+    scheme: TimeScheme
     largest: Callable[[int, float], float]
 
 
@@ -76,8 +76,10 @@ class ConformingSolver:
         alone. Remeshed: gmsh meshes the cut body anew, with the same mean cell area. Neither is
         graded.
     scheme : {"newmark", "energy_momentum", "implicit_euler", "generalised_alpha"}
-        Dynamics: time integration; the last with a spectral radius of 0.8. The step is the
-        scene's, or else the time in which a pressure wave crosses an element.
+        Dynamics: time integration. The step is the scene's, or else the time in which a pressure
+        wave crosses an element.
+    spectral_radius : float
+        Dynamics: that of generalised_alpha at infinite frequency, from 0 to 1.
     """
 
     name = "conforming"
@@ -98,6 +100,7 @@ class ConformingSolver:
         degree: int = 1,
         mesh: str = "imprinted",
         scheme: str = "newmark",
+        spectral_radius: float = 0.8,
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
         if mesh not in ("imprinted", "remeshed") or degree not in (1, 2):
@@ -117,7 +120,7 @@ class ConformingSolver:
             level,
             degree,
             repetitions,
-            _Motion(scheme, largest),
+            _Motion(TimeScheme(scheme, spectral_radius), largest),
         )
 
 
@@ -158,7 +161,7 @@ class ReferenceSolver:
             level,
             scene.reference.degree,
             min(repetitions, 1),
-            _Motion("newmark" if linear else "energy_momentum", largest),
+            _Motion(TimeScheme("newmark" if linear else "energy_momentum"), largest),
             wants_pressure(scene, scene.reference.degree),
         )
 

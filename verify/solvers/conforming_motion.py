@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from itertools import pairwise
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
 from verify.scene import Equilibrium, Moving, Scene
 
-__all__ = ["SCHEMES", "ConformingMotion", "move", "natural_step"]
+__all__ = ["SCHEMES", "ConformingMotion", "TimeScheme", "move", "natural_step"]
 
 Array = NDArray[np.float64]
 _SAME = 1e-12  # of the duration: times that close are one
@@ -30,6 +30,19 @@ SCHEMES: dict[str, tuple[Scheme, bool]] = {
     "implicit_euler": (implicit_euler(), False),
     "generalised_alpha": (generalised_alpha(0.8), False),
 }
+
+
+class TimeScheme(NamedTuple):
+    """One of `SCHEMES`, and the spectral radius at infinite frequency if it is generalised-α."""
+
+    name: str
+    spectral_radius: float = 0.8
+
+    def found(self) -> tuple[Scheme, bool]:
+        """Return the scheme, and whether the internal force is the mean of a step."""
+        if self.name == "generalised_alpha":
+            return generalised_alpha(self.spectral_radius), False
+        return SCHEMES[self.name]
 
 
 @dataclass
@@ -76,7 +89,7 @@ def move(
     mesh: ConformingMesh,
     degree: int,
     exact: Any,
-    scheme: str,
+    scheme: TimeScheme,
     largest: float,
     comm: Any = None,
     pressure: bool = False,
@@ -91,8 +104,7 @@ def move(
         With all cuts open.
     degree : {1, 2}
     exact : ExactSolution or None
-    scheme : str
-        One of `SCHEMES`.
+    scheme : TimeScheme
     largest : float
         Largest time step, s.
     comm : MPI communicator, optional
@@ -122,7 +134,7 @@ class _Mover:
         mesh: ConformingMesh,
         degree: int,
         exact: Any,
-        scheme: str,
+        scheme: TimeScheme,
         largest: float,
         comm: Any,
         pressure: bool,
@@ -221,7 +233,7 @@ class _Mover:
         trial: bool,
     ) -> list[State]:
         """Step from one opening to the next; return the states at the times that are wanted."""
-        scheme, averaged = SCHEMES[self.scheme]
+        scheme, averaged = self.scheme.found()
         breaks = self._breaks(start, end)
         stops = np.unique([start, end, *wanted, *breaks])
         steppers: dict[float, Stepper] = {}
@@ -300,7 +312,7 @@ class _Mover:
         sizes = sorted(self.sizes)
         said = " … ".join(f"{s:.6g} s" for s in dict.fromkeys((sizes[0], sizes[-1])))
         unknowns = MIXED if self.pressure else "displacement"
-        notes = {"scheme": self.scheme, "mass": "consistent", "time step": said}
+        notes = {"scheme": self.scheme.name, "mass": "consistent", "time step": said}
         return {**notes, "unknowns": unknowns}
 
 

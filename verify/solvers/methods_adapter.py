@@ -82,8 +82,8 @@ class MethodSolver:
         Corotational statics: as of the solver ``xfem``.
     scheme : str
         Dynamics: as of the solver ``xfem``.
-    step_factor : float
-        Dynamics: share of the critical step.
+    step_factor, spectral_radius : float
+        Dynamics: as of the solver ``xfem``.
     further parameters
         Those of the method, in `verify.methods`.
     """
@@ -114,6 +114,7 @@ class MethodSolver:
         load_steps: int = 0,
         scheme: str = "newmark",
         step_factor: float = 0.9,
+        spectral_radius: float = 0.8,
         **parameters: Any,
     ) -> Solution:
         """Solve `scene` on mesh `level`.
@@ -138,9 +139,8 @@ class MethodSolver:
                 f"at least 0, a positive number, one of {', '.join(_SCHEMES)}"
             )
         self._check(scene, scheme, parameters)
-        choice = _Choice(
-            load_steps, MotionChoice(scheme, "sidewise", step_factor, "inside", "keep")
-        )
+        motion = MotionChoice(scheme, "sidewise", step_factor, "inside", "keep", spectral_radius)
+        choice = _Choice(load_steps, motion)
         try:
             start = perf_counter()
             mesh, size = background_mesh(scene, level)
@@ -161,7 +161,7 @@ class MethodSolver:
         known = list(signature(METHODS[self._method]).parameters)[2:]
         for name in parameters:
             if name not in known:
-                further = ", ".join([*known, "load_steps", "scheme", "step_factor"])
+                further = ", ".join([*known, "load_steps", "scheme", "step_factor", "spectral_radius"])
                 raise InputError(f"parameter '{name}' of {self.name}; expected one of {further}")
         if scene.analysis.kind == "dynamic" and parameters.get("weights") == "whole":
             raise UnsupportedSceneError(
@@ -259,6 +259,7 @@ class MassSpringSolver(MethodSolver):
         load_steps: int = 0,
         scheme: str = "newmark",
         step_factor: float = 0.9,
+        spectral_radius: float = 0.8,
         cut: str = "snapping",
         fit: str = "fitted",
         **parameters: Any,
@@ -271,7 +272,7 @@ class MassSpringSolver(MethodSolver):
         self._method = cut
         self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
         return super().solve(
-            scene, level, repetitions, load_steps, scheme, step_factor, **parameters
+            scene, level, repetitions, load_steps, scheme, step_factor, spectral_radius, **parameters
         )
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
@@ -279,7 +280,7 @@ class MassSpringSolver(MethodSolver):
         if scene.analysis.kind == "dynamic" and scheme in (*_EXPLICIT, "energy_momentum"):
             raise UnsupportedSceneError(
                 f"{scheme} of springs: their critical step is not that of the elements, and they "
-                "have no stress; expected newmark or implicit_euler"
+                "have no stress; expected newmark, implicit_euler or generalised_alpha"
             )
 
 

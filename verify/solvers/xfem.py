@@ -71,9 +71,11 @@ class XfemSolver:
     load_steps : int
         Corotational statics: equal parts in which supports and loads grow, halved where the energy
         asks for it; 0: one.
-    scheme : {"newmark", "implicit_euler", "energy_momentum", "central_differences",
-              "symplectic_euler", "forward_euler"}
+    scheme : {"newmark", "implicit_euler", "energy_momentum", "generalised_alpha",
+              "central_differences", "symplectic_euler", "forward_euler"}
         Dynamics: time integration.
+    spectral_radius : float
+        Dynamics: that of generalised_alpha at infinite frequency, from 0 to 1.
     mass : {"sidewise", "consistent", "row_sum", "hrz", "thesis"}
         Dynamics: the last three are the lumpings of the thesis.
     step_factor : float
@@ -110,6 +112,7 @@ class XfemSolver:
         scheme: str = "newmark",
         mass: str = "sidewise",
         step_factor: float = 0.9,
+        spectral_radius: float = 0.8,
     ) -> Solution:
         """Solve `scene` on mesh `level`.
 
@@ -144,7 +147,7 @@ class XfemSolver:
             raise UnsupportedSceneError(f"the {basis} basis is offered for linear statics only")
         if slivers == "penalise":
             _check_penalty(scene, basis, mass)
-        motion = MotionChoice(scheme, mass, step_factor, tip, slivers)
+        motion = MotionChoice(scheme, mass, step_factor, tip, slivers, spectral_radius)
         return _solve(scene, level, repetitions, _Choice(basis, tip, slivers, load_steps, motion))
 
 

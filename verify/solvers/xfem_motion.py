@@ -16,7 +16,7 @@ from verify.solvers.xfem_answer import Answer, penalised
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import nodal_forces
 from verify.solvers.xfem_scene import density_of, material_of
-from verify.solvers.xfem_steps import MASSES, SCHEMES, largest_step
+from verify.solvers.xfem_steps import MASSES, integrator_of, largest_step
 from verify.solvers.xfem_supports import initial_path, motion_of_supports
 from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
@@ -54,6 +54,11 @@ class MotionChoice:
     step_factor: float
     tip: str
     slivers: str
+    spectral_radius: float = 0.8
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.spectral_radius <= 1.0:
+            raise InputError(f"spectral_radius {self.spectral_radius:g}; expected 0 to 1")
 
 
 def move(
@@ -307,7 +312,7 @@ class Mover:
 
     def _integrator(self, body: DynamicBody, size: float) -> Integrator:
         try:
-            return SCHEMES[self.choice.scheme](body, size)
+            return integrator_of(body, size, self.choice.scheme, self.choice.spectral_radius)
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{self.choice.scheme}': {error}") from None
 

@@ -13,6 +13,7 @@ from verify.xfem.dynamics import (
     DynamicBody,
     EnergyMomentum,
     ForwardEuler,
+    GeneralisedAlpha,
     ImplicitEuler,
     Integrator,
     SymplecticEuler,
@@ -23,12 +24,13 @@ from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["MASSES", "SCHEMES", "largest_step"]
+__all__ = ["MASSES", "SCHEMES", "integrator_of", "largest_step"]
 
 SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
     "newmark": Trapezoidal,
     "implicit_euler": ImplicitEuler,
     "energy_momentum": EnergyMomentum,
+    "generalised_alpha": GeneralisedAlpha,
     "central_differences": CentralDifferences,
     "symplectic_euler": SymplecticEuler,
     "forward_euler": ForwardEuler,
@@ -42,6 +44,26 @@ MASSES: dict[str, Callable[[VirtualMesh, float], Mass]] = {
 }
 _REACH = 1.0  # strain up to which the step of a turning body is a bound
 _EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
+
+
+def integrator_of(
+    body: DynamicBody, step_size: float, scheme: str, spectral_radius: float
+) -> Integrator:
+    """Make the integrator of a scheme.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    step_size : float
+        In s.
+    scheme : str
+        One of `SCHEMES`.
+    spectral_radius : float
+        Of generalised-α, at infinite frequency; the others have none.
+    """
+    if scheme == "generalised_alpha":
+        return GeneralisedAlpha(body, step_size, spectral_radius=spectral_radius)
+    return SCHEMES[scheme](body, step_size)
 
 
 def largest_step(

@@ -7,6 +7,7 @@ from verify.xfem.dynamics.explicit import (
     SymplecticEuler,
     acceleration_of,
 )
+from verify.xfem.dynamics.generalised_alpha import GeneralisedAlpha
 from verify.xfem.dynamics.implicit import EnergyMomentum, ImplicitEuler, Trapezoidal
 from verify.xfem.dynamics.inheritance import ancestors, inherit_state
 from verify.xfem.dynamics.integrator import Integrator, StepFailedError, StepForces
@@ -20,6 +21,7 @@ __all__ = [
     "DynamicBody",
     "EnergyMomentum",
     "ForwardEuler",
+    "GeneralisedAlpha",
     "ImplicitEuler",
     "Integrator",
     "LinearSolver",

@@ -1,11 +1,12 @@
 """Where the energy of a motion goes, step by step, for any integration scheme.
 
-A step is M Δv = h (f_ext − f_int − f_visc + r) with the reactions r at the supports. Multiplied
-by Δu this is an identity, whatever scheme has chosen the forces:
+A step is p = f_ext − f_int − f_visc + r with the reactions r at the supports and the inertia p,
+M Δv/h unless the scheme says otherwise. Multiplied by Δu this is an identity, whatever scheme has
+chosen the forces:
 
     ΔT + ΔW − Δu·f_ext − Δu·r + Δu·f_visc + D = − Δu·(residual at free components),
 
-    D = (Δu/h − v̄)·M Δv + (Δu·f_int − ΔW),   v̄ = ½ (v₀ + v₁).
+    D = (Δu·p − v̄·M Δv) + (Δu·f_int − ΔW),   v̄ = ½ (v₀ + v₁).
 
 D is what the scheme itself dissipates (negative: produces). The right-hand side is what the step
 leaves unsolved; if it is not round-off, the forces are not those of the motion.
@@ -40,7 +41,8 @@ class Ledger:
     unbalanced : energy gained because steps were left unsolved, since the start, in J
     momentum : (n + 1, d) linear momentum, in kg m/s
     angular_momentum : (n + 1, 1 or 3), about the origin, in kg m²/s
-    impulse : (n + 1, d) of external, viscous and support forces since the start, in N s
+    impulse : (n + 1, d) of external, viscous and support forces since the start, in N s; by a
+        scheme with an inertia p of its own the momentum differs from it by Σ (M Δv − h p)
     penalty : share of a ghost penalty in the strain energy, in J
     """
 
@@ -105,17 +107,21 @@ class EnergyLedger:
         if h == 0.0:
             raise XfemError(f"no time has passed since the last entry, t = {state.time:g} s")
         change = state.displacement - last.displacement
-        inertia = body.mass.apply(state.velocity - last.velocity)
-        residual = inertia / h - forces.external + forces.internal + forces.viscous
+        gained = body.mass.apply(state.velocity - last.velocity)
+        inertia = gained / h if forces.inertia is None else forces.inertia
+        residual = inertia - forces.external + forces.internal + forces.viscous
         reaction = np.where(body.fixed, residual, 0.0)
         strain, self._penalty = self._stored(state)
-        slip = change / h - 0.5 * (last.velocity + state.velocity)
+        # the two parts nearly cancel: what they differ by is taken first
+        slip = np.sum((change / h - 0.5 * (last.velocity + state.velocity)) * gained)
+        if forces.inertia is not None:
+            slip += np.sum(change * (inertia - gained / h))
         assert body.weight is not None
         self._work += [
             np.sum(change * (forces.external - body.weight)),
             np.sum(change * reaction),
             np.sum(change * forces.viscous),
-            np.sum(slip * inertia) + np.sum(change * forces.internal) - (strain - self._strain),
+            slip + np.sum(change * forces.internal) - (strain - self._strain),
             np.sum(change * (residual - reaction)),
         ]
         self._impulse = self._impulse + h * (forces.external - forces.viscous + reaction).sum(

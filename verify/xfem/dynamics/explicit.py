@@ -6,10 +6,9 @@ same instant. All of them are free of any linear solve if the mass is diagonal.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
+from verify.xfem.dynamics.free_mass import FreeMass, couples_supports
 from verify.xfem.dynamics.integrator import (
     StepFailedError,
     StepForces,
@@ -28,14 +27,12 @@ class _Explicit:
         """Prepare a body and a step in seconds."""
         self.body = body
         self.step_size = check_step(step_size)
-        self._solvers = None
-        if body.mass.diagonal is None and body.fixed.any():
-            if body.moving and _couples_supports(body):
-                raise XfemError(
-                    "explicit step with moving supports whose nodes the mass couples to free ones; "
-                    "use the side-wise mass, and hold slivers there on their own or keep them"
-                )
-            self._solvers = [_supported(body, k) for k in range(body.shape[1])]
+        if body.moving and couples_supports(body):
+            raise XfemError(
+                "explicit step with moving supports whose nodes the mass couples to free ones; "
+                "use the side-wise mass, and hold slivers there on their own or keep them"
+            )
+        self._mass = FreeMass(body)
 
     def _acceleration(
         self, displacement: _Floats, velocity: _Floats, time: float
@@ -43,12 +40,7 @@ class _Explicit:
         body = self.body
         internal, _ = body.force.evaluate(displacement)
         forces = StepForces(internal, body.external(time), body.viscous(velocity))
-        total = forces.external - forces.internal - forces.viscous
-        total[body.fixed] = 0.0
-        if self._solvers is None:
-            return body.mass.solve(total), forces
-        columns = [solver.solve(total[:, k]) for k, solver in enumerate(self._solvers)]
-        return np.stack(columns, axis=1), forces
+        return self._mass.solve(forces.external - forces.internal - forces.viscous), forces
 
     def _finish(
         self, state: MotionState, displacement: _Floats, velocity: _Floats, time: float
@@ -75,19 +67,6 @@ def acceleration_of(body: DynamicBody, state: MotionState) -> _Floats:
     """
     check_state(state, body.shape)
     return _Explicit(body, 1.0)._acceleration(state.displacement, state.velocity, state.time)[0]
-
-
-def _couples_supports(body: DynamicBody) -> bool:
-    """Whether an acceleration of held components moves free ones through the mass."""
-    rows, columns, _ = body.mass.entries
-    return bool((body.fixed[rows] & ~body.fixed[columns]).any())
-
-
-def _supported(body: DynamicBody, component: int) -> SuperLU:
-    """Factor of the mass of the free nodes in one component."""
-    free = diags_array((~body.fixed[:, component]).astype(float))
-    held = diags_array(body.fixed[:, component].astype(float))
-    return splu(csc_array(free @ body.mass.matrix @ free + held))
 
 
 class CentralDifferences(_Explicit):

@@ -32,7 +32,7 @@ class ImplicitEuler(NewtonIntegrator):
 
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
         internal, _ = self.body.force.evaluate(displacement)
-        return StepForces(internal, self.body.external(time), self.body.viscous(velocity))
+        return StepForces(internal, self._load_at_end(time), self.body.viscous(velocity))
 
 
 class Trapezoidal(NewtonIntegrator):
@@ -49,13 +49,13 @@ class Trapezoidal(NewtonIntegrator):
         start = self._start
         internal, _ = self.body.force.evaluate(start.displacement)
         viscous = self.body.viscous(start.velocity)
-        self._before = StepForces(internal, self.body.external(start.time).copy(), viscous)
+        self._before = StepForces(internal, self._load_at_start(), viscous)
 
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
         internal, _ = self.body.force.evaluate(displacement)
         return StepForces(
             0.5 * (self._before.internal + internal),
-            0.5 * (self._before.external + self.body.external(time)),
+            0.5 * (self._before.external + self._load_at_end(time)),
             0.5 * (self._before.viscous + self.body.viscous(velocity)),
         )
 

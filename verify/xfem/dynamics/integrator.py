@@ -1,7 +1,8 @@
 """What every integrator is: a step that changes a state and says which forces it has used.
 
 Each scheme advances M (v₁ − v₀) = h (f_ext − f_int − f_visc + reactions) with forces of its own
-choice. Knowing them, the energy ledger closes for any scheme without knowing which one it was.
+choice, or balances them with an inertia of its own. Knowing them, the energy ledger closes for any
+scheme without knowing which one it was.
 """
 
 from dataclasses import dataclass
@@ -30,11 +31,14 @@ class StepForces:
     Attributes
     ----------
     internal, external, viscous : (N, d) float array
+    inertia : (N, d) float array, optional
+        What the step has balanced with them, where that is not M (v₁ − v₀)/h.
     """
 
     internal: _Floats
     external: _Floats
     viscous: _Floats
+    inertia: _Floats | None = None
 
 
 class Integrator(Protocol):

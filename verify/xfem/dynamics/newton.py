@@ -23,6 +23,7 @@ __all__ = ["NewtonIntegrator"]
 _Floats = NDArray[np.float64]
 
 _HALVINGS = 10
+_JUST = 1e-9  # of a step: more than the round-off of a time that some thousand steps have added up
 _ROUND_OFF = 64.0 * np.finfo(float).eps
 
 
@@ -51,6 +52,7 @@ class NewtonIntegrator(ABC):
 
     rate: float  # γ: 1 for implicit Euler, 2 for schemes centred in the step
     share: float  # derivative of the forces used with respect to those at the end
+    weight: float | None = None  # h² times the inertia used, by M u₁; without one γ
 
     def __init__(
         self,
@@ -86,6 +88,14 @@ class NewtonIntegrator(ABC):
 
     def _prepare(self) -> None:  # noqa: B027
         """Evaluate what is needed of the start of the step; nothing by default."""
+
+    def _load_at_start(self) -> _Floats:
+        """External force (N, d) at the start of the step, after what jumps then."""
+        return self.body.external(self._start.time + _JUST * self.step_size).copy()
+
+    def _load_at_end(self, time: float) -> _Floats:
+        """External force (N, d) of a step that ends at a time, before what jumps then."""
+        return self.body.external(time - _JUST * self.step_size)
 
     def _add_stiffness(self, displacement: _Floats, kind: TangentKind) -> None:
         """Add the derivative of the internal force of the step to the blocks."""
@@ -125,12 +135,18 @@ class NewtonIntegrator(ABC):
         """
         velocity = self._velocity(displacement)
         forces = self._forces(displacement, velocity, self._start.time + self.step_size)
-        inertia = self.body.mass.apply(velocity - self._start.velocity) / self.step_size
+        inertia = forces.inertia
+        if inertia is None:
+            inertia = self.body.mass.apply(velocity - self._start.velocity) / self.step_size
         residual = forces.external - forces.internal - forces.viscous - inertia
         residual[self.body.fixed] = 0.0
         parts = (forces.external, forces.internal, forces.viscous, inertia)
         scale = max(self._size(part) for part in parts)
         return residual, self._size(residual), forces, scale
+
+    @property
+    def _weight(self) -> float:
+        return self.rate if self.weight is None else self.weight
 
     def _size(self, force: _Floats) -> float:
         return float(np.linalg.norm(self._inverse_mass * force))
@@ -177,7 +193,7 @@ class NewtonIntegrator(ABC):
         self._blocks[:] = 0.0
         body.force.add_stiffness(body.pattern, self._blocks, self.share)
         stiffness = np.abs(self._blocks[body.pattern.diagonal]).max(axis=(1, 2))[:, None]
-        return _ROUND_OFF * (self._inverse_mass * stiffness + self.rate / self.step_size**2)
+        return _ROUND_OFF * (self._inverse_mass * stiffness + self._weight / self.step_size**2)
 
     def _excess(self, residual: _Floats, noise: _Floats) -> float:
         """Norm of the accelerations that are left, as far as they are more than round-off."""
@@ -228,7 +244,7 @@ class NewtonIntegrator(ABC):
             body.force.add_stiffness(
                 body.pattern, self._blocks, per_velocity * body.damping.stiffness
             )
-        factor = self.rate / h**2 + per_velocity * body.damping.mass
+        factor = self._weight / h**2 + per_velocity * body.damping.mass
         add_mass(self._blocks, self._mass_places, body.mass.entries[2], factor)
         constrain(body.pattern.starts, body.pattern.columns, body.fixed, self._blocks)
 

@@ -1,0 +1,191 @@
+"""Generalised-α: its order, what it does to high frequencies, and where its energy goes."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, cut_body, cut_square, material
+from time_schemes import SCHEMES
+
+from verify.xfem.corotation import InternalForce
+from verify.xfem.dynamics import (
+    DynamicBody,
+    GeneralisedAlpha,
+    MovingSupports,
+    RayleighDamping,
+    Trapezoidal,
+    acceleration_of,
+)
+from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.structured_meshes import rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+RADII = [0.0, 0.3, 0.8, 1.0]
+
+
+def _body(v, kinematics="linear", mass_of=side_wise_mass, **further):
+    force = InternalForce(v, material(v.mesh.dim), kinematics)
+    return DynamicBody(force, mass_of(v, DENSITY), **further)
+
+
+def _modes(body):
+    v = body.force.virtual
+    K = body.pattern.matrix(LinearStiffness(v, material(v.mesh.dim)).assemble(body.pattern))
+    root = np.repeat(np.sqrt(body.mass.diagonal), body.shape[1])
+    values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
+    first = int(np.argmax(values > 1e-6 * values[-1]))
+    return np.sqrt(values[first:]), vectors[:, first:] / root[:, None]
+
+
+@pytest.mark.parametrize("rho", RADII)
+def test_errors_of_a_damped_mode_fall_with_the_square_of_the_step(rho):
+    body = _body(cut_square(4))
+    omegas, shapes = _modes(body)
+    omega, shape = omegas[0], shapes[:, 0].reshape(body.shape)
+    body.damping = RayleighDamping(0.1 * omega, 0.1 / omega)
+    ratio, end = 0.1, 6.0 / omega
+    turned = np.sqrt(1.0 - ratio**2) * omega * end
+    exact = np.exp(-ratio * omega * end) * np.array(
+        [
+            np.cos(turned) + ratio / np.sqrt(1.0 - ratio**2) * np.sin(turned),
+            -omega / np.sqrt(1.0 - ratio**2) * np.sin(turned),
+        ]
+    )
+    errors = []
+    for steps in (60, 120, 240):
+        state = body.rest()
+        state.displacement[:] = 1e-3 * shape
+        run(GeneralisedAlpha(body, end / steps, spectral_radius=rho), body, state, steps)
+        of_mode = [np.sum(body.mass.apply(shape) * x) for x in (state.displacement, state.velocity)]
+        errors.append(np.linalg.norm((np.array(of_mode) / 1e-3 - exact) / [1.0, omega]))
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert orders == pytest.approx(2.0, abs=0.1)
+    assert errors[-1] < 3e-3  # (ωΔt)²/12 of a phase of 6, times 5 at ρ = 0
+
+
+@pytest.mark.parametrize("rho", RADII)
+def test_what_a_step_does_not_resolve_is_multiplied_by_the_radius(rho):
+    """All three roots are −ρ at infinite frequency, so that (E + ρ)³ u = 0 with the shift E."""
+    body = _body(cut_square(2))
+    omegas, shapes = _modes(body)
+    state, shape = body.rest(), shapes[:, -1].reshape(body.shape)
+    state.displacement[:] = 1e-3 * shape
+    scheme = GeneralisedAlpha(body, 1e4 / omegas[-1], spectral_radius=rho)
+    history = []
+    for _ in range(8):
+        history.append(float(np.sum(body.mass.apply(shape) * state.displacement)) / 1e-3)
+        scheme.step(state)
+    for a, b, c, d in zip(history, history[1:], history[2:], history[3:], strict=False):
+        # (ωΔt)⁻² = 1e-8 is what is missing to infinity
+        assert abs(d + 3.0 * rho * c + 3.0 * rho**2 * b + rho**3 * a) < 1e-6
+    assert (abs(history[3]) < 1e-6) == (rho == 0.0)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("rho", RADII)
+def test_what_linear_motion_dissipates_is_the_formula_of_the_scheme(rho, dim):
+    """D = h (β − γ/2) Δa·MΔv + (½ − α_f) (Δu·MΔa + Δu·KΔu), step by step, without a load."""
+    body = _body(cut_body(dim), mass_of=consistent_mass)
+    scheme = GeneralisedAlpha(body, 0.01, spectral_radius=rho)
+    state = body.rest()
+    state.displacement[:] = np.random.default_rng(2).normal(size=body.shape) * 1e-3
+    a, predicted, states = acceleration_of(body, state), [0.0], [state.copy()]
+    for _ in range(30):
+        scheme.step(state)
+        before = states[-1]
+        du, dv = state.displacement - before.displacement, state.velocity - before.velocity
+        da, a = scheme.acceleration - a, scheme.acceleration
+        stretched = np.zeros(body.shape)
+        body.force.add_frozen_product(du, 1.0, stretched)
+        lost = scheme.step_size * (scheme.beta - 0.5 * scheme.gamma) * np.sum(
+            da * body.mass.apply(dv)
+        ) + (0.5 - scheme.alpha_f) * np.sum(du * (body.mass.apply(da) + stretched))
+        predicted.append(predicted[-1] + lost)
+        states.append(state.copy())
+    start = states[0].copy()
+    other = GeneralisedAlpha(body, 0.01, spectral_radius=rho)
+    account = run(other, body, start, 30)
+    size = account.mechanical[0]
+    assert account.algorithmic == pytest.approx(predicted, abs=1e-10 * size)  # Newton's tolerance
+    assert np.ptp(account.balance - account.unbalanced) < 1e-12 * size
+    if rho == 1.0:
+        assert np.abs(account.algorithmic).max() < 1e-10 * size
+    else:
+        assert account.algorithmic[-1] > 1e-3 * size
+
+
+def test_momentum_is_later_than_impulses_by_a_share_of_a_step():
+    """M Δv − h M a_α = −h (½ − α_f) M Δa, of which the sum is that of the ends."""
+    v = cut_body(2)
+    body = _body(v, "corotational")
+    push = np.random.default_rng(3).normal(size=body.shape)
+    body.load = lambda t: np.sin(15.0 * t) * push
+    state = body.rest()
+    first = acceleration_of(body, state)
+    scheme = GeneralisedAlpha(body, 0.005, spectral_radius=0.4)
+    account = run(scheme, body, state, 50)
+    missing = account.momentum[-1] - account.momentum[0] - account.impulse[-1]
+    shift = -0.005 * (0.5 - scheme.alpha_f) * body.mass.apply(scheme.acceleration - first)
+    assert missing == pytest.approx(shift.sum(axis=0), rel=1e-6)
+
+
+@pytest.mark.parametrize("scheme", [Trapezoidal, GeneralisedAlpha])
+def test_a_load_that_jumps_between_two_steps_costs_no_order(scheme):
+    """The step before took half of it already, and the acceleration of before was gone on with."""
+    body = _body(cut_square(4))
+    omegas, shapes = _modes(body)
+    omega, shape = omegas[0], shapes[:, 0].reshape(body.shape)
+    push = body.mass.apply(shape) * omega**2
+    end = 4.0 / omega
+    body.load = lambda t: push * (0.0 if t < 0.25 * end else 1.0)
+    errors = []
+    for steps in (32, 64, 128):
+        state = body.rest()
+        run(scheme(body, end / steps), body, state, steps)
+        errors.append(abs(np.sum(body.mass.apply(shape) * state.displacement) - 1.0 + np.cos(3.0)))
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.parametrize("mass_of", [side_wise_mass, consistent_mass])
+def test_a_support_that_accelerates_from_the_start_costs_no_order(mass_of):
+    v = cut_mesh(rectangle_mesh((4, 4)), [])
+    fixed = np.repeat(v.node_points[:, -1:] == 0.0, 2, axis=1)
+    along = np.array([1.0, 0.0])
+
+    def motion(t):
+        return np.tile(0.5 * t**2 * along, (len(fixed), 1)), np.tile(t * along, (len(fixed), 1))
+
+    body = _body(v, mass_of=mass_of, supports=MovingSupports(fixed, motion))
+    ends = []
+    for steps in (20, 40, 80, 160):
+        state = body.rest()
+        run(GeneralisedAlpha(body, 0.2 / steps, spectral_radius=0.5), body, state, steps)
+        ends.append(state.displacement.copy())
+    changes = [np.linalg.norm(b - a) for a, b in zip(ends, ends[1:], strict=False)]
+    assert np.log2(changes[1] / changes[2]) == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_radius_outside_of_its_range_is_refused_and_the_others_have_none():
+    body = _body(cut_body(2))
+    for wrong in (-0.1, 1.1, np.nan):
+        with pytest.raises(XfemError, match="spectral radius"):
+            GeneralisedAlpha(body, 0.01, spectral_radius=wrong)
+    assert GeneralisedAlpha in SCHEMES
+
+
+def test_at_a_radius_of_one_it_goes_the_way_of_the_trapezoidal_rule():
+    body = _body(cut_body(3), "linear")
+    held = body.held_by(
+        Supports.none(body.force.virtual).prescribe(
+            body.force.virtual, body.force.virtual.mesh.points[:, 2] == 0.0
+        )
+    )
+    held.weight = held.mass.weight([1.0, 2.0, -9.8])
+    ends = []
+    for scheme in (Trapezoidal(held, 0.01), GeneralisedAlpha(held, 0.01, spectral_radius=1.0)):
+        state = held.rest()
+        run(scheme, held, state, 40)
+        ends.append(state.displacement)
+    assert ends[1] == pytest.approx(ends[0], abs=1e-9 * np.abs(ends[0]).max())
