@@ -1,4 +1,4 @@
-"""Generalised-α of the compact solver and of the reference: the same motion of the same elements."""
+"""Generalised-α of the compact solver and of the reference: one motion of the same elements."""
 
 import numpy as np
 import pytest

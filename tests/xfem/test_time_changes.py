@@ -89,9 +89,12 @@ def test_nodes_that_are_held_in_flight_come_to_rest_and_start_from_rest_when_let
     assert np.ptp(account.balance - account.unbalanced) < 1e-12 * size
     assert np.abs(account.unbalanced).max() < 1e-7 * size
     gained = account.momentum - account.momentum[0]
-    # momentum of generalised-α is later than impulses by a share of a step: 1e-4 of it here
-    tolerance = 1e-3 if kind is GeneralisedAlpha else 1e-8
-    assert np.abs(gained - account.impulse).max() < tolerance * np.abs(account.momentum).max()
+    if kind is GeneralisedAlpha:
+        # later than impulses by ½ − α_f = 1/18 of a step; what the mass couples to the stopped
+        # nodes is thrown forward by less than these lose, so that twice the sum passes there
+        assert np.abs(gained - account.impulse).max() < 2.0 * np.abs(gained).max() / 18
+    else:
+        assert np.abs(gained - account.impulse).max() < 1e-8 * np.abs(account.momentum).max()
     run(kind(free, 1e-6), free, state, 1)
     # let go they are pulled along by the stress that has built up, in a millionth of a second
     assert np.abs(state.velocity[clamp]).max() < 1e-3

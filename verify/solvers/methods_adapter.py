@@ -161,7 +161,8 @@ class MethodSolver:
         known = list(signature(METHODS[self._method]).parameters)[2:]
         for name in parameters:
             if name not in known:
-                further = ", ".join([*known, "load_steps", "scheme", "step_factor", "spectral_radius"])
+                common = ("load_steps", "scheme", "step_factor", "spectral_radius")
+                further = ", ".join([*known, *common])
                 raise InputError(f"parameter '{name}' of {self.name}; expected one of {further}")
         if scene.analysis.kind == "dynamic" and parameters.get("weights") == "whole":
             raise UnsupportedSceneError(
@@ -272,7 +273,14 @@ class MassSpringSolver(MethodSolver):
         self._method = cut
         self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
         return super().solve(
-            scene, level, repetitions, load_steps, scheme, step_factor, spectral_radius, **parameters
+            scene,
+            level,
+            repetitions,
+            load_steps,
+            scheme,
+            step_factor,
+            spectral_radius,
+            **parameters,
         )
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:

@@ -1,7 +1,7 @@
 """Generalised-α: second order, with a dissipation of high frequencies that is chosen.
 
-J. Chung, G. M. Hulbert: A time integration algorithm for structural dynamics with improved numerical
-dissipation: the generalized-α method, J. Appl. Mech. 60 (1993) 371–375.
+J. Chung, G. M. Hulbert: A time integration algorithm for structural dynamics with improved
+numerical dissipation: the generalized-α method, J. Appl. Mech. 60 (1993) 371–375.
 """
 
 from typing import NamedTuple
