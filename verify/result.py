@@ -23,6 +23,7 @@ __all__ = [
     "NoticeKind",
     "OpeningCurve",
     "OpeningProfile",
+    "PartRecord",
     "Rate",
     "SolveRecord",
     "Status",
@@ -97,6 +98,37 @@ class Metric:
 
 @_closed
 @dataclass(frozen=True)
+class PartRecord:
+    """A separated part of a moving body: a connected piece of material of its final cut.
+
+    Parameters
+    ----------
+    mass : float
+        kg (plane scenes: per metre of thickness, as all that follows).
+    centre : list of float
+        Of mass, undeformed, m.
+    inertia : list of float
+        Moments about the axes z, in space x, y, z, through its own centre, undeformed, kg m².
+    free_from : float or None
+        From when on only gravity and uniform body forces act on it, s; None if never.
+    drift : dict of str to float
+        From then on, relative: ``linear_momentum`` beside the impulse of these forces, and
+        ``angular_momentum`` about its own centre. Empty if it is not free or has no velocities.
+    series : dict of str to list of float
+        Over the output times: ``strain`` and ``kinetic`` energy (J), ``linear_momentum_x`` …
+        (N s), ``angular_momentum_z`` … about its own centre (N m s).
+    """
+
+    mass: float
+    centre: list[float]
+    inertia: list[float]
+    free_from: float | None
+    drift: dict[str, float] = field(default_factory=dict)
+    series: dict[str, list[float]] = field(default_factory=dict)
+
+
+@_closed
+@dataclass(frozen=True)
 class SolveRecord:
     """One solve: one solver on one mesh level of one case.
 
@@ -125,6 +157,8 @@ class SolveRecord:
     series: dict[str, list[float]] = field(default_factory=dict)
     # energies and momenta over time, by name, with "time" in s; empty for a static scene
     account: dict[str, list[float]] = field(default_factory=dict)
+    # separated parts, from the top down; empty for a static scene
+    parts: list[PartRecord] = field(default_factory=list)
 
     def metric(self, name: str) -> Metric | None:
         """Return the metric called `name`, if it was measured."""

@@ -8,8 +8,10 @@ import pytest
 from page_parser import parsed
 from synthetic_run import cut_square, make_run
 
+from verify.compare.hooke import Hooke
 from verify.report import render
 from verify.solution import Solution
+from verify.study.motion_account import motion_account
 from verify.study.motion_history import motion_history
 
 TIMES = [0.0, 0.25, 0.5, 0.75, 1.0]
@@ -99,8 +101,10 @@ def test_momenta_of_a_rigid_motion_are_mass_times_velocity_and_inertia_times_spi
               "work_of_loads": np.array([0.0, 0.5])}  # fmt: skip
     solution = Solution(points=points, cells=body.cells, displacement=np.zeros((2, *points.shape)),
                         times=np.array([0.0, 1.0]), velocity=speed, ledger=ledger)  # fmt: skip
-    scene = SimpleNamespace(material=SimpleNamespace(density=density, thickness=None))
-    found = motion_history(scene, solution)
+    scene = SimpleNamespace(
+        material=SimpleNamespace(density=density, thickness=None), loads=[SimpleNamespace()]
+    )
+    found = motion_history(motion_account(scene, solution, Hooke(1.0, 1.0)))
     corners = points[body.cells]
     area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
     middle = (area[:, None] * corners.mean(axis=1)).sum(axis=0)
@@ -113,4 +117,4 @@ def test_momenta_of_a_rigid_motion_are_mass_times_velocity_and_inertia_times_spi
     second = area / 12 * (np.trace(products, axis1=1, axis2=2) + products.sum(axis=(1, 2)))
     assert found["angular_momentum_z"][0] == pytest.approx(density * spin * second.sum(), rel=1e-12)
     assert found["total"] == pytest.approx([3.0, 2.5])
-    assert motion_history(scene, body) == {}
+    assert motion_history(motion_account(scene, body, Hooke(1.0, 1.0))) == {}

@@ -21,26 +21,43 @@ class Kinetic:
 
     Parameters
     ----------
+    mass : float
+        kg.
+    centre : (t, d) array
+        Current centre of mass, m.
     energy : (t,) array
         ½ ∫ ρ v², J.
     linear : (t, d) array
         ∫ ρ v, N s.
     angular : (t, 1 or 3) array
         ∫ ρ x × v about the origin, x the current position, N m s.
+    spin : (t, 1 or 3) array
+        The same about the current centre of mass, N m s.
     linear_scale, angular_scale : float
         Largest ∫ ρ |v| and ∫ ρ |x − c||v| over time, c the centre of mass: what the momenta
         are small against when they cancel.
     """
 
+    mass: float
+    centre: Array
     energy: Array
     linear: Array
     angular: Array
+    spin: Array
     linear_scale: float
     angular_scale: float
 
 
-def kinetic(solution: Solution, density: float) -> Kinetic:
+def kinetic(solution: Solution, density: float, cells: NDArray[np.int64] | None = None) -> Kinetic:
     """Integrate over the cells of the solution, exactly for its velocity field.
+
+    Parameters
+    ----------
+    solution : Solution
+    density : float
+        kg/m³; of a membrane times its thickness.
+    cells : (c,) int array, optional
+        Numbers of the cells of a part; default all.
 
     Raises
     ------
@@ -50,28 +67,38 @@ def kinetic(solution: Solution, density: float) -> Kinetic:
     if solution.velocity is None:
         raise InputError("a solution without velocities has no kinetic energy")
     d, k = solution.dimension, solution.cell_dimension
-    shape = simplices(solution.points, solution.cells)
+    nodes = solution.cells if cells is None else solution.cells[cells]
+    shape = simplices(solution.points, nodes)
     place, share = simplex_rule(k, 2 if solution.order == 1 else 4)
     hats = _shape_functions(place, k, solution.order)
     mass = density * (shape.volume[:, None] * share).ravel()
-    rows: dict[str, list[Array]] = {"energy": [], "linear": [], "angular": [], "scales": []}
+    names = ("centre", "energy", "linear", "angular", "spin", "scales")
+    rows: dict[str, list[Array]] = {name: [] for name in names}
     for u, v in zip(solution.displacement, solution.velocity, strict=True):
         x, speed = (
-            np.einsum("qk,mka->mqa", hats, nodal[solution.cells]).reshape(-1, d)
+            np.einsum("qk,mka->mqa", hats, nodal[nodes]).reshape(-1, d)
             for nodal in (solution.points + u, v)
         )
         size = np.linalg.norm(speed, axis=1)
-        arm = np.linalg.norm(x - mass @ x / mass.sum(), axis=1)
-        turn = np.cross(x, speed) if d == 3 else x[:, :1] * speed[:, 1:] - x[:, 1:] * speed[:, :1]
+        centre = mass @ x / max(mass.sum(), 1e-300)
+        rows["centre"].append(centre)
+        arm = np.linalg.norm(x - centre, axis=1)
         rows["energy"].append(0.5 * mass @ size**2)
         rows["linear"].append(mass @ speed)
-        rows["angular"].append(mass @ turn)
+        rows["angular"].append(mass @ _cross(x, speed))
+        rows["spin"].append(mass @ _cross(x - centre, speed))
         rows["scales"].append(np.array([mass @ size, mass @ (arm * size)]))
     scales = np.max(rows["scales"], axis=0)
     return Kinetic(
-        np.array(rows["energy"]), np.array(rows["linear"]), np.array(rows["angular"]),
+        float(mass.sum()), np.array(rows["centre"]), np.array(rows["energy"]),
+        np.array(rows["linear"]), np.array(rows["angular"]), np.array(rows["spin"]),
         float(scales[0]), float(scales[1]),
     )  # fmt: skip
+
+
+def _cross(x: Array, v: Array) -> Array:
+    """Cross product (n, 3), in the plane its only component (n, 1)."""
+    return np.cross(x, v) if x.shape[1] == 3 else x[:, :1] * v[:, 1:] - x[:, 1:] * v[:, :1]
 
 
 def _shape_functions(place: Array, k: int, order: int) -> Array:

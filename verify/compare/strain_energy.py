@@ -1,6 +1,7 @@
 """Strain energy: of a solution, exactly; of any field, by quadrature."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.compare.hooke import Corotated, Law
 from verify.compare.locate import Field, SolutionField
@@ -9,7 +10,7 @@ from verify.compare.simplices import in_frames, triangle_frames
 from verify.compare.slabs import Rule
 from verify.solution import Solution
 
-__all__ = ["field_strain_energy", "nodal_strain_energy", "strain_energy"]
+__all__ = ["cell_strain_energies", "field_strain_energy", "nodal_strain_energy", "strain_energy"]
 
 # points per direction where the density is no polynomial of the gradient
 _FINE = 4
@@ -26,10 +27,15 @@ def strain_energy(solution: Solution, law: Law, step: int = -1) -> float:
 
 def nodal_strain_energy(field: SolutionField, law: Law) -> float:
     """Energy of the cells of a solution's field, J (2D: per metre)."""
+    return float(cell_strain_energies(field, law).sum())
+
+
+def cell_strain_energies(field: SolutionField, law: Law) -> NDArray[np.float64]:
+    """Energy (m,) of each cell of a solution's field, J (2D: per metre)."""
     solution, shape = field.solution, field.shape
     order = 1 if solution.order == 1 else _FINE if isinstance(law, Corotated) else 2
     every = np.arange(len(solution.cells))
-    total = 0.0
+    found = np.zeros(len(solution.cells))
     membrane = solution.cell_dimension < solution.dimension
     frames = triangle_frames(shape.corners) if membrane else None
     for weights, share in zip(*simplex_rule(solution.cell_dimension, order), strict=True):
@@ -37,8 +43,8 @@ def nodal_strain_energy(field: SolutionField, law: Law) -> float:
         gradient = field.in_cells(points, every)[1]
         if frames is not None:
             gradient = in_frames(gradient, frames)
-        total += share * float(shape.volume @ law.energy_density(gradient))
-    return total
+        found += share * shape.volume * law.energy_density(gradient)
+    return found
 
 
 def field_strain_energy(field: Field, rule: Rule, law: Law) -> float:

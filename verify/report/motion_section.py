@@ -16,6 +16,7 @@ __all__ = ["ACCOUNT_METRICS", "motion_section"]
 ACCOUNT_METRICS = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
     "linear_momentum_drift", "angular_momentum_drift",
+    "part_linear_momentum_drift", "part_angular_momentum_drift",
 )  # fmt: skip
 _PER_PANEL = 4
 # parts of a ledger, the ones that tell most first; a panel has room for four
@@ -40,9 +41,9 @@ def motion_section(result: CaseResult) -> Markup | None:
         shown = ", ".join(f"{time:.4g} s" for time in cuts)
         said += f" Dashed vertical lines: a cut opens ({shown})."
     said += (
-        " Energies are those of the solver's own ledger; total is what physics keeps constant, "
-        "without what the time scheme takes (algorithmic). Momenta are integrated from the "
-        "velocities, about the origin."
+        " Energies are those of the solver's own ledger, or of its fields if it has none; total is "
+        "what physics keeps constant, without what the time scheme takes (algorithmic). Momenta "
+        "are integrated from the velocities, about the origin."
     )
     return tag(
         "div",
@@ -50,6 +51,7 @@ def motion_section(result: CaseResult) -> Markup | None:
         tag("div", panels, class_="panels"),
         tag("p", said, class_="quiet"),
         _kept_table(result, moving),
+        _parts_table(moving),
     )
 
 
@@ -151,3 +153,32 @@ def _kept_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Markup | N
     head = ["solver", "level", *(metric_title(name) for name in names)]
     return table(head, rows, "What is kept of energy and momenta, with the verdicts of the case",
                  class_="prose")  # fmt: skip
+
+
+def _parts_table(solves: Sequence[SolveRecord]) -> Markup | None:
+    """Return the separated parts of every solver, with what each keeps once it is free."""
+    rows = []
+    for solve in solves:
+        for k, part in enumerate(solve.parts):
+            kinetic, strain = part.series.get("kinetic", []), part.series.get("strain", [])
+            rows.append([
+                solver_title(solve.solver), k + 1, number(part.mass), _numbers(part.centre),
+                _numbers(part.inertia),
+                number(kinetic[-1]) if kinetic else "–", number(strain[-1]) if strain else "–",
+                f"{part.free_from:.4g}" if part.free_from is not None else "held",
+                *(number(part.drift[name]) if name in part.drift else "–"
+                  for name in ("linear_momentum", "angular_momentum")),
+            ])  # fmt: skip
+    if not rows:
+        return None
+    head = [
+        "solver", "part", "mass, kg", "centre, m", "inertia about its own centre, kg m²",
+        "kinetic energy at the end, J", "strain energy at the end, J", "free from, s",
+        "drift of its momentum", "drift of its spin",
+    ]  # fmt: skip
+    return table(head, rows, "Separated parts, from the top down (plane scenes: per metre)",
+                 class_="prose")  # fmt: skip
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(number(value) for value in values)

@@ -44,6 +44,8 @@ _METRICS = {
     "ledger_mismatch": "relative mismatch of the energy ledger",
     "linear_momentum_drift": "relative change of the momentum",
     "angular_momentum_drift": "relative change of the angular momentum",
+    "part_linear_momentum_drift": "relative drift of the momentum of free parts",
+    "part_angular_momentum_drift": "relative drift of the spin of free parts",
 }
 _ERRORS = set(_METRICS) - {"strain_energy"}
 # not drawn and not in tables unless the case judges them; they are in the exported files

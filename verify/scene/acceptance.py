@@ -13,6 +13,7 @@ __all__ = [
     "KnownFinding",
     "MaximumDisplacementQuantity",
     "OpeningQuantity",
+    "PartQuantity",
     "Quantity",
     "RateCheck",
     "RatioCheck",
@@ -23,12 +24,13 @@ __all__ = [
 
 # of a cut; near and far: closer to a tip or front than a tenth of its cut, and the rest
 OF_CUTS = ("jump_l2", "opening_l2", "opening_max", "jump_l2_max", "jump_l2_mean")
-# max and mean: over time; the last seven need no reference
+# max and mean: over time; the last nine need no reference
 OF_MOTION = (
     "displacement_l2_max", "displacement_l2_mean", "energy_norm_max", "energy_norm_mean",
     "jump_l2_max", "jump_l2_mean",
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
     "linear_momentum_drift", "angular_momentum_drift",
+    "part_linear_momentum_drift", "part_angular_momentum_drift",
 )  # fmt: skip
 # measured whether a quantity asks for them or not
 METRICS = tuple(dict.fromkeys((
@@ -90,6 +92,38 @@ class OpeningQuantity(Strict):
     time: Time = None
 
 
+class PartQuantity(Strict):
+    """A number of a separated part: of the connected piece of material that holds a point."""
+
+    kind: Literal["part"]
+    name: Line
+    point: Vector | None = Field(
+        default=None,
+        description="material coordinates of a point of it, m; not on a cut; default: of all",
+    )
+    of: Literal[
+        "mass", "inertia", "linear_momentum", "angular_momentum", "kinetic_energy",
+        "strain_energy",
+    ] = Field(
+        description="inertia and angular_momentum about its own centre; mass and inertia of it "
+        "undeformed"
+    )  # fmt: skip
+    component: Literal["x", "y", "z"] | None = Field(
+        default=None, description="of inertia and momenta; in 2D inertia and spin are about z"
+    )
+    time: Time = None
+
+    @model_validator(mode="after")
+    def _components_belong(self) -> "PartQuantity":
+        directed = self.of in ("inertia", "linear_momentum", "angular_momentum")
+        if directed != (self.component is not None):
+            need = "needs one" if directed else "has none"
+            raise ValueError(f"component: the {self.of} of a part {need}")
+        if self.time is not None and self.of in ("mass", "inertia"):
+            raise ValueError(f"time: the {self.of} of a part is that of it undeformed")
+        return self
+
+
 class StressIntensityQuantity(Strict):
     """A stress-intensity factor at an end of a plane cut, Pa √m."""
 
@@ -109,6 +143,7 @@ Quantity = Annotated[
     | DisplacementQuantity
     | MaximumDisplacementQuantity
     | OpeningQuantity
+    | PartQuantity
     | StressIntensityQuantity,
     Field(discriminator="kind"),
 ]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity
+from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity, PartQuantity
 from verify.scene.cuts import ArcCut, whole_cut
 from verify.scene.geometry import Box, Polygon, Rectangle
 from verify.scene.planar import (
@@ -117,7 +117,9 @@ def _common_arc(a: ArcCut, b: ArcCut) -> float:
 def check_points(scene: "Scene") -> None:
     """Raise ValueError if a quantity is asked for where there is no material, or two values."""
     for i, asked in enumerate(scene.quantities):
-        if isinstance(asked, DisplacementQuantity):
+        if isinstance(asked, PartQuantity) and asked.point is None:
+            continue
+        if isinstance(asked, DisplacementQuantity | PartQuantity):
             place, point = f"quantities[{i}].point:", np.array(asked.point, dtype=float)
         elif isinstance(asked, OpeningQuantity) and scene.dimension == 2:
             cut: Any = next(cut for cut in _known(scene) if cut.name == asked.cut)
@@ -138,6 +140,8 @@ def _check_point(scene: "Scene", asked: Any, point: Array, where: str) -> None:
     if not _holds(scene, point, _TOLERANCE * size):
         raise ValueError(f"{where}, which is not in the body")
     near = {name: d for name, d in _cut_distances(scene, point).items() if d <= _TOLERANCE * size}
+    if isinstance(asked, PartQuantity) and near:
+        raise ValueError(f"{where} lies on cut '{next(iter(near))}', between two parts")
     if isinstance(asked, DisplacementQuantity) and near:
         raise ValueError(
             f"{where} lies on cut '{next(iter(near))}', where the displacement has two values; "

@@ -2,7 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION
+import numpy as np
+
+from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION, PartQuantity
 from verify.scene.cut_placement import check_cuts, check_points
 from verify.scene.cuts import ArcCut
 from verify.scene.empty_parts import check_parts_act
@@ -218,6 +220,8 @@ def _check_names(scene: "Scene") -> None:
             raise ValueError(f"quantities[{i}].point: expected {scene.dimension} coordinates")
         if quantity.kind == "displacement" and "xyz".index(quantity.component) >= scene.dimension:
             raise ValueError(f"quantities[{i}].component: z in a 2D scene")
+        if quantity.kind == "part":
+            _check_part(scene, quantity, f"quantities[{i}]")
         if quantity.kind == "opening":
             key, other = ("at", "point") if scene.dimension == 2 else ("point", "at")
             if getattr(quantity, key) is None or getattr(quantity, other) is not None:
@@ -229,6 +233,26 @@ def _check_names(scene: "Scene") -> None:
     for i, name in enumerate(quantities):
         if name in METRICS:
             raise ValueError(f"quantities[{i}].name: '{name}' names an error; take another")
+
+
+def _check_part(scene: "Scene", asked: PartQuantity, place: str) -> None:
+    d = scene.dimension
+    if asked.point is not None and len(asked.point) != d:
+        raise ValueError(f"{place}.point: expected {d} coordinates")
+    if d == 2 and asked.component is not None:
+        axes = ("x", "y") if asked.of == "linear_momentum" else ("z",)
+        if asked.component not in axes:
+            expected = " or ".join(axes)
+            raise ValueError(f"{place}.component: {asked.of} in a 2D scene has {expected}")
+    if asked.of != "strain_energy" and scene.material.density is None:
+        raise ValueError(f"{place}: the {asked.of} of a part needs material.density")
+    moves = asked.of in ("linear_momentum", "angular_momentum", "kinetic_energy")
+    if moves and scene.analysis.duration is None:
+        raise ValueError(f"{place}: {asked.of} belongs to a dynamic analysis")
+    if asked.time is not None and scene.analysis.duration is not None:
+        times = np.array(scene.analysis.output_times)
+        if np.abs(times - asked.time).min() > 1e-9 * times[-1]:
+            raise ValueError(f"{place}.time: {asked.time:g} s is no output time")
 
 
 def _check_acceptance(scene: "Scene") -> None:

@@ -21,7 +21,9 @@ from verify.scene import Scene, scene_hash
 from verify.solution import Solution
 from verify.study.energy_account import ACCOUNT, account_metrics
 from verify.study.error_history import ERROR_NAMES, History, compared_times, error_history
+from verify.study.motion_account import motion_account
 from verify.study.motion_history import motion_history
+from verify.study.part_account import part_metrics, part_records
 from verify.study.quantities import Measured, unit_of
 from verify.study.rates import observed_rate
 from verify.study.reference import (
@@ -193,9 +195,13 @@ def _measure(
     own = record.solver == REFERENCE and not scene.judged_by_exact
     metrics, notes = _quantities(scene, one, None if own else reference)
     if scene.analysis.kind == "dynamic":
-        kept, why = account_metrics(scene, one.solution, one.law)
-        metrics, notes = metrics + kept, notes | why
-        record = replace(record, account=motion_history(scene, one.solution))
+        account = motion_account(scene, one.solution, one.law)
+        parts = part_records(scene, one.solution, account)
+        for kept, why in (account_metrics(scene, account), part_metrics(parts, account)):
+            metrics, notes = metrics + kept, notes | why
+        if account.lighter:
+            notes["parts"] = f"{account.lighter} lighter parts are not listed"
+        record = replace(record, account=motion_history(account), parts=parts)
     if reference is None:
         without = _named(scene, missing)
         notes = {name: why for name, why in without.items() if name not in ACCOUNT} | notes

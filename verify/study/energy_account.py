@@ -2,32 +2,29 @@
 
 import numpy as np
 
-from verify.compare.hooke import Law
-from verify.compare.kinetic import kinetic
 from verify.compare.ledger import balance, energy_scale, total_energy
-from verify.compare.locate import SolutionField
-from verify.compare.strain_energy import nodal_strain_energy
 from verify.result import Metric
 from verify.scene import Scene
-from verify.solution import Solution
+from verify.study.motion_account import NO_VELOCITIES, MotionAccount
+from verify.study.part_account import PART_METRICS
 
 __all__ = ["ACCOUNT", "account_metrics"]
 
-ACCOUNT = (
+_ENERGIES = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
-    "linear_momentum_drift", "angular_momentum_drift",
 )  # fmt: skip
+_MOMENTA = ("linear_momentum_drift", "angular_momentum_drift")
+ACCOUNT = (*_ENERGIES, *_MOMENTA, *PART_METRICS)
 
 
-def account_metrics(
-    scene: Scene, solution: Solution, law: Law
-) -> tuple[list[Metric], dict[str, str]]:
+def account_metrics(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[str, str]]:
     """Measure what a moving solution keeps, all relative.
 
-    Energies are those of the solution's own ledger, without what its time scheme dissipates, over
-    the largest energy that moved: ``energy_drift``, the largest change; ``energy_slope``, the
-    secular change over the whole time (its uncertainty: two standard errors);
-    ``energy_oscillation``, what is left beside trend and jumps; ``energy_jump``, the largest step
+    Energies are those of the solution's own ledger, without what its time scheme dissipates, or
+    else those of its fields; over the largest energy that moved from one form to another in the
+    run (`energy_scale`). ``energy_drift`` is the largest change over the run; ``energy_slope``
+    the secular change over the whole run (its uncertainty: two standard errors);
+    ``energy_oscillation`` what is left beside trend and jumps; ``energy_jump`` the largest step
     at a cut. ``ledger_mismatch`` is the largest difference of the ledger's strain energy from
     that of the field, and of the ledger with the scheme's dissipation from its first value.
     Momenta are integrated from the velocities.
@@ -38,12 +35,10 @@ def account_metrics(
     notes : dict of str to str
         For what could not be measured, why.
     """
-    metrics, notes = _energies(scene, solution, law)
-    if solution.velocity is None or scene.material.density is None:
-        why = "the solution has no velocities"
-        return metrics, notes | {name: why for name in ACCOUNT if "momentum" in name}
-    thickness = scene.material.thickness or 1.0  # of a membrane
-    found = kinetic(solution, thickness * scene.material.density)
+    metrics, notes = _energies(scene, account)
+    found = account.whole
+    if found is None:
+        return metrics, notes | dict.fromkeys(_MOMENTA, NO_VELOCITIES)
     for kind, momentum, scale in (
         ("linear", found.linear, found.linear_scale),
         ("angular", found.angular, found.angular_scale),
@@ -57,16 +52,15 @@ def account_metrics(
     return metrics, notes
 
 
-def _energies(scene: Scene, solution: Solution, law: Law) -> tuple[list[Metric], dict[str, str]]:
-    ledger, times = solution.ledger, solution.times
+def _energies(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[str, str]]:
+    ledger, times = account.ledger, account.times
     total, scale = total_energy(ledger), energy_scale(ledger)
-    names = [name for name in ACCOUNT if "momentum" not in name]
     if total is None or len(times) < 2:
-        return [], dict.fromkeys(names, "the solution has no ledger of energies over time")
+        why = account.lacking or "the solution has one output time"
+        return [], dict.fromkeys(_ENERGIES, why)
     if scale == 0.0:
-        return [], dict.fromkeys(names, "no energy moves")
-    cuts = [cut.opens_at for cut in scene.cuts]
-    found = balance(times, total, cuts)
+        return [], dict.fromkeys(_ENERGIES, "no energy moves")
+    found = balance(times, total, [cut.opens_at for cut in scene.cuts])
     span = float(np.ptp(times))
     values = {
         "energy_drift": (found.drift, 0.0),
@@ -78,23 +72,23 @@ def _energies(scene: Scene, solution: Solution, law: Law) -> tuple[list[Metric],
         values["energy_jump"] = float(np.abs(found.jumps).max()), found.oscillation
     else:
         notes["energy_jump"] = "nothing is cut between the first and the last output time"
-    values["ledger_mismatch"] = _mismatch(solution, law), 0.0
-    source = "ledger of the solution"
+    if account.is_own_ledger:
+        values["ledger_mismatch"] = _mismatch(account), 0.0
+    else:
+        notes["ledger_mismatch"] = "the solution has no ledger of its own"
     metrics = [
-        Metric(name, value / scale, "1", None, width / scale, source)
+        Metric(name, value / scale, "1", None, width / scale, account.source)
         for name, (value, width) in values.items()
     ]
     return metrics, notes
 
 
-def _mismatch(solution: Solution, law: Law) -> float:
+def _mismatch(account: MotionAccount) -> float:
     """Largest disagreement of a ledger with the field and with itself, J."""
     off = [0.0]
-    if "strain" in solution.ledger:
-        field = SolutionField(solution)
-        for u, stated in zip(solution.displacement, solution.ledger["strain"], strict=True):
-            off.append(abs(nodal_strain_energy(field.with_nodal(u), law) - float(stated)))
-    closed = total_energy(solution.ledger, scheme=True)
-    if "algorithmic" in solution.ledger and closed is not None:
+    if "strain" in account.ledger:
+        off.append(float(np.abs(account.strain_of_all - account.ledger["strain"]).max()))
+    closed = total_energy(account.ledger, scheme=True)
+    if "algorithmic" in account.ledger and closed is not None:
         off.append(float(np.abs(closed - closed[0]).max()))
     return max(off)

@@ -17,10 +17,12 @@ from verify.scene.acceptance import (
     DisplacementQuantity,
     MaximumDisplacementQuantity,
     OpeningQuantity,
+    PartQuantity,
     Quantity,
     StressIntensityQuantity,
 )
 from verify.solution import Solution
+from verify.study.part_quantity import part_quantity, part_unit
 from verify.study.stress_intensity import solution_intensity
 
 __all__ = ["Measured", "field_quantity", "unit_of"]
@@ -37,7 +39,7 @@ class Measured:
     body : Body or SolidBody
     law : Law
     scene : Scene, optional
-        Only stress-intensity factors need it.
+        Only stress-intensity factors and numbers of parts need it.
     """
 
     def __init__(
@@ -84,6 +86,10 @@ class Measured:
             if self.scene is None:
                 raise UnsupportedSceneError("a stress-intensity factor needs the scene")
             return solution_intensity(self.scene, self.solution, asked)
+        if isinstance(asked, PartQuantity):
+            if self.scene is None:
+                raise UnsupportedSceneError("a number of a part needs the scene")
+            return part_quantity(self.scene, self.solution, self.motion, self.law, asked)
         if isinstance(asked, MaximumDisplacementQuantity):
             u = self.motion.nodal(asked.time)
             return float(np.linalg.norm(u, axis=1).max())
@@ -105,6 +111,8 @@ def field_quantity(
 
 def unit_of(asked: Quantity, dimension: int) -> str:
     """SI unit of a quantity; energies of plane scenes are per metre of thickness."""
+    if isinstance(asked, PartQuantity):
+        return part_unit(asked, dimension)
     if asked.kind == "stress_intensity":
         return "Pa √m"
     if asked.kind == "strain_energy":
