@@ -153,19 +153,27 @@ def test_a_level_that_is_not_there_is_refused(tmp_path, level):
         XfemSolver().solve(scene(tmp_path), level)
 
 
-PLAYED = """
-[[cuts]]
-name = "stroke"
-kind = "tool_path"
-points = [[0.0, 0.02], [0.01, 0.02]]
-speed = 0.1
+BOX = """title = "A box"
+requirement = "It shall be meshed."
+[geometry]
+kind = "box"
+lower = [0.0, 0.0, 0.0]
+upper = [1.0, 1.0, 1.0]
+[mesh]
+sizes = [0.5]
+pattern = "unstructured"
+[material]
+young = 1.0
+poisson = 0.3
+[[supports]]
+where = "boundary"
+displacement = [0.0, 0.0, 0.0]
 """
 
 
 def test_what_the_adapter_does_not_offer_is_refused_before_and_while_solving(tmp_path):
-    dynamic = '[analysis]\nkind = "dynamic"\nduration = 1.0\n[[supports]]'
-    asked = scene(tmp_path, ("[[supports]]", dynamic), base=STRIP + PLAYED)
-    assert "grows while the body moves" in XfemSolver().refuses(asked)
+    asked = scene(tmp_path, base=BOX)
+    assert "structured way only" in XfemSolver().refuses(asked)
     with pytest.raises(UnsupportedSceneError):
         XfemSolver().solve(asked, 0)
 

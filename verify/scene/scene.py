@@ -104,8 +104,8 @@ class Scene(Strict):
             return "a geometry of kind 'skin' is for `verify play`"
         if self.replay is not None and self.replay.pulls:
             return "pulls at the edges of a cut are for `verify play`"
-        if any(isinstance(cut, ToolPathCut) for cut in self.cuts):
-            return "a tool_path, which cuts as time goes on, is for `verify play`"
+        if self.replay is not None and any(isinstance(cut, ToolPathCut) for cut in self.cuts):
+            return "a tool_path with a table [replay] is for `verify play`"
         return None
 
     @property

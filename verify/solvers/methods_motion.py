@@ -3,12 +3,14 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from verify.methods.cut_body import CutBody
-from verify.scene import Equilibrium, Scene
+from verify.scene import Equilibrium, Scene, ToolPathCut
 from verify.solvers.xfem_answer import Answer
 from verify.solvers.xfem_motion import MotionChoice, Mover
 from verify.xfem.corotation import InternalForce
-from verify.xfem.dynamics import DynamicBody, MotionState
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh
 
@@ -17,7 +19,7 @@ __all__ = ["MethodMover", "refuses_motion"]
 
 def refuses_motion(scene: Scene) -> str | None:
     """Why a dynamic scene cannot be done by a method that changes the mesh, if it cannot."""
-    if any(getattr(cut, "opens_at", 0.0) > 0.0 for cut in scene.cuts):
+    if any(isinstance(cut, ToolPathCut) or cut.opens_at > 0.0 for cut in scene.cuts):
         return "cuts that open later are not offered: nothing inherits a state from another mesh"
     if scene.cuts and isinstance(scene.initial, Equilibrium):
         return "an equilibrium with closed cuts is not offered: the mesh has them open"
@@ -56,13 +58,11 @@ class MethodMover(Mover):
         del answer.timings["enrichment"]
         return answer
 
-    def _cut(self, count: int) -> VirtualMesh:
+    def _events(self) -> NDArray[np.float64]:
+        return np.empty(0)
+
+    def _cut(self, time: float) -> VirtualMesh:
         return self._cut_body.virtual
 
     def _law(self, virtual: VirtualMesh) -> InternalForce:
         return self._internal_force(self._cut_body.resisting)
-
-    def _inherited(
-        self, virtual: VirtualMesh, state: MotionState, further: DynamicBody
-    ) -> MotionState:
-        return state

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Box, Scene, Skin, ToolPathCut
+from verify.scene import Box, Scene, Skin
 from verify.solution import Solution
 from verify.solvers.xfem_answer import Answer, joined, solution_of
 from verify.solvers.xfem_cuts import cuts_of
@@ -91,9 +91,6 @@ class XfemSolver:
             return "the geometry 'skin' is played (verify play), not solved"
         if isinstance(scene.geometry, Box) and scene.mesh.pattern == "unstructured":
             return "boxes are meshed in a structured way only; give a mesh file for another mesh"
-        dynamic = scene.analysis.kind == "dynamic"
-        if dynamic and any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
-            return "a cut that grows while the body moves is played (verify play), not solved"
         return None
 
     def levels(self, scene: Scene) -> int:

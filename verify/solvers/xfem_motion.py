@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Equilibrium, Gravity, Moving, Scene
+from verify.scene import Equilibrium, Gravity, Moving, Scene, ToolPathCut
 from verify.scene.history import factor_at, first_factor, jumps
 from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_answer import Answer, penalised
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import nodal_forces
+from verify.solvers.xfem_openings import opening_times
 from verify.solvers.xfem_scene import density_of, material_of
 from verify.solvers.xfem_steps import MASSES, integrator_of, largest_step
 from verify.solvers.xfem_supports import initial_path, motion_of_supports
@@ -43,6 +44,7 @@ __all__ = ["MotionChoice", "Mover", "move"]
 
 _Floats = NDArray[np.float64]
 _SAME = 1e-12  # of the duration: times that close are one
+_DUE = 1e-9  # of the duration: steps added up are off by less than that
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,8 @@ class _Output(NamedTuple):
 class Mover:
     """One motion, stage by stage.
 
-    Other ways to cut override `_cut`, `_law` and `_inherited`.
+    A stage begins at a step at which a cut opens, in all or in some of its cells. Other ways to
+    cut override `_events`, `_cut`, `_law`, `_inherited` and `_shown`.
     """
 
     def __init__(
@@ -112,10 +115,12 @@ class Mover:
         phases = ("enrichment", "loading", "initial state", "steps", "accounting")
         self.timings = dict.fromkeys(phases, 0.0)
         self.times = np.array(scene.analysis.output_times)
+        self.due = _DUE * float(self.times[-1])
         opens = [self._snapped(float(getattr(cut, "opens_at", 0.0))) for cut in scene.cuts]
         order = np.argsort(opens, kind="stable")
         cuts = cuts_of(scene, size)
         # those that open first come first: what is cut further keeps what is cut already
+        self.asked = [scene.cuts[k] for k in order]
         self.cuts, self.opens = [cuts[k] for k in order], [opens[k] for k in order]
         self.account = Account()
         self.slivers: SliverReport | None = None
@@ -126,43 +131,50 @@ class Mover:
 
     def run(self, trial: bool) -> Answer:
         """Run all stages and carry the fields of each to the finally cut mesh."""
+        events = self._events()
         initial = self.scene.initial
         open_before = isinstance(initial, Equilibrium) and initial.cuts == "open"
-        opened = self.opens.count(0.0) if open_before else 0
+        opened = 0.0 if open_before else -np.inf
         virtual = self._cut(opened)
         body = self._body(virtual)
         state = self._initial(body)
-        starts = sorted({0.0, *self.opens})
         fields: list[_Output] = []
-        for k, start in enumerate(starts):
-            count = sum(opens <= start for opens in self.opens)
-            if count > opened:
-                further = self._body(self._cut(count))
+        while True:
+            due = state.time + self.due
+            if np.any((events > opened) & (events <= due)):
+                further = self._body(self._cut(due))
                 inherited = self._inherited(virtual, state, further)
                 self.account.open(body, state, further, inherited)
-                body, state, opened = further, inherited, count
+                body, state = further, inherited
                 virtual = body.force.virtual
-            last = k == len(starts) - 1
-            end = float(self.times[-1]) if last else starts[k + 1]
-            wanted = self.times[(self.times >= start) & ((self.times < end) | last)]
-            stage = self._stage(body, state, start, end, wanted, trial)
+            opened = due
+            until = float(events[events > due].min(initial=np.inf))
+            stage = self._stage(body, state, until, trial)
             fields += [_Output(virtual, *output) for output in stage]
-            if trial:
-                break
-        return self._answer(virtual, fields)
+            if trial or state.time >= float(self.times[-1]) - self.due:
+                return self._answer(fields)
 
     def _snapped(self, time: float) -> float:
         """Return the output time that is the same up to round-off, if there is one."""
         nearest = float(self.times[np.abs(self.times - time).argmin()])
         return nearest if abs(nearest - time) <= _SAME * self.times[-1] else time
 
-    def _cut(self, count: int) -> VirtualMesh:
-        """Cut the mesh along the first `count` cuts."""
+    def _events(self) -> _Floats:
+        """Find the times at which something opens, for `_cut` as well."""
+        clock = perf_counter()
+        tip: Any = self.choice.tip
+        self.opening = opening_times(self.asked, cut_mesh(self.mesh, self.cuts, tip), self.opens)
+        self.timings["enrichment"] += perf_counter() - clock
+        return np.unique(self.opening[~np.isnan(self.opening)])
+
+    def _cut(self, time: float) -> VirtualMesh:
+        """Cut the mesh where the cuts have opened it at a time."""
         clock = perf_counter()
         tip: Any = self.choice.tip
         policy: Any = self.choice.slivers
-        virtual = cut_mesh(self.mesh, self.cuts[:count], tip)
-        if count and policy in ("merge", "drop"):
+        opened = self.opening <= time
+        virtual = cut_mesh(self.mesh, self.cuts, tip, opened)
+        if opened.any() and policy in ("merge", "drop"):
             held = motion_of_supports(self.scene, virtual, self.exact).fixed.any(axis=1)
             virtual, self.slivers = treat_slivers(virtual, policy, held=held)
         self.timings["enrichment"] += perf_counter() - clock
@@ -255,15 +267,12 @@ class Mover:
             ) from None
 
     def _stage(
-        self,
-        body: DynamicBody,
-        state: MotionState,
-        start: float,
-        end: float,
-        wanted: _Floats,
-        trial: bool,
+        self, body: DynamicBody, state: MotionState, until: float, trial: bool
     ) -> list[tuple[MotionState, _Floats | None]]:
-        """Step from one opening to the next; return the states at the times that are wanted."""
+        """Step to the end, or to the first step that begins at `until` or later.
+
+        Returns the states at the output times on the way.
+        """
         scene, choice = self.scene, self.choice
         largest, self.said = largest_step(
             body,
@@ -273,19 +282,19 @@ class Mover:
             choice.step_factor,
             scene.analysis.time_step,
         )
-        stops = np.unique([start, end, *wanted, *self._jumps(start, end)])
         ledger = EnergyLedger(body, state)
         integrators: dict[float, Integrator] = {}
         outputs, instants, taken = [], [], 0
-        if start in wanted:
-            outputs, instants = [self._kept(body, state)], [0]
-        for a, b in pairwise(stops):
+        for a, b in pairwise(self._stops(state.time)):
+            if np.abs(self.times - a).min() <= self.due:
+                outputs.append(self._kept(body, state))
+                instants.append(taken)
             count = max(1, int(np.ceil((b - a) / largest * (1 - 1e-9))))
             size = float(f"{(b - a) / count:.14g}")  # the same up to round-off: one integrator
             self.step_sizes.add(size)
             if size not in integrators:
                 integrators[size] = self._integrator(body, size)
-            for _ in range(1 if trial else count):
+            for _ in range(count):
                 clock = perf_counter()
                 forces = integrators[size].step(state)
                 stepped = perf_counter()
@@ -293,16 +302,29 @@ class Mover:
                 self.timings["steps"] += stepped - clock
                 self.timings["accounting"] += perf_counter() - stepped
                 taken += 1
-            if trial:
+                if over := trial or state.time >= until - self.due:
+                    break
+            if over:
                 break
-            if b in wanted:
-                outputs.append(self._kept(body, state))
-                instants.append(taken)
+        if state.time >= self.times[-1] - self.due:
+            outputs.append(self._kept(body, state))
+            instants.append(taken)
         self.account.enter(ledger.close(), instants)
         self.steps += taken
         newton = [one for one in integrators.values() if isinstance(one, NewtonIntegrator)]
         self.solves += sum(one.solves for one in newton)
         return outputs
+
+    def _stops(self, start: float) -> _Floats:
+        """Return the times from `start` on at which a step has to end."""
+        end = float(self.times[-1])
+        whole = [
+            t
+            for cut, t in zip(self.asked, self.opens, strict=True)
+            if not isinstance(cut, ToolPathCut)
+        ]
+        found = np.unique([*self.times, *whole, *self._jumps()])
+        return np.concatenate([[start], found[(found > start + self.due) & (found <= end)]])
 
     def _kept(self, body: DynamicBody, state: MotionState) -> tuple[MotionState, _Floats | None]:
         """Copy a state, with its acceleration where that is to be had."""
@@ -316,23 +338,22 @@ class Mover:
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{self.choice.scheme}': {error}") from None
 
-    def _jumps(self, start: float, end: float) -> list[float]:
-        """Return the times between the two at which a load or a support jumps."""
+    def _jumps(self) -> list[float]:
+        """Return the times that are no output times at which a load or a support jumps."""
         parts = [*self.scene.supports, *self.scene.loads]
         found = [t for part in parts for t in jumps(getattr(part, "history", None))]
-        tolerance = _SAME * float(self.times[-1])
-        apart = [t for t in found if np.abs(self.times - t).min() > tolerance]
-        return [t for t in apart if start + tolerance < t < end - tolerance]
+        return [t for t in found if np.abs(self.times - t).min() > self.due]
 
-    def _answer(self, virtual: VirtualMesh, fields: list["_Output"]) -> Answer:
-        olds = {id(one.virtual): one.virtual for one in fields if one.virtual is not virtual}
+    def _answer(self, fields: list["_Output"]) -> Answer:
+        virtual = self._cut(np.inf)
+        olds = {id(one.virtual): one.virtual for one in fields}
         sources = {key: ancestors(old, virtual) for key, old in olds.items()}
         # before a cut opens nothing follows a root cell there: corners say it all
         shape = (len(fields), *virtual.corners.node_points.shape)
         displacement, velocity, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
         balanced = True
         for k, one in enumerate(fields):
-            source = sources.get(id(one.virtual), slice(None))
+            source = sources[id(one.virtual)]
             displacement[k] = one.virtual.extend(one.state.displacement)[source]
             velocity[k] = one.virtual.extend(one.state.velocity)[source]
             if one.acceleration is None:

@@ -258,7 +258,12 @@ class VirtualMesh:
         return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def cut_mesh(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside") -> VirtualMesh:
+def cut_mesh(
+    mesh: SimplexMesh,
+    cuts: Sequence[Cut],
+    tip: TipRule = "inside",
+    opened: NDArray[np.bool_] | None = None,
+) -> VirtualMesh:
     """Cut a mesh.
 
     Parameters
@@ -269,19 +274,21 @@ def cut_mesh(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside") ->
         In any order; they may cross, branch, touch and run through nodes or along faces.
     tip : {"inside", "through", "nearest"}
         Treatment of elements in which a cut ends; see `verify.xfem.splitting.split.split_cells`.
+    opened : (m, cuts) bool array, optional
+        Cells that each cut has opened; the others are as whole as if it did not meet them.
 
     Raises
     ------
     XfemError
         If the cuts are no sequence, one is in another space than the mesh, a level set is not
-        finite, a depth is NaN, or the tip rule is unknown.
+        finite, a depth is NaN, the tip rule is unknown, or `opened` has a wrong shape.
 
     Notes
     -----
     A branch ends on the *realised* cut from which it leaves, which for a curved cut is off the
     given one by O(h²): let the branch start a little behind its stem.
     """
-    partition = split_cells(mesh, cuts, tip)
+    partition = split_cells(mesh, cuts, tip, opened=opened)
     fraction = partition.fraction
     solid = fraction > 0.0
     slots = join_slots(mesh, partition, solid)

@@ -121,7 +121,11 @@ class Partition:
 
 
 def split_cells(
-    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside", held: Held | None = None
+    mesh: SimplexMesh,
+    cuts: Sequence[Cut],
+    tip: TipRule = "inside",
+    held: Held | None = None,
+    opened: NDArray[np.bool_] | None = None,
 ) -> Partition:
     """Split every cell that a cut goes through; the others do not appear in the result.
 
@@ -138,22 +142,28 @@ def split_cells(
     held : callable, optional
         For a cut that grows: given the cells and labels of pieces that a cut meets but does not
         go through, and its number, tells which it shall split: those that it split before.
+    opened : (m, cuts) bool array, optional
+        Cells in which each cut may split anything; without it all.
 
     Raises
     ------
     XfemError
         If the cuts are no sequence, a level set is not finite, a depth is NaN, either has a wrong
-        shape, or the tip rule is unknown.
+        shape, the tip rule is unknown, or `opened` is of another mesh.
     """
     if tip not in get_args(TipRule):
         raise XfemError(f"tip rule '{tip}'; expected inside, through or nearest")
     if not isinstance(cuts, Sequence):
         raise XfemError(f"cuts of type {type(cuts).__name__}; expected a list of cuts")
+    if opened is not None and opened.shape != (len(mesh.cells), len(cuts)):
+        raise XfemError(
+            f"opened cells of shape {opened.shape}; expected ({len(mesh.cells)}, {len(cuts)})"
+        )
     values, snapped = _nodal_values(mesh, cuts)
     snap = ROUND_OFF * mesh.extent
     if len(cuts) == 1 and tip != "nearest":
         return _split_by_one(
-            mesh, cuts[0], ZeroPoints(mesh.points, values, snap), snapped, tip, held
+            mesh, cuts[0], ZeroPoints(mesh.points, values, snap), snapped, tip, held, opened
         )
     plus = values[mesh.cells] >= 0.0
     candidates = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
@@ -176,14 +186,20 @@ def split_cells(
     for _ in range(max(1, len(cuts))):
         before = len(partition.parent)
         for index, cut in enumerate(cuts):
-            partition = _split_by(partition, index, cut, sizes, tip, held)
+            partition = _split_by(partition, index, cut, sizes, tip, held, opened)
         if len(partition.parent) == before:
             break
     return _only_split(partition)
 
 
 def _split_by_one(
-    mesh: SimplexMesh, cut: Cut, points: ZeroPoints, snapped: int, tip: TipRule, held: Held | None
+    mesh: SimplexMesh,
+    cut: Cut,
+    points: ZeroPoints,
+    snapped: int,
+    tip: TipRule,
+    held: Held | None,
+    opened: NDArray[np.bool_] | None,
 ) -> Partition:
     """Do the same for a single cut: whole cells are divided, once, and nothing lies beside.
 
@@ -200,6 +216,8 @@ def _split_by_one(
         doubtful = np.flatnonzero(~active)
         label = np.zeros((len(doubtful), 1), dtype=np.int8)
         active[doubtful] = held(crossed[doubtful], label, 0)
+    if opened is not None:
+        active &= opened[crossed, 0]
     cells = crossed[active]
     whole, every, below = whole_simplices(cells, mesh.cells)
     stairs = staircase(mesh.dim + 1)
@@ -234,6 +252,7 @@ def _split_by(
     sizes: _Floats,
     tip: TipRule,
     held: Held | None,
+    opened: NDArray[np.bool_] | None,
 ) -> Partition:
     points = partition.points
     edges, piece = crossed_edges(
@@ -251,6 +270,8 @@ def _split_by(
     if held is not None:
         doubtful = np.flatnonzero((np.bincount(piece, minlength=len(active)) > 0) & ~active)
         active[doubtful] = held(partition.parent[doubtful], partition.label[doubtful], index)
+    if opened is not None:
+        active &= opened[partition.parent, index]
     if not active.any():
         return partition
     divided = _divide(partition, index, active)
