@@ -36,7 +36,7 @@ def judged_by(check: Any, solvers: Sequence[str]) -> list[str]:
     """
     if check.solver is not None:
         return [check.solver]
-    aside = {REFERENCE, check.to if check.check == "ratio" else REFERENCE}
+    aside = {REFERENCE, check.compared}
     return [name for name in solvers if name not in aside]
 
 
@@ -72,7 +72,7 @@ def applied_checks(
             yield AppliedCheck(check.model_copy(update={"solver": ""}), reason)
         for name in names:
             one = check.model_copy(update={"solver": name})
-            needed = [name, *([check.to] if check.check == "ratio" else [])]
+            needed = [name, *([check.compared] if check.compared else [])]
             if judge_only and name not in (*judge_only, REFERENCE):
                 yield AppliedCheck(one, f"this run judges only {', '.join(judge_only)}")
             elif missing := [other for other in needed if other not in asked]:
@@ -99,9 +99,13 @@ def limit_text(check: Any) -> str:
         case BoundCheck():
             return f"relative error ≤ {check.at_most:g}"
         case RatioCheck(at_most=float(most)):
-            return f"error ≤ {most:g} × that of {check.to}, on every level"
+            return f"error ≤ {most:g} × that of {_other(check)}, on every level"
         case RatioCheck():
-            return f"error ratio to {check.to} within 1 ± {check.within:g}, on every level"
+            return f"error ratio to {_other(check)} within 1 ± {check.within:g}, on every level"
         case ValueCheck():
             return f"{check.equals:.10g} ± {check.relative_tolerance:g} (relative)"
     raise TypeError(f"{check!r} is no acceptance check")
+
+
+def _other(check: RatioCheck) -> str:
+    return check.to if check.row is None else f"the row {check.row:g}"

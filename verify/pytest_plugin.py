@@ -114,7 +114,7 @@ class _Runs:
         from verify.runner import Options
         from verify.runner.reference_cache import cache_folder
 
-        named = {name for c in scene.acceptance for name in (c.solver, getattr(c, "to", c.solver))}
+        named = {name for c in scene.acceptance for name in (c.solver, c.compared)}
         # the default would run the conforming solver too, for the report that nobody reads here;
         # if more are named, the default takes them all and survives one that is not installed
         alone = ("xfem",) if named <= {"xfem", None} else ()
@@ -128,12 +128,14 @@ class _Runs:
         )
 
     def _run(self, source: str) -> "CaseResult":
-        from verify.runner import run_cases
+        from verify.runner import run_cases, select_cases
         from verify.scene import load_scene
 
         scene = load_scene(source)
         folder = self._root() / scene.name.replace("/", "__")
-        return run_cases([scene], folder, self._options(scene), _Silent(), "pytest").results[0]
+        with_rows = select_cases([source])  # of the family, that it is compared with
+        summary = run_cases(with_rows, folder, self._options(scene), _Silent(), "pytest")
+        return next(one for one in summary.results if one.case == scene.name)
 
     def _root(self) -> Path:
         if kept := self._config.getoption("verify_out"):
@@ -213,21 +215,28 @@ class CaseFile(pytest.File):
     def collect(self) -> Iterator["CheckItem"]:
         """Yield a test per acceptance check and solver."""
         from verify.errors import InputError
+        from verify.scene import load_scenes
 
         try:
-            names = self.config.stash[_RUNS].check_names(str(self.path))
+            labels = [one.row.label if one.row else "" for one in load_scenes(self.path)]
+            names = {r: self.config.stash[_RUNS].check_names(f"{self.path}{r}") for r in labels}
         except InputError as error:
             raise self.CollectError(str(error)) from None
-        for name in names:
-            yield CheckItem.from_parent(self, name=name)
+        for row, checks in names.items():
+            for check in checks:
+                yield CheckItem.from_parent(self, name=f"{check}{row}", row=row, check=check)
 
 
 class CheckItem(pytest.Item):
-    """An acceptance check of a case file, made of one solver."""
+    """An acceptance check of a row of a case file, made of one solver."""
+
+    def __init__(self, *, row: str, check: str, **given: Any) -> None:
+        super().__init__(**given)
+        self._row, self._check = row, check
 
     def runtest(self) -> None:
         """Run the case, if that is not done, and judge the check."""
-        _judge(self.config.stash[_RUNS], str(self.path), self.name)
+        _judge(self.config.stash[_RUNS], f"{self.path}{self._row}", self._check)
 
     def reportinfo(self) -> tuple[Path, None, str]:
         """Say which check of which file this is."""

@@ -316,6 +316,7 @@ class CaseResult:
     provenance: dict[str, Any] = field(default_factory=dict)
     notices: list[Notice] = field(default_factory=list)
     openings: list[OpeningProfile] = field(default_factory=list)
+    row: dict[str, Any] | None = None  # family, parameter and value, if the case has several rows
     schema: int = SCHEMA_VERSION
 
     @property

@@ -5,18 +5,25 @@ does, UNDECIDED otherwise: the reference is too imprecise to tell. ERROR if a so
 check needs is missing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
 from verify.applied_checks import applied_checks, limit_text, unjudged
-from verify.result import Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
+from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 from verify.study.energy_account import ACCOUNT
 from verify.study.error_history import ERROR_NAMES
 from verify.study.rates import ROUND_OFF
 
-__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval", "judge"]
+__all__ = [
+    "ERROR_METRICS",
+    "Interval",
+    "NotMeasuredError",
+    "error_interval",
+    "judge",
+    "judged_against_rows",
+]
 
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
 
@@ -86,6 +93,50 @@ def judge(
     return [_marked(scene, verdict) for verdict in verdicts]
 
 
+def judged_against_rows(
+    scene: Scene,
+    result: CaseResult,
+    rows: Mapping[float, CaseResult],
+    judge_only: Sequence[str] = (),
+) -> CaseResult:
+    """Judge the checks of a row that compare it with other rows of its family.
+
+    Parameters
+    ----------
+    scene : Scene
+    result : CaseResult
+        Of the scene; its verdicts on these checks are made anew.
+    rows : mapping of float to CaseResult
+        The rows that are known, by the value of the parameter.
+    judge_only : sequence of str
+        As of `judge`.
+    """
+    if not result.reference:  # its comparison failed, and its verdicts say so
+        return result
+    applied = applied_checks(scene.acceptance, result.solves, judge_only)
+    verdicts = []
+    for one, found in zip(applied, result.verdicts, strict=True):
+        check = one.check
+        if isinstance(check, RatioCheck) and check.row is not None and not one.not_judged:
+            found = _marked(scene, _against_row(check, result, rows))
+        verdicts.append(found)
+    return replace(result, verdicts=verdicts)
+
+
+def _against_row(
+    check: RatioCheck, result: CaseResult, rows: Mapping[float, CaseResult]
+) -> VerdictRecord:
+    assert check.row is not None
+    assert check.solver is not None
+    if check.row not in rows:
+        text = f"the row {check.row:g} is not part of this run"
+        return unjudged(check, Verdict.UNDECIDED, text)
+    try:
+        return _ratio(check, result.solves, rows[check.row].solves, check.solver)
+    except NotMeasuredError as problem:
+        return unjudged(check, Verdict.ERROR, str(problem))
+
+
 def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:
     """Enter the reason if the case lists this as a known finding; say if it is none any more."""
     for known in scene.known_findings:
@@ -145,9 +196,22 @@ def _judge_value(
 def _judge_ratio(
     check: RatioCheck, records: Sequence[SolveRecord], rates: Sequence[Rate]
 ) -> VerdictRecord:
-    ours, theirs = _levels(records, check.solver), _levels(records, check.to)
+    if check.row is not None:
+        text = "the row that it is compared with is judged after it"
+        return unjudged(check, Verdict.UNDECIDED, text)
+    return _ratio(check, records, records, check.to)
+
+
+def _ratio(
+    check: RatioCheck,
+    records: Sequence[SolveRecord],
+    others: Sequence[SolveRecord],
+    to: str,
+) -> VerdictRecord:
+    """Judge an error over that of the solver `to`, level by level."""
+    ours, theirs = _levels(records, check.solver), _levels(others, to)
     if [r.level for r in ours] != [r.level for r in theirs]:
-        raise NotMeasuredError(f"{check.solver} and {check.to} were not solved on the same levels")
+        raise NotMeasuredError(f"{check.solver} and {to} were not solved on the same levels")
     low, high = 0.0, check.at_most or 0.0
     if check.within is not None:
         low, high = 1 - check.within, 1 + check.within
@@ -164,7 +228,7 @@ def _judge_ratio(
         if b.low <= 0.0:
             text = (
                 f"level {one.level}: the uncertainty {b.half_width:.1e} is not below the error "
-                f"{b.value:.1e} of {check.to}"
+                f"{b.value:.1e} of {to}"
             )
             return _record(check, Verdict.UNDECIDED, None, limit_text(check), text)
         found.append((one.level, Interval(a.value / b.value, a.low / b.high, a.high / b.low)))

@@ -7,7 +7,7 @@ import sys
 from verify.errors import InputError
 from verify.printable import one_line
 from verify.runner.checking import check_scene
-from verify.scene import load_scene
+from verify.scene import load_scenes
 
 __all__ = ["execute"]
 
@@ -28,8 +28,10 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def _row(file: str) -> dict[str, str | None]:
     try:
-        scene = load_scene(file)
-        check_scene(scene)
+        scenes = load_scenes(file)
+        for scene in scenes:
+            check_scene(scene)
     except InputError as error:
         return {"file": file, "title": None, "error": one_line(error)}
-    return {"file": file, "title": scene.title, "error": None}
+    rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
+    return {"file": file, "title": f"{scenes[0].title}{rows}", "error": None}

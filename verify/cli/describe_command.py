@@ -72,10 +72,14 @@ def _demand(check: Any) -> str:
         case "rate":
             return f"order of {what} is at least {check.at_least:g}"
         case "ratio" if check.within is not None:
-            return f"{what} over that of {check.to} is 1 within {check.within:g} on every mesh"
+            return f"{what} over {_other(check)} is 1 within {check.within:g} on every mesh"
         case "ratio":
-            return f"{what} over that of {check.to} is at most {check.at_most:g} on every mesh"
+            return f"{what} over {_other(check)} is at most {check.at_most:g} on every mesh"
     return _keys(check)
+
+
+def _other(check: Any) -> str:
+    return f"that of {check.to if check.row is None else f'the row {check.row:g}'}"
 
 
 def _keys(part: Any, *without: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.runner.selection import parse_expression
-from verify.scene import list_cases, load_scene
+from verify.scene import list_cases, load_scenes
 
 __all__ = ["execute"]
 
@@ -32,22 +32,23 @@ def _cases(expression: str | None) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for name, path in list_cases().items():
         try:
-            scene = load_scene(path)
+            scenes = load_scenes(path)
         except InputError as error:
             rows.append({"name": name, "title": f"BROKEN: {error}", "tags": []})
             continue
-        if wanted is None or wanted(scene):
-            rows.append(
-                {
-                    "name": name,
-                    "title": scene.title,
-                    "requirement": scene.requirement,
-                    "tags": scene.tags,
-                    "levels": scene.mesh.count,
-                    "dimension": scene.dimension,
-                    "file": str(path),
-                }
-            )
+        rows += [
+            {
+                "name": scene.name,
+                "title": scene.title,
+                "requirement": scene.requirement,
+                "tags": scene.tags,
+                "levels": scene.mesh.count,
+                "dimension": scene.dimension,
+                "file": str(path),
+            }
+            for scene in scenes
+            if wanted is None or wanted(scene)
+        ]
     return rows
 
 

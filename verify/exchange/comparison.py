@@ -139,13 +139,13 @@ def _judged_scene(scene: Scene, judged_as: str | None, names: list[str]) -> Scen
 def _with_acceptance(scene: Scene, checks: list[Any]) -> Scene:
     known = [known for known in scene.known_findings if any(map(known.concerns, checks))]
     changed = scene.model_copy(update={"acceptance": checks, "known_findings": known})
-    changed._name, changed._file = scene.name, scene.file
+    changed._name, changed._file, changed._row = scene.name, scene.file, scene.row
     return changed
 
 
 def _beside(judged: Scene, options: Options, names: list[str]) -> tuple[str, ...]:
     """Names of the solvers that have to run beside the answers."""
-    compared = [check.to for check in judged.acceptance if check.check == "ratio"]
+    compared = [check.compared for check in judged.acceptance if check.compared]
     reference = [] if judged.judged_by_exact else ["reference"]
     wanted = [*options.solvers, *compared, *reference]
     return tuple(dict.fromkeys(solver for solver in wanted if solver not in names))

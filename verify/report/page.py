@@ -4,6 +4,7 @@ from importlib.resources import files
 
 from verify.printable import words_of
 from verify.report.case_section import case_section, failed_section
+from verify.report.family_section import family_section
 from verify.report.markup import Markup, joined, tag
 from verify.report.origin import origin_section, reading_guide
 from verify.report.pictures import CasePictures
@@ -64,6 +65,7 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
         [tag("p", "Note: " + note, class_="warning") for note in notes],
         verdict_table(run),
         which,
+        _families(run),
         sections,
         reading_guide(),
         origin_section(run),
@@ -72,6 +74,14 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
     script = turntable_script() if turned else None
     whole = tag("html", head, tag("body", top, body, script), lang="en")
     return joined(Markup("<!DOCTYPE html>\n"), whole)
+
+
+def _families(run: Run) -> Markup | None:
+    try:
+        return family_section(run)
+    except Exception as error:
+        text = f"The families of scenes cannot be shown: {words_of(error)}."
+        return tag("p", text, class_="warning")
 
 
 def _section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup:

@@ -31,7 +31,7 @@ def check_scene(scene: Scene) -> None:
         if isinstance(asked, StressIntensityQuantity) and (reason := _missing(scene, asked)):
             raise InputError(f"quantities[{i}] ('{asked.name}'): {reason}", where)
     for i, check in enumerate(scene.acceptance):
-        for name in (check.solver, *([check.to] if check.check == "ratio" else [])):
+        for name in (check.solver, check.compared):
             if name is not None:
                 check_solver_name(name, f"{where}: acceptance[{i}]")
 

@@ -43,7 +43,7 @@ class CasePlan:
 def solvers_of(scene: Scene, options: Options) -> list[str]:
     """Return the names of the solvers that a run of `scene` takes, the reference last."""
     named = [check.solver for check in scene.acceptance if check.solver is not None]
-    named += [check.to for check in scene.acceptance if check.check == "ratio"]
+    named += [check.compared for check in scene.acceptance if check.compared]
     names = list(dict.fromkeys(options.solvers or ("xfem", "conforming", *named)))
     if options.judged and not scene.judged_by_exact and REFERENCE not in names:
         names.append(REFERENCE)

@@ -11,7 +11,7 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line
 from verify.provenance import provenance
-from verify.result import CaseResult, SolveRecord, Status
+from verify.result import CaseResult, SolveRecord, Status, write_result
 from verify.runner.checking import check_scene
 from verify.runner.child import POLL_SECONDS, Ending
 from verify.runner.cluster import ClusterEngine
@@ -19,6 +19,7 @@ from verify.runner.comparing import Comparison, stored_result
 from verify.runner.deepening import further_level, take_up_known_levels
 from verify.runner.directory import RunDirectory, claimed, emptied, write_run
 from verify.runner.engine import Engine, LocalEngine, Running
+from verify.runner.families import Families
 from verify.runner.fingerprint import code_of_comparison, digest_of
 from verify.runner.interruption import StopRequest, listening
 from verify.runner.job import Job, load_record, store_record, stored_record
@@ -147,6 +148,7 @@ class _Work:
         self.running: dict[Running, Job] = {}
         self.comparing: list[Comparison] = []
         self.results: dict[str, CaseResult] = {}
+        self.families = Families((plan.scene for plan in plans), options.judge_only)
         self.records: dict[Path, bytes] = {}  # as they were written
         self.again: set[Path] = set()
         side_by_side = max(1, min(options.jobs, len(self.waiting)))
@@ -347,8 +349,12 @@ class _Work:
             self.waiting.insert(0, job)
             self.open[result.case] += 1
             return
-        self.results[result.case] = result
-        self.progress.judged(result)
+        for done in self.families.ready(result):
+            folder = self.directory.case_folder(done.case)
+            if done is not result:
+                write_result(done, folder / "result.json")
+            self.results[done.case] = done
+            self.progress.judged(done)
 
 
 def _now() -> str:

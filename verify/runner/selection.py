@@ -5,7 +5,8 @@ from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
 
 from verify.errors import InputError
-from verify.scene import Scene, list_cases, load_scene
+from verify.scene import RatioCheck, Scene, list_cases, load_scenes
+from verify.scene.family import row_asked
 
 __all__ = ["parse_expression", "select_cases"]
 
@@ -21,7 +22,9 @@ def select_cases(
     Parameters
     ----------
     names : sequence of str
-        Names of cases, patterns (``statics/*``) or paths of case files; none: all cases.
+        Names of cases, patterns (``statics/*``) or paths of case files; none: all cases. A row of
+        a case with a parameter is ``slivers/plane[epsilon=0.01]``; with it comes the row that it
+        is compared with.
     expression : str, optional
         Words with and, or, not and parentheses; a word is looked for in name, title and tags.
     weight : {"quick", "normal", "heavy"}
@@ -41,19 +44,31 @@ def select_cases(
     wanted = parse_expression(expression) if expression is not None else None
     chosen: dict[str, Scene] = {}
     for source, is_named in _sources(names).items():
-        scene = load_scene(source)
-        heavy_enough = is_named or _of_weight(scene, weight)
-        if not heavy_enough or (wanted is not None and not wanted(scene)):
-            continue
-        if scene.played_only and not is_named:
-            continue  # for `verify play`; every solver would refuse it
-        twin = chosen.setdefault(scene.name, scene)
-        if twin.file != scene.file:
-            raise InputError(
-                f"another case is called '{scene.name}' too ({twin.file}); rename one",
-                str(scene.file),
-            )
+        named = load_scenes(source)
+        row = row_asked(source)
+        rows = load_scenes(row[0]) if row else named
+        asked = [
+            scene
+            for scene in named
+            if (is_named or (_of_weight(scene, weight) and not scene.played_only))
+            and (wanted is None or wanted(scene))
+        ]  # what is for `verify play` every solver would refuse
+        for scene in _with_rows_compared(asked, rows):
+            twin = chosen.setdefault(scene.name, scene)
+            if twin.file != scene.file:
+                raise InputError(
+                    f"another case is called '{scene.name}' too ({twin.file}); rename one",
+                    str(scene.file),
+                )
     return list(chosen.values())
+
+
+def _with_rows_compared(asked: list[Scene], rows: list[Scene]) -> list[Scene]:
+    """Add the rows with which those that are asked are compared, in the order of the case."""
+    checks = [c for scene in asked for c in scene.acceptance if isinstance(c, RatioCheck)]
+    wanted = {check.row for check in checks if check.row is not None}
+    names = {scene.name for scene in asked}
+    return [s for s in rows if s.name in names or (s.row is not None and s.row.value in wanted)]
 
 
 def parse_expression(text: str) -> Predicate:
@@ -125,7 +140,8 @@ def _sources(names: Sequence[str]) -> dict[str, bool]:
     known = list_cases()
     sources: dict[str, bool] = {}
     for name in names:
-        if any(mark in name for mark in "*?[") and not name.endswith(".toml"):
+        pattern = any(mark in name for mark in "*?[") and not name.endswith(".toml")
+        if pattern and row_asked(name) is None:
             found = [case for case in known if fnmatchcase(case, name)]
             if not found:
                 raise InputError(f"no case matches '{name}'; `verify list` shows them all")

@@ -1,6 +1,7 @@
 """The result of a case that could not be compared: its solves, and an ERROR per check."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -47,4 +48,5 @@ def unjudged_result(
             for applied in applied_checks(scene.acceptance, solves, judge_only)
         ],
         provenance=provenance,
+        row=asdict(scene.row) if scene.row else None,
     )

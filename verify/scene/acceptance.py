@@ -160,6 +160,11 @@ class _Check(Strict):
         "or the name of a quantity"
     )
 
+    @property
+    def compared(self) -> str | None:
+        """The other solver that the check needs, if it needs one."""
+        return None
+
 
 class RateCheck(_Check):
     """The observed order of an error over the mesh levels."""
@@ -188,11 +193,16 @@ class BoundCheck(_Check):
 class RatioCheck(_Check):
     """The error over another solver's at equal mesh size, on every level.
 
-    Without a `solver` it is asked of all but the one compared with.
+    Without a `solver` it is asked of all but the one compared with. In a case with a parameter it
+    may be the error over the same solver's in another `row`.
     """
 
     check: Literal["ratio"]
     to: str = Field(default="conforming", description="the solver compared with")
+    row: Finite | None = Field(
+        default=None,
+        description="value of the case's parameter in the row compared with, instead of a solver",
+    )
     at_most: Positive | None = None
     within: Positive | None = Field(default=None, description="|ratio − 1| must not exceed it")
 
@@ -200,7 +210,14 @@ class RatioCheck(_Check):
     def _one_form(self) -> "RatioCheck":
         if (self.at_most is None) == (self.within is None):
             raise ValueError("a ratio check has either at_most or within")
+        if self.row is not None and self.to != "conforming":
+            raise ValueError("a ratio check is either to a solver or to a row")
         return self
+
+    @property
+    def compared(self) -> str | None:
+        """The other solver, unless the error is over that of another row."""
+        return self.to if self.row is None else None
 
 
 class ValueCheck(_Check):
@@ -228,5 +245,4 @@ class KnownFinding(Strict):
     def concerns(self, check: "RateCheck | BoundCheck | RatioCheck | ValueCheck") -> bool:
         """Whether `check` is the one that fails and is made of the solver."""
         same = (check.check, check.metric) == (self.check, self.metric)
-        compared = check.to if isinstance(check, RatioCheck) else None
-        return same and check.solver in (None, self.solver) and compared != self.solver
+        return same and check.solver in (None, self.solver) and check.compared != self.solver

@@ -5,6 +5,8 @@ import json
 import re
 import tomllib
 import warnings
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ from pydantic import ValidationError
 from verify.errors import InputError
 from verify.json_files import deeper_than
 from verify.printable import one_line, words_of
+from verify.scene.acceptance import RatioCheck
+from verify.scene.family import Row, expand_rows, row_asked, rows_schema
 from verify.scene.geometry import MeshFile
 from verify.scene.messages import first_fault
 from verify.scene.nearest import nearest
@@ -24,6 +28,7 @@ __all__ = [
     "case_folder",
     "list_cases",
     "load_scene",
+    "load_scenes",
     "mesh_path",
     "restore_scene",
     "scene_content",
@@ -55,12 +60,13 @@ def list_cases(folder: Path | None = None) -> dict[str, Path]:
 
 
 def load_scene(source: str | Path) -> Scene:
-    """Read a scene from a case file, or by the name of a case that comes with the project.
+    """Read one scene from a case file, or by the name of a case that comes with the project.
 
     Parameters
     ----------
     source : str or Path
-        A path that ends in ``.toml``, or a name as `list_cases` gives it.
+        A path that ends in ``.toml``, or a name as `list_cases` gives it; of a case with
+        parameters with the value of the row that is meant: ``slivers/plane[epsilon=0.01]``.
 
     Returns
     -------
@@ -69,9 +75,33 @@ def load_scene(source: str | Path) -> Scene:
     Raises
     ------
     InputError
+        With file, key and what was expected there, if anything is wrong; or if the case has
+        several rows and none is named.
+    """
+    scenes = load_scenes(source)
+    if len(scenes) > 1:
+        rows = f"it has {len(scenes)} rows; name one, e.g. '{source}{_label(scenes[0])}'"
+        raise InputError(rows, str(source))
+    return scenes[0]
+
+
+def load_scenes(source: str | Path) -> list[Scene]:
+    """Read a case: one scene, or one for each value of its parameter.
+
+    Parameters
+    ----------
+    source : str or Path
+        As of `load_scene`.
+
+    Raises
+    ------
+    InputError
         With file, key and what was expected there, if anything is wrong.
     """
     text = str(source)
+    asked = row_asked(text)
+    if asked is not None:
+        text = asked[0]
     path = Path(text)
     name = path.stem
     if path.suffix != ".toml":
@@ -84,18 +114,72 @@ def load_scene(source: str | Path) -> Scene:
     if file.is_relative_to(cases):
         name = file.relative_to(cases).with_suffix("").as_posix()
     try:
+        rows = expand_rows(content, name)
+    except InputError as error:
+        raise InputError(str(error), str(path)) from None
+    known = [row for row, _ in rows]
+    if asked is not None:
+        rows = [_the_row(rows, asked, str(path))]
+    scenes = [_scene(row, one, file, name, path) for row, one in rows]
+    for scene in scenes:
+        _check_row(scene, known, f"{path}{scene.row.label if scene.row else ''}")
+    return scenes
+
+
+def _check_row(scene: Scene, known: Sequence[Row | None], where: str) -> None:
+    """Raise InputError if a check compares with a row that there is not, or with itself."""
+    values = [row.value for row in known if row is not None]
+    own = None if scene.row is None else scene.row.value
+    for i, check in enumerate(scene.acceptance):
+        row = check.row if isinstance(check, RatioCheck) else None
+        if row is None:
+            continue
+        if row not in values:
+            listed = ", ".join(f"{value:g}" for value in values) or "no rows: no [parameters]"
+            raise InputError(f"acceptance[{i}].row: no row {row:g}; the case has {listed}", where)
+        if row == own:
+            text = f"the row {row:g} is compared with itself; a `when` leaves it out"
+            raise InputError(f"acceptance[{i}].row: {text}", where)
+
+
+def _scene(row: Row | None, content: dict[str, Any], file: Path, name: str, path: Path) -> Scene:
+    """Validate one row of a case."""
+    where = f"{path}{row.label if row else ''}"
+    try:
         with warnings.catch_warnings():  # of numpy, about numbers that the error is about
             warnings.simplefilter("ignore")
             scene = Scene.model_validate(content)
     except ValidationError as error:
-        raise InputError(first_fault(error, content, scene_schema()), str(path)) from None
+        raise InputError(first_fault(error, content, scene_schema()), where) from None
     except (ArithmeticError, MemoryError, RecursionError, np.linalg.LinAlgError) as error:
         text = f"its numbers cannot be computed with ({words_of(error)})"
-        raise InputError(text, str(path)) from None
-    scene._file, scene._name = file, name
+        raise InputError(text, where) from None
+    scene._file, scene._name, scene._row = file, f"{name}{row.label if row else ''}", row
     if isinstance(scene.geometry, MeshFile) and not mesh_path(scene).is_file():
-        raise InputError(f"geometry.file: no mesh file '{scene.geometry.file}'", str(path))
+        raise InputError(f"geometry.file: no mesh file '{scene.geometry.file}'", where)
     return scene
+
+
+def _label(scene: Scene) -> str:
+    return scene.row.label if scene.row else ""
+
+
+def _the_row(
+    rows: list[tuple[Row | None, dict[str, Any]]], asked: tuple[str, str, str], where: str
+) -> tuple[Row | None, dict[str, Any]]:
+    """Find the row that is named, by the number that its value is."""
+    _, parameter, text = asked
+    known = [row.label for row, _ in rows if row is not None]
+    if not known:
+        raise InputError(f"has no parameters, and so no row '[{parameter}={text}]'", where)
+    try:
+        wanted = f"[{parameter}={float(text):.12g}]"
+    except ValueError:
+        wanted = f"[{parameter}={text}]"
+    for row, content in rows:
+        if row is not None and row.label == wanted:
+            return row, content
+    raise InputError(f"no row '{wanted}'; it has {', '.join(known)}", where)
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -124,6 +208,7 @@ def scene_content(scene: Scene) -> dict[str, Any]:
     return {
         "name": scene.name,
         "file": str(scene.file) if scene.file else None,
+        "row": asdict(scene.row) if scene.row else None,
         "scene": scene.model_dump(mode="json", by_alias=True),
     }
 
@@ -133,6 +218,7 @@ def restore_scene(content: dict[str, Any]) -> Scene:
     scene = Scene.model_validate(content["scene"])
     scene._name = content["name"]
     scene._file = Path(content["file"]) if content["file"] else None
+    scene._row = Row(**content["row"]) if content.get("row") else None
     return scene
 
 
@@ -158,4 +244,6 @@ def scene_hash(scene: Scene) -> str:
 
 def scene_schema() -> dict[str, Any]:
     """JSON Schema of a case file, for editors."""
-    return Scene.model_json_schema(by_alias=True)
+    schema = Scene.model_json_schema(by_alias=True)
+    schema["properties"]["parameters"] = rows_schema()
+    return schema

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["Expression", "Region", "parse_expression", "parse_region"]
+__all__ = ["RESERVED_NAMES", "Expression", "Region", "parse_expression", "parse_region"]
 
 Array = NDArray[np.float64]
 Region = Callable[[Array], NDArray[np.bool_]]
@@ -36,6 +36,8 @@ _COMPARISONS = {
     ast.GtE: operator.ge,
 }
 _FUNCTIONS = {"abs": np.abs, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "hypot": np.hypot}
+#: names that mean something in a formula
+RESERVED_NAMES = {*_COORDINATES, *_FUNCTIONS, "t", "pi", "and", "or", "not"}
 _MEANING = (
     "an inequality in x, y, z such as 'x < 0.01 and y > 0.5' "
     "(comparisons < <= > >=, and/or/not, + - * / **, abs sqrt sin cos hypot, pi)"

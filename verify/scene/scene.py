@@ -8,6 +8,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from verify.scene.acceptance import Acceptance, KnownFinding, Quantity, StrainEnergyQuantity
 from verify.scene.contact import Contact
 from verify.scene.cuts import Cut, whole_cut
+from verify.scene.family import Row
 from verify.scene.geometry import Geometry, MeshFile
 from verify.scene.initial import AtRest, Initial
 from verify.scene.mesh import MeshLevels, ReferenceLevels
@@ -57,6 +58,7 @@ class Scene(Strict):
     # where it was read from; set by `load_scene`
     _file: Path | None = PrivateAttr(default=None)
     _name: str = PrivateAttr(default="scene")
+    _row: Row | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "Scene":
@@ -66,8 +68,16 @@ class Scene(Strict):
 
     @property
     def name(self) -> str:
-        """Name of the case: its path below the case folder, e.g. ``statics/f1_patch``."""
+        """Name of the case: its path below the case folder, e.g. ``statics/f1_patch``.
+
+        Of a row of a family with the value: ``slivers/plane[epsilon=0.01]``.
+        """
         return self._name
+
+    @property
+    def row(self) -> Row | None:
+        """Which row of its family it is; None for a case without parameters."""
+        return self._row
 
     @property
     def file(self) -> Path | None:

@@ -5,7 +5,7 @@ A pure function of the scene and the stored solutions: it solves nothing and wri
 
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -121,6 +121,7 @@ def assess_accuracy(
         rates=rates,
         verdicts=judge(scene, measured, rates, judge_only),
         notices=unavailable_quantities(scene, measured),
+        row=asdict(scene.row) if scene.row else None,
     )
 
 
