@@ -31,7 +31,7 @@ def _family(name: str, results: list[CaseResult]) -> Markup:
     assert rows[0].row is not None
     parameter = rows[0].row["parameter"]
     metrics = list(dict.fromkeys(metric for row in rows for metric in metric_names(row)))
-    parts = []
+    parts: list[Markup | None] = []
     for metric in metrics:
         found = {_value(row): _finest(row, metric) for row in rows}
         solvers = list(dict.fromkeys(label for one in found.values() for label in one))

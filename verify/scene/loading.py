@@ -117,12 +117,12 @@ def load_scenes(source: str | Path) -> list[Scene]:
         rows = expand_rows(content, name)
     except InputError as error:
         raise InputError(str(error), str(path)) from None
-    known = [row for row, _ in rows]
+    listed = [row for row, _ in rows]
     if asked is not None:
         rows = [_the_row(rows, asked, str(path))]
     scenes = [_scene(row, one, file, name, path) for row, one in rows]
     for scene in scenes:
-        _check_row(scene, known, f"{path}{scene.row.label if scene.row else ''}")
+        _check_row(scene, listed, f"{path}{scene.row.label if scene.row else ''}")
     return scenes
 
 
