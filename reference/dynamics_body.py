@@ -23,20 +23,32 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Held:
-    """Nodes and components that a support holds, and their values where they are exact."""
+    """Nodes and components that a support holds, and the exact field where that holds them."""
 
     support: Support
     place: tuple[NDArray[np.int64], NDArray[np.int64]]
     points: Array
-    exact: Array | None
+    near: Array
+    exact: Any
 
-    def values(self, factor: float) -> Array:
-        if self.exact is not None:
-            return factor * self.exact
-        return self.support.values(self.points, factor)
+    def values(self, factor: float, time: float) -> Array:
+        if self.exact is None:
+            return self.support.values(self.points, factor, time)
+        return factor * self._own(self.exact.at(time).displacement(self.points, self.near))
 
-    def rates(self, factor: float) -> Array:
-        return self.exact if self.exact is not None else self.support.rates(self.points, factor)
+    def velocities(self, time: float) -> Array:
+        factor = factor_at(self.support.history, time)
+        slope = slope_at(self.support.history, time)
+        if self.exact is None:
+            return self.support.velocities(self.points, factor, slope, time)
+        field = self.exact.at(time)
+        speed = factor * field.velocity(self.points, self.near)
+        if slope:
+            speed = speed + slope * field.displacement(self.points, self.near)
+        return self._own(speed)
+
+    def _own(self, values: Array) -> Array:
+        return np.asarray(values[:, list(self.support.held(values.shape[1]))])
 
 
 class MovingBody:
@@ -87,10 +99,13 @@ class MovingBody:
             self.inertia = assembled_matrix(mass_form(scene.material, *pair))
         self.weight = np.zeros(space.node_points.size)
         self._driven: list[tuple[Array, Any]] = []
+        self._timed: list[Any] = []  # loads that are another field at every time
         for load in scene.loads:
-            forces = nodal_forces(self._load_form(load, ufl.TestFunction(V)), space)
+            forces = self._forces(load)
             if isinstance(load, Gravity):
                 self.weight += forces
+            elif load.timed or (load.exact and exact.moves):
+                self._timed.append(load)
             else:
                 self._driven.append((forces, load.history))
         self._supports = self._found()
@@ -104,15 +119,16 @@ class MovingBody:
         total = self.weight.copy()
         for forces, history in self._driven:
             total += factor_at(history, time) * forces
+        for load in self._timed:
+            total += factor_at(load.history, time) * self._forces(load, time)
         return total
 
     def prescribed(self, time: float) -> tuple[Array, Array]:
         """Displacements and velocities (h,) of what is held, m and m/s."""
         values, rates = [], []
         for one in self._supports:
-            factor = factor_at(one.support.history, time)
-            values.append(one.values(factor))
-            rates.append(slope_at(one.support.history, time) * one.rates(factor))
+            values.append(one.values(factor_at(one.support.history, time), time))
+            rates.append(one.velocities(time))
         return self._filled(values), self._filled(rates)
 
     def equilibrium(self) -> Array:
@@ -132,7 +148,7 @@ class MovingBody:
 
         def prescribed(share: float) -> Array:
             pairs = zip(self._supports, factors, strict=True)
-            return self._filled([one.values(share * factor) for one, factor in pairs])
+            return self._filled([one.values(share * factor, 0.0) for one, factor in pairs])
 
         found = solve_large_strain(
             self.scene.material, self.space, self.held, prescribed, self._first_loads
@@ -147,9 +163,11 @@ class MovingBody:
         load = self.weight.copy()
         for forces, history in self._driven:
             load += first_factor(history) * forces
+        for timed in self._timed:
+            load += first_factor(timed.history) * self._forces(timed)
         u = np.zeros_like(load)
         pairs = zip(self._supports, factors, strict=True)
-        u[self.held] = self._filled([one.values(factor) for one, factor in pairs])
+        u[self.held] = self._filled([one.values(factor, 0.0) for one, factor in pairs])
         left = load - self.law.force(u)
         return u + self._solved(self.law.tangent(u), self.law.unknowns, "symmetric", left)
 
@@ -175,10 +193,17 @@ class MovingBody:
             form += first_factor(getattr(load, "history", None)) * self._load_form(load, v)
         return form
 
-    def _load_form(self, load: Any, v: Any) -> Any:
+    def _forces(self, load: Any, time: float = 0.0) -> Array:
+        """Nodal forces (k,) of a load at a time, N, without the factor of its history."""
+        import ufl
+
+        v = ufl.TestFunction(self.space.function_space)
+        return nodal_forces(self._load_form(load, v, time), self.space)
+
+    def _load_form(self, load: Any, v: Any, time: float = 0.0) -> Any:
         alone = self.scene.model_copy(update={"loads": [load] if load is not None else []})
         alone._file, alone._name = self.scene.file, self.scene.name
-        return load_form(alone, self.space, v, self.exact)
+        return load_form(alone, self.space, v, self.exact, time)
 
     def _found(self) -> list[_Held]:
         """Find what each support holds."""
@@ -189,12 +214,10 @@ class MovingBody:
         for i, support in enumerate(self.scene.supports):
             chosen = on_part(self.scene, support.where, points, f"supports[{i}].where")
             held = list(support.held(space.dimension))
-            exact = None
-            if support.displacement == "exact":
-                near = space.centroids[owner[chosen]]
-                exact = self.exact.displacement(points[chosen], near)[:, held]
+            exact = self.exact if support.displacement == "exact" else None
             place: Any = np.ix_(nodes[chosen], held)
-            found.append(_Held(support, place, points[chosen], exact))
+            near = space.centroids[owner[chosen]]
+            found.append(_Held(support, place, points[chosen], near, exact))
         return found
 
     def _filled(self, values: list[Array]) -> Array:

@@ -193,11 +193,12 @@ def mass_form(material: Material, u: Any, v: Any, where: str = "") -> Any:
     return density * ufl.inner(u, v) * ufl.dx
 
 
-def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
-    """Sum up the linear form of all loads of a scene for the test function `v`."""
+def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: float = 0.0) -> Any:
+    """Sum up the linear form of all loads of a scene at a time for the test function `v`."""
     import ufl
     from dolfinx import fem
 
+    exact = None if exact is None else exact.at(time)
     domain = space.function_space.mesh
     form = ufl.inner(fem.Constant(domain, np.zeros(space.dimension)), v) * ufl.dx
     thickness = scene.material.thickness or 1.0  # loads of a membrane are per volume and area too
@@ -217,25 +218,26 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any) -> Any:
             force = (
                 _sided_function(space, exact.body_force, (space.dimension,))
                 if load.force == "exact"
-                else thickness * _density(space, load, load.force)
+                else thickness * _density(space, load, load.force, time)
             )
             form += ufl.inner(force, v) * ufl.dx
         elif load.traction == "exact":
             stress = _sided_function(space, exact.stress, (space.dimension,) * 2)
             form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
         else:
-            traction = thickness * _density(space, load, load.traction)
+            traction = thickness * _density(space, load, load.traction, time)
             form += ufl.inner(traction, v) * ds(i)
     return form
 
 
-def _density(space: ConformingSpace, load: BodyForce | Traction, given: Any) -> Any:
+def _density(space: ConformingSpace, load: BodyForce | Traction, given: Any, time: float) -> Any:
     """Give a force per volume or area as a constant, or interpolated if it is a formula."""
     from dolfinx import fem
 
     if is_uniform(given):
         return fem.Constant(space.function_space.mesh, np.asarray(given, dtype=float))
-    return _sided_function(space, lambda points, _near: load.values(points), (space.dimension,))
+    values = lambda points, _near: load.values(points, time)  # noqa: E731
+    return _sided_function(space, values, (space.dimension,))
 
 
 def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> NDArray[np.int32]:

@@ -132,6 +132,12 @@ class ConformingSpace(SharedUnknowns):
         found, first = np.unique(nodes, return_index=True)
         return found, np.repeat(cell, nodes.shape[1])[first]
 
+    def beside_nodes(self) -> NDArray[np.float64]:
+        """Centroid (n, d) of a cell of each node, m: on which side of a cut the node is."""
+        beside = np.empty_like(self.node_points)
+        beside[self.cell_nodes] = self.centroids[:, None]
+        return beside
+
     @property
     def owned(self) -> int:
         """Number of (vector) unknowns that this rank owns."""

@@ -7,6 +7,7 @@ from typing import Any
 from reference.exact.airy import Airy
 from reference.exact.arc_crack import ArcCrack
 from reference.exact.bending import Bending
+from reference.exact.blade_strip import BladeStrip
 from reference.exact.circular_cut import CircularCut
 from reference.exact.crack_tip import CrackTip
 from reference.exact.griffith import Griffith
@@ -78,8 +79,13 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         Penny,
         "3D: penny-shaped crack in infinite space under tension: centre, normal, a, tension",
     ),
+    "blade_strip": (
+        BladeStrip,
+        "3D, moving: mode III crack that advances through a strip gripped at ±grip: half_width, "
+        "grip, speed, tip at the time 0, angle of its way in the x-y plane",
+    ),
 }
-_IN_SPACE = ("linear", "solid_patch", "solid_smooth", "spherical_cut", "penny")
+_IN_SPACE = ("linear", "solid_patch", "solid_smooth", "spherical_cut", "penny", "blade_strip")
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 
 

@@ -1,6 +1,7 @@
 """A displacement field known at every point, with what it takes to integrate it exactly."""
 
 from abc import ABC, abstractmethod
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,17 @@ class ExactField(ABC):
     close to `points`: a point on the cut, or off it by round-off, belongs to the side on which
     its `near` lies. Without `near` a point on the cut belongs to the positive (left) side.
 
+    A field that moves says so (`moves`), gives itself at another time (`at`) and has velocities;
+    as it is made it is the field at the time 0. It solves the equations of motion: its
+    `body_force` balances stress and inertia.
+
     Parameters
     ----------
     law : Hooke
     """
 
     has_body_force: bool = False
+    moves: bool = False
 
     def __init__(self, law: Hooke) -> None:
         self.law = law
@@ -45,6 +51,10 @@ class ExactField(ABC):
         """In space: point and normal of the plane across which the field jumps, if it does."""
         return None
 
+    def at(self, time: float) -> Self:
+        """Return the field at a time, s: itself, if it stands still."""
+        return self
+
     @abstractmethod
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Displacement (n, d), m."""
@@ -52,6 +62,10 @@ class ExactField(ABC):
     @abstractmethod
     def gradient(self, points: Array, near: Array | None = None) -> Array:
         """Displacement gradient (n, d, d): entry i, j is ∂u_i/∂x_j."""
+
+    def velocity(self, points: Array, near: Array | None = None) -> Array:
+        """Velocity (n, d), m/s: zero, if it stands still."""
+        return np.zeros_like(points, dtype=float)
 
     def body_force(self, points: Array, near: Array | None = None) -> Array:
         """Force per volume (n, d), N/m³, that keeps the field in equilibrium."""

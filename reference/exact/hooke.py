@@ -24,11 +24,14 @@ class Hooke:
     shear : float
         Shear modulus μ, Pa.
     dimension : {2, 3}
+    density : float, optional
+        kg/m³; what moves needs it.
     """
 
     lame: float
     shear: float
     dimension: int
+    density: float | None = None
 
     @property
     def eta(self) -> float:
@@ -62,4 +65,4 @@ def hooke(material: Material) -> Hooke:
     lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
     if material.plane == "stress":
         lame = young * poisson / (1 - poisson**2)
-    return Hooke(lame, shear, 3 if material.plane is None else 2)
+    return Hooke(lame, shear, 3 if material.plane is None else 2, material.density)

@@ -40,7 +40,8 @@ def points():
 
 
 def test_every_solution_in_space_is_checked_here():
-    assert set(SOLUTIONS) == {n for n, t in exact_solution_names().items() if t.startswith("3D")}
+    # one that moves is in test_blade_strip.py
+    assert set(SOLUTIONS) == {n for n, t in exact_solution_names().items() if t.startswith("3D:")}
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.0, 0.49])

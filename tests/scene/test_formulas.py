@@ -74,4 +74,58 @@ def test_a_support_moves_by_its_formula_times_the_factor_of_its_history():
     support = Scene.model_validate(content()).supports[0]
     points = np.array([[0.0, 0.5], [0.0, 1.0]])
     np.testing.assert_allclose(support.values(points, 0.5), [[0.025, 0], [0.05, 0]], atol=1e-17)
-    np.testing.assert_allclose(support.rates(points), [[0.05, 0], [0.1, 0]], atol=1e-17)
+    rates = support.velocities(points, 0.5, 2.0, 0.0)
+    np.testing.assert_allclose(rates, [[0.1, 0], [0.2, 0]], atol=1e-17)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x*sin(3*t) + y", "sqrt(1 + t*x**2)", "hypot(x, 2*t)", "abs(x - t)", "(1 + t)**(x + t)",
+        "x/(2 + t*y)", "cos(t)**3 - t", "x", "t**2",
+    ],
+)  # fmt: skip
+def test_the_rate_of_a_formula_is_its_derivative_by_the_time(text):
+    expression, step = parse_expression(text, 2, timed=True), 1e-6
+    points = POINTS[:, :2]
+    expected = (expression(points, 0.7 + step) - expression(points, 0.7 - step)) / (2 * step)
+    # second differences of 1e-12, round-off of 1e-16 over 1e-6
+    np.testing.assert_allclose(expression.rate(points, 0.7), expected, atol=1e-8)
+
+
+def test_what_stands_still_has_no_rate_where_its_slope_is_infinite():
+    at = np.array([[0.0, 0.0]])
+    for text in ("sqrt(x)*t", "x**0.5", "hypot(x, y)", "abs(x) + t"):
+        rate = parse_expression(text, 2, timed=True).rate(at, 0.0)
+        assert rate == pytest.approx(1.0 if "+ t" in text else 0.0)
+    with pytest.raises(InputError, match=r"no finite rate at 0 s at \(0, 0\)"):
+        parse_expression("sqrt(t)", 2, timed=True).rate(at, 0.0)
+
+
+MOTION = {
+    "material": {"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
+    "analysis": {"kind": "dynamic", "duration": 1.0},
+}
+
+
+def test_the_time_belongs_to_a_dynamic_analysis():
+    swung = [{"where": "left", "displacement": ["0.1*y*sin(t)", 0.0]}]
+    assert Scene.model_validate(content(**MOTION, supports=swung)).supports[0].timed
+    with pytest.raises(
+        ValueError, match=r"supports\[0\].displacement: 't' in .* a formula in x, y"
+    ):
+        Scene.model_validate(content(supports=swung))
+
+
+@pytest.mark.parametrize(
+    "initial, said",
+    [
+        ({"kind": "field"}, "needs a displacement, a velocity, or both"),
+        ({"kind": "field", "velocity": ["x", "y", "0"]}, "initial.velocity: 3 values; expected 2"),
+        ({"kind": "field", "velocity": ["x*t", "0"]}, "initial.velocity: 't' in 'x\\*t'"),
+        ({"kind": "field", "displacement": "exact"}, "initial.displacement: 'exact' needs an"),
+    ],
+)
+def test_an_initial_field_that_makes_no_sense_is_refused(initial, said):
+    with pytest.raises(ValueError, match=said):
+        Scene.model_validate(content(**MOTION, initial=initial))

@@ -63,7 +63,7 @@ def test_a_support_turns_by_a_rotation_whose_rate_is_its_derivative(axis):
     points = np.random.default_rng(5).random((4, dimension))
     step = 1e-6
     slope = (support.values(points, 0.4 + step) - support.values(points, 0.4 - step)) / (2 * step)
-    np.testing.assert_allclose(support.rates(points, 0.4), slope, atol=1e-9)
+    np.testing.assert_allclose(support.velocities(points, 0.4, 3.0, 0.0), 3 * slope, atol=3e-9)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from verify.compare.sampled import Sampled
 from verify.errors import InputError
 from verify.solution import Solution
 
-__all__ = ["ExactMotion", "Motion", "SolutionMotion"]
+__all__ = ["ExactMotion", "Motion", "SolutionMotion", "field_at"]
 
 Array = NDArray[np.float64]
 
@@ -117,15 +117,22 @@ class SolutionMotion:
 
 
 class ExactMotion:
-    """An exact field, over time if it offers ``at(time)``; else it stands still."""
+    """An exact field, over time if it offers ``at(time)``; else it stands still.
 
-    def __init__(self, exact: Any) -> None:
-        self._exact = exact
+    Parameters
+    ----------
+    exact : object with ``displacement`` and ``gradient``, perhaps ``at``
+    end : float, optional
+        The last time, s; None where it stands still.
+    """
+
+    def __init__(self, exact: Any, end: float | None = None) -> None:
+        self._exact, self._end = exact, end
         self._last: tuple[float | None, Sampled] | None = None
 
     def afresh(self) -> "ExactMotion":
         """Return the same motion, without what it remembers of points."""
-        return ExactMotion(self._exact)
+        return ExactMotion(self._exact, self._end)
 
     def known_at(self, time: float) -> bool:
         """Whether the field is known: always."""
@@ -133,10 +140,15 @@ class ExactMotion:
 
     def at(self, time: float | None = None) -> Field:
         """Field at a time in s; None is its last or only one."""
+        time = self._end if time is None else time
         if self._last is None or self._last[0] != time:
-            moving = time is not None and hasattr(self._exact, "at")
-            self._last = time, Sampled(self._exact.at(time) if moving else self._exact)
+            self._last = time, Sampled(field_at(self._exact, time))
         return self._last[1]
+
+
+def field_at(exact: Any, time: float | None) -> Any:
+    """Return an exact field at a time, s: itself where there is no time or it stands still."""
+    return exact.at(time) if time is not None and hasattr(exact, "at") else exact
 
 
 _Found = dict[tuple[int, int], tuple[Array, Array | None, NDArray[np.int64]]]

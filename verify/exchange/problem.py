@@ -178,16 +178,19 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
     Raises
     ------
     UnsupportedSceneError
-        If a conforming mesh of the scene is not offered.
+        If a conforming mesh of the scene is not offered, or a support or load is another field at
+        every time.
     InputError
         If a support or load acts nowhere, or a mesh file is bad.
     """
+    exact = _exact(scene)
+    if reason := _at_every_time(scene, exact):
+        raise UnsupportedSceneError(reason)
     background, size = background_mesh(scene, level)
     points, cells, facet_cell = background.points, background.cells, background.boundary_facets
     cut_facets = np.zeros((0, scene.cell_dimension, scene.dimension))
     if conforming:
         points, cells, facet_cell, cut_facets = _opened(scene, level, points, cells)
-    exact = _exact(scene)
     corners = np.ones((len(facet_cell), cells.shape[1]), dtype=bool)
     corners[np.arange(len(facet_cell)), facet_cell[:, 1]] = False
     boundary = cells[facet_cell[:, 0]][corners].reshape(len(facet_cell), -1)
@@ -252,6 +255,18 @@ def _exact(scene: Scene) -> Any:
     from reference.exact import exact_solution
 
     return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+
+
+def _at_every_time(scene: Scene, exact: Any) -> str | None:
+    """Say what no list of values and factors holds, if there is such a thing."""
+    moves = exact is not None and exact.moves
+    for i, support in enumerate(scene.supports):
+        if support.timed or (moves and support.displacement == "exact"):
+            return f"supports[{i}] is another field at every time, which is not laid out as arrays"
+    for i, load in enumerate(scene.loads):
+        if not isinstance(load, Gravity) and (load.timed or (moves and load.exact)):
+            return f"loads[{i}] is another field at every time, which is not laid out as arrays"
+    return None
 
 
 def _held(scene: Scene, mesh: _Mesh, i: int, support: Support, exact: Any) -> HeldNodes:

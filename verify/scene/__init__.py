@@ -15,7 +15,7 @@ from verify.scene.acceptance import (
 )
 from verify.scene.cuts import ArcCut, PolylineCut
 from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle
-from verify.scene.initial import AtRest, Equilibrium, Moving
+from verify.scene.initial import AtRest, Equilibrium, InitialField, Moving
 from verify.scene.loading import (
     case_folder,
     list_cases,
@@ -38,6 +38,7 @@ from verify.scene.physics import (
     Rotation,
     Support,
     Traction,
+    is_timed,
     is_uniform,
 )
 from verify.scene.regions import Region, parse_expression, parse_region
@@ -67,6 +68,7 @@ __all__ = [
     "Equilibrium",
     "Exact",
     "Gravity",
+    "InitialField",
     "KnownFinding",
     "Material",
     "MaximumDisplacementQuantity",
@@ -98,6 +100,7 @@ __all__ = [
     "Traction",
     "ValueCheck",
     "case_folder",
+    "is_timed",
     "is_uniform",
     "list_cases",
     "load_scene",

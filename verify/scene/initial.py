@@ -1,14 +1,15 @@
 """The state in which a dynamic analysis begins."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from verify.scene.strict import Finite, Point3, Strict, Vector
+from verify.scene.physics import field_values
+from verify.scene.strict import Components, Finite, Point3, Strict, Vector
 
-__all__ = ["AtRest", "Equilibrium", "Initial", "Moving"]
+__all__ = ["AtRest", "Equilibrium", "Initial", "InitialField", "Moving", "starts_open"]
 
 
 class AtRest(Strict):
@@ -60,4 +61,53 @@ class Moving(Strict):
         return velocity + np.cross(np.asarray(self.spin, dtype=float), arm)
 
 
-Initial = Annotated[AtRest | Equilibrium | Moving, Field(discriminator="kind")]
+class InitialField(Strict):
+    """Displacement and velocity by formulas, or those of the exact solution at the time 0."""
+
+    kind: Literal["field"]
+    displacement: Components | Literal["exact"] | None = Field(
+        default=None, description="m, a number or a formula in x, y, z per component; or 'exact'"
+    )
+    velocity: Components | Literal["exact"] | None = Field(
+        default=None, description="m/s, a number or a formula in x, y, z per component; or 'exact'"
+    )
+
+    @model_validator(mode="after")
+    def _says_something(self) -> "InitialField":
+        if self.displacement is None and self.velocity is None:
+            raise ValueError("an initial field needs a displacement, a velocity, or both")
+        return self
+
+    def state(
+        self, points: NDArray[np.float64], near: NDArray[np.float64], exact: Any
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Displacement and velocity (n, d) of points (n, d), m and m/s.
+
+        Parameters
+        ----------
+        points : (n, d) array
+        near : (n, d) array
+            Points of the material that they move: on which side of a cut they are.
+        exact : ExactSolution or None
+        """
+        at_start = None if exact is None else exact.at(0.0)
+        fields = []
+        for given, name in ((self.displacement, "displacement"), (self.velocity, "velocity")):
+            if given == "exact":
+                fields.append(np.asarray(getattr(at_start, name)(points, near)))
+            else:
+                fields.append(field_values(given or [0.0] * points.shape[1], points))
+        return fields[0], fields[1]
+
+
+Initial = Annotated[AtRest | Equilibrium | InitialField | Moving, Field(discriminator="kind")]
+
+
+def starts_open(initial: Initial) -> bool:
+    """Whether the cuts that open at the time 0 or before are open in the initial state.
+
+    A field has a value on each side of them; what else moves or stands still is the uncut body.
+    """
+    if isinstance(initial, Equilibrium):
+        return initial.cuts == "open"
+    return isinstance(initial, InitialField)

@@ -30,6 +30,9 @@ __all__ = [
     "Rotation",
     "Support",
     "Traction",
+    "field_rates",
+    "field_values",
+    "is_timed",
     "is_uniform",
 ]
 
@@ -41,17 +44,36 @@ def is_uniform(components: Sequence[float | str]) -> bool:
     return not any(isinstance(one, str) for one in components)
 
 
-def _field(components: Sequence[float | str], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values (n, components) at points (n, d) of numbers and formulas."""
+def is_timed(components: Sequence[float | str]) -> bool:
+    """Whether a formula among the components names the time."""
+    # whichever coordinates it names: a scene has checked that they are its own
+    return any(isinstance(one, str) and parse_expression(one, 3, True).timed for one in components)
+
+
+def field_values(
+    components: Sequence[float | str], points: NDArray[np.float64], time: float = 0.0
+) -> NDArray[np.float64]:
+    """Values (n, components) of numbers and formulas at points (n, d) and a time, s."""
     if is_uniform(components):
         return np.tile(np.asarray(components, dtype=float), (len(points), 1))
     columns = [
-        parse_expression(one, points.shape[1])(points)
+        parse_expression(one, points.shape[1], timed=True)(points, time)
         if isinstance(one, str)
         else np.full(len(points), one)
         for one in components
     ]
     return np.column_stack(columns)
+
+
+def field_rates(
+    components: Sequence[float | str], points: NDArray[np.float64], time: float
+) -> NDArray[np.float64]:
+    """Return the derivatives (n, components) of `field_values` by the time, 1/s."""
+    rates = np.zeros((len(points), len(components)))
+    for k, one in enumerate(components):
+        if isinstance(one, str):
+            rates[:, k] = parse_expression(one, points.shape[1], timed=True).rate(points, time)
+    return rates
 
 
 class Material(Strict):
@@ -96,7 +118,7 @@ class Support(Strict):
 
     where: str = Field(description="name of a boundary part, 'boundary', or an inequality")
     displacement: Components | Literal["exact"] = Field(
-        description="m, one number or formula in x, y, z per component held; or 'exact' (see "
+        description="m, one number or formula in x, y, z, t per component held; or 'exact' (see "
         "[exact])"
     )
     components: list[Literal["x", "y", "z"]] | None = Field(
@@ -125,32 +147,43 @@ class Support(Strict):
                 )
         return self
 
+    @property
+    def timed(self) -> bool:
+        """Whether a formula names the time."""
+        return self.displacement != "exact" and is_timed(self.displacement)
+
     def held(self, dimension: int) -> tuple[int, ...]:
         """Return the indices of the components held."""
         if self.components is None:
             return tuple(range(dimension))
         return tuple("xyz".index(name) for name in self.components)
 
-    def values(self, points: NDArray[np.float64], factor: float = 1.0) -> NDArray[np.float64]:
+    def values(
+        self, points: NDArray[np.float64], factor: float = 1.0, time: float = 0.0
+    ) -> NDArray[np.float64]:
         """Prescribed displacement (k, held) of points (k, d), m, unless it is ``"exact"``.
 
-        A history's factor multiplies the displacement and the angle of a rotation.
+        A history's factor multiplies the displacement and the angle of a rotation; `time` (s) is
+        that of its formulas.
         """
         assert self.displacement != "exact"
-        moved = factor * _field(self.displacement, points)
+        moved = factor * field_values(self.displacement, points, time)
         if self.rotation is not None:
             turn = self.rotation.matrix(factor) - np.eye(points.shape[1])
             moved += (points - np.asarray(self.rotation.centre)) @ turn.T
         return moved
 
-    def rates(self, points: NDArray[np.float64], factor: float = 1.0) -> NDArray[np.float64]:
-        """Return the derivative (k, held) of `values` by the factor, m."""
+    def velocities(
+        self, points: NDArray[np.float64], factor: float, slope: float, time: float
+    ) -> NDArray[np.float64]:
+        """Velocity (k, held), m/s: of `values`, with the factor's `slope` (1/s)."""
         assert self.displacement != "exact"
-        rate = _field(self.displacement, points)
+        speed = slope * field_values(self.displacement, points, time)
+        speed += factor * field_rates(self.displacement, points, time)
         if self.rotation is not None:
-            turning = self.rotation.matrix_rate(factor)
-            rate += (points - np.asarray(self.rotation.centre)) @ turning.T
-        return rate
+            turning = slope * self.rotation.matrix_rate(factor)
+            speed += (points - np.asarray(self.rotation.centre)) @ turning.T
+        return speed
 
 
 class Gravity(Strict):
@@ -165,14 +198,24 @@ class BodyForce(Strict):
 
     kind: Literal["body_force"]
     force: Components | Literal["exact"] = Field(
-        description="N/m³, a number or a formula in x, y, z per component; or 'exact'"
+        description="N/m³, a number or a formula in x, y, z, t per component; or 'exact'"
     )
     history: History | None = None
 
-    def values(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    @property
+    def exact(self) -> bool:
+        """Whether it is that of the exact solution."""
+        return self.force == "exact"
+
+    @property
+    def timed(self) -> bool:
+        """Whether a formula names the time."""
+        return self.force != "exact" and is_timed(self.force)
+
+    def values(self, points: NDArray[np.float64], time: float = 0.0) -> NDArray[np.float64]:
         """Force per volume (n, d) in N/m³ at points (n, d), unless it is ``"exact"``."""
         assert self.force != "exact"
-        return _field(self.force, points)
+        return field_values(self.force, points, time)
 
 
 class Traction(Strict):
@@ -181,14 +224,24 @@ class Traction(Strict):
     kind: Literal["traction"]
     where: str = Field(description="name of a boundary part, 'boundary', or an inequality")
     traction: Components | Literal["exact"] = Field(
-        description="Pa, a number or a formula in x, y, z per component; or 'exact'"
+        description="Pa, a number or a formula in x, y, z, t per component; or 'exact'"
     )
     history: History | None = None
 
-    def values(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    @property
+    def exact(self) -> bool:
+        """Whether it is that of the exact solution."""
+        return self.traction == "exact"
+
+    @property
+    def timed(self) -> bool:
+        """Whether a formula names the time."""
+        return self.traction != "exact" and is_timed(self.traction)
+
+    def values(self, points: NDArray[np.float64], time: float = 0.0) -> NDArray[np.float64]:
         """Traction (n, d) in Pa at points (n, d), unless it is ``"exact"``."""
         assert self.traction != "exact"
-        return _field(self.traction, points)
+        return field_values(self.traction, points, time)
 
 
 Load = Annotated[Gravity | BodyForce | Traction, Field(discriminator="kind")]

@@ -1,6 +1,6 @@
 """Checks that take more than one part of a scene: dimensions, names, times."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from verify.scene.cut_placement import check_cuts, check_points
 from verify.scene.cuts import ArcCut
 from verify.scene.empty_parts import check_parts_act
 from verify.scene.geometry import MeshFile, Polygon
-from verify.scene.initial import Moving
+from verify.scene.initial import InitialField, Moving
 from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, Gravity, Rotation, Traction
 from verify.scene.regions import parse_expression, parse_region
@@ -133,13 +133,22 @@ def _check_formulas(scene: "Scene") -> None:
             given[f"loads[{i}].force"] = load.force
         elif isinstance(load, Traction):
             given[f"loads[{i}].traction"] = load.traction
+    dynamic = scene.analysis.kind == "dynamic"
     for place, components in given.items():
-        for text in [] if components == "exact" else components:
-            if isinstance(text, str):
-                try:
-                    parse_expression(text, scene.dimension)
-                except ValueError as error:
-                    raise ValueError(f"{place}: {error}") from None
+        _check_components(components, scene.dimension, dynamic, place)
+    if isinstance(scene.initial, InitialField):
+        for key in ("displacement", "velocity"):
+            components = getattr(scene.initial, key)
+            _check_components(components or [], scene.dimension, False, f"initial.{key}")
+
+
+def _check_components(components: Any, dimension: int, timed: bool, place: str) -> None:
+    for text in [] if components == "exact" else components:
+        if isinstance(text, str):
+            try:
+                parse_expression(text, dimension, timed)
+            except ValueError as error:
+                raise ValueError(f"{place}: {error}") from None
 
 
 def _check_exact(scene: "Scene") -> None:
@@ -150,6 +159,9 @@ def _check_exact(scene: "Scene") -> None:
         if (isinstance(load, BodyForce) and load.force == "exact")
         or (isinstance(load, Traction) and load.traction == "exact")
     ]
+    if isinstance(scene.initial, InitialField):
+        own = ("displacement", "velocity")
+        wants += [f"initial.{key}" for key in own if getattr(scene.initial, key) == "exact"]
     if scene.reference.kind == "exact":
         wants.append("reference.kind")
     if wants and scene.exact is None:
@@ -192,6 +204,11 @@ def _check_times(scene: "Scene") -> None:
             raise ValueError("initial: belongs to a dynamic analysis")
     if isinstance(scene.initial, Moving):
         _check_motion(scene, scene.initial)
+    if isinstance(scene.initial, InitialField):
+        for key in ("displacement", "velocity"):
+            given = getattr(scene.initial, key)
+            if given not in (None, "exact") and len(given) != scene.dimension:
+                raise ValueError(f"initial.{key}: {len(given)} values; expected {scene.dimension}")
 
 
 def _check_motion(scene: "Scene", motion: Moving) -> None:

@@ -1,4 +1,4 @@
-"""Regions and fields of the body as text: ``x < 0.01 and y > 0.5``, ``1e3 * (y - 0.5)``.
+"""Regions and fields of the body as text: ``x < 0.01 and y > 0.5``, ``1e3 * (y - 0.5) * t``.
 
 The text is parsed into a syntax tree of which only comparisons, ``and``/``or``/``not``,
 arithmetic and a few functions are accepted; nothing is ever evaluated as Python.
@@ -6,8 +6,9 @@ arithmetic and a few functions are accepted; nothing is ever evaluated as Python
 
 import ast
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,11 @@ __all__ = ["RESERVED_NAMES", "Expression", "Region", "parse_expression", "parse_
 
 Array = NDArray[np.float64]
 Region = Callable[[Array], NDArray[np.bool_]]
-Expression = Callable[[Array], Array]
+_Variables = Mapping[str, Array]
 
 _LONGEST = 2000  # characters
 _COORDINATES = ("x", "y", "z")
+_TIME = "t"
 _ARITHMETIC = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -42,7 +44,7 @@ _MEANING = (
     "an inequality in x, y, z such as 'x < 0.01 and y > 0.5' "
     "(comparisons < <= > >=, and/or/not, + - * / **, abs sqrt sin cos hypot, pi)"
 )
-_FORMULA = "a formula in x, y, z such as '1e3 * (y - 0.5)' (+ - * / **, abs sqrt sin cos hypot, pi)"
+_FORMULA = "a formula in {variables} such as '{example}' (+ - * / **, abs sqrt sin cos hypot, pi)"
 
 
 def parse_region(text: str, dimension: int) -> Region:
@@ -76,60 +78,99 @@ def parse_region(text: str, dimension: int) -> Region:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise InputError(f"'{text}' is not {_MEANING}") from None
     try:
-        _check_condition(tree, text, dimension)
+        _check_condition(tree, text, _COORDINATES[:dimension])
     except RecursionError:
         raise InputError(f"the inequality is nested too deep; expected {_MEANING}") from None
 
     def region(points: Array) -> NDArray[np.bool_]:
         with np.errstate(all="ignore"):
-            values = _condition(tree, np.asarray(points, dtype=float))
+            values = _condition(tree, _variables(points, 0.0))
         return np.broadcast_to(values, (len(points),)).astype(bool)
 
     return region
 
 
-def parse_expression(text: str, dimension: int) -> Expression:
-    """Turn a formula into a function of points.
+class Expression:
+    """A formula in the coordinates of a point, and perhaps in time.
 
     Parameters
     ----------
     text : str
-        The formula; coordinates in metres.
+        The formula; coordinates in metres, time t in seconds.
     dimension : int
         2 or 3: which of x, y, z may be named.
-
-    Returns
-    -------
-    callable
-        Maps points (n, dimension) to values (n,). It raises InputError where a value is no finite
-        number, and names the place.
+    timed : bool
+        Whether t may be named.
 
     Raises
     ------
     InputError
         If the text is not such a formula; the message names the part that is not.
     """
-    _check_length(text)
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-        _check_number(tree, text, dimension, _FORMULA)
-        _check_constants(tree, text)
-    except InputError:
-        raise
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise InputError(f"'{text}' is not {_FORMULA}") from None
 
-    def expression(points: Array) -> Array:
-        points = np.asarray(points, dtype=float)
+    def __init__(self, text: str, dimension: int, timed: bool = False) -> None:
+        names = (*_COORDINATES[:dimension], *((_TIME,) if timed else ()))
+        example = "1e3 * (y - 0.5) * t" if timed else "1e3 * (y - 0.5)"
+        meaning = _FORMULA.format(variables=", ".join(names), example=example)
+        _check_length(text)
+        try:
+            self._tree = ast.parse(text.strip(), mode="eval").body
+            _check_number(self._tree, text, names, meaning)
+            _check_constants(self._tree, text)
+        except InputError:
+            raise
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise InputError(f"'{text}' is not {meaning}") from None
+        self.text = text
+
+    @property
+    def timed(self) -> bool:
+        """Whether the formula names the time."""
+        named = (part.id for part in ast.walk(self._tree) if isinstance(part, ast.Name))
+        return _TIME in named
+
+    def __call__(self, points: Array, time: float = 0.0) -> Array:
+        """Values (n,) at points (n, d) and a time in s.
+
+        Raises
+        ------
+        InputError
+            Where a value is no finite number; the message names the place.
+        """
         with np.errstate(all="ignore"):
-            values = np.array(np.broadcast_to(_number(tree, points), (len(points),)))
-        if not np.isfinite(values).all():
-            place = points[np.argmin(np.isfinite(values))]
-            at = ", ".join(f"{x:.4g}" for x in place)
-            raise InputError(f"'{text}' is no finite number at ({at})")
-        return values
+            values = _number(self._tree, _variables(points, time))
+        return self._finite(values, points, "is no finite number")
 
-    return expression
+    def rate(self, points: Array, time: float) -> Array:
+        """Return the derivative (n,) by the time, 1/s, by the rules of differentiation.
+
+        Raises
+        ------
+        InputError
+            Where it is no finite number.
+        """
+        with np.errstate(all="ignore"):
+            rates = _dual(self._tree, _variables(points, time))[1]
+        return self._finite(rates, points, f"has no finite rate at {time:.6g} s")
+
+    def _finite(self, values: Array, points: Array, what: str) -> Array:
+        found = np.array(np.broadcast_to(values, (len(points),)))
+        if not np.isfinite(found).all():
+            place = np.asarray(points)[np.argmin(np.isfinite(found))]
+            at = ", ".join(f"{x:.4g}" for x in place)
+            raise InputError(f"'{self.text}' {what} at ({at})")
+        return found
+
+
+def parse_expression(text: str, dimension: int, timed: bool = False) -> Expression:
+    """Read a formula of the field of a body; see `Expression`."""
+    return Expression(text, dimension, timed)
+
+
+def _variables(points: Array, time: float) -> dict[str, Array]:
+    columns = np.asarray(points, dtype=float).T
+    named = dict(zip(_COORDINATES, columns, strict=False))
+    return {**named, _TIME: np.float64(time)}
 
 
 def _check_length(text: str) -> None:
@@ -141,86 +182,128 @@ def _reject(node: ast.AST, text: str, meaning: str = _MEANING) -> InputError:
     return InputError(f"'{ast.unparse(node)}' in '{text}' is not allowed; expected {meaning}")
 
 
-def _check_condition(node: ast.AST, text: str, dimension: int) -> None:
+def _check_condition(node: ast.AST, text: str, names: tuple[str, ...]) -> None:
     match node:
         case ast.BoolOp(values=values):
             for value in values:
-                _check_condition(value, text, dimension)
+                _check_condition(value, text, names)
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            _check_condition(operand, text, dimension)
+            _check_condition(operand, text, names)
         case ast.Compare(left=left, ops=ops, comparators=comparators) if all(
             type(op) in _COMPARISONS for op in ops
         ):
             for value in (left, *comparators):
-                _check_number(value, text, dimension)
+                _check_number(value, text, names)
                 _check_constants(value, text)
         case _:
             raise _reject(node, text)
 
 
 def _check_constants(node: ast.AST, text: str) -> None:
-    """Refuse 1/0, sqrt(-1), 10**999: what holds no coordinate must be a finite number."""
-    if any(isinstance(part, ast.Name) and part.id in _COORDINATES for part in ast.walk(node)):
+    """Refuse 1/0, sqrt(-1), 10**999: what holds no variable must be a finite number."""
+    variable = (*_COORDINATES, _TIME)
+    if any(isinstance(part, ast.Name) and part.id in variable for part in ast.walk(node)):
         for part in node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node):
             if isinstance(part, ast.expr):
                 _check_constants(part, text)
         return
     with np.errstate(all="ignore"):
-        finite = np.isfinite(_number(node, np.empty((0, 0))))
+        finite = np.isfinite(_number(node, {}))
     if not finite:
         raise InputError(f"'{ast.unparse(node)}' in '{text}' is no finite number")
 
 
-def _check_number(node: ast.AST, text: str, dimension: int, meaning: str = _MEANING) -> None:
+def _check_number(
+    node: ast.AST, text: str, names: tuple[str, ...], meaning: str = _MEANING
+) -> None:
     match node:
         case ast.Constant(value=bool()):
             raise _reject(node, text, meaning)
         case ast.Constant(value=int() | float() as value) if abs(value) <= 1e300:
             pass
-        case ast.Name(id=name) if name in (*_COORDINATES[:dimension], "pi"):
+        case ast.Name(id=name) if name in (*names, "pi"):
             pass
         case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
-            _check_number(operand, text, dimension, meaning)
+            _check_number(operand, text, names, meaning)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _ARITHMETIC:
-            _check_number(left, text, dimension, meaning)
-            _check_number(right, text, dimension, meaning)
+            _check_number(left, text, names, meaning)
+            _check_number(right, text, names, meaning)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if (
             name in _FUNCTIONS and len(arguments) == (2 if name == "hypot" else 1)
         ):
             for argument in arguments:
-                _check_number(argument, text, dimension, meaning)
+                _check_number(argument, text, names, meaning)
         case _:
             raise _reject(node, text, meaning)
 
 
-def _condition(node: ast.AST, points: Array) -> NDArray[np.bool_]:
+def _condition(node: ast.AST, at: _Variables) -> NDArray[np.bool_]:
     match node:
         case ast.BoolOp(op=op, values=values):
             combine = np.logical_and if isinstance(op, ast.And) else np.logical_or
-            return reduce(combine, (_condition(value, points) for value in values))
+            return reduce(combine, (_condition(value, at) for value in values))
         case ast.UnaryOp(operand=operand):
-            return np.logical_not(_condition(operand, points))
+            return np.logical_not(_condition(operand, at))
         case ast.Compare(left=left, ops=ops, comparators=comparators):
-            terms = [_number(value, points) for value in (left, *comparators)]
+            terms = [_number(value, at) for value in (left, *comparators)]
             steps = zip(ops, terms[:-1], terms[1:], strict=True)
             holds = [_COMPARISONS[type(op)](a, b) for op, a, b in steps]
             return reduce(np.logical_and, holds + [np.isfinite(term) for term in terms])
     raise AssertionError(ast.dump(node))  # _check_condition lets nothing else through
 
 
-def _number(node: ast.AST, points: Array) -> Array:
+def _number(node: ast.AST, at: _Variables) -> Array:
+    value: Array = _dual(node, at)[0]
+    return value
+
+
+def _dual(node: ast.AST, at: _Variables) -> tuple[Any, Any]:
+    """Return the value, and its derivative by the time (forward differentiation)."""
+    still = np.float64(0.0)
+    pair: Any
     match node:
         case ast.Constant(value=value):
-            return np.float64(value)  # type: ignore[arg-type, return-value]
+            pair = np.float64(value), still  # type: ignore[arg-type]
         case ast.Name(id="pi"):
-            return np.float64(np.pi)  # type: ignore[return-value]
+            pair = np.float64(np.pi), still
         case ast.Name(id=name):
-            return points[:, _COORDINATES.index(name)]
+            pair = at[name], np.float64(name == _TIME)
         case ast.UnaryOp(op=op, operand=operand):
-            inner = _number(operand, points)
-            return -inner if isinstance(op, ast.USub) else inner
+            a, da = _dual(operand, at)
+            pair = (-a, -da) if isinstance(op, ast.USub) else (a, da)
         case ast.BinOp(left=left, op=op, right=right):
-            return _ARITHMETIC[type(op)](_number(left, points), _number(right, points))
-        case ast.Call(func=ast.Name(id=name), args=arguments):
-            return _FUNCTIONS[name](*(_number(argument, points) for argument in arguments))
-    raise AssertionError(ast.dump(node))  # _check_number lets nothing else through
+            (a, da), (b, db) = _dual(left, at), _dual(right, at)
+            pair = _ARITHMETIC[type(op)](a, b), _RATES[type(op)](a, da, b, db)
+        case ast.Call(func=ast.Name(id="hypot"), args=[one, other]):
+            (a, da), (b, db) = _dual(one, at), _dual(other, at)
+            pair = np.hypot(a, b), _product(1 / np.hypot(a, b), a * da + b * db)
+        case ast.Call(func=ast.Name(id=name), args=[argument]):
+            a, da = _dual(argument, at)
+            pair = _FUNCTIONS[name](a), _product(_SLOPES[name](a), da)
+        case _:
+            raise AssertionError(ast.dump(node))  # _check_number lets nothing else through
+    return pair
+
+
+def _product(slope: Any, rate: Any) -> Any:
+    """Chain rule; what stands still has no rate, even where the slope is infinite."""
+    return np.where(rate == 0.0, 0.0, slope * rate)
+
+
+def _power_rate(a: Any, da: Any, b: Any, db: Any) -> Any:
+    return _product(b * a ** (b - 1), da) + _product(np.log(a) * a**b, db)
+
+
+_RATES: dict[type, Callable[[Any, Any, Any, Any], Any]] = {
+    ast.Add: lambda a, da, b, db: da + db,
+    ast.Sub: lambda a, da, b, db: da - db,
+    ast.Mult: lambda a, da, b, db: _product(b, da) + _product(a, db),
+    ast.Div: lambda a, da, b, db: _product(1 / b, da) - _product(a / b**2, db),
+    ast.Pow: _power_rate,
+}
+_SLOPES: dict[str, Callable[[Any], Any]] = {
+    "abs": np.sign,
+    "sqrt": lambda a: 0.5 / np.sqrt(a),
+    "sin": np.cos,
+    "cos": lambda a: -np.sin(a),
+}

@@ -37,7 +37,7 @@ Line = Annotated[
 Point2 = tuple[Finite, Finite]
 Point3 = tuple[Finite, Finite, Finite]
 Vector = Annotated[list[Finite], Field(min_length=2, max_length=3)]
-# a number, or a formula in x, y, z that `verify.scene.regions.parse_expression` reads
+# a number, or a formula in x, y, z, t that `verify.scene.regions.parse_expression` reads
 Formula = Annotated[str, Field(min_length=1, max_length=1000)]
 Components = Annotated[list[Finite | Formula], Field(min_length=1, max_length=3)]
 

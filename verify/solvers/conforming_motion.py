@@ -17,7 +17,8 @@ from reference.fracture.pressure import MIXED
 from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
-from verify.scene import Equilibrium, Moving, Scene
+from verify.scene import Equilibrium, InitialField, Moving, Scene
+from verify.scene.initial import starts_open
 
 __all__ = ["SCHEMES", "ConformingMotion", "TimeScheme", "move", "natural_step"]
 
@@ -155,7 +156,7 @@ class _Mover:
     def run(self, trial: bool) -> ConformingMotion:
         """Run all stages and carry the fields of each to the mesh with all cuts open."""
         initial = self.scene.initial
-        open_before = isinstance(initial, Equilibrium) and initial.cuts == "open"
+        open_before = starts_open(initial)
         space = self._space(0.0 if open_before else -1.0)
         clock = perf_counter()
         with naming_weak_places(self.scene, space):
@@ -216,6 +217,9 @@ class _Mover:
         u, v = np.zeros((2, body.space.node_points.size))
         if isinstance(initial, Moving):
             v = initial.velocities(body.space.node_points.reshape(-1, d)).ravel()
+        elif isinstance(initial, InitialField):
+            fields = initial.state(body.space.node_points, body.space.beside_nodes(), self.exact)
+            u, v = (field.ravel() for field in fields)
         elif isinstance(initial, Equilibrium):
             u = body.equilibrium()
         if not isinstance(initial, Equilibrium):

@@ -11,7 +11,7 @@ from verify.solvers.xfem_boundary import facets_on
 from verify.xfem.loads import Density, body_force, traction
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["NodalForces", "loads_of", "nodal_forces"]
+__all__ = ["NodalForces", "forces_of", "is_moving", "loads_of", "nodal_forces"]
 
 _Floats = NDArray[np.float64]
 
@@ -32,35 +32,48 @@ def loads_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> _Floats:
 
 
 def nodal_forces(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[NodalForces]:
-    """Return the nodal forces of every load, in the order of the scene.
+    """Return the nodal forces of every load at the time 0, in the order of the scene.
 
     Those of a membrane are times its thickness: forces per volume and per area stay what they
     are.
     """
-    thickness = scene.material.thickness or 1.0
-    found = []
-    for i, entry in enumerate(scene.loads):
-        if isinstance(entry, Gravity):
-            assert scene.material.density is not None  # the scene has checked it
-            weight = scene.material.density * np.asarray(entry.acceleration)
-            forces = body_force(virtual, weight)
-        elif isinstance(entry, Traction):
-            facets = facets_on(scene, virtual.mesh, entry.where, f"loads[{i}].where")
-            if entry.traction == "exact":
-                forces = _stresses(virtual, facets, exact)
-            else:
-                forces = traction(virtual, facets, _density(entry, entry.traction))
-        elif entry.force == "exact":
-            forces = body_force(virtual, lambda points, sides: exact.body_force(points))
+    return [
+        NodalForces(entry, forces_of(scene, i, virtual, exact))
+        for i, entry in enumerate(scene.loads)
+    ]
+
+
+def is_moving(load: Load, exact: Any) -> bool:
+    """Whether a load is another field at every time, apart from the factor of its history."""
+    if isinstance(load, Gravity):
+        return False
+    return bool(load.timed or (load.exact and exact.moves))
+
+
+def forces_of(scene: Scene, i: int, virtual: VirtualMesh, exact: Any, time: float = 0.0) -> _Floats:
+    """Return the nodal forces (N, d) of a load at a time, without the factor of its history, N."""
+    entry = scene.loads[i]
+    field: Any = None if exact is None else exact.at(time)
+    if isinstance(entry, Gravity):
+        assert scene.material.density is not None  # the scene has checked it
+        weight = scene.material.density * np.asarray(entry.acceleration)
+        forces = body_force(virtual, weight)
+    elif isinstance(entry, Traction):
+        facets = facets_on(scene, virtual.mesh, entry.where, f"loads[{i}].where")
+        if entry.exact:
+            forces = _stresses(virtual, facets, field)
         else:
-            forces = body_force(virtual, _density(entry, entry.force))
-        found.append(NodalForces(entry, thickness * forces))
-    return found
+            forces = traction(virtual, facets, _density(entry, entry.traction, time))
+    elif entry.exact:
+        forces = body_force(virtual, lambda points, sides: field.body_force(points))
+    else:
+        forces = body_force(virtual, _density(entry, entry.force, time))
+    return np.asarray((scene.material.thickness or 1.0) * forces)
 
 
-def _density(load: BodyForce | Traction, given: Any) -> Any:
+def _density(load: BodyForce | Traction, given: Any, time: float) -> Any:
     """Numbers as they are, which are integrated in closed form; formulas as a function."""
-    return given if is_uniform(given) else lambda points, sides: load.values(points)
+    return given if is_uniform(given) else lambda points, sides: load.values(points, time)
 
 
 def _stresses(virtual: VirtualMesh, facets: NDArray[np.int64], exact: Any) -> _Floats:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import Equilibrium, Gravity, Moving, Scene, ToolPathCut
+from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.history import factor_at, first_factor, jumps
+from verify.scene.initial import starts_open
 from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_answer import Answer, penalised
 from verify.solvers.xfem_cuts import cuts_of
-from verify.solvers.xfem_loads import nodal_forces
+from verify.solvers.xfem_loads import forces_of, is_moving, nodal_forces
 from verify.solvers.xfem_openings import opening_times
 from verify.solvers.xfem_scene import density_of, material_of
 from verify.solvers.xfem_steps import MASSES, integrator_of, largest_step
@@ -133,8 +134,7 @@ class Mover:
         """Run all stages and carry the fields of each to the finally cut mesh."""
         events = self._events()
         initial = self.scene.initial
-        open_before = isinstance(initial, Equilibrium) and initial.cuts == "open"
-        opened = 0.0 if open_before else -np.inf
+        opened = 0.0 if starts_open(initial) else -np.inf
         virtual = self._cut(opened)
         body = self._body(virtual)
         state = self._initial(body)
@@ -187,9 +187,12 @@ class Mover:
         force, mass = self._inertia(virtual, density)
         weight = np.zeros_like(virtual.node_points)
         driven: list[tuple[_Floats, Any]] = []
-        for load, forces in nodal_forces(scene, virtual, self.exact):
+        moving: list[tuple[int, Any]] = []
+        for i, (load, forces) in enumerate(nodal_forces(scene, virtual, self.exact)):
             if isinstance(load, Gravity):  # on the mass as it is lumped, so that all falls alike
                 weight += mass.weight(load.acceleration)
+            elif is_moving(load, self.exact):
+                moving.append((i, load.history))
             else:
                 driven.append((forces, load.history))
 
@@ -197,13 +200,16 @@ class Mover:
             total = np.zeros_like(weight)
             for forces, history in driven:
                 total += factor_at(history, time) * forces
+            for i, history in moving:
+                forces = forces_of(scene, i, virtual, self.exact, time)
+                total += factor_at(history, time) * forces
             return total
 
         body = DynamicBody(
             force,
             mass,
             weight,
-            load_at if driven else None,
+            load_at if driven or moving else None,
             motion_of_supports(scene, virtual, self.exact),
             RayleighDamping(*scene.analysis.damping),
         )
@@ -236,6 +242,10 @@ class Mover:
         if isinstance(initial, Moving):
             free = ~body.fixed
             state.velocity[free] = initial.velocities(body.force.virtual.node_points)[free]
+        elif isinstance(initial, InitialField):
+            virtual, free = body.force.virtual, ~body.fixed
+            u, v = initial.state(virtual.node_points, virtual.node_piece_points, self.exact)
+            state.displacement[free], state.velocity[free] = u[free], v[free]
         elif isinstance(initial, Equilibrium):
             state.displacement[:] = self._equilibrium(body)
         self.timings["initial state"] += perf_counter() - clock

@@ -22,23 +22,45 @@ _Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Held:
-    """Unknowns (k,) that a support holds, and their displacement where the scene says 'exact'."""
+    """Unknowns (k,) that a support holds, and the exact field where the scene says 'exact'.
+
+    `near` are points of the material that the unknowns move.
+    """
 
     support: Support
     unknowns: NDArray[np.int64]
     components: tuple[int, ...]
     points: _Floats
-    exact: _Floats | None
+    near: _Floats
+    exact: Any
 
-    def values(self, factor: float) -> _Floats:
+    @property
+    def moves(self) -> bool:
+        """Whether the values change in time."""
+        timed = self.support.timed if self.exact is None else self.exact.moves
+        return bool(timed or self.support.history)
+
+    def values(self, factor: float, time: float = 0.0) -> _Floats:
         """Prescribed displacement (k, held), m."""
-        if self.exact is not None:
-            return factor * self.exact
-        return self.support.values(self.points, factor)
+        if self.exact is None:
+            return self.support.values(self.points, factor, time)
+        return factor * self._own(self.exact.at(time).displacement(self.points, self.near))
 
-    def rates(self, factor: float) -> _Floats:
-        """Return the derivative (k, held) of the values by the factor, m."""
-        return self.exact if self.exact is not None else self.support.rates(self.points, factor)
+    def velocities(self, time: float) -> _Floats:
+        """Prescribed velocity (k, held), m/s."""
+        history = self.support.history
+        factor, slope = factor_at(history, time), slope_at(history, time)
+        if self.exact is None:
+            return self.support.velocities(self.points, factor, slope, time)
+        field = self.exact.at(time)
+        speed = factor * field.velocity(self.points, self.near)
+        if slope:
+            speed = speed + slope * field.displacement(self.points, self.near)
+        return self._own(speed)
+
+    def _own(self, values: _Floats) -> _Floats:
+        own: _Floats = values[:, list(self.components)]
+        return own
 
 
 def supports_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports:
@@ -68,18 +90,15 @@ def initial_path(scene: Scene, virtual: VirtualMesh, exact: Any) -> Callable[[fl
 
 
 def motion_of_supports(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports | MovingSupports:
-    """Supports of a dynamic scene: moving ones if one has a history."""
+    """Supports of a dynamic scene: moving ones if one changes in time."""
     held = _held(scene, virtual, exact)
     fixed, values = _filled(virtual, held, [one.values(1.0) for one in held])
-    histories = [one.support.history for one in held]
-    if not any(histories):
+    if not any(one.moves for one in held):
         return Supports(fixed, values)
 
     def motion(time: float) -> tuple[_Floats, _Floats]:
-        factors = [factor_at(history, time) for history in histories]
-        slopes = [slope_at(history, time) for history in histories]
-        where = [one.values(f) for one, f in zip(held, factors, strict=True)]
-        speed = [s * one.rates(f) for one, f, s in zip(held, factors, slopes, strict=True)]
+        where = [one.values(factor_at(one.support.history, time), time) for one in held]
+        speed = [one.velocities(time) for one in held]
         return _filled(virtual, held, where)[1], _filled(virtual, held, speed)[1]
 
     return MovingSupports(fixed, motion)
@@ -120,9 +139,7 @@ def _held(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[_Held]:
         mark[unknowns[lie_on_part(scene, support.where, parts, size)]] = True
         at = np.flatnonzero(mark)
         components = support.held(scene.dimension)
-        values = None
-        if support.displacement == "exact":
-            points, near = virtual.node_points[at], virtual.node_piece_points[at]
-            values = exact.displacement(points, near)[:, list(components)]
-        found.append(_Held(support, at, components, virtual.node_points[at], values))
+        field = exact if support.displacement == "exact" else None
+        points, near = virtual.node_points[at], virtual.node_piece_points[at]
+        found.append(_Held(support, at, components, points, near, field))
     return found

@@ -13,7 +13,7 @@ from verify.compare.body_rule import body_rule
 from verify.compare.errors import ERRORS, Rules
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
-from verify.compare.motion import ExactMotion, Motion
+from verify.compare.motion import ExactMotion, Motion, field_at
 from verify.compare.near_tip import NEAR, near_radius
 from verify.compare.simplices import simplices
 from verify.compare.slabs import Rule, area_rule, slab_angles
@@ -122,7 +122,7 @@ def _sizes_of_cells(solution: Solution) -> tuple[float, float]:
 def exact_reference(scene: Scene, exact: ExactField, body: AnyBody, law: Law) -> Reference:
     """Make the reference from an exact solution; its quantities are integrated here."""
     assert scene.exact is not None
-    motion = ExactMotion(exact)
+    motion = ExactMotion(exact, scene.analysis.duration)
     found = {q.name: _exact_quantity(scene, q, exact, body, law) for q in scene.quantities}
     quantities = {name: pair for name, pair in found.items() if pair is not None}
     source = f"exact: {scene.exact.solution}"
@@ -142,11 +142,12 @@ def exact_reference(scene: Scene, exact: ExactField, body: AnyBody, law: Law) ->
 def _exact_quantity(
     scene: Scene, asked: Quantity, exact: ExactField, body: AnyBody, law: Law
 ) -> tuple[float, float] | None:
-    motion = ExactMotion(exact)
+    end = scene.analysis.duration
+    motion = ExactMotion(exact, end)
     if isinstance(asked, PartQuantity):
         return None  # which parts there are is known of meshes only
     if isinstance(asked, StressIntensityQuantity):
-        stated = exact_intensity(scene, exact, asked)
+        stated = exact_intensity(scene, field_at(exact, asked.time or end), asked)
         return None if stated is None else (stated, 0.0)
     if isinstance(asked, MaximumDisplacementQuantity):
         found = [
@@ -158,7 +159,7 @@ def _exact_quantity(
         return max(found), 3 * abs(found[0] - found[1])  # the maximum lies between points
     if asked.kind != "strain_energy":
         return field_quantity(motion.at(asked.time), body, asked), 0.0
-    return _exact_energy(scene, exact, body, law)
+    return _exact_energy(scene, field_at(exact, end), body, law)
 
 
 def _exact_energy(scene: Scene, exact: ExactField, body: AnyBody, law: Law) -> tuple[float, float]:

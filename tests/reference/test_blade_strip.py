@@ -1,0 +1,152 @@
+"""The exact blade through a prestretched strip: motion, faces, grips, K_III and G."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from reference.exact import exact_solution
+from verify.errors import InputError
+from verify.scene import Material
+
+# λ = μ = 1, ρ = 1: c = 1
+MATERIAL = Material(young=2.5, poisson=0.25, density=1.0)
+TURNED = {"tip": [0.3, -0.2], "angle": 37.0}
+
+
+def _field(speed, time=0.1, material=MATERIAL, **further):
+    given = {"half_width": 1.0, "grip": 1.0, "speed": speed, **further}
+    return exact_solution("blade_strip", given, material).at(time)
+
+
+def _places(tip, count=200, far=0.2):
+    """Places of the strip in its own axes, not too near to the tip and off the middle."""
+    at = np.random.default_rng(3).uniform([-2.0, -0.95], [2.0, 0.95], (count, 2))
+    at = at[(np.hypot(at[:, 0] - tip, at[:, 1]) > far) & (np.abs(at[:, 1]) > 0.02)]
+    return np.column_stack([at, np.linspace(0.0, 0.3, len(at))])
+
+
+def _turned(local, tip, angle):
+    c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    found = local.copy()
+    found[:, :2] = np.asarray(tip) + local[:, :2] @ np.array([[c, s], [-s, c]])
+    return found
+
+
+def test_values_are_those_of_the_catalogue():
+    at = np.array([[-0.4, 0.2, 0.0], [0.3, 0.5, 0.0], [-1.0, 1e-4, 0.0]])
+    found = _field(0.5).displacement(at)
+    np.testing.assert_allclose(found[:, 2], [0.7270027, 0.56223309, 0.90485436], rtol=1e-7)
+    assert not found[:, :2].any()
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.1, 0.6, 0.95])
+def test_it_solves_the_wave_equation(speed):
+    # second differences are off by d²/12 of the fourth derivatives: of 1.13 √r in each direction
+    # 1.06/r^3.5, with the contraction 1/g^4
+    points, d, t = _turned(_places(speed * 0.1), **TURNED), 1e-3, 0.1
+    u = lambda p, time: _field(speed, time, **TURNED).displacement(p)[:, 2]  # noqa: E731
+    bend = sum(
+        u(points + d * axis, t) - 2 * u(points, t) + u(points - d * axis, t)
+        for axis in np.eye(3)[:2]
+    )
+    fast = u(points, t + d) - 2 * u(points, t) + u(points, t - d)
+    tolerance = 3 * 1.06 * d**2 / 12 / 0.2**3.5 / (1 - speed**2) ** 2
+    np.testing.assert_allclose(bend / d**2, fast / d**2, atol=tolerance)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.6])
+def test_gradient_and_velocity_are_the_derivatives(speed):
+    points, d = _turned(_places(speed * 0.1), **TURNED), 1e-5
+    field = _field(speed, **TURNED)
+    gradient = field.gradient(points)
+    for k, axis in enumerate(np.eye(3)):
+        slope = field.displacement(points + d * axis) - field.displacement(points - d * axis)
+        np.testing.assert_allclose(gradient[:, :, k], slope / (2 * d), atol=1e-7)
+    later, earlier = field.at(0.1 + d), field.at(0.1 - d)
+    rate = (later.displacement(points) - earlier.displacement(points)) / (2 * d)
+    np.testing.assert_allclose(field.velocity(points), rate, atol=1e-7)
+
+
+def test_grips_faces_and_what_lies_ahead():
+    field, x = _field(0.6, **TURNED), np.linspace(-3.0, 3.0, 41)
+    grip = _turned(np.column_stack([x, np.ones(41), 0 * x]), **TURNED)
+    np.testing.assert_allclose(field.displacement(grip)[:, 2], 1.0, atol=1e-12)
+    behind = _turned(np.column_stack([x[x < 0.05], 0 * x[x < 0.05], 0 * x[x < 0.05]]), **TURNED)
+    normal = np.array([-np.sin(np.deg2rad(37.0)), np.cos(np.deg2rad(37.0)), 0.0])
+    for side in (1.0, -1.0):
+        near = behind + 0.01 * side * normal
+        # also for places that round-off has put on the other side
+        for off in (-1e-15, 0.0, 1e-15):
+            points = behind + off * normal
+            traction = field.stress(points, near) @ normal
+            np.testing.assert_allclose(traction, 0.0, atol=1e-9)
+            assert (side * field.displacement(points, near)[:, 2] > 0.0).all()
+    ahead = _turned(np.column_stack([x[x > 0.1], 0 * x[x > 0.1], 0 * x[x > 0.1]]), **TURNED)
+    for side in (1.0, -1.0):
+        found = field.displacement(ahead, ahead + 0.01 * side * normal)
+        np.testing.assert_allclose(found, 0.0, atol=1e-12)
+
+
+def test_a_side_is_continued_beyond_the_cut():
+    """What moves a node beyond the cut belongs to the material on this side: an even field."""
+    field = _field(0.3, 0.0)
+    here = np.array([[-0.4, 0.05, 0.0], [-0.01, 0.02, 0.0]])
+    beyond = here * [1.0, -1.0, 1.0]
+    np.testing.assert_allclose(field.displacement(beyond, here), field.displacement(here))
+    flipped = field.gradient(here) * [1.0, -1.0, 1.0]
+    np.testing.assert_allclose(field.gradient(beyond, here), flipped)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.3, 0.6, 0.9])
+def test_intensity_at_the_moving_tip(speed):
+    """The opening at r behind the tip is 4 K/(μg) √(r/2π), up to r/b; G = K²/(2μg) = μw₀²/b."""
+    material = Material(young=25.0, poisson=0.25, density=10.0)  # μ = 10, c = 1
+    field = _field(speed, 0.2, material, grip=0.02, half_width=0.5)
+    k, g, r = field.stress_intensity[2], np.sqrt(1 - speed**2), 1e-7
+    behind = np.array([[0.2 * speed - r, 0.0, 0.0]])
+    up = np.array([[0.0, 1.0, 0.0]])
+    opening = (field.displacement(behind, up) - field.displacement(behind, -up))[0, 2]
+    assert opening == pytest.approx(4 * k / (10.0 * g) * np.sqrt(r / (2 * np.pi)), rel=1e-5)
+    assert field.energy_release_rate == pytest.approx(10.0 * 0.02**2 / 0.5)
+    assert k**2 / (2 * 10.0 * g) == pytest.approx(field.energy_release_rate)
+
+
+def test_energy_flows_into_the_tip():
+    """What a long strip stores falls by G per unit advance, kinetic energy being carried along."""
+    speed, b = 0.5, 1.0
+    y, w = np.polynomial.legendre.leggauss(40)
+    # far ahead the strain is w₀/b and nothing moves; far behind neither
+    for end, stored in ((8.0, 1.0), (-8.0, 0.0)):
+        points = np.column_stack([np.full(40, end), b * y, 0 * y])
+        field = _field(speed, 0.0)
+        slope, v = field.gradient(points)[:, 2, :2], field.velocity(points)[:, 2]
+        line = float(w @ (0.5 * np.sum(slope**2, axis=1) + 0.5 * v**2)) * b
+        assert line == pytest.approx(stored, abs=1e-4)
+    assert field.energy_release_rate == pytest.approx(1.0)
+
+
+def test_energy_of_the_strip_at_rest():
+    """The work on the surface, against the integral over triangles from the tip."""
+    field, total = _field(0.0), 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(48)
+    r, t = (grid.ravel() for grid in np.meshgrid(0.5 * (nodes + 1), 0.5 * (nodes + 1)))
+    weight = np.outer(weights, weights).ravel() / 4
+    corners = np.array([[-0.7, 0.0], [-0.7, 1.0], [0.9, 1.0], [0.9, 0.0]])[::-1]
+    for a, c in pairwise(corners):  # of the upper half
+        points = np.zeros((len(r), 3))
+        points[:, :2] = r[:, None] * (a + t[:, None] * (c - a))
+        slope = field.gradient(points)[:, 2, :2]
+        area = a[0] * c[1] - a[1] * c[0]
+        total += 0.5 * float((weight * r * area) @ np.sum(slope**2, axis=1))
+    box = np.array([[-0.7, -1.0, 0.0], [0.9, 1.0, 0.25]])
+    assert field.strain_energy(box) == pytest.approx(2 * 0.25 * total, rel=1e-8)
+
+
+def test_what_is_refused():
+    with pytest.raises(InputError, match="density"):
+        _field(0.5, material=Material(young=2.5, poisson=0.25))
+    with pytest.raises(InputError, match="below that of shear waves, 1 m/s"):
+        _field(1.0)
+    with pytest.raises(InputError, match="moving field"):
+        _field(0.5).strain_energy(np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 0.1]]))
