@@ -6,12 +6,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.boundary_values import constrained_values
 from reference.dynamics_law import law_of
+from reference.dynamics_ties import TiedUnknowns
 from reference.elasticity import load_form, mass_form
 from reference.large_strain import solve_large_strain
 from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
-from reference.space import ConformingSpace, SharedUnknowns
+from reference.space import ConformingSpace
 from verify.scene import Gravity, Scene, Support
 from verify.scene.history import factor_at, first_factor, slope_at
 from verify.scene.parts import on_part
@@ -72,8 +72,10 @@ class MovingBody:
         The same, of all unknowns of the law.
     weight : (k,) array
         Dead load of gravity, N.
+    ties : TiedUnknowns
+        Of all unknowns of the law: what of the cut is still closed.
     held : (h,) int array
-        Unknowns with a prescribed motion, ascending.
+        Unknowns with a prescribed motion, ascending: also those that are tied to such.
 
     Raises
     ------
@@ -112,7 +114,27 @@ class MovingBody:
         mark = np.zeros(space.node_points.shape, dtype=bool)
         for one in self._supports:
             mark[one.place] = True
-        self.held = np.flatnonzero(mark.ravel()).astype(np.int32)
+        self._own_held = np.flatnonzero(mark.ravel()).astype(np.int32)
+        self.ties = TiedUnknowns(self.law.unknowns, space)
+        alone = self.law.unknowns is space
+        self._moving = self.ties if alone else TiedUnknowns(space, space)
+        self.tie(np.zeros((0, 2), dtype=np.int64))
+
+    def tie(self, pairs: NDArray[np.int64]) -> None:
+        """Tie the nodes of pairs (p, 2) to each other, and no others.
+
+        A support that holds one node of a group holds all; of several the lowest number decides.
+        """
+        for ties in {id(one): one for one in (self.ties, self._moving)}.values():
+            ties.tie(pairs)
+        self.held = self.ties.all_tied_to(self._own_held)
+        d = self.space.dimension
+        node, component = np.divmod(self._own_held, d)
+        leading = self.ties.leader[node] * d + component
+        found, first = np.unique(leading, return_index=True)
+        node, component = np.divmod(self.held, d)
+        at = np.searchsorted(found, self.ties.leader[node] * d + component)
+        self._holder = self._own_held[first[at]]
 
     def external(self, time: float) -> Array:
         """Return the forces of all loads at a time, N; after a jump there."""
@@ -134,14 +156,13 @@ class MovingBody:
     def equilibrium(self) -> Array:
         """Find the static equilibrium (k,) under the first factors of all histories, m.
 
+        Every piece must be held. At finite rotation nothing may be tied.
+
         Raises
         ------
-        InputError
-            If a piece is not held.
         RuntimeError
             If it is not found.
         """
-        constrained_values(self.scene, self.space, self.exact)  # says which piece is not held
         factors = [first_factor(one.support.history) for one in self._supports]
         if self.scene.analysis.kinematics == "linear":
             return self._linear_equilibrium(factors)
@@ -157,7 +178,14 @@ class MovingBody:
 
     def accelerations(self, forces: Array) -> Array:
         """Solve M a = forces, with a = 0 where held."""
-        return self._solved(self.mass.petsc.copy(), self.space, "definite", forces)
+        return self._solved(self.mass.petsc.copy(), self._moving, "definite", forces)
+
+    def step_solver(self, matrix: Any, kind: Literal["symmetric", "general"]) -> NodalSolver:
+        """Factorise a matrix of all unknowns, which is destroyed with the solver.
+
+        What a solve misses the next iteration of a step corrects, if it is little.
+        """
+        return NodalSolver(self.ties.projected(matrix), self.ties, self.held, kind, largest=1e-3)
 
     def _linear_equilibrium(self, factors: list[float]) -> Array:
         load = self.weight.copy()
@@ -169,19 +197,19 @@ class MovingBody:
         pairs = zip(self._supports, factors, strict=True)
         u[self.held] = self._filled([one.values(factor, 0.0) for one, factor in pairs])
         left = load - self.law.force(u)
-        return u + self._solved(self.law.tangent(u), self.law.unknowns, "symmetric", left)
+        return u + self._solved(self.law.tangent(u), self.ties, "symmetric", left)
 
     def _solved(
         self,
         matrix: Any,
-        unknowns: SharedUnknowns,
+        ties: TiedUnknowns,
         kind: Literal["definite", "symmetric"],
         forces: Array,
     ) -> Array:
         """Solve a system, with zero where held, and destroy it."""
         right = forces.copy()
         right[self.held] = 0.0
-        solver = NodalSolver(matrix, unknowns, self.held, kind)
+        solver = NodalSolver(ties.projected(matrix), ties, self.held, kind)
         found = solver.solve(right)
         solver.destroy()
         return found
@@ -225,4 +253,4 @@ class MovingBody:
         filled = np.zeros(self.space.node_points.shape)
         for one, value in zip(self._supports, values, strict=True):
             filled[one.place] = value
-        return filled.ravel()[self.held]
+        return np.asarray(filled.ravel()[self._holder])

@@ -1,6 +1,5 @@
-"""Cuts that open one after the other on one mesh that conforms to all of them."""
+"""When each facet of a mesh opens that conforms to all cuts of a scene."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,41 +15,76 @@ from verify.scene import (
     Scene,
     SphereCut,
     SweptCut,
+    ToolPathCut,
 )
 from verify.scene.planar import distance_to_outline, distance_to_polyline, inside_polygon
 
-__all__ = ["partly_opened"]
+__all__ = ["finally_cut", "opening_times", "partly_opened"]
 
 Array = NDArray[np.float64]
 
 
-def partly_opened(scene: Scene, mesh: ConformingMesh, opened: Sequence[bool]) -> ConformingMesh:
-    """Give a mesh with all cuts open again, with some of them open only; cells stay in order.
+def finally_cut(scene: Scene) -> Scene:
+    """Give a scene with the whole cut of every tool path in its place, for meshes.
+
+    Raises
+    ------
+    InputError
+        If a blade turns out of a plane on its way.
+    """
+    if not any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
+        return scene
+    cuts = [cut.whole() if isinstance(cut, ToolPathCut) else cut for cut in scene.cuts]
+    found = scene.model_copy(update={"cuts": cuts})
+    found._file, found._name = scene.file, scene.name
+    return found
+
+
+def opening_times(scene: Scene, mesh: ConformingMesh, delay: float = 0.0) -> Array:
+    """Times (f,) from which on each of `mesh.cut_facets` is open, s.
+
+    Those of a cut open with it. One on a tool path opens when the blade has passed all of it, the
+    last of its corners. A facet belongs to the cut that it is closest to: one on a curved cut is
+    off by its own sagitta, and cuts do not lie on each other.
 
     Parameters
     ----------
     scene : Scene
     mesh : ConformingMesh
-    opened : sequence of bool
-        Whether each cut of the scene is open. A facet belongs to the cut that it is closest to:
-        one on a curved cut is off by its own sagitta, and cuts do not lie on each other.
+        With all cuts of `finally_cut` open.
+    delay : float
+        By which facets on tool paths open late, s.
     """
-    if all(opened):
+    corners = mesh.realised_cut
+    places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+    points = places.reshape(-1, mesh.dimension)
+    cuts = finally_cut(scene).cuts
+    off = [_distance(cut, points).reshape(places.shape[:2]).max(axis=1) for cut in cuts]
+    times = np.zeros(len(corners))
+    for i, cut in enumerate(scene.cuts):
+        mine = np.argmin(off, axis=0) == i
+        if isinstance(cut, ToolPathCut):
+            passed = cut.passed_at(corners[mine].reshape(-1, mesh.dimension))
+            times[mine] = passed.reshape(corners[mine].shape[:2]).max(axis=1) + delay
+        else:
+            times[mine] = cut.opens_at
+    return times
+
+
+def partly_opened(mesh: ConformingMesh, opened: NDArray[np.bool_]) -> ConformingMesh:
+    """Give a mesh with all cuts open again, with some facets open only; cells stay in order.
+
+    Parameters
+    ----------
+    mesh : ConformingMesh
+    opened : (f,) bool array
+        Whether each of `mesh.cut_facets` is.
+    """
+    if opened.all():
         return mesh
-    parents = int(mesh.parent.max()) + 1
-    points = np.empty((parents, mesh.dimension))
+    points = np.empty((int(mesh.parent.max()) + 1, mesh.dimension))
     points[mesh.parent] = mesh.points
-    keep = np.zeros(len(mesh.cut_facets), dtype=bool)
-    if any(opened):
-        corners = points[mesh.cut_facets]
-        places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
-        off = [
-            _distance(cut, places.reshape(-1, mesh.dimension)).reshape(places.shape[:2])
-            for cut in scene.cuts
-        ]
-        nearest = np.max(off, axis=2).argmin(axis=0)
-        keep = np.asarray(opened, dtype=bool)[nearest]
-    return open_cut(points, mesh.parent[mesh.cells], mesh.cut_facets[keep])
+    return open_cut(points, mesh.parent[mesh.cells], mesh.cut_facets[opened])
 
 
 def _distance(cut: object, points: Array) -> Array:

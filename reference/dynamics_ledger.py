@@ -24,7 +24,7 @@ _AXES = ("x", "y", "z")
 
 
 class Ledger:
-    """The account of a motion, over all stages of its body.
+    """The account of a motion, from its start on.
 
     Attributes
     ----------
@@ -38,15 +38,8 @@ class Ledger:
         self._kinetic = self._strain = 0.0
 
     def open(self, body: MovingBody, state: State) -> None:
-        """Go on with another body in the same state.
-
-        A pressure that may jump across a cut from now on has more energy by the same displacement;
-        without one nothing changes.
-        """
-        strain = self._strain
+        """Begin with a state. When a cut opens nothing changes."""
         self._kinetic, self._strain = _energies(body, state)
-        if self.rows:
-            self._done["algorithmic"] -= self._strain - strain
 
     def started(self, body: MovingBody, state: State) -> None:
         """Enter what supports did that took up another velocity at once."""

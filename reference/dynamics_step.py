@@ -126,7 +126,7 @@ class Stepper:
         forces, residual, norm = self._residual(start, a)
         last, leaps = np.inf, 0
         for _ in range(_MOST_ITERATIONS):
-            scale = _scale(forces)
+            scale = self._scale(forces)
             stuck = norm > 0.1 * last
             if norm <= _TOLERANCE * scale or (stuck and norm <= _GOOD_ENOUGH * scale):
                 return a, forces
@@ -152,19 +152,19 @@ class Stepper:
         node = body.space.node_points[worst // body.space.dimension]
         raise RuntimeError(
             f"the step from {start.time:.6g} s by {self.size:.6g} s is not solved: residual "
-            f"{norm:.3g} N against forces of {_scale(forces):.3g} N, most of it around "
+            f"{norm:.3g} N against forces of {self._scale(forces):.3g} N, most of it around "
             f"({', '.join(f'{x:.4g}' for x in node)}); a smaller analysis.time_step may help"
         )
 
     def _residual(self, start: State, a: Array) -> tuple[StepForces, Array, float]:
         """Give the forces of a step that ends like this, what they leave, and its norm."""
         forces = self._forces(start, *self._end(start, a), a)
-        residual = forces.residual
+        residual = self.body.ties.summed(forces.residual)
         residual[self.body.held] = 0.0
         return forces, residual, float(np.linalg.norm(residual))
 
     def close(self) -> None:
-        """Free what PETSc holds."""
+        """Free what PETSc holds; a step that follows factorises anew."""
         if self._solver is not None:
             self._solver.destroy()
             self._solver = None
@@ -217,10 +217,10 @@ class Stepper:
         matrix.axpy(1 - scheme.alpha_m + keep * h * scheme.gamma * mass, body.inertia)
         symmetric = body.law.linear or not self.averaged
         kind: Any = "symmetric" if symmetric else "general"
-        # what a solve misses the next iteration corrects, if it is little
-        self._solver = NodalSolver(matrix, body.law.unknowns, body.held, kind, largest=1e-3)
+        self._solver = body.step_solver(matrix, kind)
 
-
-def _scale(forces: StepForces) -> float:
-    parts = (forces.external, forces.internal, forces.viscous, forces.inertia)
-    return max(float(np.linalg.norm(part)) for part in parts) or 1.0
+    def _scale(self, forces: StepForces) -> float:
+        """Norm of the largest of the forces, without those that ties pass on."""
+        parts = (forces.external, forces.internal, forces.viscous, forces.inertia)
+        norms = [float(np.linalg.norm(self.body.ties.summed(part))) for part in parts]
+        return max(norms) or 1.0

@@ -124,11 +124,17 @@ class ConformingSpace(SharedUnknowns):
         points: NDArray[np.float64] = self.mesh.points[self.mesh.cells].mean(axis=1)
         return points
 
+    def facet_nodes(
+        self, cell: NDArray[np.int64], opposite: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Nodes (f, q) of facets, each of a cell (f,) and opposite one of its corners (f,)."""
+        on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
+        return np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
+
     def boundary_nodes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Nodes (b,) on the outer boundary (not on the faces of the cut), and a cell of each."""
         cell, opposite = self.mesh.boundary.T
-        on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
-        nodes = np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
+        nodes = self.facet_nodes(cell, opposite)
         found, first = np.unique(nodes, return_index=True)
         return found, np.repeat(cell, nodes.shape[1])[first]
 

@@ -154,7 +154,7 @@ def test_cuts_that_open_one_after_the_other_set_one_piece_after_the_other_free()
 
 def test_every_facet_of_a_curved_cut_is_known_to_be_its_own():
     """A tube crossed by a plane: each opens alone to the faces that it has."""
-    from reference.dynamics_cuts import partly_opened
+    from reference.dynamics_cuts import opening_times, partly_opened
     from reference.meshing import Grading, conforming_mesh
 
     tube = {
@@ -165,11 +165,12 @@ def test_every_facet_of_a_curved_cut_is_known_to_be_its_own():
         "radius": 0.3,
         "height": 2.0,
     }
-    scene = moving([tube, MIDDLE])
+    scene = moving([{**tube, "opens_at": 0.1}, {**MIDDLE, "opens_at": 0.2}])
     mesh = conforming_mesh(scene, Grading(0.2, np.zeros((0, 3))))
     areas, pieces = [], []
-    for opened in [(True, False), (False, True), (False, False)]:
-        part = partly_opened(scene, mesh, opened)
+    times = opening_times(scene, mesh)
+    for opened in [times == 0.1, times == 0.2, times < 0.1]:
+        part = partly_opened(mesh, opened)
         a, b, c = part.realised_cut.swapaxes(0, 1)
         areas.append(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
         pieces.append(part.pieces.max() + 1)

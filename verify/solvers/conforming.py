@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from reference.boundary_values import constrained_values
 from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
+from reference.dynamics_cuts import finally_cut
 from reference.exact import exact_solution
 from reference.fracture.pressure import MIXED
 from reference.large_strain import LargeStrainSolve, solve_large_strain
@@ -21,14 +22,20 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
-from verify.solvers.conforming_motion import SCHEMES, TimeScheme, move, natural_step
+from verify.solvers.conforming_motion import SCHEMES, Marching, move, natural_step
 
 __all__ = ["ConformingSolver", "ReferenceSolver"]
+
+_RADIUS = 0.0  # of the reference behind a blade: what it leaves to the mesh is damped at once
 
 import_dolfinx()  # fail here, by name, and not in the middle of a solve
 
 
 def _refusal(scene: Scene) -> str | None:
+    try:
+        scene = finally_cut(scene)
+    except UnsupportedSceneError as error:
+        return str(error)
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
         if geometry.cells == "surface" and scene.exact is not None:
@@ -37,8 +44,6 @@ def _refusal(scene: Scene) -> str | None:
             return reason
     elif not isinstance(geometry, Rectangle | Polygon | Box):
         return f"conforming meshes of a '{geometry.kind}' geometry are not offered yet"
-    if any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
-        return "a cut that grows while the body moves is played (verify play), not solved"
     return None
 
 
@@ -54,13 +59,6 @@ class _Answer(NamedTuple):
     timings: dict[str, float]
     iterations: dict[str, int]
     notes: dict[str, str]
-
-
-class _Motion(NamedTuple):
-    """Scheme of a dynamic scene, and its largest step (s) on a level of an element size (m)."""
-
-    scheme: TimeScheme
-    largest: Callable[[int, float], float]
 
 
 class ConformingSolver:
@@ -79,7 +77,9 @@ class ConformingSolver:
         Dynamics: time integration. The step is the scene's, or else the time in which a pressure
         wave crosses an element.
     spectral_radius : float
-        Dynamics: that of generalised_alpha at infinite frequency, from 0 to 1.
+        Of generalised-α at infinite frequency, 0 to 1.
+    delay : float
+        By which facets behind a blade on its way open late, s.
     """
 
     name = "conforming"
@@ -101,6 +101,7 @@ class ConformingSolver:
         mesh: str = "imprinted",
         scheme: str = "newmark",
         spectral_radius: float = 0.8,
+        delay: float = 0.0,
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
         if mesh not in ("imprinted", "remeshed") or degree not in (1, 2):
@@ -110,17 +111,18 @@ class ConformingSolver:
         if scheme not in SCHEMES:
             raise InputError(f"scheme '{scheme}'; expected one of {', '.join(SCHEMES)}")
 
-        def largest(_level: int, size: float) -> float:
-            return scene.analysis.time_step or natural_step(scene, size)
+        def marching(_level: int, size: float) -> Marching:
+            largest = scene.analysis.time_step or natural_step(scene, size)
+            return Marching(scheme, largest, spectral_radius, delay)
 
         size = structure(scene, level).size
         return _solve(
             scene,
-            lambda level: (peer_mesh(scene, level, mesh), size),
+            lambda whole, level: (peer_mesh(whole, level, mesh), size),
             level,
             degree,
             repetitions,
-            _Motion(TimeScheme(scheme, spectral_radius), largest),
+            marching,
         )
 
 
@@ -147,32 +149,37 @@ class ReferenceSolver:
         """Return the number of levels of the reference."""
         return scene.reference.levels
 
-    def solve(self, scene: Scene, level: int, repetitions: int = 1) -> Solution:
+    def solve(
+        self, scene: Scene, level: int, repetitions: int = 1, delay: float = 0.0
+    ) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
-
-        def largest(level: int, size: float) -> float:
-            step = scene.analysis.time_step or natural_step(scene, size * 2**level)
-            return step / 2**level
-
         linear = scene.analysis.kinematics == "linear"
+        scheme = "newmark" if linear else "energy_momentum"
+        if any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
+            scheme = "generalised_alpha"
+
+        def marching(level: int, size: float) -> Marching:
+            step = scene.analysis.time_step or natural_step(scene, size * 2**level)
+            return Marching(scheme, step / 2**level, _RADIUS, delay)
+
         return _solve(
             scene,
-            lambda level: reference_mesh(scene, level),
+            reference_mesh,
             level,
             scene.reference.degree,
             min(repetitions, 1),
-            _Motion(TimeScheme("newmark" if linear else "energy_momentum"), largest),
+            marching,
             wants_pressure(scene, scene.reference.degree),
         )
 
 
 def _solve(
     scene: Scene,
-    make_mesh: Callable[[int], tuple[ConformingMesh, float]],
+    make_mesh: Callable[[Scene, int], tuple[ConformingMesh, float]],
     level: int,
     degree: int,
     repetitions: int,
-    motion: _Motion,
+    marching: Callable[[int, float], Marching],
     pressure: bool = False,
 ) -> Solution:
     if reason := _refusal(scene):
@@ -181,22 +188,21 @@ def _solve(
     if scene.exact is not None:
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
-    comm = _comm()
+    comm, whole = _comm(), finally_cut(scene)
 
     def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
+        space = conforming_space(mesh, degree, comm)
         if scene.analysis.kind == "static":
-            return _equilibrium(scene, conforming_space(mesh, degree, comm), exact, pressure)
-        largest = motion.largest(level, size)
-        scheme = motion.scheme
-        found = move(scene, mesh, degree, exact, scheme, largest, comm, pressure, trial)
+            return _equilibrium(scene, space, exact, pressure)
+        found = move(scene, space, exact, marching(level, size), comm, pressure, trial)
         return _Answer(**vars(found))
 
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
-        answer(0, *_shared(comm, lambda: make_mesh(0)), trial=True)
+        answer(0, *_shared(comm, lambda: make_mesh(whole, 0)), trial=True)
     for _ in range(max(repetitions, 1)):
         start = perf_counter()
-        mesh, size = _shared(comm, lambda: make_mesh(level))
+        mesh, size = _shared(comm, lambda: make_mesh(whole, level))
         meshed = perf_counter() - start
         result = answer(level, mesh, size)
         if repetitions:

@@ -1,49 +1,61 @@
-"""Motion on a conforming mesh: stages between the openings of cuts, steps between the outputs."""
+"""Motion on a conforming mesh whose facets open on the way, whole cuts or behind a blade."""
 
 from dataclasses import dataclass, field
-from itertools import pairwise
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.boundary_values import constrained_values
 from reference.dynamics import Scheme, generalised_alpha, implicit_euler, inherit
 from reference.dynamics_body import MovingBody
-from reference.dynamics_cuts import partly_opened
+from reference.dynamics_cuts import opening_times, partly_opened
 from reference.dynamics_ledger import Ledger
 from reference.dynamics_step import State, Stepper
+from reference.dynamics_ties import facing_nodes
 from reference.fracture.pressure import MIXED
-from reference.meshing import ConformingMesh
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
-from verify.scene import Equilibrium, InitialField, Moving, Scene
+from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
+from verify.scene.cuts import Cut
 from verify.scene.initial import starts_open
 
-__all__ = ["SCHEMES", "ConformingMotion", "TimeScheme", "move", "natural_step"]
+__all__ = ["SCHEMES", "ConformingMotion", "Marching", "move", "natural_step"]
 
 Array = NDArray[np.float64]
 _SAME = 1e-12  # of the duration: times that close are one
-# the scheme, and whether the internal force is the mean of a step
-SCHEMES: dict[str, tuple[Scheme, bool]] = {
-    "newmark": (generalised_alpha(), False),
-    "energy_momentum": (generalised_alpha(), True),
-    "implicit_euler": (implicit_euler(), False),
-    "generalised_alpha": (generalised_alpha(0.8), False),
-}
+_PASSED = 1e-9  # of the duration: what is passed so little later counts as passed
+SCHEMES = ("newmark", "energy_momentum", "implicit_euler", "generalised_alpha")
 
 
-class TimeScheme(NamedTuple):
-    """One of `SCHEMES`, and the spectral radius at infinite frequency if it is generalised-α."""
+@dataclass(frozen=True)
+class Marching:
+    """How a motion is integrated.
+
+    Attributes
+    ----------
+    name : str
+        One of `SCHEMES`.
+    largest : float
+        Largest time step, s.
+    spectral_radius : float
+        Of generalised-α at infinite frequency.
+    delay : float
+        By which facets on tool paths open late, s.
+    """
 
     name: str
+    largest: float
     spectral_radius: float = 0.8
+    delay: float = 0.0
 
-    def found(self) -> tuple[Scheme, bool]:
-        """Return the scheme, and whether the internal force is the mean of a step."""
-        if self.name == "generalised_alpha":
-            return generalised_alpha(self.spectral_radius), False
-        return SCHEMES[self.name]
+    def scheme(self) -> tuple[Scheme, bool]:
+        """Give the scheme, and whether the internal force is the mean of a step."""
+        if self.name == "implicit_euler":
+            return implicit_euler(), False
+        radius = self.spectral_radius if self.name == "generalised_alpha" else 1.0
+        return generalised_alpha(radius), self.name == "energy_momentum"
 
 
 @dataclass
@@ -87,11 +99,9 @@ def natural_step(scene: Scene, size: float) -> float:
 
 def move(
     scene: Scene,
-    mesh: ConformingMesh,
-    degree: int,
+    space: ConformingSpace,
     exact: Any,
-    scheme: TimeScheme,
-    largest: float,
+    marching: Marching,
     comm: Any = None,
     pressure: bool = False,
     trial: bool = False,
@@ -101,13 +111,10 @@ def move(
     Parameters
     ----------
     scene : Scene
-    mesh : ConformingMesh
+    space : ConformingSpace
         With all cuts open.
-    degree : {1, 2}
     exact : ExactSolution or None
-    scheme : TimeScheme
-    largest : float
-        Largest time step, s.
+    marching : Marching
     comm : MPI communicator, optional
         Of the ranks that share the work, each with the whole answer; default: each by itself.
     pressure : bool
@@ -123,171 +130,181 @@ def move(
     RuntimeError
         If a step or the initial equilibrium is not found.
     """
-    return _Mover(scene, mesh, degree, exact, scheme, largest, comm, pressure).run(trial)
+    return _Mover(scene, space, exact, marching, comm, pressure).run(trial)
 
 
 class _Mover:
-    """One motion, stage by stage."""
+    """One motion, from stop to stop: outputs, openings of whole cuts, kinks of histories."""
 
     def __init__(
         self,
         scene: Scene,
-        mesh: ConformingMesh,
-        degree: int,
+        space: ConformingSpace,
         exact: Any,
-        scheme: TimeScheme,
-        largest: float,
+        marching: Marching,
         comm: Any,
         pressure: bool,
     ) -> None:
-        self.scene, self.mesh, self.degree, self.exact = scene, mesh, degree, exact
-        self.comm = comm
-        self.pressure = pressure and scene.analysis.kinematics == "linear"
-        self.scheme, self.largest = scheme, largest
+        self.scene, self.space, self.exact = scene, space, exact
+        self.comm, self.marching = comm, marching
+        pressure = pressure and scene.analysis.kinematics == "linear"
+        self.unknowns = MIXED if pressure else "displacement"
         self.times = np.array(scene.analysis.output_times)
-        self.opens = [self._snapped(float(getattr(cut, "opens_at", 0.0))) for cut in scene.cuts]
-        self.spaces: dict[tuple[bool, ...], ConformingSpace] = {}
+        self.end = float(self.times[-1])
+        clock = perf_counter()
+        self.body = MovingBody(scene, space, exact, pressure)
+        self.facing = facing_nodes(space)
+        self.opening = self._snapped(opening_times(scene, space.mesh, marching.delay))
+        self.closed = np.ones(len(self.opening), dtype=bool)
         self.ledger = Ledger()
         phases = ("loading", "initial state", "steps", "accounting")
         self.timings = dict.fromkeys(phases, 0.0)
-        self.steps = self.solves = 0
-        self.sizes: set[float] = set()
+        self.timings["loading"] = perf_counter() - clock
+        self.steppers: dict[float, Stepper] = {}
+        self.steps = self.openings = 0
 
     def run(self, trial: bool) -> ConformingMotion:
-        """Run all stages and carry the fields of each to the mesh with all cuts open."""
-        initial = self.scene.initial
-        open_before = starts_open(initial)
-        space = self._space(0.0 if open_before else -1.0)
-        clock = perf_counter()
-        with naming_weak_places(self.scene, space):
-            state = self._initial(self._body(space))
-        self.timings["initial state"] += perf_counter() - clock
-        starts = sorted({0.0, *self.opens})
-        outputs: list[tuple[ConformingSpace, State]] = []
-        for k, start in enumerate(starts):
+        """Run to the end, or for one step."""
+        with naming_weak_places(self.scene, self.space, self.body.ties):
             clock = perf_counter()
-            opened = self._space(start)
-            state = _carried(space, opened, state)
-            space, body = opened, self._body(opened)
-            self.timings["loading"] += perf_counter() - clock
-            last = k == len(starts) - 1
-            end = float(self.times[-1]) if last else starts[k + 1]
-            wanted = self.times[(self.times >= start) & ((self.times < end) | last)]
-            with naming_weak_places(self.scene, space):
-                stage = self._stage(body, state, start, end, wanted, trial)
-            outputs += [(space, output) for output in stage]
-            if trial:
-                break
-        final = self._space(np.inf)
-        states = [_carried(space, final, state) for space, state in outputs]
-        shape = (len(states), -1, self.mesh.dimension)
+            state = self._initial()
+            self.timings["initial state"] += perf_counter() - clock
+            states = self._march(state, trial)
+        shape = (len(states), -1, self.space.dimension)
+        linear = self.scene.analysis.kinematics == "linear"
+        for stepper in self.steppers.values():
+            stepper.close()
         return ConformingMotion(
-            final,
+            self.space,
             self.times[: len(states)],
             np.reshape([state.displacement for state in states], shape),
             np.reshape([state.velocity for state in states], shape),
-            np.reshape([state.acceleration for state in states], shape)
-            if self.scene.analysis.kinematics == "linear"
-            else None,
+            np.reshape([state.acceleration for state in states], shape) if linear else None,
             self.ledger.columns(),
             self.timings,
-            {"steps": self.steps, "newton": self.solves},
+            {
+                "steps": self.steps,
+                "newton": sum(stepper.solves for stepper in self.steppers.values()),
+            },
             self._notes(),
         )
 
-    def _snapped(self, time: float) -> float:
-        """Return the output time that is the same up to round-off, if there is one."""
-        nearest = float(self.times[np.abs(self.times - time).argmin()])
-        return nearest if abs(nearest - time) <= _SAME * self.times[-1] else time
+    def _snapped(self, times: Array) -> Array:
+        """Give output times for those that are the same up to round-off."""
+        if not len(times):
+            return times
+        nearest = self.times[np.abs(self.times[:, None] - times).argmin(axis=0)]
+        return np.where(np.abs(nearest - times) <= _SAME * self.end, nearest, times)
 
-    def _space(self, time: float) -> ConformingSpace:
-        """Space with the cuts open that open up to a time."""
-        opened = tuple(opens <= time for opens in self.opens)
-        if opened not in self.spaces:
-            mesh = partly_opened(self.scene, self.mesh, opened)
-            self.spaces[opened] = conforming_space(mesh, self.degree, self.comm)
-        return self.spaces[opened]
+    def _open(self, time: float) -> bool:
+        """Open what is due at a time; say whether anything was."""
+        due = self.closed & (self.opening <= time + _PASSED * self.end)
+        if not due.any():
+            return False
+        clock = perf_counter()
+        self._tie(self.closed & ~due)
+        self.openings += 1
+        self.timings["loading"] += perf_counter() - clock
+        return True
 
-    def _body(self, space: ConformingSpace) -> MovingBody:
-        return MovingBody(self.scene, space, self.exact, self.pressure)
+    def _tie(self, closed: NDArray[np.bool_]) -> None:
+        self.closed = closed
+        self.body.tie(self.facing[closed].reshape(-1, 2))
+        for stepper in self.steppers.values():
+            stepper.close()
 
-    def _initial(self, body: MovingBody) -> State:
+    def _initial(self) -> State:
         """State at the time 0, before what opens then."""
-        initial, d = self.scene.initial, self.mesh.dimension
-        u, v = np.zeros((2, body.space.node_points.size))
+        initial, body, d = self.scene.initial, self.body, self.space.dimension
+        balanced = isinstance(initial, Equilibrium)
+        if not (starts_open(initial) and self._open(0.0)):
+            self._tie(self.closed)
+        u, v = np.zeros((2, self.space.node_points.size))
         if isinstance(initial, Moving):
-            v = initial.velocities(body.space.node_points.reshape(-1, d)).ravel()
+            v = initial.velocities(self.space.node_points.reshape(-1, d)).ravel()
         elif isinstance(initial, InitialField):
-            fields = initial.state(body.space.node_points, body.space.beside_nodes(), self.exact)
-            u, v = (field.ravel() for field in fields)
-        elif isinstance(initial, Equilibrium):
-            u = body.equilibrium()
-        if not isinstance(initial, Equilibrium):
+            fields = initial.state(self.space.node_points, self.space.beside_nodes(), self.exact)
+            u, v = (body.ties.mean(field.ravel()) for field in fields)
+        elif balanced:
+            u = self._equilibrium()
+        if not balanced:
             u[body.held] = body.prescribed(0.0)[0]
         v[body.held] = body.prescribed(0.0)[1]
         return State(u, v, np.zeros_like(u), 0.0)
 
-    def _stage(
-        self,
-        body: MovingBody,
-        state: State,
-        start: float,
-        end: float,
-        wanted: Array,
-        trial: bool,
-    ) -> list[State]:
-        """Step from one opening to the next; return the states at the times that are wanted."""
-        scheme, averaged = self.scheme.found()
-        breaks = self._breaks(start, end)
-        stops = np.unique([start, end, *wanted, *breaks])
-        steppers: dict[float, Stepper] = {}
+    def _equilibrium(self) -> Array:
+        """Displacement at which the body is at rest with what is closed, which must hold it."""
+        before = self.space
+        if self.closed.any():
+            mesh = partly_opened(self.space.mesh, ~self.closed)
+            before = conforming_space(mesh, self.space.degree, self.comm)
+        constrained_values(self.scene, before, self.exact)  # says which piece is not held
+        if self.scene.analysis.kinematics == "linear" or before is self.space:
+            return self.body.equilibrium()
+        found = MovingBody(self.scene, before, self.exact).equilibrium()
+        return inherit(before, self.space, found.reshape(-1, self.space.dimension)).ravel()
+
+    def _march(self, state: State, trial: bool) -> list[State]:
+        """Step from stop to stop; return the states at the outputs."""
+        own = [float(getattr(cut, "opens_at", 0.0)) for cut in self.scene.cuts if not _grows(cut)]
+        breaks = self._breaks()
+        stops = np.unique([0.0, *self._snapped(np.array(own)), *self.times, *breaks])
         outputs = []
-        self.ledger.open(body, state)
-        self._begin(body, state)
-        if start in wanted:
-            outputs.append(state.copy())
-            self.ledger.enter(body, state)
-        for a, b in pairwise(stops):
-            count = max(1, int(np.ceil((b - a) / self.largest * (1 - 1e-9))))
-            size = float(f"{(b - a) / count:.14g}")  # the same up to round-off: one stepper
-            self.sizes.add(size)
-            if size not in steppers:
-                steppers[size] = Stepper(body, scheme, averaged, size)
-            if np.abs(np.array(breaks) - a).min(initial=np.inf) <= _SAME * self.times[-1]:
-                self._begin(body, state)
-            for _ in range(1 if trial else count):
-                self._step(body, steppers[size], state)
+        self.ledger.open(self.body, state)
+        for k, stop in enumerate(stops):
+            state.time = float(stop)  # without the round-off of the sum of steps
+            begun = self._open(state.time) or k == 0
+            if begun:
+                self._begin(state)
+            if stop in self.times:
+                outputs.append(self._balanced(state, begun))
+                self.ledger.enter(self.body, state)
+            if k == len(stops) - 1:
+                break
+            if not begun and np.abs(breaks - stop).min(initial=np.inf) <= _SAME * self.end:
+                self._begin(state)
+            self._advance(state, float(stops[k + 1]), 1 if trial else None)
             if trial:
                 break
-            state.time = float(b)  # without the round-off of the sum of steps
-            if b in wanted:
-                outputs.append(self._balanced(body, state, scheme))
-                self.ledger.enter(body, state)
-        self.solves += sum(stepper.solves for stepper in steppers.values())
-        for stepper in steppers.values():
-            stepper.close()
         return outputs
 
-    def _begin(self, body: MovingBody, state: State) -> None:
+    def _advance(self, state: State, end: float, most: int | None) -> None:
+        """Step to a time by equal steps, and open on the way what was passed."""
+        span = end - state.time
+        count = max(1, int(np.ceil(span / self.marching.largest * (1 - 1e-9))))
+        size = float(f"{span / count:.14g}")  # the same up to round-off: one stepper
+        if size not in self.steppers:
+            scheme, averaged = self.marching.scheme()
+            self.steppers[size] = Stepper(self.body, scheme, averaged, size)
+        for n in range(most or count):
+            if n and self._open(state.time):
+                self._begin(state)
+            self._step(self.steppers[size], state)
+
+    def _begin(self, state: State) -> None:
         """Take up what jumps at this time: velocities of supports, accelerations."""
+        clock, body = perf_counter(), self.body
         state.velocity[body.held] = body.prescribed(state.time)[1]
         self.ledger.started(body, state)
-        size = _SAME * float(self.times[-1])
-        state.acceleration = self._acceleration(body, state, state.time + size)
+        state.acceleration = self._acceleration(state, state.time + _SAME * self.end)
+        self.timings["loading"] += perf_counter() - clock
 
-    def _balanced(self, body: MovingBody, state: State, scheme: Scheme) -> State:
+    def _balanced(self, state: State, begun: bool) -> State:
         """Copy a state, with the acceleration that balances its forces.
 
         Where accelerations and forces are those of the same share of a step, it has it already:
         what is in balance at the start of a step is at its end.
         """
         found = state.copy()
-        if self.scene.analysis.kinematics == "linear" and scheme.alpha_m != scheme.alpha_f:
-            found.acceleration = self._acceleration(body, state, state.time)
+        scheme, _ = self.marching.scheme()
+        linear = self.scene.analysis.kinematics == "linear"
+        if linear and not begun and scheme.alpha_m != scheme.alpha_f:
+            found.acceleration = self._acceleration(state, state.time)
         return found
 
-    def _acceleration(self, body: MovingBody, state: State, time: float) -> Array:
+    def _acceleration(self, state: State, time: float) -> Array:
         """Acceleration of a state in balance with the loads at a time."""
+        body = self.body
         law, (mass, stiffness) = body.law, self.scene.analysis.damping
         forces = body.external(time) - law.force(state.displacement)
         forces -= mass * (body.mass @ state.velocity)
@@ -295,36 +312,31 @@ class _Mover:
             forces -= stiffness * law.viscous(state.displacement, state.velocity)
         return body.accelerations(forces)
 
-    def _step(self, body: MovingBody, stepper: Stepper, state: State) -> None:
+    def _step(self, stepper: Stepper, state: State) -> None:
         clock = perf_counter()
         before = state.copy()
         forces = stepper.step(state)
         stepped = perf_counter()
-        self.ledger.record(body, before, state, forces)
+        self.ledger.record(self.body, before, state, forces)
         self.timings["steps"] += stepped - clock
         self.timings["accounting"] += perf_counter() - stepped
         self.steps += 1
 
-    def _breaks(self, start: float, end: float) -> list[float]:
-        """Return times in between at which the history of a load or support has a kink or jumps."""
+    def _breaks(self) -> Array:
+        """Return times at which the history of a load or support has a kink or jumps."""
         parts = [*self.scene.supports, *self.scene.loads]
-        found = [t for part in parts for t, _ in getattr(part, "history", None) or ()]
-        slack = _SAME * float(self.times[-1])
-        return [self._snapped(t) for t in found if start + slack < t < end - slack]
+        found = np.array([t for part in parts for t, _ in getattr(part, "history", None) or ()])
+        slack = _SAME * self.end
+        return self._snapped(found[(found > slack) & (found < self.end - slack)])
 
     def _notes(self) -> dict[str, str]:
-        sizes = sorted(self.sizes)
+        sizes = sorted(self.steppers)
         said = " … ".join(f"{s:.6g} s" for s in dict.fromkeys((sizes[0], sizes[-1])))
-        unknowns = MIXED if self.pressure else "displacement"
-        notes = {"scheme": self.scheme.name, "mass": "consistent", "time step": said}
-        return {**notes, "unknowns": unknowns}
+        notes = {"scheme": self.marching.name, "mass": "consistent", "time step": said}
+        if any(map(_grows, self.scene.cuts)):
+            notes["openings"] = str(self.openings)
+        return {**notes, "unknowns": self.unknowns}
 
 
-def _carried(space: ConformingSpace, other: ConformingSpace, state: State) -> State:
-    """Carry a state over to the same mesh with more of its cuts open."""
-    if other is space:
-        return state
-    d = space.dimension
-    fields = (state.displacement, state.velocity, state.acceleration)
-    u, v, a = (inherit(space, other, f.reshape(-1, d)).ravel() for f in fields)
-    return State(u, v, a, state.time)
+def _grows(cut: Cut) -> bool:
+    return isinstance(cut, ToolPathCut)
