@@ -19,29 +19,13 @@ from verify.scene import (
 )
 from verify.scene.planar import distance_to_outline, distance_to_polyline, inside_polygon
 
-__all__ = ["finally_cut", "opening_times", "partly_opened"]
+__all__ = ["opening_times", "partly_opened"]
 
 Array = NDArray[np.float64]
 
 
-def finally_cut(scene: Scene) -> Scene:
-    """Give a scene with the whole cut of every tool path in its place, for meshes.
-
-    Raises
-    ------
-    InputError
-        If a blade turns out of a plane on its way.
-    """
-    if not any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
-        return scene
-    cuts = [cut.whole() if isinstance(cut, ToolPathCut) else cut for cut in scene.cuts]
-    found = scene.model_copy(update={"cuts": cuts})
-    found._file, found._name = scene.file, scene.name
-    return found
-
-
 def opening_times(scene: Scene, mesh: ConformingMesh, delay: float = 0.0) -> Array:
-    """Times (f,) from which on each of `mesh.cut_facets` is open, s.
+    """Give the times (f,) from which on each of `mesh.cut_facets` is open, s.
 
     Those of a cut open with it. One on a tool path opens when the blade has passed all of it, the
     last of its corners. A facet belongs to the cut that it is closest to: one on a curved cut is
@@ -51,15 +35,14 @@ def opening_times(scene: Scene, mesh: ConformingMesh, delay: float = 0.0) -> Arr
     ----------
     scene : Scene
     mesh : ConformingMesh
-        With all cuts of `finally_cut` open.
+        With all final cuts open.
     delay : float
         By which facets on tool paths open late, s.
     """
     corners = mesh.realised_cut
     places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
     points = places.reshape(-1, mesh.dimension)
-    cuts = finally_cut(scene).cuts
-    off = [_distance(cut, points).reshape(places.shape[:2]).max(axis=1) for cut in cuts]
+    off = [_distance(cut, points).reshape(places.shape[:2]).max(axis=1) for cut in scene.final_cuts]
     times = np.zeros(len(corners))
     for i, cut in enumerate(scene.cuts):
         mine = np.argmin(off, axis=0) == i

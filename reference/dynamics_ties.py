@@ -35,7 +35,8 @@ def facing_nodes(space: ConformingSpace) -> Numbers:
     # nodes that face each other lie at the same place, to the last digit
     _, place = np.unique(space.node_points[both.ravel()], axis=0, return_inverse=True)
     rank = np.argsort(place.reshape(both.shape), axis=2)
-    return np.stack(np.take_along_axis(both, rank, axis=2), axis=2)
+    facing: Numbers = np.moveaxis(np.take_along_axis(both, rank, axis=2), 0, 2)
+    return facing
 
 
 class TiedUnknowns(SharedUnknowns):
@@ -64,6 +65,8 @@ class TiedUnknowns(SharedUnknowns):
         self.leader = np.arange(len(space.node_points))
         self.followers = self.leader[:0]
         self._expansion: Any = None
+        self._few: Any = None
+        self._full: Any = None
 
     def tie(self, pairs: Numbers) -> None:
         """Tie the nodes of pairs (p, 2), and no others."""

@@ -35,7 +35,7 @@ def bowl(n):
     return np.column_stack([x, y, -3.0 * x * (1 - x) * y * (1 - y)]), mesh.cells
 
 
-def bowl_scene(folder, n, text, duration=0.2, step=0.01, outputs=5, opens=0.0, at=0.5):
+def bowl_scene(folder, n, text, duration=0.2, step=0.01, outputs=5, opens=0.0, at=0.5, cut=None):
     points, cells = bowl(n)
     meshio.Mesh(points, [("triangle", cells)]).write(folder / "sheet.vtu")
     analysis = (
@@ -43,7 +43,7 @@ def bowl_scene(folder, n, text, duration=0.2, step=0.01, outputs=5, opens=0.0, a
         f"duration = {duration}\ntime_step = {step}\noutputs = {outputs}\n"
     )
     corners = [(at, 0.25, -2), (at, 0.75, -2), (at, 0.75, 1), (at, 0.25, 1)]
-    cut = f"{cut_text(*corners)}opens_at = {opens}\n"
+    cut = cut or f"{cut_text(*corners)}opens_at = {opens}\n"
     body = sheet_text("A bowl of skin", "It shall move as membranes do.")
     (folder / "case.toml").write_text(body + analysis + cut + text)
     return load_scene(folder / "case.toml")

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from reference.boundary_values import constrained_values
 from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
-from reference.dynamics_cuts import finally_cut
 from reference.exact import exact_solution
 from reference.fracture.pressure import MIXED
 from reference.large_strain import LargeStrainSolve, solve_large_strain
@@ -33,8 +32,8 @@ import_dolfinx()  # fail here, by name, and not in the middle of a solve
 
 def _refusal(scene: Scene) -> str | None:
     try:
-        scene = finally_cut(scene)
-    except UnsupportedSceneError as error:
+        _ = scene.final_cuts
+    except InputError as error:
         return str(error)
     geometry = scene.geometry
     if isinstance(geometry, MeshFile):
@@ -118,7 +117,7 @@ class ConformingSolver:
         size = structure(scene, level).size
         return _solve(
             scene,
-            lambda whole, level: (peer_mesh(whole, level, mesh), size),
+            lambda level: (peer_mesh(scene, level, mesh), size),
             level,
             degree,
             repetitions,
@@ -149,9 +148,7 @@ class ReferenceSolver:
         """Return the number of levels of the reference."""
         return scene.reference.levels
 
-    def solve(
-        self, scene: Scene, level: int, repetitions: int = 1, delay: float = 0.0
-    ) -> Solution:
+    def solve(self, scene: Scene, level: int, repetitions: int = 1, delay: float = 0.0) -> Solution:
         """Solve `scene` on reference level `level`; each halves all element sizes."""
         linear = scene.analysis.kinematics == "linear"
         scheme = "newmark" if linear else "energy_momentum"
@@ -164,7 +161,7 @@ class ReferenceSolver:
 
         return _solve(
             scene,
-            reference_mesh,
+            lambda level: reference_mesh(scene, level),
             level,
             scene.reference.degree,
             min(repetitions, 1),
@@ -175,7 +172,7 @@ class ReferenceSolver:
 
 def _solve(
     scene: Scene,
-    make_mesh: Callable[[Scene, int], tuple[ConformingMesh, float]],
+    make_mesh: Callable[[int], tuple[ConformingMesh, float]],
     level: int,
     degree: int,
     repetitions: int,
@@ -188,7 +185,7 @@ def _solve(
     if scene.exact is not None:
         exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
-    comm, whole = _comm(), finally_cut(scene)
+    comm = _comm()
 
     def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
         space = conforming_space(mesh, degree, comm)
@@ -199,10 +196,10 @@ def _solve(
 
     timings: dict[str, list[float]] = {}
     if repetitions:  # a pass on the coarsest mesh compiles the forms and is not timed
-        answer(0, *_shared(comm, lambda: make_mesh(whole, 0)), trial=True)
+        answer(0, *_shared(comm, lambda: make_mesh(0)), trial=True)
     for _ in range(max(repetitions, 1)):
         start = perf_counter()
-        mesh, size = _shared(comm, lambda: make_mesh(whole, level))
+        mesh, size = _shared(comm, lambda: make_mesh(level))
         meshed = perf_counter() - start
         result = answer(level, mesh, size)
         if repetitions:

@@ -1,0 +1,208 @@
+"""Bodies that a blade cuts while they move: what opens when, and what it does to energy."""
+
+import numpy as np
+import pytest
+from reference_scenes import needs_fenicsx
+from test_membrane_motion import HANGING as HANGING_SKIN
+from test_membrane_motion import bowl_scene, moved
+from test_motion import moving, solved, spread
+from test_solid_motion import moving as solid
+
+pytestmark = needs_fenicsx
+
+INCLINED = {"kind": "tool_path", "name": "stroke", "points": [[-0.1, 0.33], [1.1, 0.71]]}
+BENT = {
+    "kind": "tool_path",
+    "name": "bent",
+    "points": [[0.21, 0.83], [0.42, 0.57], [0.66, 0.52], [0.79, 0.31]],
+}
+ACROSS = {"kind": "tool_path", "name": "across", "points": [[0.71, -0.2], [0.38, 1.2]]}
+PULLED = {
+    "supports": [
+        {"where": "bottom", "displacement": [0, 0]},
+        {"where": "top", "displacement": [0.02, 0.03]},
+    ],
+    "initial": {"kind": "equilibrium"},
+}
+FLYING = {"kind": "moving", "spin": 4.0, "centre": [0.3, 0.6], "velocity": [0.3, -0.1]}
+UNSTRUCTURED = {"pattern": "unstructured", "sizes": [0.2]}
+
+
+def plate(paths, **changes):
+    content = {"duration": 0.3, "outputs": 4, "mesh": UNSTRUCTURED}
+    return moving(paths, **content | changes)
+
+
+def hidden(ledger):
+    """The largest change of the account that closes it, over the energy in play."""
+    energy = max(np.ptp(ledger[name]) for name in ("kinetic", "strain", "gravity"))
+    return np.ptp(ledger["total"]) / energy
+
+
+@pytest.mark.parametrize(
+    ("paths", "degree"),
+    [
+        ([{**INCLINED, "times": [0.02, 0.25]}], 1),
+        ([{**INCLINED, "times": [0.02, 0.25]}], 2),
+        ([{**BENT, "speed": 3.5, "starts_at": -0.05}], 2),
+        ([{**INCLINED, "times": [0.0, 0.1]}, {**ACROSS, "times": [0.1, 0.22]}], 1),
+    ],
+)
+def test_a_conservative_scheme_keeps_the_energy_of_a_plate_at_every_opening(paths, degree):
+    found = solved(plate(paths, **PULLED), degree=degree)
+    ledger = found.ledger
+    assert int(found.notes["openings"]) >= 5
+    assert np.ptp(ledger["kinetic"]) > 0.01 * ledger["strain"][0]
+    # fifty solves to 1e-11 of the forces; nothing is damped and nothing works
+    energy = ledger["kinetic"] + ledger["strain"]
+    assert spread(energy) < 1e-10
+    assert np.abs(ledger["algorithmic"]).max() < 1e-10 * energy[0]
+    assert np.abs(ledger["unbalanced"]).max() < 1e-10 * energy[0]
+
+
+def test_what_generalised_alpha_takes_at_the_openings_is_its_own_and_the_account_closes():
+    path = {**INCLINED, "times": [0.02, 0.25]}
+    taken = {}
+    for radius in (1.0, 0.5, 0.0):
+        scene = plate([path], **PULLED)
+        ledger = solved(scene, scheme="generalised_alpha", spectral_radius=radius).ledger
+        assert hidden(ledger) < 1e-10
+        taken[radius] = ledger["algorithmic"][-1] / ledger["strain"][0]
+    assert abs(taken[1.0]) < 1e-10
+    assert 0.01 < taken[0.5] < taken[0.0]
+
+
+def test_a_free_body_that_spins_keeps_energy_and_momenta_while_two_blades_part_it():
+    paths = [{**INCLINED, "times": [0.02, 0.12]}, {**ACROSS, "times": [0.13, 0.28]}]
+    scene = plate(paths, kinematics="corotational", initial=FLYING)
+    ledger = solved(scene, scheme="energy_momentum").ledger
+    assert np.ptp(ledger["strain"]) > 1e-3 * ledger["kinetic"][0]
+    assert spread(ledger["kinetic"] + ledger["strain"]) < 1e-10
+    assert spread(ledger["angular_momentum_z"]) < 1e-10
+    for axis in "xy":
+        assert np.ptp(ledger[f"linear_momentum_{axis}"]) < 1e-10 * 1000
+
+
+def test_a_facet_opens_at_the_first_step_that_begins_after_the_blade_has_passed_it():
+    """Four facets in a row, as four cuts that open at those steps: the same motion."""
+    ends = [0.0, 0.25, 0.5, 0.75, 1.0]
+    path = {"kind": "tool_path", "name": "row", "points": [[0, 0.5], [1, 0.5]], "speed": 5.0}
+    row = [
+        {"kind": "polyline", "name": f"c{k}", "points": [[a, 0.5], [b, 0.5]], "opens_at": t}
+        for k, (a, b, t) in enumerate(zip(ends, ends[1:], [0.06, 0.11, 0.16, 0.21], strict=False))
+    ]
+    given = {**PULLED, "mesh": {"cells": [[4, 4]]}}
+    # passed at 0.055, 0.105 …: within steps of 0.01
+    behind = solved(plate([{**path, "starts_at": 0.005}], **given))
+    given["duration"] = 0.3
+    whole = solved(plate(row, **given))
+    apart = np.abs(behind.displacement - whole.displacement).max()
+    assert apart < 1e-10 * np.abs(whole.displacement).max()
+
+
+def test_what_was_passed_before_the_start_is_open_and_what_comes_late_is_whole_until_then():
+    given = {**PULLED, "initial": {"kind": "equilibrium", "cuts": "open"}}
+    # at 0 the blade is in the middle of its way; at 0.1 s it goes on
+    ends = [[-0.1, 0.33], [0.5, 0.52], [0.5, 0.52], [1.1, 0.71]]
+    path = {**INCLINED, "points": ends, "times": [-1.0, -0.5, 0.11, 0.3]}
+    found = solved(plate([path], **given), degree=2)
+    still = np.abs(found.velocity).max(axis=(1, 2))
+    size = np.abs(found.displacement[0]).max()
+    # at rest with a slit, to 1e-11 of the forces, until it grows
+    assert still[1] < 1e-7 * size / 0.1
+    assert still[2] > 1e-2 * size / 0.1
+    half = {"kind": "polyline", "name": "half", "points": [[-0.1, 0.33], [0.5, 0.52]]}
+    rest = {"kind": "polyline", "name": "rest", "points": [[0.5, 0.52], [1.1, 0.71]]}
+    twin = solved(plate([half, {**rest, "opens_at": 0.3}], **given), degree=2)
+    assert twin.ledger["strain"][0] == pytest.approx(found.ledger["strain"][0], rel=0.02)
+
+
+def test_a_delay_is_a_blade_that_comes_later():
+    path = {**INCLINED, "times": [0.02, 0.2]}
+    late = solved(plate([path], **PULLED), delay=0.043)
+    later = solved(plate([{**path, "times": [0.063, 0.243]}], **PULLED))
+    assert np.array_equal(late.displacement, later.displacement)
+    assert np.abs(late.displacement - solved(plate([path], **PULLED)).displacement).max() > 1e-3
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_what_is_tied_is_the_mesh_on_which_only_the_open_facets_are_cut(degree):
+    """Nodes that cells share, as `open_cut` gives them for the first facets of two paths."""
+    from reference.dynamics_cuts import opening_times, partly_opened
+    from reference.dynamics_ties import TiedUnknowns, facing_nodes
+    from reference.space import conforming_space
+    from verify.solvers.conforming_meshes import peer_mesh
+
+    paths = [{**INCLINED, "times": [0.0, 0.2]}, {**ACROSS, "times": [0.05, 0.22]}]
+    scene = plate(paths)
+    mesh = peer_mesh(scene, 0, "imprinted")
+    whole, times = conforming_space(mesh, degree), opening_times(scene, mesh)
+    facing, ties = facing_nodes(whole), TiedUnknowns(whole, whole)
+    assert np.ptp(whole.node_points[facing], axis=2).max() == 0.0
+    for time in (0.06, 0.11, 0.15, 0.3):
+        ties.tie(facing[times > time].reshape(-1, 2))
+        part = conforming_space(partly_opened(mesh, times <= time), degree)
+        tied = ties.leader[whole.cell_nodes]
+        pairs = np.unique(np.stack([tied.ravel(), part.cell_nodes.ravel()]), axis=1)
+        # one to one: as many pairs as nodes of either
+        assert pairs.shape[1] == len(part.node_points) == len(np.unique(ties.leader))
+
+
+SLANTED = {
+    "kind": "tool_path",
+    "name": "stroke",
+    "points": [[0.31, -0.1, 0.55], [0.47, 0.4, 0.5], [0.62, 1.1, 0.52]],
+    "direction": [0.2, 0.1, 1.0],
+    "depth": 0.7,
+    "times": [0.02, 0.08, 0.18],
+}
+HANGING = {
+    "supports": [{"where": "bottom", "displacement": [0, 0, 0]}],
+    "loads": [{"kind": "gravity", "acceleration": [1.0, 0.5, -2.0]}],
+    "initial": {"kind": "equilibrium"},
+}
+
+
+@pytest.mark.parametrize(
+    ("scheme", "mesh"), [("newmark", "imprinted"), ("energy_momentum", "remeshed")]
+)
+def test_a_block_keeps_its_energy_while_a_blade_goes_through_it(scheme, mesh):
+    scene = solid([SLANTED], 0.2, **HANGING)
+    kinematics = "linear" if scheme == "newmark" else "corotational"
+    analysis = scene.analysis.model_copy(update={"kinematics": kinematics})
+    scene = scene.model_copy(update={"analysis": analysis})
+    found = solved(scene, scheme=scheme, mesh=mesh)
+    assert int(found.notes["openings"]) >= 4
+    ledger = found.ledger
+    assert hidden(ledger) < 1e-10
+    play = np.ptp(ledger["strain"])
+    assert np.abs(ledger["algorithmic"]).max() < 1e-9 * play
+    assert np.ptp(ledger["kinetic"]) > 0.05 * play
+
+
+def test_a_free_block_that_spins_keeps_energy_and_momenta_while_it_is_cut_through():
+    through = {**SLANTED, "points": [[0.31, -0.1, -0.1], [0.62, 1.1, -0.1]], "depth": 1.4}
+    start = {"kind": "moving", "spin": [1.0, 3.0, -2.0], "centre": [0.5, 0.5, 0.4]}
+    scene = solid([{**through, "times": [0.02, 0.15]}], 0.2, initial=start)
+    ledger = solved(scene, scheme="energy_momentum").ledger
+    assert spread(ledger["kinetic"] + ledger["strain"]) < 1e-10
+    for axis in "xyz":
+        assert np.ptp(ledger[f"angular_momentum_{axis}"]) < 1e-10 * 1000
+
+
+def test_a_membrane_is_cut_on_its_way_down(tmp_path):
+    stroke = """
+[[cuts]]
+kind = "tool_path"
+points = [[0.23, 0.11, 0.5], [0.41, 0.52, 0.5], [0.77, 0.63, 0.5]]
+direction = [0.1, 0.0, -1.0]
+depth = 2.0
+times = [0.03, 0.09, 0.18]
+"""
+    for scheme in ("energy_momentum", "generalised_alpha"):
+        scene = bowl_scene(tmp_path, 6, HANGING_SKIN, cut=stroke)
+        found = moved(scene, scheme=scheme)
+        assert int(found.notes["openings"]) >= 4
+        assert hidden(found.ledger) < 1e-10
+        uncut = found.displacement[0]
+        assert np.isfinite(uncut).all()
