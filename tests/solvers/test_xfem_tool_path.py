@@ -3,80 +3,30 @@
 import meshio
 import numpy as np
 import pytest
-from case_texts import body_text, cut_text, sheet_text, support_text, weight_text
+from case_texts import sheet_text, support_text, weight_text
+from tool_path_scenes import (
+    BODIES,
+    INCLINED,
+    KINKED,
+    MOTION,
+    PLANE,
+    SPUN,
+    UNSTRUCTURED,
+    path_text,
+)
 
 from verify.scene import load_scene
-from verify.solvers import xfem_account
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_openings import opening_times
 from verify.solvers.xfem_steps import SCHEMES
 from verify.xfem.cuts import Polyline
-from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
-
-PLANE = body_text(
-    "A plate under a blade", "It shall move.", [1.0, 0.7], [[9, 6]], "1e4", density="1e3"
-)
-UNSTRUCTURED = PLANE.replace("cells = [[9, 6]]", 'sizes = [0.13]\npattern = "unstructured"')
-SOLID = body_text(
-    "A block under a blade", "It shall move.", [0.4, 0.3, 0.2], [[4, 3, 2]], "1e4", density="1e3"
-)
-MOTION = '[analysis]\nkind = "dynamic"\nduration = 0.3\ntime_step = 0.02\noutputs = 4\n'
-SPUN = '[initial]\nkind = "moving"\nspin = %s\nvelocity = %s\n'
-
-
-def path_text(points, times, depth=None, name="cut"):
-    blade = f"depth = {depth[0]}\ndirection = {depth[1]}\n" if depth else ""
-    return (
-        f'[[cuts]]\nkind = "tool_path"\nname = "{name}"\n'
-        f"points = {points}\ntimes = {times}\n{blade}"
-    )
-
-
-INCLINED = path_text([[-0.1, 0.21], [1.1, 0.52]], [-0.05, 0.25])
-KINKED = path_text([[-0.1, 0.2], [0.45, 0.43], [0.8, 0.31], [1.1, 0.5]], [-0.05, 0.1, 0.12, 0.27])
-CROSSING = path_text([[0.31, 0.8], [0.53, -0.1]], [0.05, 0.22], name="across")
-BLADE = path_text([[-0.05, 0.11, -0.05], [0.45, 0.19, -0.05]], [0.0, 0.25], (0.6, [0.1, 0.2, 1.0]))
-SHALLOW = path_text(
-    [[-0.05, 0.12, 0.07], [0.2, 0.16, 0.05], [0.45, 0.1, 0.07]], [0.0, 0.1, 0.25],
-    (0.3, [0.05, 0.1, 1.0]),
-)  # fmt: skip
-BODIES = {
-    "plane": (PLANE, INCLINED, "3.0", "[0.2, 0.1]"),
-    "plane, curved, unstructured, crossed": (UNSTRUCTURED, KINKED + CROSSING, "3.0", "[0.2, 0.1]"),
-    "plane, with a cut at a time": (
-        PLANE,
-        INCLINED + cut_text([0.31, 0.8], [0.53, -0.1]) + 'name = "slit"\nopens_at = 0.11\n',
-        "3.0",
-        "[0.2, 0.1]",
-    ),
-    "solid": (SOLID, BLADE, "[1.0, 2.0, -1.5]", "[0.2, 0.1, 0.0]"),
-    "solid, not through its depth, curved": (SOLID, SHALLOW, "[1.0, 2.0, -1.5]", "[0.2, 0.1, 0.0]"),
-}  # fmt: skip
 
 
 def solve(folder, text, **parameters):
     (folder / "tool.toml").write_text(text)
     return XfemSolver().solve(load_scene(folder / "tool.toml"), 0, 0, **parameters)
-
-
-@pytest.fixture
-def openings(monkeypatch):
-    """What the ledger says of the body before and after each opening, as it happens."""
-    found = []
-    genuine = xfem_account.Account.open
-
-    def opened(self, body, state, further, inherited):
-        rows = []
-        for of in ((body, state), (further, inherited)):
-            one = EnergyLedger(*of).close()
-            rows.append([[one.kinetic[0], one.strain[0]], one.momentum[0], one.angular_momentum[0]])
-        found.append((state.time, rows))
-        genuine(self, body, state, further, inherited)
-
-    monkeypatch.setattr(xfem_account.Account, "open", opened)
-    return found
 
 
 @pytest.mark.parametrize("kinematics", ["linear", "corotational"])
@@ -158,7 +108,9 @@ def test_elements_open_at_the_first_step_that_begins_after(tmp_path, openings):
     found = solve(tmp_path, PLANE + MOTION + INCLINED + weight_text() + support_text("top", [0, 0]))
     times = [time for time, _ in openings]
     np.testing.assert_allclose(np.array(times) / 0.02, np.round(np.array(times) / 0.02), atol=1e-9)
-    assert times[0] == 0.0  # what the blade had passed before the start
+    # what the blade had passed before the start is open in it: an element there has no event
+    assert times[0] > 0.0
+    assert len(times) >= 10
     assert found.iterations["steps"] == 15
     assert found.notes["time step"] == "0.02 s"
 

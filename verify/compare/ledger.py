@@ -16,7 +16,8 @@ _SIGNS = {
     "kinetic": 1.0, "strain": 1.0, "gravity": 1.0, "damping": 1.0, "work_of_loads": -1.0,
     "work_of_supports": -1.0,
 }  # fmt: skip
-_SCHEME = "algorithmic"  # what the time scheme itself takes: counts only where it is asked about
+# what the time scheme itself takes, and material that is removed: only where it is asked about
+_SCHEME = {"algorithmic": 1.0, "removed_energy": 1.0}
 
 
 @dataclass(frozen=True)
@@ -47,10 +48,11 @@ class Balance:
 def total_energy(ledger: Mapping[str, Array], scheme: bool = False) -> Array | None:
     """Sum (t,) of a ledger's parts that physics keeps constant; None without any of them.
 
-    The solver's own ``total`` is not read. With `scheme`, what the time scheme dissipates is
-    added: then it is an identity of the solver's steps, and its changes are errors of account.
+    The solver's own ``total`` is not read. With `scheme`, what the time scheme dissipates and what
+    was removed is added: then it is an identity of the solver's steps, and its changes are errors
+    of account.
     """
-    signs = {**_SIGNS, **({_SCHEME: 1.0} if scheme else {})}
+    signs = {**_SIGNS, **(_SCHEME if scheme else {})}
     parts = [sign * np.asarray(ledger[name]) for name, sign in signs.items() if name in ledger]
     return np.sum(parts, axis=0) if parts else None
 

@@ -67,6 +67,8 @@ class CutBody:
     changes : tuple of Change
     seconds : dict of str to float
         Wall time of the phases of the cut.
+    cell_number : (m,) int array, optional
+        Where cells go as the cut opens: ascending numbers that the others keep.
     """
 
     virtual: VirtualMesh
@@ -77,6 +79,7 @@ class CutBody:
     smallest_fraction: float
     changes: tuple[Change, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    cell_number: _Ints | None = None
 
     def material(self, given: Material) -> Material:
         """Material of the cells of ``virtual.mesh``, from that of the cells as given."""
@@ -98,6 +101,7 @@ def make_body(
     conforming: Subdivision | None = None,
     cell_origin: _Ints | None = None,
     seconds: dict[str, float] | None = None,
+    cell_number: _Ints | None = None,
 ) -> CutBody:
     """Make the body of a cut mesh, with its counts.
 
@@ -105,7 +109,7 @@ def make_body(
     ----------
     given : SimplexMesh
         The mesh before the method touched it.
-    virtual, resisting, conforming, cell_origin, changes, seconds
+    virtual, resisting, conforming, cell_origin, changes, seconds, cell_number
         As in `CutBody`; without them nothing but `virtual` is special.
     """
     origin = np.arange(len(given.cells)) if cell_origin is None else cell_origin
@@ -118,4 +122,5 @@ def make_body(
         smallest_fraction=float((virtual.volumes / given.measures[origin[virtual.parent]]).min()),
         changes=tuple(change for change in changes if change.count),
         seconds=seconds or {},
+        cell_number=cell_number,
     )

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.methods.cut_body import Change, CutBody, make_body
 from verify.methods.opened_mesh import OpenedMesh, conforming_to
+from verify.methods.opening import OpenedCells, cut_so_far
 from verify.methods.refinement import bisect_cells
 from verify.methods.whole_cells import whole_cells
 from verify.xfem.cuts import Cut
@@ -36,7 +37,13 @@ _TOUCHED = 1e-9
 _UNITS = {2: "m²", 3: "m³"}
 
 
-def removal(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "through") -> CutBody:
+def removal(
+    mesh: SimplexMesh,
+    cuts: Sequence[Cut],
+    tip: TipRule = "through",
+    *,
+    opened: OpenedCells | None = None,
+) -> CutBody:
     """Remove every cell through whose interior the cut goes.
 
     Cells that hang on the rest by a node or an edge only are taken off there, as such a hinge
@@ -49,6 +56,8 @@ def removal(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "through") ->
     cuts : sequence of Cut
     tip : {"inside", "through", "nearest"}
         "through" removes the cells in which the cut ends.
+    opened : callable, optional
+        Without it all cells go through which the cut goes; else those that a cut has opened.
 
     Raises
     ------
@@ -56,11 +65,17 @@ def removal(mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "through") ->
         If nothing is left.
     """
     start = perf_counter()
-    return _remove(mesh, mesh, cuts, tip, np.arange(len(mesh.cells)), start, [])
+    cut = cut_so_far(mesh, cuts, tip, opened)
+    return _remove(mesh, cut, np.arange(len(mesh.cells)), start, [])
 
 
 def removal_refined(
-    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "through", levels: int = 2
+    mesh: SimplexMesh,
+    cuts: Sequence[Cut],
+    tip: TipRule = "through",
+    levels: int = 2,
+    *,
+    opened: OpenedCells | None = None,
 ) -> CutBody:
     """Refine the cells that the cut touches, then remove those that it still touches.
 
@@ -71,6 +86,8 @@ def removal_refined(
     tip : {"inside", "through", "nearest"}
     levels : int
         Touched cells have their longest edge halved so many times.
+    opened : callable, optional
+        As of `removal`; the mesh is refined along all of the cuts from the start.
 
     Raises
     ------
@@ -83,28 +100,27 @@ def removal_refined(
     wanted = _longest_edges(mesh) * 0.5**levels * (1.0 + 1e-9)
     refined, origin = mesh, np.arange(len(mesh.cells))
     while True:
-        touched = _touched(cut_mesh(refined, cuts, tip))
-        coarse = touched & (_longest_edges(refined) > wanted[origin])
+        cut = cut_mesh(refined, cuts, tip)
+        coarse = _touched(cut) & (_longest_edges(refined) > wanted[origin])
         if not coarse.any():
             break
         refined, before = bisect_cells(refined, coarse)
         origin = origin[before]
     added = len(refined.cells) - len(mesh.cells)
     changes = [Change("cell added by refinement", added, 0.5**levels, "of the edge")]
-    return _remove(mesh, refined, cuts, tip, origin, start, changes)
+    if opened is not None:
+        cut = cut_mesh(refined, cuts, tip, opened(cut))
+    return _remove(mesh, cut, origin, start, changes)
 
 
 def _remove(
     given: SimplexMesh,
-    mesh: SimplexMesh,
-    cuts: Sequence[Cut],
-    tip: TipRule,
+    cut: VirtualMesh,
     origin: _Ints,
     start: float,
     changes: list[Change],
 ) -> CutBody:
-    cut = cut_mesh(mesh, cuts, tip)
-    touched = _touched(cut)
+    mesh, touched = cut.mesh, _touched(cut)
     kept = ~touched[cut.parent] & (cut.fraction > 0.5)
     if not kept.any():
         raise XfemError("the cut touches every cell of the mesh: removal leaves nothing")
@@ -140,6 +156,7 @@ def _remove(
         conforming=conforming_to(opened, origin[parents], facets),
         cell_origin=origin[parents],
         seconds=seconds,
+        cell_number=parents,
     )
 
 

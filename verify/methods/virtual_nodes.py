@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.methods.cut_body import Change, CutBody, make_body
+from verify.methods.opening import OpenedCells, cut_so_far
 from verify.methods.whole_cells import whole_cells
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
@@ -24,7 +25,7 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers.absorption import absorb
 from verify.xfem.slivers.piece_contacts import sibling_contacts
 from verify.xfem.splitting.split import TipRule
-from verify.xfem.virtual import VirtualMesh, cut_mesh
+from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["CopyWeights", "virtual_node", "virtual_node_arbitrary"]
 
@@ -32,7 +33,12 @@ CopyWeights = Literal["share", "whole"]
 
 
 def virtual_node(
-    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside", weights: CopyWeights = "share"
+    mesh: SimplexMesh,
+    cuts: Sequence[Cut],
+    tip: TipRule = "inside",
+    weights: CopyWeights = "share",
+    *,
+    opened: OpenedCells | None = None,
 ) -> CutBody:
     """Copy a cell once for each part with a node in it; parts without one join their sibling.
 
@@ -45,9 +51,11 @@ def virtual_node(
     weights : {"share", "whole"}
         Copies resist by their share of the volume, or as whole cells: no sliver is left, but the
         cut cells count several times.
+    opened : callable, optional
+        Without it all cells that the cuts go through are open.
     """
     start = perf_counter()
-    cut = cut_mesh(mesh, cuts, tip)
+    cut = cut_so_far(mesh, cuts, tip, opened)
     into = _parts_with_nodes(cut)
     merged = np.flatnonzero(into != np.arange(len(into)))
     largest = float(cut.fraction[merged].max(initial=0.0))
@@ -57,14 +65,19 @@ def virtual_node(
 
 
 def virtual_node_arbitrary(
-    mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule = "inside", weights: CopyWeights = "share"
+    mesh: SimplexMesh,
+    cuts: Sequence[Cut],
+    tip: TipRule = "inside",
+    weights: CopyWeights = "share",
+    *,
+    opened: OpenedCells | None = None,
 ) -> CutBody:
     """Copy a cell once for each of its parts.
 
     Parameters are those of `virtual_node`.
     """
     start = perf_counter()
-    return _body(mesh, cut_mesh(mesh, cuts, tip), weights, [], start)
+    return _body(mesh, cut_so_far(mesh, cuts, tip, opened), weights, [], start)
 
 
 def _body(

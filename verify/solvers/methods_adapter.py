@@ -16,7 +16,7 @@ from verify.methods.cut_body import CutBody
 from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
-from verify.solvers.methods_motion import MethodMover, refuses_motion
+from verify.solvers.methods_motion import MethodMover
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import loads_of
@@ -30,7 +30,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import solve_static, static_equilibrium
 from verify.xfem.supports import check_bodies
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MassSpringSolver", "MethodSolver"]
 
@@ -100,7 +99,7 @@ class MethodSolver:
             return reason
         if scene.material.thickness is not None and self.name not in _SHEETS:
             return f"membranes in space are not offered by {self.name}"
-        return refuses_motion(scene) if scene.analysis.kind == "dynamic" else None
+        return None
 
     def levels(self, scene: Scene) -> int:
         """Return the number of mesh levels of the scene."""
@@ -158,7 +157,8 @@ class MethodSolver:
         return _solution(self.name, runs[-1], size, {"meshing": [meshing], **timings})
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
-        known = list(signature(METHODS[self._method]).parameters)[2:]
+        _, _, *offered = signature(METHODS[self._method]).parameters.values()
+        known = [one.name for one in offered if one.kind is not one.KEYWORD_ONLY]
         for name in parameters:
             if name not in known:
                 common = ("load_steps", "scheme", "step_factor", "spectral_radius")
@@ -181,23 +181,26 @@ class MethodSolver:
     ) -> _Run:
         """Cut, load, solve: all of it, nothing kept from the run before."""
         mesh = SimplexMesh(mesh.points, mesh.cells)
-        body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
-        exact, material = _exact(scene), body.material(material_of(scene))
-        kinematics = scene.analysis.kinematics
+        exact, kinematics = _exact(scene), scene.analysis.kinematics
         if scene.analysis.kind == "dynamic":
             forces: list[InternalForce] = []
 
-            def law(virtual: VirtualMesh) -> InternalForce:
-                forces.append(self._force(virtual, material, kinematics))
+            def law(body: CutBody) -> InternalForce:
+                material = body.material(material_of(scene))
+                forces.append(self._force(body.resisting, material, kinematics))
                 return forces[-1]
 
-            mover = MethodMover(body, law, scene, mesh, size, exact, choice.motion)
+            mover = MethodMover(
+                self._method, parameters, law, scene, mesh, size, exact, choice.motion
+            )
             moved = mover.run(trial)
             return _Run(
-                body, moved.times, moved.displacement, moved.velocity, moved.acceleration,
+                mover.final, moved.times, moved.displacement, moved.velocity, moved.acceleration,
                 moved.ledger, moved.timings, moved.iterations, moved.notes,
                 getattr(forces[-1], "clamped", 0),
             )  # fmt: skip
+        body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
+        material = body.material(material_of(scene))
         start = perf_counter()
         supports = supports_of(scene, body.virtual, exact)
         load = loads_of(scene, body.virtual, exact)

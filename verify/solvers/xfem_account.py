@@ -16,15 +16,23 @@ _DONE = {
     "algorithmic": "algorithmic",
     "unbalanced": "unbalanced",
 }
+_REMOVED = ("removed_energy", "removed_mass")
 _AXES = ("x", "y", "z")
 
 
 class Account:
-    """Rows of the ledgers of stages, one after the other; work goes on from stage to stage."""
+    """Rows of the ledgers of stages, one after the other; work goes on from stage to stage.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    removal : bool
+        Whether openings take material away: its energy and mass have entries of their own.
+    """
+
+    def __init__(self, removal: bool = False) -> None:
         self._rows: list[dict[str, float]] = []
         self._done = dict.fromkeys(_DONE.values(), 0.0)
+        self._removed = dict.fromkeys(_REMOVED if removal else (), 0.0)
 
     def enter(self, ledger: Ledger, instants: list[int]) -> None:
         """Enter the rows of a stage that are asked for, and keep what it has done in all."""
@@ -34,12 +42,14 @@ class Account:
                 name: self._done[name] + float(getattr(ledger, column)[k])
                 for column, name in _DONE.items()
             }
+            row |= self._removed
             row["total"] = (
                 sum(row[name] for name in _STATE)
                 - row["work_of_loads"]
                 - row["work_of_supports"]
                 + row["damping"]
                 + row["algorithmic"]
+                + row.get("removed_energy", 0.0)
             )
             row |= _components("linear_momentum", ledger.momentum[k])
             row |= _components("angular_momentum", ledger.angular_momentum[k])
@@ -52,13 +62,20 @@ class Account:
     ) -> None:
         """Enter the energy that is lost where a body that is cut further takes over a state.
 
-        Nothing without a sliver policy. It is the scheme's, like what a step dissipates.
+        Nothing without a sliver policy, whose loss is the scheme's, like what a step dissipates.
+        What is removed takes its energy and its mass with it.
         """
         before, after = (
             float(EnergyLedger(*of).close().mechanical[0])
             for of in ((body, state), (further, inherited))
         )
-        self._done["algorithmic"] += before - after
+        if self._removed:
+            self._removed["removed_energy"] += before - after
+            self._removed["removed_mass"] += float(
+                body.mass.weights.sum() - further.mass.weights.sum()
+            )
+        else:
+            self._done["algorithmic"] += before - after
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """All entries (t,) by name: energies in J, momenta in kg m/s and kg m²/s."""

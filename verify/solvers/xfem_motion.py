@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, ToolPathCut
-from verify.scene.history import factor_at, first_factor, jumps
+from verify.scene.history import factor_at, first_factor
 from verify.scene.initial import starts_open
 from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_answer import Answer, penalised
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import forces_of, is_moving, nodal_forces
-from verify.solvers.xfem_openings import opening_times
+from verify.solvers.xfem_openings import opening_times, stops_of
 from verify.solvers.xfem_scene import density_of, material_of
 from verify.solvers.xfem_steps import MASSES, integrator_of, largest_step
 from verify.solvers.xfem_supports import initial_path, motion_of_supports
@@ -106,8 +106,11 @@ class Mover:
     """One motion, stage by stage.
 
     A stage begins at a step at which a cut opens, in all or in some of its cells. Other ways to
-    cut override `_events`, `_cut`, `_law`, `_inherited` and `_shown`.
+    cut override `_events`, `_cut_at`, `_law`, `_inherited` and `_source`.
     """
+
+    removal = False  # whether openings take material away
+    rule = "elements as a whole, when the blade has crossed them through"
 
     def __init__(
         self, scene: Scene, mesh: SimplexMesh, size: float, exact: Any, choice: MotionChoice
@@ -123,7 +126,13 @@ class Mover:
         # those that open first come first: what is cut further keeps what is cut already
         self.asked = [scene.cuts[k] for k in order]
         self.cuts, self.opens = [cuts[k] for k in order], [opens[k] for k in order]
-        self.account = Account()
+        whole = [
+            t
+            for cut, t in zip(self.asked, self.opens, strict=True)
+            if not isinstance(cut, ToolPathCut)
+        ]
+        self.stops = stops_of(scene, self.times, whole, self.due)
+        self.account = Account(self.removal)
         self.slivers: SliverReport | None = None
         self.penalty: GhostPenalty | None = None
         self.steps = self.solves = 0
@@ -132,9 +141,12 @@ class Mover:
 
     def run(self, trial: bool) -> Answer:
         """Run all stages and carry the fields of each to the finally cut mesh."""
+        clock = perf_counter()
         events = self._events()
+        self.timings["enrichment"] += perf_counter() - clock
         initial = self.scene.initial
-        opened = 0.0 if starts_open(initial) else -np.inf
+        closed_before = isinstance(initial, Equilibrium) and not starts_open(initial)
+        opened = -np.inf if closed_before else self.due
         virtual = self._cut(opened)
         body = self._body(virtual)
         state = self._initial(body)
@@ -161,24 +173,24 @@ class Mover:
 
     def _events(self) -> _Floats:
         """Find the times at which something opens, for `_cut` as well."""
-        clock = perf_counter()
         tip: Any = self.choice.tip
         self.opening = opening_times(self.asked, cut_mesh(self.mesh, self.cuts, tip), self.opens)
-        self.timings["enrichment"] += perf_counter() - clock
         return np.unique(self.opening[~np.isnan(self.opening)])
 
     def _cut(self, time: float) -> VirtualMesh:
         """Cut the mesh where the cuts have opened it at a time."""
         clock = perf_counter()
-        tip: Any = self.choice.tip
         policy: Any = self.choice.slivers
-        opened = self.opening <= time
-        virtual = cut_mesh(self.mesh, self.cuts, tip, opened)
-        if opened.any() and policy in ("merge", "drop"):
+        virtual = self._cut_at(time)
+        if policy in ("merge", "drop"):
             held = motion_of_supports(self.scene, virtual, self.exact).fixed.any(axis=1)
             virtual, self.slivers = treat_slivers(virtual, policy, held=held)
         self.timings["enrichment"] += perf_counter() - clock
         return virtual
+
+    def _cut_at(self, time: float) -> VirtualMesh:
+        tip: Any = self.choice.tip
+        return cut_mesh(self.mesh, self.cuts, tip, self.opening <= time)
 
     def _body(self, virtual: VirtualMesh) -> DynamicBody:
         """Give a cut mesh its elasticity, mass, supports and loads."""
@@ -295,7 +307,7 @@ class Mover:
         ledger = EnergyLedger(body, state)
         integrators: dict[float, Integrator] = {}
         outputs, instants, taken = [], [], 0
-        for a, b in pairwise(self._stops(state.time)):
+        for a, b in pairwise([state.time, *self.stops[self.stops > state.time + self.due]]):
             if np.abs(self.times - a).min() <= self.due:
                 outputs.append(self._kept(body, state))
                 instants.append(taken)
@@ -325,17 +337,6 @@ class Mover:
         self.solves += sum(one.solves for one in newton)
         return outputs
 
-    def _stops(self, start: float) -> _Floats:
-        """Return the times from `start` on at which a step has to end."""
-        end = float(self.times[-1])
-        whole = [
-            t
-            for cut, t in zip(self.asked, self.opens, strict=True)
-            if not isinstance(cut, ToolPathCut)
-        ]
-        found = np.unique([*self.times, *whole, *self._jumps()])
-        return np.concatenate([[start], found[(found > start + self.due) & (found <= end)]])
-
     def _kept(self, body: DynamicBody, state: MotionState) -> tuple[MotionState, _Floats | None]:
         """Copy a state, with its acceleration where that is to be had."""
         alone = body.mass.diagonal is not None or not body.moving
@@ -348,16 +349,14 @@ class Mover:
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{self.choice.scheme}': {error}") from None
 
-    def _jumps(self) -> list[float]:
-        """Return the times that are no output times at which a load or a support jumps."""
-        parts = [*self.scene.supports, *self.scene.loads]
-        found = [t for part in parts for t in jumps(getattr(part, "history", None))]
-        return [t for t in found if np.abs(self.times - t).min() > self.due]
+    def _source(self, old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
+        """Corner of an old body from which each corner of one that is cut further comes."""
+        return ancestors(old, new)
 
     def _answer(self, fields: list["_Output"]) -> Answer:
         virtual = self._cut(np.inf)
         olds = {id(one.virtual): one.virtual for one in fields}
-        sources = {key: ancestors(old, virtual) for key, old in olds.items()}
+        sources = {key: self._source(old, virtual) for key, old in olds.items()}
         # before a cut opens nothing follows a root cell there: corners say it all
         shape = (len(fields), *virtual.corners.node_points.shape)
         displacement, velocity, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
@@ -379,6 +378,8 @@ class Mover:
             else "none",
             "step from": self.said,
         }
+        if any(isinstance(cut, ToolPathCut) for cut in self.asked):
+            notes["a tool path opens"] = self.rule
         iterations = {"steps": self.steps}
         if self.solves:
             iterations["newton"] = self.solves

@@ -1,0 +1,24 @@
+"""What tests of motions share."""
+
+import pytest
+
+from verify.solvers import xfem_account
+from verify.xfem.dynamics.energy_ledger import EnergyLedger
+
+
+@pytest.fixture
+def openings(monkeypatch):
+    """What the ledger says of the body before and after each opening, as it happens."""
+    found = []
+    genuine = xfem_account.Account.open
+
+    def opened(self, body, state, further, inherited):
+        rows = []
+        for of in ((body, state), (further, inherited)):
+            one = EnergyLedger(*of).close()
+            rows.append([[one.kinetic[0], one.strain[0]], one.momentum[0], one.angular_momentum[0]])
+        found.append((state.time, rows))
+        genuine(self, body, state, further, inherited)
+
+    monkeypatch.setattr(xfem_account.Account, "open", opened)
+    return found
