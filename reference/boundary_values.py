@@ -9,9 +9,9 @@ from reference.linear_solvers import rigid_motions
 from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import Scene
-from verify.scene.parts import on_part
+from verify.scene.parts import copies_on_part
 
-__all__ = ["constrained_values"]
+__all__ = ["constrained_values", "nodes_on_part"]
 
 _HELD = 1e-9  # lever of the supports over the size of the piece, below which it may turn
 
@@ -37,23 +37,40 @@ def constrained_values(
     InputError
         If a support holds no node, or a piece of the body is left a rigid motion.
     """
-    nodes, owner = space.boundary_nodes()
-    points = space.node_points[nodes]
     d = space.dimension
     value = np.full((len(space.node_points), d), np.nan)
     for i, support in enumerate(scene.supports):
-        chosen = on_part(scene, support.where, points, f"supports[{i}].where")
-        held = list(support.held(d))
+        nodes, near = nodes_on_part(scene, space, support.where, f"supports[{i}].where")
+        points, held = space.node_points[nodes], list(support.held(d))
         if support.displacement == "exact":
-            near = space.centroids[owner[chosen]]
-            found = share * exact.displacement(points[chosen], near)[:, held]
+            found = share * exact.displacement(points, near)[:, held]
         else:
-            found = support.values(points[chosen], share)
-        value[np.ix_(nodes[chosen], held)] = found
+            found = support.values(points, share)
+        value[np.ix_(nodes, held)] = found
     _check_every_piece_is_held(scene, space, value)
     flat = value.ravel()
     unknowns = np.flatnonzero(~np.isnan(flat)).astype(np.int32)
     return unknowns, flat[unknowns]
+
+
+def nodes_on_part(
+    scene: Scene, space: ConformingSpace, where: str, key: str
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Nodes (k,) of the boundary on a part, each on its own side of the cuts.
+
+    Returns
+    -------
+    nodes : (k,) int array
+    near : (k, d) array
+        Centroid of a cell of each: on its side of the cuts, m.
+    """
+    nodes, owner = space.boundary_nodes()
+    number = np.zeros(len(space.node_points), dtype=np.int64)
+    number[nodes] = np.arange(len(nodes))
+    of_facets, middle = space.nodes_of_boundary_facets()
+    points = space.node_points[nodes]
+    chosen = copies_on_part(scene, where, points, (number[of_facets], middle), key)
+    return nodes[chosen], space.centroids[owner[chosen]]
 
 
 def _check_every_piece_is_held(

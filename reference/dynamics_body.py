@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.boundary_values import nodes_on_part
 from reference.dynamics_law import law_of
 from reference.dynamics_ties import TiedUnknowns
 from reference.elasticity import load_form, mass_form
@@ -14,7 +15,6 @@ from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, 
 from reference.space import ConformingSpace
 from verify.scene import Gravity, Scene, Support
 from verify.scene.history import factor_at, first_factor, slope_at
-from verify.scene.parts import on_part
 
 __all__ = ["MovingBody"]
 
@@ -236,16 +236,14 @@ class MovingBody:
     def _found(self) -> list[_Held]:
         """Find what each support holds."""
         space = self.space
-        nodes, owner = space.boundary_nodes()
-        points = space.node_points[nodes]
         found = []
         for i, support in enumerate(self.scene.supports):
-            chosen = on_part(self.scene, support.where, points, f"supports[{i}].where")
+            key = f"supports[{i}].where"
+            nodes, near = nodes_on_part(self.scene, space, support.where, key)
             held = list(support.held(space.dimension))
             exact = self.exact if support.displacement == "exact" else None
-            place: Any = np.ix_(nodes[chosen], held)
-            near = space.centroids[owner[chosen]]
-            found.append(_Held(support, place, points[chosen], near, exact))
+            place: Any = np.ix_(nodes, held)
+            found.append(_Held(support, place, space.node_points[nodes], near, exact))
         return found
 
     def _filled(self, values: list[Array]) -> Array:

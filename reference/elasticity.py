@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.boundary_values import constrained_values
+from reference.face_loads import cut_facets_of
 from reference.linear_solvers import (
     Answer,
     direct_solver,
@@ -18,7 +19,7 @@ from reference.linear_solvers import (
 from reference.space import ConformingSpace, SharedUnknowns
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError
-from verify.scene import BodyForce, Gravity, Material, Scene, Traction, is_uniform
+from verify.scene import BodyForce, CutFaces, Gravity, Material, Scene, Traction, is_uniform
 from verify.scene.parts import on_part
 
 __all__ = [
@@ -34,6 +35,8 @@ __all__ = [
 
 # Unknowns in space up to which MUMPS was measured to be quicker (in the plane it always is)
 _MOST_DIRECT = 30_000
+# marks of the faces of cuts in a measure, beyond those of the loads on the boundary
+_FACE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -207,6 +210,11 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: fl
         for i, load in enumerate(scene.loads)
         if isinstance(load, Traction)
     }
+    for i, load in enumerate(scene.loads):
+        if isinstance(load, CutFaces):
+            cell, opposite, positive = cut_facets_of(scene, space, load, f"loads[{i}]")
+            tractions[_FACE + 2 * i] = _pairs(space, cell[positive], opposite[positive])
+            tractions[_FACE + 2 * i + 1] = _pairs(space, cell[~positive], opposite[~positive])
     # all parts in one measure: DOLFINx takes one set of subdomains per form
     ds = ufl.Measure("ds", domain=domain, subdomain_data=list(tractions.items()))
     for i, load in enumerate(scene.loads):
@@ -221,6 +229,13 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: fl
                 else thickness * _density(space, load, load.force, time)
             )
             form += ufl.inner(force, v) * ufl.dx
+        elif isinstance(load, CutFaces):
+            given = _face_density(space, load, time)
+            one, other = ds(_FACE + 2 * i), ds(_FACE + 2 * i + 1)
+            if load.traction is None:
+                form -= given[0] * ufl.inner(ufl.FacetNormal(domain), v) * (one + other)
+            else:
+                form += ufl.inner(given, v) * one - ufl.inner(given, v) * other
         elif load.traction == "exact":
             stress = _sided_function(space, exact.stress, (space.dimension,) * 2)
             form += ufl.inner(stress * ufl.FacetNormal(domain), v) * ds(i)
@@ -240,6 +255,17 @@ def _density(space: ConformingSpace, load: BodyForce | Traction, given: Any, tim
     return _sided_function(space, values, (space.dimension,))
 
 
+def _face_density(space: ConformingSpace, load: CutFaces, time: float) -> Any:
+    """Give what acts on the faces of a cut as a vector: a pressure (1,) or a traction (d,)."""
+    from dolfinx import fem
+
+    if is_uniform(load.components):
+        given = np.asarray(load.components, dtype=float)
+        return fem.Constant(space.function_space.mesh, given)
+    shape = (len(load.components),)
+    return _sided_function(space, lambda points, _near: load.given(points, time), shape)
+
+
 def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> NDArray[np.int32]:
     """Find the facets that a traction acts on, as DOLFINx's pairs of cell and local facet."""
     d = space.mesh.cell_dimension
@@ -254,9 +280,16 @@ def _facets(scene: Scene, space: ConformingSpace, load: Traction, key: str) -> N
         raise InputError(
             f"{key}: no facet of the boundary lies in '{load.where}'", str(scene.file or "")
         )
+    return _pairs(space, cell[chosen], opposite[chosen])
+
+
+def _pairs(
+    space: ConformingSpace, cell: NDArray[np.int64], opposite: NDArray[np.int64]
+) -> NDArray[np.int32]:
+    """DOLFINx's pairs of cell and local facet of the facets opposite to corners of cells."""
     # facet i lies opposite corner i; other ranks integrate over their cells themselves
-    pairs = np.column_stack([space.dolfinx_cell[cell[chosen]], opposite[chosen]])
-    own = space.function_space.mesh.topology.index_map(d).size_local
+    pairs = np.column_stack([space.dolfinx_cell[cell], opposite])
+    own = space.function_space.mesh.topology.index_map(space.mesh.cell_dimension).size_local
     pairs = pairs[(pairs[:, 0] >= 0) & (pairs[:, 0] < own)]
     return pairs[np.argsort(pairs[:, 0], kind="stable")].astype(np.int32).ravel()
 

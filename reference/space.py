@@ -144,6 +144,15 @@ class ConformingSpace(SharedUnknowns):
         beside[self.cell_nodes] = self.centroids[:, None]
         return beside
 
+    def nodes_of_boundary_facets(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Nodes (k,) of all facets of the outer boundary, and centroids (k, d) of the facets, m."""
+        cell, opposite = self.mesh.boundary.T
+        on_facet = _facet_nodes(self.mesh.cell_dimension, self.degree)[opposite]
+        nodes = np.take_along_axis(self.cell_nodes[cell], on_facet, axis=1)
+        corners = nodes[:, : self.mesh.cell_dimension]
+        middle = self.node_points[corners].mean(axis=1)
+        return nodes.ravel(), np.repeat(middle, nodes.shape[1], axis=0)
+
     @property
     def owned(self) -> int:
         """Number of (vector) unknowns that this rank owns."""

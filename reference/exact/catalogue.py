@@ -50,7 +50,8 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     "tip": (CrackTip, "crack-tip field of modes I and II: tip, angle, intensity (K_I, K_II)"),
     "griffith": (
         Griffith,
-        "crack in an infinite plate: centre, a, angle, remote stress (sxx, syy, sxy)",
+        "crack in an infinite plate: centre, a, angle, remote stress (sxx, syy, sxy), pressure on "
+        "its faces",
     ),
     "arc_crack": (
         ArcCrack,
@@ -77,7 +78,8 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
     ),
     "penny": (
         Penny,
-        "3D: penny-shaped crack in infinite space under tension: centre, normal, a, tension",
+        "3D: penny-shaped crack in infinite space: centre, normal, a, remote tension or stress "
+        "(three rows), pressure on its faces",
     ),
     "blade_strip": (
         BladeStrip,

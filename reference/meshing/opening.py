@@ -1,6 +1,7 @@
 """Opening a cut: the nodes on it are doubled by the connectivity of the cells around them."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,17 @@ class ConformingMesh:
             label[self.cells[:, 0]], return_index=True, return_inverse=True
         )
         return np.argsort(np.argsort(start))[of_cell].astype(np.int64)
+
+    @cached_property
+    def faces(self) -> NDArray[np.int64]:
+        """(g, 2) cell and opposite corner of each facet on the faces of the cuts."""
+        corners = self.cells.shape[1]
+        _, which, count = np.unique(
+            cell_facets(self.cells), axis=0, return_inverse=True, return_counts=True
+        )
+        alone = count[which.ravel()] == 1
+        alone[self.boundary[:, 0] * corners + self.boundary[:, 1]] = False
+        return np.column_stack(np.divmod(np.flatnonzero(alone), corners))
 
     @property
     def realised_cut(self) -> NDArray[np.float64]:

@@ -47,7 +47,10 @@ def test_every_solution_in_space_is_checked_here():
 @pytest.mark.parametrize("poisson", [0.3, 0.0, 0.49])
 @pytest.mark.parametrize("name", SOLUTIONS)
 def test_the_gradient_is_the_derivative_and_the_stress_is_in_equilibrium(name, poisson, points):
-    u = solution(name, Material(young=1.0, poisson=poisson))
+    check_equations(solution(name, Material(young=1.0, poisson=poisson)), points)
+
+
+def check_equations(u, points):
     expected = difference(u.displacement, points, 1e-3)
     error = np.abs(u.gradient(points) - expected).max(axis=(1, 2))
     scale = 1 + np.abs(u.stress(points)).max()
@@ -223,3 +226,57 @@ def test_a_ball_that_is_cut_out_leaves_a_hollow_free_of_traction(poisson):
     assert np.abs(traction).max() < 1e-13 * scale
     np.testing.assert_allclose(u.displacement(centre + outward), 0.1 * outward, atol=1e-14)
     assert not u.displacement(points, points - 1e-6 * outward).any()
+
+
+REMOTE = [[0.2, 0.1, 0.3], [0.1, -0.4, 0.5], [0.3, 0.5, 0.7]]
+
+
+def sheared(poisson=0.3, **changes):
+    given = {"centre": [0.4, 0.5, 0.45], "normal": [1.0, 2.0, 2.0], "a": 0.3, "stress": REMOTE}
+    return exact_solution("penny", given | changes, Material(young=1.0, poisson=poisson))
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.0, 0.49])
+def test_a_sheared_penny_is_in_equilibrium(poisson, points):
+    check_equations(sheared(poisson, pressure=0.4), points)
+
+
+def test_the_faces_of_a_sheared_penny_bear_its_pressure_alone():
+    u = sheared(pressure=0.4)
+    for radius in (0.0, 0.1, 0.29):
+        face, normal = penny_ring(radius)
+        for side in (1.0, -1.0):
+            bears = u.stress(face, face + side * normal) @ (-side * normal)
+            assert bears == pytest.approx(np.tile(0.4 * side * normal, (len(face), 1)), abs=1e-12)
+    far, _ = penny_ring(300.0)
+    assert u.stress(far) == pytest.approx(np.tile(REMOTE, (len(far), 1, 1)), abs=1e-8)
+
+
+def test_the_slip_behind_the_front_of_a_sheared_penny_is_that_of_its_intensities():
+    """4(1−ν)K√(r/2π)/μ across in I and II, 4K√(r/2π)/μ in III; the next term is r/a smaller."""
+    u, behind = sheared(), 1e-7
+    front, normal = penny_ring(0.3)
+    face, _ = penny_ring(0.3 - behind)
+    jump = u.displacement(face, face + normal) - u.displacement(face, face - normal)
+    root = 4 * np.sqrt(behind / (2 * np.pi)) * 2.6
+    centre = np.array([0.4, 0.5, 0.45])
+    for place, slip in zip(front, jump, strict=True):
+        ahead = (place - centre) / 0.3
+        k_1, k_2, k_3 = u.intensity_at(place)
+        seen = slip @ np.stack([normal, ahead, np.cross(ahead, normal)]).T
+        assert seen == pytest.approx(root * np.array([0.7 * k_1, 0.7 * k_2, k_3]), rel=1e-5)
+    # M. K. Kassir and G. C. Sih: K_II = 4T√(a/π)/(2−ν) where the shear points ahead
+    vector = np.array(REMOTE) @ normal
+    shear = np.linalg.norm(vector - (vector @ normal) * normal)
+    ahead = (vector - (vector @ normal) * normal) / shear
+    largest = u.intensity_at(centre + 0.3 * ahead)
+    assert largest[1] == pytest.approx(4 * shear * np.sqrt(0.3 / np.pi) / 1.7)
+    assert largest[2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_energy_of_a_penny_under_pressure_is_half_the_pressure_times_the_volume():
+    """Far from the walls of a large box all work is done in the crack: p V / 2."""
+    given = {"a": 1.0, "tension": 0.0, "pressure": 2.0}
+    u = exact_solution("penny", given, SOLID)
+    volume = 16 * 0.91 * 2.0 / 3
+    assert u.strain_energy(np.array([[-60.0] * 3, [60.0] * 3])) == pytest.approx(volume, rel=1e-4)

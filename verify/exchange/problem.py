@@ -19,6 +19,7 @@ from verify.exchange.quadrature import simplex_rule
 from verify.scene import (
     BodyForce,
     Box,
+    CutFaces,
     Gravity,
     Polygon,
     PolylineCut,
@@ -28,7 +29,7 @@ from verify.scene import (
     Traction,
     is_uniform,
 )
-from verify.scene.parts import on_part
+from verify.scene.parts import copies_on_part, on_part
 from verify.solvers.xfem_scene import background_mesh
 
 __all__ = ["HeldNodes", "Load", "Problem", "problem_of"]
@@ -178,12 +179,14 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
     Raises
     ------
     UnsupportedSceneError
-        If a conforming mesh of the scene is not offered, or a support or load is another field at
-        every time.
+        If a conforming mesh of the scene is not offered, a support or load is another field at
+        every time, or a load acts on the faces of a cut.
     InputError
         If a support or load acts nowhere, or a mesh file is bad.
     """
     exact = _exact(scene)
+    if any(isinstance(load, CutFaces) for load in scene.loads):
+        raise UnsupportedSceneError("loads on the faces of a cut are not exported")
     if reason := _at_every_time(scene, exact):
         raise UnsupportedSceneError(reason)
     background, size = background_mesh(scene, level)
@@ -220,6 +223,16 @@ class _Mesh:
     def centroids(self, cells: NDArray[np.int64]) -> Array:
         centroids: Array = self.points[self.cells[cells]].mean(axis=1)
         return centroids
+
+    def held(self, scene: Scene, where: str, key: str) -> NDArray[np.int64]:
+        """Nodes of the boundary that lie on a part, each on its own side of the cuts."""
+        nodes, number = np.unique(self.boundary, return_inverse=True)
+        middle = np.repeat(self.points[self.boundary].mean(axis=1), self.boundary.shape[1], axis=0)
+        beside = number.ravel(), middle
+        chosen: NDArray[np.int64] = nodes[
+            copies_on_part(scene, where, self.points[nodes], beside, key)
+        ]
+        return chosen
 
     def on(self, scene: Scene, where: str, key: str) -> NDArray[np.bool_]:
         """(n,) nodes of the boundary that lie on a part."""
@@ -270,7 +283,7 @@ def _at_every_time(scene: Scene, exact: Any) -> str | None:
 
 
 def _held(scene: Scene, mesh: _Mesh, i: int, support: Support, exact: Any) -> HeldNodes:
-    nodes = np.flatnonzero(mesh.on(scene, support.where, f"supports[{i}].where"))
+    nodes = mesh.held(scene, support.where, f"supports[{i}].where")
     components = support.held(scene.dimension)
     if support.displacement != "exact":
         values = support.values(mesh.points[nodes])
@@ -307,6 +320,7 @@ def _across(
 
 def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
     load = scene.loads[i]
+    assert not isinstance(load, CutFaces)  # refused
     if isinstance(load, Traction):
         chosen = mesh.on(scene, load.where, f"loads[{i}].where")[mesh.boundary].all(axis=1)
         simplices, cells = mesh.boundary[chosen], mesh.boundary_cell[chosen]

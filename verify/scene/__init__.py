@@ -13,6 +13,7 @@ from verify.scene.acceptance import (
     StressIntensityQuantity,
     ValueCheck,
 )
+from verify.scene.cut_faces import Faces, faces_of
 from verify.scene.cuts import ArcCut, PolylineCut
 from verify.scene.geometry import Box, MeshFile, Polygon, Rectangle
 from verify.scene.initial import AtRest, Equilibrium, InitialField, Moving
@@ -32,6 +33,7 @@ from verify.scene.mesh_file import read_mesh
 from verify.scene.physics import (
     Analysis,
     BodyForce,
+    CutFaces,
     Exact,
     Gravity,
     Material,
@@ -62,11 +64,13 @@ __all__ = [
     "BodyForce",
     "BoundCheck",
     "Box",
+    "CutFaces",
     "CylinderCut",
     "DiscCut",
     "DisplacementQuantity",
     "Equilibrium",
     "Exact",
+    "Faces",
     "Gravity",
     "InitialField",
     "KnownFinding",
@@ -100,6 +104,7 @@ __all__ = [
     "Traction",
     "ValueCheck",
     "case_folder",
+    "faces_of",
     "is_timed",
     "is_uniform",
     "list_cases",

@@ -8,9 +8,10 @@ from verify.scene.geometry import Box, Geometry, Polygon, Rectangle
 from verify.scene.regions import parse_region
 from verify.scene.scene import Scene
 
-__all__ = ["lie_on_part", "on_edges", "on_part"]
+__all__ = ["copies_on_part", "lie_on_part", "on_edges", "on_part"]
 
 _TOLERANCE = 1e-9  # of the body's size: a point closer than that to a part is on it
+_BESIDE = 0.01  # of the way from a node into a facet: what decides for the copies of one node
 
 
 def on_part(scene: Scene, where: str, points: NDArray[np.float64], key: str) -> NDArray[np.bool_]:
@@ -43,6 +44,42 @@ def on_part(scene: Scene, where: str, points: NDArray[np.float64], key: str) -> 
     if not found.any():
         raise InputError(f"{key}: no node of the boundary lies in '{where}'", str(scene.file or ""))
     return found
+
+
+def copies_on_part(
+    scene: Scene,
+    where: str,
+    points: NDArray[np.float64],
+    beside: tuple[NDArray[np.int64], NDArray[np.float64]],
+    key: str,
+) -> NDArray[np.bool_]:
+    """Tell which nodes of the boundary of a cut body lie on the part `where`, each on its own side.
+
+    Where a cut comes out of the body, a place has a copy of its node for every side. A part may
+    end there: a copy is on it if the boundary of its own material beside it is. Where that is so
+    of no copy, the part is a mere point or line and holds them all.
+
+    Parameters
+    ----------
+    scene, where, key
+        As of `on_part`.
+    points : (n, d) array
+        Places of the nodes, m, equal to the last bit for the copies of one.
+    beside : (k,) int array and (k, d) array
+        Facets of the boundary, or parts of such: a node of each, and its centroid, m.
+    """
+    found = on_part(scene, where, points, key)
+    _, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    place = place.ravel()
+    asked = found & (count[place] > 1)
+    node, centroid = beside[0][asked[beside[0]]], beside[1][asked[beside[0]]]
+    inward = points[node] + _BESIDE * (centroid - points[node])
+    size = float(np.ptp(points, axis=0).max(initial=0.0))
+    own = np.zeros(len(points), dtype=bool)
+    own[node[lie_on_part(scene, where, inward, size)]] = True
+    decided = np.zeros(len(count), dtype=bool)
+    decided[place[own]] = True
+    return found & (own | ~asked | ~decided[place])
 
 
 def lie_on_part(

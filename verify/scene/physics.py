@@ -13,6 +13,7 @@ from verify.scene.strict import (
     Components,
     Count,
     Finite,
+    Formula,
     NonNegative,
     Point3,
     Positive,
@@ -23,6 +24,7 @@ from verify.scene.strict import (
 __all__ = [
     "Analysis",
     "BodyForce",
+    "CutFaces",
     "Exact",
     "Gravity",
     "Load",
@@ -244,7 +246,81 @@ class Traction(Strict):
         return field_values(self.traction, points, time)
 
 
-Load = Annotated[Gravity | BodyForce | Traction, Field(discriminator="kind")]
+class CutFaces(Strict):
+    """A load on both faces of a cut that is in balance, per area of the undeformed faces.
+
+    It is a dead load: its direction stays what it is when the faces turn.
+    """
+
+    kind: Literal["cut_faces"]
+    cut: str = Field(default="cut", description="name of the cut")
+    pressure: Finite | Formula | None = Field(
+        default=None,
+        description="Pa, pushes the faces apart; a number or a formula in x, y, z",
+    )
+    traction: Components | None = Field(
+        default=None,
+        description="Pa, on the face of the positive side; the other bears the opposite; a number "
+        "or a formula in x, y, z per component",
+    )
+    history: History | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> "CutFaces":
+        if (self.pressure is None) == (self.traction is None):
+            raise ValueError("a load on the faces of a cut has either a pressure or a traction")
+        return self
+
+    @property
+    def exact(self) -> bool:
+        """Whether an exact solution says it: no."""
+        return False
+
+    @property
+    def timed(self) -> bool:
+        """Whether a formula names the time."""
+        return is_timed(self.components)
+
+    @property
+    def components(self) -> Sequence[float | str]:
+        """The numbers and formulas given."""
+        if self.traction is not None:
+            return self.traction
+        return [] if self.pressure is None else [self.pressure]
+
+    def given(self, points: NDArray[np.float64], time: float = 0.0) -> NDArray[np.float64]:
+        """Pressure (n, 1), or traction (n, d) on the positive side's face, at points (n, d), Pa."""
+        return field_values(self.components, points, time)
+
+    def values(
+        self,
+        points: NDArray[np.float64],
+        outward: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        time: float = 0.0,
+    ) -> NDArray[np.float64]:
+        """Traction (n, d) in Pa at points (n, d) of faces.
+
+        Parameters
+        ----------
+        points : (n, d) array
+            m.
+        outward : (n, d) array
+            Unit normals of the faces, out of the material.
+        normals : (n, d) array
+            Of the cut there, towards its positive side: they tell the faces apart.
+        time : float
+            s.
+        """
+        given = self.given(points, time)
+        if self.traction is None:
+            return np.asarray(-given * outward)
+        # the material on the positive side ends where its outward normal points to the other
+        positive = np.sum(outward * normals, axis=1) < 0.0
+        return np.asarray(np.where(positive, 1.0, -1.0)[:, None] * given)
+
+
+Load = Annotated[Gravity | BodyForce | Traction | CutFaces, Field(discriminator="kind")]
 
 
 class Exact(Strict):

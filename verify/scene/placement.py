@@ -11,7 +11,7 @@ from verify.scene.empty_parts import check_parts_act
 from verify.scene.geometry import MeshFile, Polygon
 from verify.scene.initial import InitialField, Moving
 from verify.scene.nearest import nearest
-from verify.scene.physics import BodyForce, Gravity, Rotation, Traction
+from verify.scene.physics import BodyForce, CutFaces, Gravity, Rotation, Traction
 from verify.scene.regions import parse_expression, parse_region
 from verify.scene.skin import Skin
 
@@ -74,6 +74,9 @@ def _check_dimensions(scene: "Scene") -> None:
         if support.rotation is not None:
             _check_rotation(support.rotation, d, f"supports[{i}].rotation")
     for i, load in enumerate(scene.loads):
+        if isinstance(load, CutFaces):
+            _check_faces(scene, load, f"loads[{i}]")
+            continue
         vector = {"gravity": "acceleration", "body_force": "force", "traction": "traction"}
         value = getattr(load, vector[load.kind])
         if value != "exact" and len(value) != d:
@@ -94,6 +97,19 @@ def _check_dimensions(scene: "Scene") -> None:
         )
     if scene.analysis.kind == "dynamic" and scene.material.density is None:
         raise ValueError("material.density: a dynamic analysis needs it")
+
+
+def _check_faces(scene: "Scene", load: CutFaces, place: str) -> None:
+    names = [cut.name for cut in scene.cuts]
+    if load.cut not in names:
+        raise ValueError(f"{place}.cut: no cut '{load.cut}'{nearest(load.cut, names)}")
+    if scene.cell_dimension < scene.dimension:
+        raise ValueError(f"{place}: the cuts of a membrane have no faces that a load acts on")
+    if next(cut for cut in scene.cuts if cut.name == load.cut).kind == "tool_path":
+        raise ValueError(f"{place}.cut: '{load.cut}' is opened on the way; its faces bear no load")
+    if load.traction is not None and len(load.traction) != scene.dimension:
+        given = len(load.traction)
+        raise ValueError(f"{place}.traction: {given} values; expected {scene.dimension}")
 
 
 def _check_rotation(rotation: Rotation, dimension: int, place: str) -> None:
@@ -133,6 +149,9 @@ def _check_formulas(scene: "Scene") -> None:
             given[f"loads[{i}].force"] = load.force
         elif isinstance(load, Traction):
             given[f"loads[{i}].traction"] = load.traction
+        elif isinstance(load, CutFaces):
+            key = "pressure" if load.traction is None else "traction"
+            given[f"loads[{i}].{key}"] = list(load.components)
     dynamic = scene.analysis.kind == "dynamic"
     for place, components in given.items():
         _check_components(components, scene.dimension, dynamic, place)

@@ -55,7 +55,7 @@ def own_corners(virtual: VirtualMesh) -> NDArray[np.bool_]:
 
 
 def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
-    """Parts of the boundary facets that are cut, each for every unknown that moves it.
+    """Boundary facets, of those that are cut the parts, each for every unknown that moves it.
 
     Returns
     -------
@@ -67,9 +67,11 @@ def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
     """
     mesh = virtual.mesh
     piece, in_cell, _ = virtual.solid_simplices
-    cut = virtual.split[piece]
-    piece, cell, in_cell = piece[cut], virtual.parent[piece[cut]], in_cell[cut]
     facets = mesh.boundary_facets
+    outer = np.zeros(len(mesh.cells), dtype=bool)
+    outer[facets[:, 0]] = True
+    mine = outer[virtual.parent[piece]]
+    piece, cell, in_cell = piece[mine], virtual.parent[piece[mine]], in_cell[mine]
     unknowns, points = [], []
     corners = mesh.dim + 1
     for local in range(corners):

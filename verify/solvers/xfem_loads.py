@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import BodyForce, Gravity, Scene, Traction, is_uniform
+from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, is_uniform
 from verify.scene.physics import Load
 from verify.solvers.xfem_boundary import facets_on
+from verify.solvers.xfem_faces import face_forces
 from verify.xfem.loads import Density, body_force, traction
 from verify.xfem.virtual import VirtualMesh
 
@@ -58,6 +59,8 @@ def forces_of(scene: Scene, i: int, virtual: VirtualMesh, exact: Any, time: floa
         assert scene.material.density is not None  # the scene has checked it
         weight = scene.material.density * np.asarray(entry.acceleration)
         forces = body_force(virtual, weight)
+    elif isinstance(entry, CutFaces):
+        forces = face_forces(scene, virtual, i, time)
     elif isinstance(entry, Traction):
         facets = facets_on(scene, virtual.mesh, entry.where, f"loads[{i}].where")
         if entry.exact:

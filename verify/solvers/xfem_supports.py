@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from verify.scene import Scene, Support
 from verify.scene.history import factor_at, first_factor, slope_at
-from verify.scene.parts import lie_on_part, on_part
+from verify.scene.parts import copies_on_part, lie_on_part
 from verify.solvers.xfem_boundary import boundary_nodes, facet_parts, own_corners
 from verify.xfem.dynamics import MovingSupports
 from verify.xfem.supports import Supports
@@ -119,23 +119,30 @@ def _held(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[_Held]:
     """Find what each support holds.
 
     A node of the boundary is on a part by its place, and so is every unknown whose material
-    reaches that node. The other unknowns there belong to material beyond a cut: they are held if
-    the boundary of *that* material is on the part. So a part may end at a cut, and a cut close to
-    a support frees what is behind it.
+    reaches that node; where a cut runs through the node, each by the boundary of its own material.
+    The other unknowns there belong to material beyond a cut: they are held if the boundary of
+    *that* material is on the part. So a part may end at a cut, and a cut close to a support frees
+    what is behind it.
     """
     mesh = virtual.mesh
-    boundary = boundary_nodes(mesh)
     unknowns, parts = facet_parts(virtual)
-    own = own_corners(virtual)
-    beyond = ~own[unknowns]
+    at_node = own_corners(virtual)
+    outer = np.zeros(len(mesh.points), dtype=bool)
+    outer[boundary_nodes(mesh)] = True
+    own = np.flatnonzero(at_node & outer[virtual.node_parent])
+    number = np.full(len(at_node), -1)
+    number[own] = np.arange(len(own))
+    beside = number[unknowns] >= 0
+    own_parts = number[unknowns[beside]], parts[beside]
+    beyond = ~at_node[unknowns]
     unknowns, parts = unknowns[beyond], parts[beyond]
     size = float(np.ptp(mesh.points, axis=0).max())
     found = []
     for i, support in enumerate(scene.supports):
         key = f"supports[{i}].where"
-        on_place = np.zeros(len(mesh.points), dtype=bool)
-        on_place[boundary[on_part(scene, support.where, mesh.points[boundary], key)]] = True
-        mark = own & on_place[virtual.node_parent]
+        mark = np.zeros(len(at_node), dtype=bool)
+        places = virtual.node_points[own]
+        mark[own[copies_on_part(scene, support.where, places, own_parts, key)]] = True
         mark[unknowns[lie_on_part(scene, support.where, parts, size)]] = True
         at = np.flatnonzero(mark)
         components = support.held(scene.dimension)
