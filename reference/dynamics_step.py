@@ -220,7 +220,11 @@ class Stepper:
         self._solver = body.step_solver(matrix, kind)
 
     def _scale(self, forces: StepForces) -> float:
-        """Norm of the largest of the forces, without those that ties pass on."""
-        parts = (forces.external, forces.internal, forces.viscous, forces.inertia)
+        """Norm of the largest of the forces, without those inside that ties pass on.
+
+        Loads count in full: those on the faces of a closed cut leave the round-off of their sum.
+        """
+        parts = (forces.internal, forces.viscous, forces.inertia)
         norms = [float(np.linalg.norm(self.body.ties.summed(part))) for part in parts]
+        norms.append(float(np.linalg.norm(forces.external)))
         return max(norms) or 1.0

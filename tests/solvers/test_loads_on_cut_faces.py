@@ -122,7 +122,7 @@ def test_a_pressure_drives_two_halves_apart_from_the_opening_of_the_cut_on(solve
         analysis={"kind": "dynamic", "duration": 0.3, "time_step": 0.01, "outputs": 4},
     )
     found = find_solver(solver).solve(scene, 0, repetitions=0, **choice)
-    assert np.abs(found.displacement[1]).max() == 0.0
+    assert np.abs(found.displacement[1]).max() < 1e-20  # round-off of forces that cancel
     corners = found.points[found.cells]
     mass = 2.0 * 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     middle = corners.mean(axis=1)
