@@ -21,10 +21,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.elasticity import lame, stiffness_form
+from reference.elasticity import stiffness_form
 from reference.linear_solvers import direct_solver
 from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import mixed_space
+from reference.moduli import lame_constants
 from reference.nearly_incompressible import saddle_form
 from reference.nodal_algebra import (
     NodalMatrix,
@@ -198,9 +199,9 @@ class CorotatedLaw:
         self.unknowns: SharedUnknowns = space
         V = space.function_space
         thickness = material.thickness or 1.0
-        lam, mu = (fem.Constant(V.mesh, thickness * value) for value in lame(material))
         self._before, self._after, self._velocity = (fem.Function(V) for _ in range(3))
         v, w = ufl.TestFunction(V), ufl.TrialFunction(V)
+        lam, mu = lame_constants(material, v, thickness)
         degree = 4 * space.degree - 2
         polar = MembraneStretch if space.mesh.cell_dimension < space.dimension else PolarStretch
         first, last = (polar(u, degree) for u in (self._before, self._after))

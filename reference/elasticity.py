@@ -16,6 +16,7 @@ from reference.linear_solvers import (
     solve_by_multigrid,
     solve_directly,
 )
+from reference.moduli import density, lame_constants
 from reference.space import ConformingSpace, SharedUnknowns
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError
@@ -25,7 +26,6 @@ from verify.scene.parts import on_part
 __all__ = [
     "LinearSolve",
     "held_system",
-    "lame",
     "load_form",
     "mass_form",
     "mean_stiffness",
@@ -168,11 +168,8 @@ def held_system(
 def stiffness_form(material: Material, u: Any, v: Any) -> Any:
     """Write the virtual work ∫ σ(u) : ε(v) of linear elasticity."""
     import ufl
-    from dolfinx import fem
 
-    # constants, so that another material does not compile another form
-    domain = ufl.domain.extract_unique_domain(v)
-    lam, mu = (fem.Constant(domain, value) for value in lame(material))
+    lam, mu = lame_constants(material, v)
     strain = ufl.sym(ufl.grad(u))
     stress = 2 * mu * strain + lam * ufl.tr(strain) * ufl.Identity(len(u))
     return ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx
@@ -187,13 +184,10 @@ def mass_form(material: Material, u: Any, v: Any, where: str = "") -> Any:
         If there is no density; `where` names the case file.
     """
     import ufl
-    from dolfinx import fem
 
     if material.density is None:
         raise InputError("material.density is missing: motion and vibration need it", where)
-    mass = material.density * (material.thickness or 1.0)  # of a membrane per area
-    density = fem.Constant(ufl.domain.extract_unique_domain(v), np.asarray(mass))
-    return density * ufl.inner(u, v) * ufl.dx
+    return density(material, v) * ufl.inner(u, v) * ufl.dx
 
 
 def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: float = 0.0) -> Any:
@@ -219,9 +213,8 @@ def load_form(scene: Scene, space: ConformingSpace, v: Any, exact: Any, time: fl
     ds = ufl.Measure("ds", domain=domain, subdomain_data=list(tractions.items()))
     for i, load in enumerate(scene.loads):
         if isinstance(load, Gravity):
-            assert scene.material.density is not None  # the scene has checked it
-            weight = thickness * scene.material.density * np.asarray(load.acceleration)
-            form += ufl.inner(fem.Constant(domain, weight), v) * ufl.dx
+            acceleration = fem.Constant(domain, np.asarray(load.acceleration, dtype=float))
+            form += density(scene.material, v) * ufl.inner(acceleration, v) * ufl.dx
         elif isinstance(load, BodyForce):
             force = (
                 _sided_function(space, exact.body_force, (space.dimension,))
@@ -309,14 +302,6 @@ def _sided_function(space: ConformingSpace, values: Any, shape: tuple[int, ...])
     function = fem.Function(broken)
     function.x.array[:] = values(points, near).ravel()
     return function
-
-
-def lame(material: Material) -> tuple[float, float]:
-    """Lamé constants (λ, μ) in Pa; λ is the reduced one in plane stress and of membranes."""
-    mu = material.young / (2 * (1 + material.poisson))
-    lam = material.young * material.poisson / ((1 + material.poisson) * (1 - 2 * material.poisson))
-    thin = material.plane == "stress" or material.thickness is not None
-    return (2 * lam * mu / (lam + 2 * mu), mu) if thin else (lam, mu)
 
 
 def mean_stiffness(matrix: Any) -> float:

@@ -11,10 +11,11 @@ from typing import Any, Literal
 import numpy as np
 
 from reference.boundary_values import constrained_values
-from reference.elasticity import LinearSolve, held_system, lame, load_form
+from reference.elasticity import LinearSolve, held_system, load_form
 from reference.linear_solvers import solve_directly, symmetric_solver
 from reference.mixed_solver import solve_saddle
 from reference.mixed_space import MixedSpace, mixed_space
+from reference.moduli import lame
 from reference.space import ConformingSpace
 from reference.weak_place import naming_weak_places
 from verify.errors import InputError
@@ -31,10 +32,13 @@ _MOST_DIRECT = 60_000
 def wants_pressure(scene: Scene, degree: int) -> bool:
     """Whether a scene is solved better with a pressure.
 
-    In plane stress nothing locks: the sheet is free to become thicker.
+    In plane stress nothing locks: the sheet is free to become thicker. The pressure is continuous,
+    but jumps where materials meet: several materials are solved without.
     """
     material = scene.material
-    return degree == 2 and material.poisson >= LEAST_POISSON and material.plane != "stress"
+    if degree != 2 or material.plane == "stress" or not material.is_uniform:
+        return False
+    return material.poisson >= LEAST_POISSON
 
 
 def solve_mixed(
@@ -67,6 +71,8 @@ def solve_mixed(
             f"material.poisson {scene.material.poisson}; a pressure expects it above 0",
             str(scene.file or ""),
         )
+    if not scene.material.is_uniform:
+        raise InputError("a pressure expects one material", str(scene.file or ""))
     start = perf_counter()
     mixed = mixed_space(space)
     W = mixed.function_space

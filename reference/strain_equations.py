@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.dolfinx_versions import take_whole_steps
-from reference.elasticity import lame, mean_stiffness
+from reference.elasticity import mean_stiffness
 from reference.linear_solvers import (
     modes_not_positive,
     near_null_space,
@@ -16,6 +16,7 @@ from reference.linear_solvers import (
 from reference.membrane_stretch import MembraneStretch
 from reference.mixed_space import MixedDeformation, mixed_space
 from reference.mixed_stretch import MixedStretch
+from reference.moduli import lame_constants
 from reference.polar_stretch import PolarStretch
 from reference.rigid_motion import RigidMotions
 from reference.space import ConformingSpace, SharedUnknowns
@@ -84,7 +85,6 @@ class StrainEquations:
         self._rows = self._unknowns.rows(unknowns)
         self.solution = fem.Function(V)
         self._factor = fem.Constant(V.mesh, 0.0)
-        lam, mu = (fem.Constant(V.mesh, value) for value in lame(material))
         membrane = space.mesh.cell_dimension < space.dimension
         if membrane and energy != "corotated":
             raise InputError(f"energy '{energy}' of a membrane; expected 'corotated'")
@@ -96,6 +96,7 @@ class StrainEquations:
         self._polar = polar = kind(self.solution, 4 * space.degree - 2)
         thickness = fem.Constant(V.mesh, material.thickness or 1.0)
         v = ufl.TestFunction(V)
+        lam, mu = lame_constants(material, v)
         residual = virtual_work(energy, polar, thickness * lam, thickness * mu, v)
         if load is not None:
             residual -= self._factor * load(v if mixed is None else ufl.split(v)[0])

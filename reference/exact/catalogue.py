@@ -12,6 +12,7 @@ from reference.exact.circular_cut import CircularCut
 from reference.exact.crack_tip import CrackTip
 from reference.exact.griffith import Griffith
 from reference.exact.hooke import Hooke, hooke
+from reference.exact.layers import Layers
 from reference.exact.linear import Linear
 from reference.exact.parameters import Parameters
 from reference.exact.patch import Patch
@@ -87,13 +88,17 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         "grip, speed, tip at the time 0, angle of its way in the x-y plane",
     ),
 }
+_LAYERS = (
+    "linear on each of four parts, two materials and a cut: point, slope or angle, interface_slope "
+    "or interface_angle, stress, shift"
+)
 _IN_SPACE = ("linear", "solid_patch", "solid_smooth", "spherical_cut", "penny", "blade_strip")
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 
 
 def exact_solution_names() -> dict[str, str]:
     """Names of the exact solutions, each with one line on what it is and its parameters."""
-    own = {name: text for name, (_, text) in _CATALOGUE.items()}
+    own = {name: text for name, (_, text) in _CATALOGUE.items()} | {"layers": _LAYERS}
     return {name: f"from {point.value}" for name, point in _registered().items()} | own
 
 
@@ -120,6 +125,13 @@ def exact_solution(name: str, parameters: Mapping[str, Any], material: Material)
         another package fails.
     """
     law = hooke(material)
+    if name == "layers" and law.dimension == 2:
+        given = Parameters(name, parameters)
+        layers = Layers(material, given)
+        given.close()
+        return layers
+    if not material.is_uniform:
+        raise InputError(f"exact solution '{name}' is of one material; there are material.regions")
     if name not in _CATALOGUE:
         given = Parameters(name, parameters)
         solution = _from_entry_point(name, law, given)

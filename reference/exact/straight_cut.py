@@ -13,15 +13,18 @@ from verify.errors import InputError
 __all__ = ["StraightCutSolution", "axes"]
 
 
-def axes(parameters: Parameters) -> Array:
-    """Take the direction of the cut: rows along (s) and normal (t), from `slope` or `angle`."""
-    if parameters.has("slope") and parameters.has("angle"):
-        raise InputError("parameters: slope and angle are both given; expected one of them")
-    parameters.has("angle")
-    if parameters.has("angle"):
-        angle = np.deg2rad(float(parameters.take("angle", ())))
+def axes(parameters: Parameters, of: str = "") -> Array:
+    """Take the direction of the cut: rows along (s) and normal (t), from `slope` or `angle`.
+
+    With `of`, that of something else: the names of its parameters begin so.
+    """
+    slope, degrees = f"{of}slope", f"{of}angle"
+    if parameters.has(slope) and parameters.has(degrees):
+        raise InputError(f"parameters: {slope} and {degrees} are both given; expected one of them")
+    if parameters.has(degrees):
+        angle = np.deg2rad(float(parameters.take(degrees, ())))
     else:
-        angle = np.arctan(float(parameters.take("slope", ())))
+        angle = np.arctan(float(parameters.take(slope, ())))
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, s], [-s, c]])
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from reference.meshing.features import plane_features
 from reference.meshing.grading import singular_points
+from reference.meshing.interfaces import plane_interfaces
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 
@@ -110,6 +111,8 @@ def _tip(scene: Scene, cut: ArcCut | PolylineCut, end: End) -> Tip:
     touching = _TOUCHING * float(np.ptp(scene.geometry.outline(), axis=0).max())
     singular = np.linalg.norm(singular_points(scene) - point, axis=1)
     reach = min([*away, *singular[singular > touching].tolist()])
+    # the fields of the integral know no interface between materials
+    reach = min([reach, *(float(f.distance(point[None])[0]) for f in plane_interfaces(scene))])
     if isinstance(cut, ArcCut):
         spoke = (point - np.asarray(cut.centre)) / cut.radius
         sign = 1.0 if end == "end" else -1.0

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from reference.meshing.features import Feature, close_pairs, plane_features
 from reference.meshing.grading import Grading
+from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.outline import divided_outline
 from reference.meshing.separation import APART, check_separation, check_strips
@@ -63,7 +64,8 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
         with gmsh_session() as gmsh:
             surface = _add_outline(gmsh, (outline - origin) / scale)
             curves = [tag for cut in scene.final_cuts for tag in _add_cut(gmsh, cut, origin, scale)]
-            cut_curves = _fragment(gmsh, surface, curves)
+            met = [_add_interface(gmsh, f, origin, scale) for f in plane_interfaces(scene)]
+            cut_curves = _fragment(gmsh, surface, curves, met)
             _set_sizes(gmsh, grading, features, origin, scale)
             gmsh.option.setNumber("Mesh.Algorithm", 5 if len(grading.points) else 6)
             gmsh.model.mesh.generate(2)
@@ -117,14 +119,25 @@ def _add_cut(gmsh: ModuleType, cut: object, origin: Array, scale: float) -> list
     return [int(occ.addLine(a, b)) for a, b in pairwise(tags)]
 
 
-def _fragment(gmsh: ModuleType, surface: int, curves: list[int]) -> list[int]:
-    """Imprint the cuts on the body; return the curves of the cut that lie inside it."""
+def _add_interface(gmsh: ModuleType, interface: Feature, origin: Array, scale: float) -> int:
     occ = gmsh.model.occ
-    if not curves:
+    a, b = (
+        occ.addPoint(*((end - origin) / scale), 0.0) for end in (interface.start, interface.end)
+    )
+    if interface.centre is None:
+        return int(occ.addLine(a, b))
+    return int(occ.addCircleArc(a, occ.addPoint(*((interface.centre - origin) / scale), 0.0), b))
+
+
+def _fragment(gmsh: ModuleType, surface: int, curves: list[int], met: list[int]) -> list[int]:
+    """Imprint cuts and the curves where materials meet; return the cuts' inside the body."""
+    occ = gmsh.model.occ
+    if not curves and not met:
         occ.synchronize()
         return []
-    _, images = occ.fragment([(2, surface)], [(1, tag) for tag in curves])
+    _, images = occ.fragment([(2, surface)], [(1, tag) for tag in (*curves, *met)])
     occ.synchronize()
+    images = images[: 1 + len(curves)]
     surfaces = [tag for dim, tag in images[0] if dim == 2]
     pieces = {abs(tag) for image in images[1:] for dim, tag in image if dim == 1}
     inside, beyond = [], []

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.meshing.features import Feature, crossing_points, plane_features
+from reference.meshing.interfaces import plane_interfaces
 from reference.meshing.outline import divided_outline, load_jumps, supported_edges
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.acceptance import StressIntensityQuantity
@@ -107,8 +108,9 @@ def singular_points(scene: Scene) -> Array:
     """Points (k, 2) where the gradient of the solution may be unbounded.
 
     Tips, kinks of more than 15°, junctions and crossings of cuts; points of the outline at which
-    a support ends or a traction jumps, mouths in a support, and re-entrant corners. None of the
-    outline's where the supports prescribe an exact field, which is smooth there.
+    a support ends or a traction jumps, mouths in a support, and re-entrant corners; and where
+    materials meet at the outline, at a cut or at a corner of a region. Tips, kinks and junctions
+    alone where the supports prescribe an exact field, which is smooth elsewhere.
     """
     geometry = scene.geometry
     assert isinstance(geometry, Rectangle | Polygon)
@@ -118,6 +120,7 @@ def singular_points(scene: Scene) -> Array:
     if len(scene.final_cuts) > 1:
         found.append(_inner(_junctions(cuts), outline))
     if not any(support.displacement == "exact" for support in scene.supports):
+        found.append(_interface_points(scene, cuts, outline))
         found.append(_corners(scene))
         found.append(_held_mouths(scene, cuts))
     points = np.concatenate([np.zeros((0, 2)), *(f.reshape(-1, 2) for f in found)])
@@ -134,7 +137,8 @@ def clear_radii(scene: Scene, points: Array) -> Array:
     geometry = scene.geometry
     assert isinstance(geometry, Rectangle | Polygon)
     touching = _SAME * float(np.ptp(geometry.outline(), axis=0).max())
-    features = np.array([feature.distance(points) for feature in plane_features(scene)])
+    around = [*plane_features(scene), *plane_interfaces(scene)]
+    features = np.array([feature.distance(points) for feature in around])
     apart = np.linalg.norm(points[:, None] - points, axis=2)
     away = np.concatenate([features, apart])
     nearest = np.where(away > touching, away, np.inf).min(axis=0, initial=np.inf)
@@ -203,6 +207,21 @@ def _held_mouths(scene: Scene, cuts: list[Feature]) -> Array:
     ]
     meetings = [crossing_points([cut, edge]) for cut in cuts for edge in edges]
     return np.concatenate([np.zeros((0, 2)), *meetings])
+
+
+def _interface_points(scene: Scene, cuts: list[Feature], outline: Array) -> Array:
+    """Find where interfaces between materials end, meet cuts or meet each other."""
+    interfaces = plane_interfaces(scene)
+    ends = np.array([end for one in interfaces for end in (one.start, one.end)]).reshape(-1, 2)
+    scale = float(np.ptp(outline, axis=0).max())
+    # the parts of one arc meet smoothly
+    names = np.repeat([one.name for one in interfaces], 2)
+    same = np.linalg.norm(ends[:, None] - ends, axis=2) <= _SAME * scale
+    lone = ends[(same & (names[:, None] == names)).sum(axis=1) == 1]
+    met = [crossing_points([one, cut]) for one in interfaces for cut in cuts]
+    points = np.concatenate([lone, *met, _junctions(interfaces)])
+    on_outline = distance_to_outline(points, outline) <= _SAME * scale
+    return points[inside_polygon(points, outline) | on_outline]
 
 
 def _orientation(outline: Array) -> float:

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from reference.meshing.box_lines import clamped_edges, part_lines
 from reference.meshing.front_edges import loosen_front
 from reference.meshing.grading import Grading
+from reference.meshing.interfaces import solid_interfaces
 from reference.meshing.opening import ConformingMesh, open_cut
 from reference.meshing.session import gmsh_session, simplices
-from reference.meshing.solid_cuts import CutFaces, add_surface, imprint_surfaces
+from reference.meshing.solid_cuts import CutFaces, add_polygon, add_surface, imprint_surfaces
 from verify.errors import InputError
 from verify.scene import Box, Scene
 
@@ -50,7 +51,12 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
                 for cut in scene.final_cuts
                 for tag in add_surface(gmsh, cut, lower, scale)
             }
-            cut = imprint_surfaces(gmsh, body, faces, _add_lines(gmsh, (lines - lower) / scale))
+            met = [
+                add_polygon(gmsh.model.occ, (corners - lower) / scale)
+                for corners in solid_interfaces(scene)
+            ]
+            edges = _add_lines(gmsh, (lines - lower) / scale)
+            cut = imprint_surfaces(gmsh, body, faces, edges, met)
             if scene.final_cuts and not cut.faces:
                 raise InputError("cuts: none of them lies inside the body", where)
             graded = []

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["CutFaces", "add_surface", "imprint_surfaces"]
+__all__ = ["CutFaces", "add_polygon", "add_surface", "imprint_surfaces"]
 
 Array = NDArray[np.float64]
 _MERGED = 1e-6  # of the body's size
@@ -39,7 +39,7 @@ def add_surface(gmsh: ModuleType, cut: Any, origin: Array, scale: float) -> list
     occ = gmsh.model.occ
     match cut.kind:
         case "polygon":
-            return [_polygon(occ, (np.array(cut.points) - origin) / scale)]
+            return [add_polygon(occ, (np.array(cut.points) - origin) / scale)]
         case "disc":
             centre = (np.array(cut.centre) - origin) / scale
             first, second, normal = cut.axes()
@@ -62,11 +62,12 @@ def add_surface(gmsh: ModuleType, cut: Any, origin: Array, scale: float) -> list
 
 
 def imprint_surfaces(
-    gmsh: ModuleType, body: int, faces: dict[int, str], lines: list[int]
+    gmsh: ModuleType, body: int, faces: dict[int, str], lines: list[int], met: list[int]
 ) -> CutFaces:
     """Fragment the body by the faces of the cuts; what lies outside or along it is removed.
 
-    `faces` have the names of their cuts; `lines` on the surface of the body become edges of it.
+    `faces` have the names of their cuts; `lines` on the surface of the body become edges of it,
+    and at the faces `met` materials meet.
 
     Raises
     ------
@@ -74,20 +75,21 @@ def imprint_surfaces(
         If OpenCASCADE takes two cuts, or a cut and the surface of the body, for one.
     """
     occ = gmsh.model.occ
-    if not faces and not lines:
+    if not faces and not lines and not met:
         occ.synchronize()
         return CutFaces([], [], [])
-    tools = [(2, tag) for tag in faces] + [(1, tag) for tag in lines]
+    tools = [(2, tag) for tag in (*faces, *met)] + [(1, tag) for tag in lines]
     _, images = occ.fragment([(3, body)], tools)
     occ.synchronize()
     _check_not_merged(dict(zip(faces, images[1:], strict=False)), faces)
     volumes = [tag for dim, tag in images[0] if dim == 3]
     embedded = {tag for v in volumes for dim, tag in gmsh.model.mesh.getEmbedded(3, v) if dim == 2}
     inside, beyond, one_sided = [], [], []
+    of_cuts = {abs(tag) for image in images[1 : 1 + len(faces)] for dim, tag in image if dim == 2}
     for face in sorted({abs(tag) for image in images[1:] for dim, tag in image if dim == 2}):
         sides = gmsh.model.getAdjacencies(2, face)[0]
         if len(sides) == 2 or face in embedded:
-            inside.append(face)
+            inside += [face] * (face in of_cuts)
         elif not len(sides):
             beyond.append((2, face))
         else:
@@ -123,7 +125,8 @@ def _on_surface(gmsh: ModuleType, face: int) -> bool:
     return bool(np.abs(box - centre).min() < _MERGED * np.ptp(box, axis=0).max())
 
 
-def _polygon(occ: ModuleType, corners: Array) -> int:
+def add_polygon(occ: ModuleType, corners: Array) -> int:
+    """Add the plane face between corners (k, 3)."""
     tags = [occ.addPoint(*p) for p in corners]
     lines = [occ.addLine(a, b) for a, b in pairwise([*tags, tags[0]])]
     return int(occ.addPlaneSurface([occ.addCurveLoop(lines)]))

@@ -203,9 +203,9 @@ def bent_energy(height, curvature, mu, lam):
 
 def bending_errors(poisson, d):
     """Errors of the energy without and with a pressure of a strip between turning ends."""
-    from reference.elasticity import lame
     from reference.large_strain import solve_large_strain
     from reference.meshing import open_cut, structured_tetrahedra, structured_triangles
+    from reference.moduli import lame
     from reference.space import conforming_space
     from verify.scene import Material
 

@@ -19,10 +19,12 @@ def energy_error(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorN
     With the corotated energy: of twice its `error_density`, and twice the reference's energy.
     A reference that moves rigidly but for round-off has the norm 0.
     """
+    law = law.at(rule.points)
     expected = rule.gradient(reference)
     difference = rule.gradient(field) - expected
     scale = float(np.sqrt(2 * rule.weights @ law.energy_density(expected)))
-    whole = float(np.sqrt(2 * law.shear * rule.weights @ np.sum(expected**2, axis=(1, 2))))
+    square = law.shear * np.sum(expected**2, axis=(1, 2))
+    whole = float(np.sqrt(2 * rule.weights @ square))
     return ErrorNorm(
         float(np.sqrt(2 * rule.weights @ law.error_density(difference, expected))),
         scale if scale > _NO_STRAIN * whole else 0.0,

@@ -5,7 +5,8 @@ formulation with polar rotations is; U is the stretch of F = I + ∇u = R U. A m
 of the two stretches in its tangent plane, times its thickness, with the λ of plane stress.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,30 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Hooke:
-    """Lamé constants (Pa), those of the plane problem in plane stress; of a membrane in N/m."""
+    """Lamé constants (Pa), those of the plane problem in plane stress; of a membrane in N/m.
 
-    lame: float
-    shear: float
+    Parameters
+    ----------
+    lame, shear : float or (n,) array
+        λ and μ; one for each of n gradients after `at`.
+    material : Material, optional
+        Given where materials differ by region: the constants are then those of ``[material]``.
+    """
+
+    lame: float | Array
+    shear: float | Array
+    material: Material | None = None
+
+    def at(self, points: Array) -> Self:
+        """Return the law at points (n, d): itself, unless materials differ by region.
+
+        Interfaces are where the scene has them, whatever cells a solver gave which material.
+        """
+        if self.material is None:
+            return self
+        pairs = np.array([_constants(one) for one in self.material.each])
+        lame, shear = pairs[self.material.number_at(points)].T
+        return replace(self, lame=lame, shear=shear, material=None)
 
     def energy_density(self, gradient: Array) -> Array:
         """½ σ:ε (n,) in J/m³ of displacement gradients (n, d, d)."""
@@ -86,20 +107,24 @@ Law = Hooke | Corotated | MembraneLaw
 
 def hooke(material: Material) -> Hooke:
     """Lamé constants of a scene's material."""
-    return Hooke(*_constants(material))
+    return Hooke(*_constants(material), _if_several(material))
 
 
 def corotated(material: Material) -> Corotated:
     """Corotated energy of a scene's material."""
-    return Corotated(*_constants(material))
+    return Corotated(*_constants(material), _if_several(material))
 
 
 def law_of(scene: Scene) -> Law:
     """Elasticity that a scene asks for."""
     if scene.cell_dimension < scene.dimension:
-        return MembraneLaw(*_constants(scene.material))
+        return MembraneLaw(*_constants(scene.material), _if_several(scene.material))
     make = corotated if scene.analysis.kinematics == "corotational" else hooke
     return make(scene.material)
+
+
+def _if_several(material: Material) -> Material | None:
+    return None if material.is_uniform else material
 
 
 def _constants(material: Material) -> tuple[float, float]:

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from verify.compare.simplex_rule import simplex_rule
 from verify.compare.simplices import simplices
 from verify.errors import InputError
+from verify.scene import Scene
 from verify.solution import Solution
 
-__all__ = ["Kinetic", "kinetic"]
+__all__ = ["Kinetic", "density_of", "kinetic"]
 
 Array = NDArray[np.float64]
 
@@ -48,14 +49,29 @@ class Kinetic:
     angular_scale: float
 
 
-def kinetic(solution: Solution, density: float, cells: NDArray[np.int64] | None = None) -> Kinetic:
+def density_of(scene: Scene, solution: Solution) -> float | Array:
+    """Density in kg/m³ (of a membrane kg/m²): one, or (m,) that at the centroid of each cell.
+
+    0 where the scene has none.
+    """
+    material = scene.material
+    thickness = material.thickness or 1.0
+    if material.is_uniform:
+        return thickness * (material.density or 0.0)
+    shape = simplices(solution.points, solution.cells)
+    return thickness * np.nan_to_num(material.at(shape.corners.mean(axis=1)).density)
+
+
+def kinetic(
+    solution: Solution, density: float | Array, cells: NDArray[np.int64] | None = None
+) -> Kinetic:
     """Integrate over the cells of the solution, exactly for its velocity field.
 
     Parameters
     ----------
     solution : Solution
-    density : float
-        kg/m³; of a membrane times its thickness.
+    density : float or (m,) array
+        kg/m³, of a membrane times its thickness; of all cells of the solution or of each.
     cells : (c,) int array, optional
         Numbers of the cells of a part; default all.
 
@@ -71,7 +87,8 @@ def kinetic(solution: Solution, density: float, cells: NDArray[np.int64] | None 
     shape = simplices(solution.points, nodes)
     place, share = simplex_rule(k, 2 if solution.order == 1 else 4)
     hats = _shape_functions(place, k, solution.order)
-    mass = density * (shape.volume[:, None] * share).ravel()
+    own = density if cells is None or np.ndim(density) == 0 else np.asarray(density)[cells]
+    mass = ((own * shape.volume)[:, None] * share).ravel()
     names = ("centre", "energy", "linear", "angular", "spin", "scales")
     rows: dict[str, list[Array]] = {name: [] for name in names}
     for u, v in zip(solution.displacement, solution.velocity, strict=True):

@@ -42,7 +42,7 @@ class Part:
     inertia: Array
 
 
-def separated_parts(solution: Solution, density: float) -> list[Part]:
+def separated_parts(solution: Solution, density: float | Array) -> list[Part]:
     """Parts of a solution, from the top down (in the plane by y, in space by z; then by y, x).
 
     Cells are one part if a chain of facets leads from one to the other of which neighbours share
@@ -52,8 +52,8 @@ def separated_parts(solution: Solution, density: float) -> list[Part]:
     Parameters
     ----------
     solution : Solution
-    density : float
-        kg/m³; of a membrane times its thickness.
+    density : float or (m,) array
+        kg/m³, of a membrane times its thickness; of all cells of the solution or of each.
     """
     corners = solution.cells[:, : solution.cell_dimension + 1]
     facets, cell = _facets(corners)
@@ -74,7 +74,7 @@ def separated_parts(solution: Solution, density: float) -> list[Part]:
     return sorted(parts, key=place)
 
 
-def part_of(solution: Solution, density: float, cells: Ints) -> Part:
+def part_of(solution: Solution, density: float | Array, cells: Ints) -> Part:
     """Mass and inertia of given cells (c,), connected or not."""
     shape = simplices(solution.points, solution.cells)
     return _part(cells, shape.corners, density * shape.volume)

@@ -20,7 +20,8 @@ def strain_energy(solution: Solution, law: Law, step: int = -1) -> float:
     """Energy of the cells of the solution, J (2D: per metre), exact for its field.
 
     It needs no reference and no neutral quadrature: it is a functional of the field. Only the
-    corotated energy of a quadratic field is no polynomial: there the rule is of degree 7.
+    corotated energy of a quadratic field is no polynomial: there the rule is of degree 7. A cell
+    across an interface of materials is integrated by that rule too, each point in its own.
     """
     return nodal_strain_energy(SolutionField(solution, step), law)
 
@@ -43,10 +44,10 @@ def cell_strain_energies(field: SolutionField, law: Law) -> NDArray[np.float64]:
         gradient = field.in_cells(points, every)[1]
         if frames is not None:
             gradient = in_frames(gradient, frames)
-        found += share * shape.volume * law.energy_density(gradient)
+        found += share * shape.volume * law.at(points).energy_density(gradient)
     return found
 
 
 def field_strain_energy(field: Field, rule: Rule, law: Law) -> float:
     """Energy of the body by quadrature, J (2D: per metre); for exact fields."""
-    return float(rule.weights @ law.energy_density(rule.gradient(field)))
+    return float(rule.weights @ law.at(rule.points).energy_density(rule.gradient(field)))

@@ -160,6 +160,7 @@ class Problem:
     def lame(self) -> tuple[float, float]:
         """Lamé constants λ, μ in Pa; in plane stress the λ of the plane problem."""
         material = self.scene.material
+        assert material.is_uniform  # `problem_of` refuses others
         mu = material.young / (2 * (1 + material.poisson))
         lam = 2 * mu * material.poisson / (1 - 2 * material.poisson)
         return (2 * lam * mu / (lam + 2 * mu) if material.plane == "stress" else lam), mu
@@ -180,7 +181,7 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
     ------
     UnsupportedSceneError
         If a conforming mesh of the scene is not offered, a support or load is another field at
-        every time, or a load acts on the faces of a cut.
+        every time, a load acts on the faces of a cut, or materials differ by region.
     InputError
         If a support or load acts nowhere, or a mesh file is bad.
     """
@@ -189,6 +190,8 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
         raise UnsupportedSceneError("loads on the faces of a cut are not exported")
     if reason := _at_every_time(scene, exact):
         raise UnsupportedSceneError(reason)
+    if not scene.material.is_uniform:
+        raise UnsupportedSceneError("several materials by region are not handed to other programs")
     background, size = background_mesh(scene, level)
     points, cells, facet_cell = background.points, background.cells, background.boundary_facets
     cut_facets = np.zeros((0, scene.cell_dimension, scene.dimension))

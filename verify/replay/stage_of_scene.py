@@ -82,6 +82,8 @@ def _refusal(scene: Scene) -> str | None:
         return "a scene is played in time: it needs a dynamic analysis with a time_step"
     if scene.analysis.kinematics != "corotational":
         return "a scene is played at any rotation: kinematics must be 'corotational'"
+    if not scene.material.is_uniform:
+        return "a scene of one material is played; material.regions differ"
     if scene.initial.kind != "rest":
         return "a scene is played from rest"
     for i, load in enumerate(scene.loads):

@@ -28,6 +28,7 @@ from verify.scene.loading import (
     scene_hash,
     scene_schema,
 )
+from verify.scene.materials import Material, MaterialRegion, Moduli, crossed_by_interfaces
 from verify.scene.mesh import MeshLevels, ReferenceLevels
 from verify.scene.mesh_file import read_mesh
 from verify.scene.physics import (
@@ -36,7 +37,6 @@ from verify.scene.physics import (
     CutFaces,
     Exact,
     Gravity,
-    Material,
     Rotation,
     Support,
     Traction,
@@ -75,9 +75,11 @@ __all__ = [
     "InitialField",
     "KnownFinding",
     "Material",
+    "MaterialRegion",
     "MaximumDisplacementQuantity",
     "MeshFile",
     "MeshLevels",
+    "Moduli",
     "Moving",
     "OpeningQuantity",
     "PartQuantity",
@@ -104,6 +106,7 @@ __all__ = [
     "Traction",
     "ValueCheck",
     "case_folder",
+    "crossed_by_interfaces",
     "faces_of",
     "is_timed",
     "is_uniform",

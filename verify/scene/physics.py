@@ -1,4 +1,4 @@
-"""Material, supports, loads and the analysis of a scene. SI units."""
+"""Supports, loads and the analysis of a scene. SI units."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
@@ -28,7 +28,6 @@ __all__ = [
     "Exact",
     "Gravity",
     "Load",
-    "Material",
     "Rotation",
     "Support",
     "Traction",
@@ -76,18 +75,6 @@ def field_rates(
         if isinstance(one, str):
             rates[:, k] = parse_expression(one, points.shape[1], timed=True).rate(points, time)
     return rates
-
-
-class Material(Strict):
-    """Homogeneous isotropic elasticity."""
-
-    young: Positive = Field(description="Young's modulus E, Pa")
-    poisson: float = Field(strict=True, gt=-1.0, lt=0.5, description="Poisson's ratio")
-    density: Positive | None = Field(default=None, description="density, kg/m³")
-    plane: Literal["strain", "stress"] | None = Field(
-        default=None, description="2D only: plane strain or plane stress"
-    )
-    thickness: Positive | None = Field(default=None, description="membranes only: thickness, m")
 
 
 class Rotation(Strict):

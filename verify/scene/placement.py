@@ -10,6 +10,7 @@ from verify.scene.cuts import ArcCut
 from verify.scene.empty_parts import check_parts_act
 from verify.scene.geometry import MeshFile, Polygon
 from verify.scene.initial import InitialField, Moving
+from verify.scene.material_regions import check_material_regions
 from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, CutFaces, Gravity, Rotation, Traction
 from verify.scene.regions import parse_expression, parse_region
@@ -28,6 +29,7 @@ def check_placement(scene: "Scene") -> None:
     """Raise ValueError with one clear line if the parts of `scene` do not fit together."""
     _check_dimensions(scene)
     _check_regions(scene)
+    check_material_regions(scene)
     _check_formulas(scene)
     _check_exact(scene)
     _check_names(scene)

@@ -8,6 +8,7 @@ import ast
 import operator
 from collections.abc import Callable, Mapping
 from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,19 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["RESERVED_NAMES", "Expression", "Region", "parse_expression", "parse_region"]
+__all__ = [
+    "RESERVED_NAMES",
+    "Expression",
+    "Region",
+    "Side",
+    "comparisons",
+    "parse_expression",
+    "parse_region",
+]
 
 Array = NDArray[np.float64]
 Region = Callable[[Array], NDArray[np.bool_]]
+Side = Callable[[Array], Array]
 _Variables = Mapping[str, Array]
 
 _LONGEST = 2000  # characters
@@ -88,6 +98,30 @@ def parse_region(text: str, dimension: int) -> Region:
         return np.broadcast_to(values, (len(points),)).astype(bool)
 
     return region
+
+
+def comparisons(text: str, dimension: int) -> list[tuple[Side, Side]]:
+    """Return both sides of every comparison of an inequality that `parse_region` accepts.
+
+    The region can only begin or end where the sides of one of them are equal. Where a side is no
+    finite number, it is not a number.
+    """
+    parse_region(text, dimension)
+    found = []
+    for node in ast.walk(ast.parse(text.strip(), mode="eval").body):
+        if isinstance(node, ast.Compare):
+            sides = [_side(term) for term in (node.left, *node.comparators)]
+            found += list(pairwise(sides))
+    return found
+
+
+def _side(node: ast.AST) -> Side:
+    def side(points: Array) -> Array:
+        with np.errstate(all="ignore"):
+            values = np.broadcast_to(_number(node, _variables(points, 0.0)), (len(points),))
+        return np.where(np.isfinite(values), values, np.nan)
+
+    return side
 
 
 class Expression:

@@ -11,8 +11,9 @@ from verify.scene.cuts import Cut, whole_cut
 from verify.scene.family import Row
 from verify.scene.geometry import Geometry, MeshFile
 from verify.scene.initial import AtRest, Initial
+from verify.scene.materials import Material
 from verify.scene.mesh import MeshLevels, ReferenceLevels
-from verify.scene.physics import Analysis, Exact, Load, Material, Support
+from verify.scene.physics import Analysis, Exact, Load, Support
 from verify.scene.placement import check_placement
 from verify.scene.replay import Replay, check_replay
 from verify.scene.skin import Skin

@@ -15,6 +15,7 @@ from reference.dynamics_ledger import Ledger
 from reference.dynamics_step import State, Stepper
 from reference.dynamics_ties import facing_nodes
 from reference.fracture.pressure import MIXED
+from reference.moduli import wave_speed
 from reference.space import ConformingSpace, conforming_space
 from reference.weak_place import naming_weak_places
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
@@ -90,11 +91,7 @@ class ConformingMotion:
 
 def natural_step(scene: Scene, size: float) -> float:
     """Time in which a pressure wave crosses an element of a size, s."""
-    material = scene.material
-    assert material.density is not None  # the scene has checked it
-    e, nu = material.young, material.poisson
-    modulus = e * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
-    return float(size / np.sqrt(modulus / material.density))
+    return size / wave_speed(scene.material)
 
 
 def move(

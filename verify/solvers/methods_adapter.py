@@ -21,7 +21,7 @@ from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_motion import MotionChoice
-from verify.solvers.xfem_scene import background_mesh, material_of
+from verify.solvers.xfem_scene import across_interfaces, background_mesh, material_of
 from verify.solvers.xfem_static import dismissed_equilibria, path_notes
 from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_supports import path_of_supports, supports_of
@@ -154,7 +154,7 @@ class MethodSolver:
         timings: dict[str, list[float]] = {}
         if repetitions:
             timings = {phase: [run.timings[phase] for run in runs] for phase in runs[0].timings}
-        return _solution(self.name, runs[-1], size, {"meshing": [meshing], **timings})
+        return _solution(scene, self.name, runs[-1], size, {"meshing": [meshing], **timings})
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         _, _, *offered = signature(METHODS[self._method]).parameters.values()
@@ -186,7 +186,7 @@ class MethodSolver:
             forces: list[InternalForce] = []
 
             def law(body: CutBody) -> InternalForce:
-                material = body.material(material_of(scene))
+                material = material_of(scene, body.resisting.mesh)
                 forces.append(self._force(body.resisting, material, kinematics))
                 return forces[-1]
 
@@ -200,7 +200,7 @@ class MethodSolver:
                 getattr(forces[-1], "clamped", 0),
             )  # fmt: skip
         body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
-        material = body.material(material_of(scene))
+        material = material_of(scene, body.resisting.mesh)
         start = perf_counter()
         supports = supports_of(scene, body.virtual, exact)
         load = loads_of(scene, body.virtual, exact)
@@ -304,13 +304,15 @@ def _exact(scene: Scene) -> Any:
     return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
-def _solution(name: str, run: _Run, size: float, timings: dict[str, list[float]]) -> Solution:
+def _solution(
+    scene: Scene, name: str, run: _Run, size: float, timings: dict[str, list[float]]
+) -> Solution:
     body, shown, counts = run.body, run.body.conforming, run.body.counts
     regularisations = [
         Regularisation(change.kind, change.count, change.size, change.unit)
         for change in body.changes
     ]
-    regularisations += run.further
+    regularisations += [*run.further, *across_interfaces(scene, body.virtual.mesh)]
     if run.clamped:
         kind = "spring that the fit would make negative left out"
         regularisations.append(Regularisation(kind, run.clamped, 0.0, "N/m"))

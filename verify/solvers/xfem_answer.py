@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from verify.scene import Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
+from verify.solvers.xfem_scene import across_interfaces
 from verify.xfem.slivers import GhostPenalty, SliverReport
 from verify.xfem.specks import Specks
 from verify.xfem.subdivision import Subdivision, subdivide
@@ -76,6 +77,7 @@ def solution_of(
             *_regularisations(scene, virtual, body),
             *_treated(answer.slivers),
             *answer.further,
+            *across_interfaces(scene, virtual.mesh),
         ],
         notes={**notes, **answer.notes},
     )

@@ -9,7 +9,9 @@ from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, is_unifo
 from verify.scene.physics import Load
 from verify.solvers.xfem_boundary import facets_on
 from verify.solvers.xfem_faces import face_forces
+from verify.solvers.xfem_scene import density_of
 from verify.xfem.loads import Density, body_force, traction
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["NodalForces", "forces_of", "is_moving", "loads_of", "nodal_forces"]
@@ -56,9 +58,7 @@ def forces_of(scene: Scene, i: int, virtual: VirtualMesh, exact: Any, time: floa
     entry = scene.loads[i]
     field: Any = None if exact is None else exact.at(time)
     if isinstance(entry, Gravity):
-        assert scene.material.density is not None  # the scene has checked it
-        weight = scene.material.density * np.asarray(entry.acceleration)
-        forces = body_force(virtual, weight)
+        forces = body_force(virtual, _weight(scene, virtual.mesh, entry))
     elif isinstance(entry, CutFaces):
         forces = face_forces(scene, virtual, i, time)
     elif isinstance(entry, Traction):
@@ -72,6 +72,12 @@ def forces_of(scene: Scene, i: int, virtual: VirtualMesh, exact: Any, time: floa
     else:
         forces = body_force(virtual, _density(entry, entry.force, time))
     return np.asarray((scene.material.thickness or 1.0) * forces)
+
+
+def _weight(scene: Scene, mesh: SimplexMesh, load: Gravity) -> _Floats:
+    """Force per volume (d,), or (m, d) by cell where materials differ, N/m³."""
+    density = np.asarray(density_of(scene, mesh)) / (scene.material.thickness or 1.0)
+    return np.multiply.outer(density, np.asarray(load.acceleration))
 
 
 def _density(load: BodyForce | Traction, given: Any, time: float) -> Any:

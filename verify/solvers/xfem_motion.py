@@ -195,7 +195,7 @@ class Mover:
     def _body(self, virtual: VirtualMesh) -> DynamicBody:
         """Give a cut mesh its elasticity, mass, supports and loads."""
         clock = perf_counter()
-        scene, density = self.scene, density_of(self.scene)
+        scene, density = self.scene, density_of(self.scene, virtual.mesh)
         force, mass = self._inertia(virtual, density)
         weight = np.zeros_like(virtual.node_points)
         driven: list[tuple[_Floats, Any]] = []
@@ -228,7 +228,9 @@ class Mover:
         self.timings["loading"] += perf_counter() - clock
         return body
 
-    def _inertia(self, virtual: VirtualMesh, density: float) -> tuple[InternalForce, Mass]:
+    def _inertia(
+        self, virtual: VirtualMesh, density: float | _Floats
+    ) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a cut mesh, with the penalty if there is to be one."""
         if self.choice.slivers != "penalise":
             try:
@@ -237,15 +239,15 @@ class Mover:
                 raise UnsupportedSceneError(f"mass = '{self.choice.mass}': {error}") from None
             return self._law(virtual), mass
         kinematics = self.scene.analysis.kinematics
-        treated = treat_moving_body(
-            virtual, material_of(self.scene), density, "penalise", kinematics=kinematics
-        )
+        material = material_of(self.scene, virtual.mesh)
+        treated = treat_moving_body(virtual, material, density, "penalise", kinematics=kinematics)
         self.penalty = treated.ghost
         return treated.force, treated.mass
 
     def _law(self, virtual: VirtualMesh) -> InternalForce:
         """Return the elasticity of a cut mesh."""
-        return InternalForce(virtual, material_of(self.scene), self.scene.analysis.kinematics)
+        material = material_of(self.scene, virtual.mesh)
+        return InternalForce(virtual, material, self.scene.analysis.kinematics)
 
     def _initial(self, body: DynamicBody) -> MotionState:
         """Return the state at the time 0, before what opens then."""
@@ -298,8 +300,8 @@ class Mover:
         scene, choice = self.scene, self.choice
         largest, self.said = largest_step(
             body,
-            material_of(scene),
-            density_of(scene),
+            material_of(scene, body.force.virtual.mesh),
+            density_of(scene, body.force.virtual.mesh),
             choice.scheme,
             choice.step_factor,
             scene.analysis.time_step,

@@ -1,14 +1,26 @@
 """The body of a scene in the terms of the compact XFEM solver: mesh, elasticity, density."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.errors import InputError
-from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
+from verify.scene import (
+    Box,
+    MeshFile,
+    Polygon,
+    Rectangle,
+    Scene,
+    crossed_by_interfaces,
+    read_mesh,
+)
+from verify.solution import Regularisation
 from verify.xfem.elasticity import Material, State, isotropic
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
-__all__ = ["background_mesh", "density_of", "material_of"]
+__all__ = ["across_interfaces", "background_mesh", "density_of", "material_of"]
 
 
 def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
@@ -58,18 +70,45 @@ def _size(scene: Scene, level: int) -> float:
     return scene.mesh.sizes[level]
 
 
-def material_of(scene: Scene) -> Material:
-    """Return the elasticity of the scene; of a membrane times its thickness, in N/m."""
+def material_of(scene: Scene, mesh: SimplexMesh) -> Material:
+    """Return the elasticity of the scene; of a membrane times its thickness, in N/m.
+
+    Where materials differ by region, a cell of the mesh is of that at its centroid.
+    """
     states: dict[str | None, State] = {"strain": "plane strain", "stress": "plane stress"}
     state = states.get(scene.material.plane, "solid")
+    young, poisson, _ = _of_cells(scene, mesh)
     thickness = scene.material.thickness
     if thickness is None:
-        return isotropic(scene.material.young, scene.material.poisson, state)
-    sheet = isotropic(scene.material.young, scene.material.poisson, "plane stress")
+        return isotropic(young, poisson, state)
+    sheet = isotropic(young, poisson, "plane stress")
     return Material(thickness * sheet.lam, thickness * sheet.mu)
 
 
-def density_of(scene: Scene) -> float:
-    """Return the density in kg/m³; of a membrane times its thickness, in kg/m²."""
-    assert scene.material.density is not None  # the scene has checked it
-    return scene.material.density * (scene.material.thickness or 1.0)
+def density_of(scene: Scene, mesh: SimplexMesh) -> float | NDArray[np.float64]:
+    """Return the density in kg/m³; of a membrane times its thickness, in kg/m².
+
+    One number, or one for each cell (m,) where materials differ by region.
+    """
+    _, _, density = _of_cells(scene, mesh)
+    return density * (scene.material.thickness or 1.0)
+
+
+def _of_cells(scene: Scene, mesh: SimplexMesh) -> Any:
+    """Young's modulus, Poisson's ratio and density: numbers, or arrays (m,) by cell."""
+    material = scene.material
+    if material.is_uniform:
+        return material.young, material.poisson, material.density
+    return material.at(mesh.points[mesh.cells].mean(axis=1))
+
+
+def across_interfaces(scene: Scene, mesh: SimplexMesh) -> list[Regularisation]:
+    """State the cells that lie across an interface and are of the material at their centroid."""
+    if scene.material.is_uniform:
+        return []
+    crossed = crossed_by_interfaces(scene.material, mesh.points, mesh.cells)
+    if not crossed.any():
+        return []
+    share = float(mesh.measures[crossed].sum() / mesh.measures.sum())
+    kind = "cell across an interface, of the material at its centroid"
+    return [Regularisation(kind, int(crossed.sum()), share, "volume fraction of the body")]

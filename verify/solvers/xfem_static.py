@@ -72,7 +72,7 @@ def _linear(
     basis: str,
     penalise: bool,
 ) -> Equilibrium:
-    material = material_of(scene)
+    material = material_of(scene, virtual.mesh)
     if basis == "sidewise":
         ghost = GhostPenalty(virtual, material) if penalise else None
         static = solve_static(virtual, material, supports, load, ghost=ghost)
@@ -102,7 +102,7 @@ def _corotational(
 ) -> Equilibrium:
     check_bodies(virtual, supports)
     clock = perf_counter()
-    force = InternalForce(virtual, material_of(scene))
+    force = InternalForce(virtual, material_of(scene, virtual.mesh))
     path = path_of_supports(scene, virtual, exact)
     found = static_equilibrium(
         force, supports.fixed, lambda share: path(share).values, load, load_steps or 1

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from verify.errors import InputError
@@ -35,7 +36,7 @@ SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
     "symplectic_euler": SymplecticEuler,
     "forward_euler": ForwardEuler,
 }
-MASSES: dict[str, Callable[[VirtualMesh, float], Mass]] = {
+MASSES: dict[str, Callable[[VirtualMesh, ArrayLike], Mass]] = {
     "sidewise": side_wise_mass,
     "consistent": consistent_mass,
     "row_sum": lambda virtual, density: shifted_mass(virtual, density, "row sum"),
@@ -69,7 +70,7 @@ def integrator_of(
 def largest_step(
     body: DynamicBody,
     material: Material,
-    density: float,
+    density: ArrayLike,
     scheme: str,
     factor: float,
     asked: float | None,
@@ -86,7 +87,7 @@ def largest_step(
     ----------
     body : DynamicBody
     material : Material
-    density : float
+    density : float or (m,) array_like
     scheme : str
         One of `SCHEMES`.
     factor : float
@@ -107,7 +108,7 @@ def largest_step(
     return found, said
 
 
-def _critical(body: DynamicBody, material: Material, density: float, explicit: bool) -> float:
+def _critical(body: DynamicBody, material: Material, density: ArrayLike, explicit: bool) -> float:
     virtual = body.force.virtual
     if not explicit or body.mass.keeps_element_steps:
         # side-wise mass: no cut makes it smaller than that of the smallest uncut element

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.compare.hooke import Law
-from verify.compare.kinetic import Kinetic, kinetic
+from verify.compare.kinetic import Kinetic, density_of, kinetic
 from verify.compare.locate import SolutionField
 from verify.compare.separated import Part, separated_parts
 from verify.compare.strain_energy import cell_strain_energies
@@ -75,7 +75,7 @@ class MotionAccount:
 
 def motion_account(scene: Scene, solution: Solution, law: Law) -> MotionAccount:
     """Integrate energies and momenta of a solution and of its parts, exactly for its fields."""
-    density = (scene.material.thickness or 1.0) * (scene.material.density or 0.0)
+    density = density_of(scene, solution)
     every = separated_parts(solution, density)
     heaviest = sorted(part.mass for part in every)[-_MOST:]
     parts = [part for part in every if part.mass >= heaviest[0]][:_MOST]
@@ -86,7 +86,7 @@ def motion_account(scene: Scene, solution: Solution, law: Law) -> MotionAccount:
     sums = [(one.sum(), [one[part.cells].sum() for part in parts]) for one in energies]
     total, strain = (np.array(column) for column in zip(*sums, strict=True))
     whole, motions = None, []
-    if solution.velocity is not None and density > 0.0:
+    if solution.velocity is not None and scene.material.density is not None:
         whole = kinetic(solution, density)
         motions = [whole] if len(parts) == 1 else [
             kinetic(solution, density, part.cells) for part in parts
@@ -106,6 +106,8 @@ def uniform_force(scene: Scene) -> Array | None:
             found += load.acceleration
         elif isinstance(load, BodyForce):
             if load.force == "exact" or not is_uniform(load.force) or load.history is not None:
+                return None
+            if not scene.material.is_uniform:
                 return None
             assert scene.material.density is not None
             found += np.asarray(load.force, dtype=float) / scene.material.density

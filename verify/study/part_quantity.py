@@ -3,9 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from verify.compare.hooke import Law
-from verify.compare.kinetic import kinetic
+from verify.compare.kinetic import density_of, kinetic
 from verify.compare.locate import SolutionField
 from verify.compare.motion import SolutionMotion
 from verify.compare.separated import Part, part_of, separated_parts
@@ -34,7 +35,7 @@ def part_quantity(
     UnsupportedSceneError
         If the solution has no velocities, or not that output time.
     """
-    density = (scene.material.thickness or 1.0) * (scene.material.density or 0.0)
+    density = density_of(scene, solution)
     part = _holding(solution, motion, density, asked)
     if asked.of == "mass":
         return part.mass
@@ -68,7 +69,10 @@ def part_unit(asked: PartQuantity, dimension: int) -> str:
 
 
 def _holding(
-    solution: Solution, motion: SolutionMotion, density: float, asked: PartQuantity
+    solution: Solution,
+    motion: SolutionMotion,
+    density: float | NDArray[np.float64],
+    asked: PartQuantity,
 ) -> Part:
     """Part that holds the point; without one the whole body, whatever it consists of."""
     if asked.point is None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, BodyForce, Gravity, PolylineCut, Scene
+from verify.scene import ArcCut, BodyForce, Gravity, Material, PolylineCut, Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.history import factor_at, jumps
 from verify.solution import Solution
@@ -16,6 +16,7 @@ __all__ = ["exact_intensity", "intensity_defect", "solution_intensity"]
 
 Array = NDArray[np.float64]
 _SAME_TIME = 1e-9  # of the duration
+_AROUND = 65  # directions, and distances, in which the material around a tip is looked at
 
 
 def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
@@ -86,7 +87,7 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
     try:
         found = stress_intensity(
             solution,
-            scene.material,
+            _material_around(scene, tip.point, max(tip.radii())),
             tip.point,
             tip.direction,
             tip.radii(),
@@ -98,6 +99,27 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
     except InputError as problem:
         raise UnsupportedSceneError(str(problem)) from None
     return found.mode_1 if asked.mode == "I" else found.mode_2
+
+
+def _material_around(scene: Scene, tip: Array, radius: float) -> Material:
+    """Return the one material around a tip; the integral's fields know no interface.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If there are several within the radius, m.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, _AROUND)
+    spokes = np.column_stack([np.cos(turn), np.sin(turn)])
+    rings = radius * np.linspace(0.0, 1.0, _AROUND)
+    found = np.unique(
+        scene.material.number_at((tip + rings[:, None, None] * spokes).reshape(-1, 2))
+    )
+    if len(found) > 1:
+        raise UnsupportedSceneError(
+            f"materials differ within {radius:.3g} m of the tip; the integral expects one"
+        )
+    return scene.material.each[found[0]]
 
 
 def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) -> float | None:
@@ -126,7 +148,8 @@ def _body_force(scene: Scene, time: float) -> Callable[[Array], Array] | None:
     def force(points: Array) -> Array:
         total = np.zeros_like(points)
         for weight in weights:
-            total += (scene.material.density or 0.0) * np.asarray(weight.acceleration)
+            density = np.nan_to_num(scene.material.at(points).density)
+            total += np.multiply.outer(density, np.asarray(weight.acceleration))
         for given in forces:
             total += factor_at(given.history, time) * given.values(points)
         return total

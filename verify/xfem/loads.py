@@ -30,15 +30,16 @@ def body_force(virtual: VirtualMesh, density: ArrayLike | Density, degree: int =
     Parameters
     ----------
     virtual : VirtualMesh
-    density : (d,) array_like or callable
-        Force per volume in N/m³, e.g. ρg; a function of positions and sides.
+    density : (d,) or (m, d) array_like or callable
+        Force per volume in N/m³, e.g. ρg, of all cells of the uncut mesh or of each; a function
+        of positions and sides.
     degree : int
         Polynomial degree of density times shape function that is integrated exactly on each
         piece, if `density` is a function.
     """
     load = np.zeros_like(virtual.corners.node_points)
     if not callable(density):
-        force = _vector(density, load.shape[1])
+        force = _of_pieces(virtual, density, load.shape[1])
         np.add.at(load, virtual.cells, virtual.shape_integrals[:, :, None] * force)
         return virtual.restrict(load)
     piece, barycentric, share = virtual.solid_simplices
@@ -88,6 +89,19 @@ def traction(
         piece, corners, area = _facet_parts(virtual, cells, local)
         _integrate(virtual, load, piece, corners, area, function, degree)
     return virtual.restrict(load)
+
+
+def _of_pieces(virtual: VirtualMesh, density: ArrayLike, dim: int) -> _Floats:
+    """Force per volume, one (d,) or that of each piece's cell (pieces, 1, d)."""
+    force = real_array(density, "load density")
+    if force.ndim < 2:
+        return _vector(force, dim)
+    if force.shape != (len(virtual.mesh.cells), dim) or not np.isfinite(force).all():
+        raise XfemError(
+            f"load density of shape {force.shape} or not finite; expected ({dim},) or "
+            f"({len(virtual.mesh.cells)}, {dim})"
+        )
+    return force[virtual.parent][:, None, :]
 
 
 def _vector(density: ArrayLike, dim: int) -> _Floats:

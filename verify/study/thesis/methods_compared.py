@@ -112,9 +112,10 @@ def _relative(metric: Metric | None) -> float | None:
 
 def _critical_steps(scene: Scene) -> Mapping[tuple[str, int], float]:
     """Over that of the uncut mesh, by method and level."""
-    material, found = material_of(scene), {}
+    found = {}
     for level in range(scene.mesh.count):
         mesh, size = background_mesh(scene, level)
+        material = material_of(scene, mesh)
         cuts = cuts_of(scene, size)
         uncut = explicit_step(mesh, [], "xfem", material)[0]
         for method in ("xfem", *METHODS):

@@ -1,0 +1,147 @@
+"""Two materials: exact fields, free turns, weights and masses, for every solver alike."""
+
+import numpy as np
+import pytest
+
+from verify.compare.hooke import law_of
+from verify.compare.kinetic import density_of, kinetic
+from verify.compare.strain_energy import strain_energy
+from verify.errors import InputError
+from verify.scene import Scene, load_scene
+from verify.solvers import find_solver
+
+SOLVERS = ("reference", "xfem", "conforming", "virtual_node", "subdivision")
+LAYERS = [{"where": "y > 0.4", "young": 6.0, "poisson": 0.0, "density": 5.0}]
+SOFT = {"young": 1.0, "poisson": 0.0, "plane": "strain", "density": 2.0, "regions": LAYERS}
+CUT = {"kind": "polyline", "points": [[0.33, -0.1], [0.52, 1.1]]}
+
+
+def scene(**changes) -> Scene:
+    given = {
+        "title": "t",
+        "requirement": "r",
+        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1.0, 1.0]},
+        "mesh": {"cells": [[5, 5]]},
+        "material": SOFT,
+        "supports": [{"where": "bottom", "displacement": [0.0, 0.0]}],
+        "reference": {"size": 0.3},
+    }
+    return Scene.model_validate(given | changes)
+
+
+@pytest.fixture(scope="module")
+def patch() -> tuple[Scene, object]:
+    from reference.exact import exact_solution
+
+    case = load_scene("material/layers_patch")
+    assert case.exact is not None
+    return case, exact_solution(case.exact.solution, case.exact.parameters, case.material)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_cut_through_two_materials_passes_the_patch_test(patch, name: str) -> None:
+    """Linear on each of the four parts: whatever carries the cut exactly has it to round-off.
+
+    That the law differs by place is tested with it: the energy is half the work on the outline,
+    which holds no modulus but those of the displacements there.
+    """
+    case, exact = patch
+    found = find_solver(name).solve(case, 0, 0)
+    near = found.points[found.cells[:, :3]].mean(axis=1)
+    for k in range(found.cells.shape[1]):
+        node = found.cells[:, k]
+        expected = exact.displacement(found.points[node], near)
+        assert np.abs(found.displacement[0][node] - expected).max() < 1e-12
+    energy = strain_energy(found, law_of(case))
+    assert energy == pytest.approx(exact.strain_energy(case), rel=1e-11)
+
+
+def test_the_layered_field_is_in_equilibrium_with_each_material(patch) -> None:
+    """Stress by Hooke's law of each point's own material, against the tension that is stated."""
+    case, exact = patch
+    points = np.random.default_rng(3).uniform(0.0, 1.0, (200, 2))
+    law, gradient = law_of(case).at(points), exact.gradient(points)
+    strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
+    trace = np.trace(strain, axis1=1, axis2=2)
+    stress = 2 * law.shear[:, None, None] * strain
+    stress += (law.lame * trace)[:, None, None] * np.eye(2)
+    assert np.abs(stress - exact.stress(points)).max() < 1e-14
+    steps = 1e-7 * np.eye(2)
+    for i in range(2):
+        difference = exact.displacement(points + steps[i]) - exact.displacement(points - steps[i])
+        assert np.abs(difference / 2e-7 - gradient[:, :, i]).max() < 1e-8
+
+
+def test_layers_that_do_not_fit_are_refused(patch) -> None:
+    from reference.exact import exact_solution
+
+    case, _ = patch
+    assert case.exact is not None
+    parameters = {**case.exact.parameters, "interface_slope": 2.0}
+    with pytest.raises(InputError, match="differ across the interface"):
+        exact_solution("layers", parameters, case.material)
+    other = case.material.model_copy(update={"poisson": 0.3})
+    with pytest.raises(InputError, match="along the interface the materials strain"):
+        exact_solution("layers", case.exact.parameters, other)
+    with pytest.raises(InputError, match="one material"):
+        exact_solution("linear", {"matrix": [[1.0, 0], [0, 0]]}, case.material)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_free_turn_stores_nothing_in_any_material(name: str) -> None:
+    """Round-off of strains, 1e-15, squared, over the energy of strains of 1."""
+    turned = scene(
+        supports=[
+            {
+                "where": "boundary",
+                "displacement": [0.2, -0.1],
+                "rotation": {"angle": 77.0, "centre": [0.1, 0.3]},
+            }
+        ],
+        cuts=[CUT],
+        analysis={"kinematics": "finite_rotation"},
+    )
+    found = find_solver(name).solve(turned, 0, 0)
+    assert strain_energy(found, law_of(turned)) < 1e-20
+    assert float(found.ledger["strain"][0]) < 1e-20
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_column_of_two_materials_sinks_under_its_weight(name: str) -> None:
+    """With ν = 0 it is a column of bars: u(1) = −ρ₂gh₂²/2E₂ − (ρ₁h₁/2 + ρ₂h₂) g h₁/E₁.
+
+    Quadratic in each bar: exact for P2. The energy ½∫σ²/E of linear elements is below, by no more
+    than that of the interpolation error of a column, ½ ∫ (ρg)²/E · h²/12 (the best approximation
+    in energy is at least as good), as long as interface and rows of nodes coincide.
+    """
+    upright = {"kind": "polyline", "points": [[0.47, -0.1], [0.47, 1.1]]}
+    weight = {"kind": "gravity", "acceleration": [0.0, -1.0]}
+    standing = scene(loads=[weight], cuts=[upright])
+    found = find_solver(name).solve(standing, 0, 0)
+    if name == "reference":
+        expected = -5 * 0.36 / 12 - (2 * 0.2 + 5 * 0.6) * 0.4
+        top = found.points[:, 1] > 1 - 1e-12
+        assert found.displacement[0][top, 1] == pytest.approx(expected, rel=1e-10)
+    energy = 0.5 * ((3.8**3 - 3.0**3) / 6 + 5**2 * 0.6**3 / 3 / 6)
+    lost = 0.5 * (2**2 * 0.4 + 5**2 * 0.6 / 6) / 25 / 12
+    assert energy - lost <= strain_energy(found, law_of(standing)) <= energy * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_free_parts_of_two_densities_fall_together(name: str) -> None:
+    """Nothing strains: v = g t, and the momentum is that of the masses of both materials."""
+    falling = scene(
+        supports=[],
+        loads=[{"kind": "gravity", "acceleration": [0.6, -2.0]}],
+        analysis={"kind": "dynamic", "duration": 0.1, "outputs": 2, "time_step": 0.05},
+        cuts=[CUT],
+    )
+    found = find_solver(name).solve(falling, 0, 0)
+    assert found.velocity is not None
+    assert np.abs(found.velocity[-1] - [0.06, -0.2]).max() < 1e-12
+    mass = 2 * 0.4 + 5 * 0.6
+    momentum = kinetic(found, density_of(falling, found)).linear[-1]
+    assert momentum == pytest.approx(mass * np.array([0.06, -0.2]), rel=1e-11)
+    if "kinetic" in found.ledger:
+        expected = 0.5 * mass * (0.06**2 + 0.2**2)
+        assert found.ledger["kinetic"][-1] == pytest.approx(expected, rel=1e-11)

@@ -1,0 +1,75 @@
+"""Materials by region: what a case may say, and which material is where."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from verify.scene import Scene, crossed_by_interfaces, scene_hash
+
+CASE = {
+    "title": "t",
+    "requirement": "r",
+    "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1.0, 1.0]},
+    "mesh": {"cells": [[2, 2]]},
+    "supports": [{"where": "bottom", "displacement": [0.0, 0.0]}],
+}
+
+
+def scene(regions: list[dict], **material) -> Scene:
+    given = {"young": 1.0, "poisson": 0.3, "plane": "strain", **material}
+    return Scene.model_validate(CASE | {"material": given | {"regions": regions}})
+
+
+def test_a_region_inherits_what_it_does_not_name_and_the_last_one_counts() -> None:
+    one = scene(
+        [
+            {"where": "x > 0.5", "young": 2.0, "density": 30.0},
+            {"where": "y > 0.5", "poisson": 0.1},
+        ],
+        density=10.0,
+    )
+    found = one.material.at(np.array([[0.2, 0.2], [0.7, 0.2], [0.7, 0.7]]))
+    assert found.young.tolist() == [1.0, 2.0, 1.0]
+    assert found.poisson.tolist() == [0.3, 0.3, 0.1]
+    assert found.density.tolist() == [10.0, 30.0, 10.0]
+
+
+@pytest.mark.parametrize(
+    ("regions", "said"),
+    [
+        ([{"where": "x >> 1", "young": 2.0}], "material.regions[0].where"),
+        ([{"where": "z > 1", "young": 2.0}], "material.regions[0].where"),
+        ([{"where": "x > 3", "young": 2.0}], "no part of the body lies in 'x > 3'"),
+        ([{"where": "x > -1", "young": 2.0}], "[material] is that of no part"),
+        (
+            [{"where": "x > 0.5", "young": 2.0}, {"where": "x > 0.4", "young": 3.0}],
+            "material.regions[0].where: no part of the body lies in 'x > 0.5' alone",
+        ),
+        ([{"where": "x > 0.5", "density": 2.0}], "material.density is missing"),
+        ([{"where": "x > 0.5"}], "expected young, poisson or density"),
+        ([{"where": "x > 0.5", "young": -2.0}], "greater than 0"),
+        ([{"where": "x > 0.5", "plane": "stress"}], "plane"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(regions: list[dict], said: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        scene(regions)
+    assert said in str(refused.value)
+
+
+def test_a_scene_of_one_material_keeps_its_hash() -> None:
+    """Stored references stay valid: a key that is not given does not count."""
+    whole = Scene.model_validate(
+        CASE | {"material": {"young": 1.0, "poisson": 0.3, "plane": "strain"}}
+    )
+    assert scene_hash(scene([])) == scene_hash(whole)
+    assert scene_hash(scene([{"where": "x > 0.5", "young": 2.0}])) != scene_hash(whole)
+
+
+def test_a_cell_is_crossed_unless_the_interface_runs_along_its_facets() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    cells = np.array([[0, 1, 3], [0, 3, 2]])
+    along = scene([{"where": "y > x", "young": 2.0}]).material
+    across = scene([{"where": "y > x + 0.1", "young": 2.0}]).material
+    assert crossed_by_interfaces(along, points, cells).tolist() == [False, False]
+    assert crossed_by_interfaces(across, points, cells).tolist() == [False, True]

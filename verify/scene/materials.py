@@ -1,0 +1,100 @@
+"""Elasticity and density of a scene, which may differ by region."""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from verify.scene.regions import parse_region
+from verify.scene.strict import Positive, Strict
+
+__all__ = ["Material", "MaterialRegion", "Moduli", "crossed_by_interfaces"]
+
+Array = NDArray[np.float64]
+
+_INWARDS = 1e-6  # of the way from a corner of a cell to its centroid
+
+
+class Moduli(NamedTuple):
+    """Young's modulus (n,) in Pa, Poisson's ratio (n,) and density (n,) in kg/m³ at points.
+
+    Where a scene has no density, it is not a number.
+    """
+
+    young: Array
+    poisson: Array
+    density: Array
+
+
+class MaterialRegion(Strict):
+    """A region of another material; what it does not name is that of ``[material]``."""
+
+    where: str = Field(description="an inequality in x, y, z; of regions that overlap, the last")
+    young: Positive | None = Field(default=None, description="Young's modulus E, Pa")
+    poisson: float | None = Field(
+        default=None, strict=True, gt=-1.0, lt=0.5, description="Poisson's ratio"
+    )
+    density: Positive | None = Field(default=None, description="density, kg/m³")
+
+    @model_validator(mode="after")
+    def _differs(self) -> "MaterialRegion":
+        if self.young is None and self.poisson is None and self.density is None:
+            raise ValueError("expected young, poisson or density of the region")
+        return self
+
+
+class Material(Strict):
+    """Isotropic elasticity: one material, or others in regions of the body."""
+
+    young: Positive = Field(description="Young's modulus E, Pa")
+    poisson: float = Field(strict=True, gt=-1.0, lt=0.5, description="Poisson's ratio")
+    density: Positive | None = Field(default=None, description="density, kg/m³")
+    plane: Literal["strain", "stress"] | None = Field(
+        default=None, description="2D only: plane strain or plane stress"
+    )
+    thickness: Positive | None = Field(default=None, description="membranes only: thickness, m")
+    regions: list[MaterialRegion] = Field(
+        default_factory=list, description="other materials; what no region covers is this one"
+    )
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether the whole body is of one material."""
+        return not self.regions
+
+    @property
+    def each(self) -> "list[Material]":
+        """All materials, each alone: that outside the regions, then that of each region."""
+        base = self.model_copy(update={"regions": []})
+        given = [r.model_dump(exclude={"where"}, exclude_none=True) for r in self.regions]
+        return [base, *(base.model_copy(update=own) for own in given)]
+
+    def number_at(self, points: Array) -> NDArray[np.int64]:
+        """Return the number (n,) in `each` of the material at points (n, d)."""
+        found = np.zeros(len(points), dtype=np.int64)
+        for k, region in enumerate(self.regions):
+            found[parse_region(region.where, points.shape[1])(points)] = k + 1
+        return found
+
+    def at(self, points: Array) -> Moduli:
+        """Return the moduli at points (n, d)."""
+        each, number = self.each, self.number_at(points)
+        rows = [(m.young, m.poisson, np.nan if m.density is None else m.density) for m in each]
+        return Moduli(*np.array(rows, dtype=float)[number].T)
+
+
+def crossed_by_interfaces(
+    material: Material, points: Array, cells: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Tell of which cells (m,) the corners do not all lie in the material of the centroid.
+
+    Corners count just inside the cell: an interface along a facet crosses no cell.
+    """
+    corners = points[cells]
+    middle = corners.mean(axis=1)
+    own = material.number_at(middle)
+    crossed = np.zeros(len(cells), dtype=bool)
+    for k in range(corners.shape[1]):
+        crossed |= material.number_at(corners[:, k] + _INWARDS * (middle - corners[:, k])) != own
+    return crossed
