@@ -35,9 +35,8 @@ def test_a_killed_process_is_an_error_that_says_so():
 def test_a_study_whose_process_is_killed_ends_with_one_line_and_exit_code_3(
     tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.setattr("verify.study.slivers.sweep._measured", killed)
-    monkeypatch.setattr("verify.study.slivers.sweep.PLACEMENTS", {2: ()})
-    command = ["study", "slivers", "--dimension", "2", "--quick", "-j", "2"]
+    monkeypatch.setattr("verify.study.slivers.study._measured", killed)
+    command = ["study", "slivers", "slivers/plane_edges", "--solver", "xfem", "-j", "2"]
     assert main([*command, "--out", str(tmp_path)]) == 3
     assert "was killed" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -4,8 +4,10 @@ import argparse
 import json
 import shlex
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
+from typing import Any
 
 __all__ = ["execute"]
 
@@ -40,13 +42,6 @@ def _study(arguments: argparse.Namespace) -> int:
 
         study = getattr(case_studies, arguments.study)(arguments, announce)
         findings, record, rows = study.findings, study.as_record(), study.rows()
-    elif arguments.study == "slivers":
-        from verify.study.slivers import sliver_study
-
-        dimensions = (arguments.dimension,) if arguments.dimension else (2, 3)
-        slivers = sliver_study(dimensions, arguments.quick, announce, arguments.processes)
-        findings, record = slivers.findings, slivers.as_record()
-        rows = [asdict(m) for m in slivers.measurements]
     elif arguments.study == "calibration":
         from verify.study.calibration import calibration_study
 
@@ -55,10 +50,8 @@ def _study(arguments: argparse.Namespace) -> int:
             calibration.findings, calibration.as_record(), calibration.rows()
         )  # fmt: skip
     else:
-        from verify.study.energy import energy_study
-
-        energy = energy_study(arguments.quick, announce)
-        findings, record, rows = energy.findings, energy.as_record(), energy.rows()
+        over = _over_scenes(arguments, announce)
+        findings, record, rows = over.findings, over.as_record(), over.rows()
     written = write_study(arguments.out, arguments.study, record, rows, command)
     page = render_study(arguments.out, arguments.study)
     if arguments.json:
@@ -71,3 +64,20 @@ def _study(arguments: argparse.Namespace) -> int:
         print(f"{mark}: {finding.topic}: {finding.sentence} [expected: {finding.expected}]")
     print(f"report: {page}")
     return 0
+
+
+def _over_scenes(arguments: argparse.Namespace, announce: Callable[[str], None]) -> Any:
+    """Run the study of slivers or of energy over the cases and solvers that are asked for."""
+    from verify.runner.selection import select_cases
+    from verify.study.energy import energy_study
+    from verify.study.slivers import sliver_study
+    from verify.study.variants import variant_of
+
+    slivers = arguments.study == "slivers"
+    cases = arguments.cases or (["slivers/*"] if slivers else [])
+    expression = None if slivers or arguments.cases else "energy"
+    quick = arguments.quick and not arguments.cases
+    scenes = select_cases(cases, expression, "quick" if quick else "heavy")
+    variants = [variant_of(text) for text in arguments.solvers or ("xfem", "conforming")]
+    study = sliver_study if slivers else energy_study
+    return study(scenes, variants, announce, arguments.processes, arguments.quick)

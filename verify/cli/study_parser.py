@@ -23,8 +23,8 @@ def add_study_command(add: Add) -> None:
         "study",
         "measure what slivers do, what accuracy costs, where an error comes from, and more",
         "examples:\n  verify study slivers --quick --out studies\n"
-        "  verify study slivers --dimension 2 --out studies\n"
-        "  verify study energy --out studies\n"
+        "  verify study slivers --solver xfem --solver 'xfem slivers=merge' --out studies\n"
+        "  verify study energy --solver my_module:MySolver --out studies\n"
         "  verify study thesis --quick --out studies\n"
         "  verify study calibration --quick --out studies\n"
         "  verify study cost statics/tissue_strip --steps 4 --solver xfem --solver conforming "
@@ -35,16 +35,22 @@ def add_study_command(add: Add) -> None:
     )
     kinds = command.add_subparsers(metavar="STUDY", dest="study", required=True)
     for name, text in {
-        "slivers": "conditioning, explicit steps, errors and compliance against sliver size",
-        "energy": "falls and spins of cut bodies, by lumping and scheme",
+        "slivers": "errors, conditioning and explicit steps of any solver, over families of scenes",
+        "energy": "what any solver keeps of energy and momenta, over cases that move",
         "thesis": "the tables and figures of the thesis measured again, its claims judged",
         "calibration": "stated uncertainty of the reference against its true error",
     }.items():
         kind = add_action(kinds.add_parser, name, text)
-        if name == "slivers":
+        if name in ("slivers", "energy"):
+            tagged = "cases/slivers" if name == "slivers" else "those tagged energy"
             kind.add_argument(
-                "--dimension", type=int, choices=(2, 3), help="only 2D or 3D (default: both)"
+                "cases", metavar="CASE", nargs="*", help=f"names, patterns or files; none: {tagged}"
             )
+            kind.add_argument(
+                "--solver", metavar="'NAME [PARAMETER=VALUE …]'", action="append", dest="solvers",
+                default=[], help="solver, with parameters of its solves; repeat for several "
+                "(default: xfem and conforming)",
+            )  # fmt: skip
             cores = len(os.sched_getaffinity(0))
             kind.add_argument(
                 "-j", metavar="N", type=count, default=cores, dest="processes",

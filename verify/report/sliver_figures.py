@@ -1,12 +1,13 @@
-"""The figures of the sliver study: stability maps, and curves against the sliver's size."""
+"""The figures of the sliver study: one family of scenes, errors and systems of every solver."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from verify.report.axes import Panel, log_range
 from verify.report.curves import Curve, Point
 from verify.report.marks import Style, curve_names, drawn_curve
 from verify.report.markup import Markup, joined, tag
+from verify.report.notation import error_title, is_error
 from verify.report.stability_map import Cell, graded, listed, size_text, stability_map
 
 __all__ = ["sliver_curves", "sliver_maps"]
@@ -20,171 +21,75 @@ _STYLES = (
     Style("#a3487b", "cross"),
     Style("#4d4d4d", "diamond"),
     Style("#8a6a00", "disc"),
+    Style("#5b4db5", "square"),
+    Style("#7a3b00", "triangle"),
 )
-_PLACE = "along faces"
+_STEP, _UNCUT = "critical explicit step", "critical explicit step, uncut"
+_SCALED = "condition number scaled by the diagonal"
+_DRAWN = ("condition number", _SCALED, _STEP)
 _STEP_LEGEND = {
     "good": "at least 0.9",
     "fair": "at least 0.5",
     "poor": "at least 0.1",
     "bad": "less: it vanishes",
 }
-_CONDITION_LEGEND = {"good": "up to 10³", "fair": "up to 10⁴", "poor": "up to 10⁶", "bad": "more"}
 _FAIR = ((0.9, "good"), (0.5, "fair"), (0.1, "poor"))
+_CONDITION_LEGEND = {"good": "up to 10³", "fair": "up to 10⁴", "poor": "up to 10⁶", "bad": "more"}
+_CONDITION = ((1e3, "good"), (1e4, "fair"), (1e6, "poor"))
 
 
-def sliver_maps(measured: Records, dimension: int) -> Markup:
-    """Return the maps of one dimension, of the cut along faces."""
-    every = listed(measured, dimension=dimension)
-    uncut = _number(listed(every, placement="uncut", quantity="critical step"))
-    here = listed(every, placement=_PLACE)
-
-    def step(record: Mapping[str, Any]) -> Cell:
-        value = record["value"]
-        share = None if value is None or not uncut else value / uncut
-        return graded(share, _FAIR, record["reason"])
-
-    def condition(record: Mapping[str, Any]) -> Cell:
-        value, reason = record["value"], record["reason"]
-        if value is None:
-            return ("none", "", reason)
-        limits = ((1e3, "good"), (1e4, "fair"), (1e6, "poor"))
-        grade = next((g for most, g in limits if value <= most), "bad")
-        return (grade, f"{value:.0f}" if value < 9999.5 else f"{value:.0e}", reason)
-
-    scaled = [m for m in here if m["variant"].endswith(", Jacobi")]
+def sliver_maps(measured: Records) -> Markup:
+    """Return the maps of one family: the critical step and the scaled condition number."""
+    steps = []
+    for record in listed(measured, quantity=_STEP):
+        uncut = listed(measured, quantity=_UNCUT, solver=record["solver"])
+        whole = next((one["value"] for one in uncut if one["value"]), None)
+        share = record["value"] / whole if record["value"] and whole else None
+        reason = record["reason"] or ("" if share else "no step of the uncut body to compare with")
+        steps.append((record, graded(share, _FAIR, reason)))
+    conditions = [(one, _condition(one)) for one in listed(measured, quantity=_SCALED)]
     return joined(
-        _map(
-            f"{dimension}D: explicit step over that of the uncut body", here, "critical step", step,
-            _STEP_LEGEND,
-        ),
-        _map(
-            f"{dimension}D: linear runs at 0.9 of the uncut step", here,
-            "steps to blow-up, explicit", _course,
-            {"good": "ran through", "bad": "blew up after so many steps"},
-        ),
-        _map(
-            f"{dimension}D: condition number, scaled by its diagonal", scaled, "condition number",
-            condition,
-            _CONDITION_LEGEND,
-        ),
-        _map(
-            f"{dimension}D: most pieces inside out at once, explicit from 15 % strain", here,
-            "inverted pieces", _inverted, {"good": "none", "poor": "so many"},
-        ),
-        _map(
-            f"{dimension}D: implicit from 15 % strain, ten times the uncut step", here,
-            "steps to blow-up, implicit", _course,
-            {"good": "ran through", "bad": "ended after so many steps"},
-        ),
-        _map(
-            f"{dimension}D: explicit step over that of the uncut body, wherever cut",
-            _by_placement(every, "side-wise"), "critical step", step, _STEP_LEGEND,
-        ),
-        _map(
-            f"{dimension}D: condition number, scaled by its diagonal, wherever cut",
-            _by_placement(every, "side-wise, Jacobi"), "condition number", condition,
-            _CONDITION_LEGEND,
-        ),
-        _map(
-            f"{dimension}D: linear runs at 0.9 of the uncut step, small features",
-            _by_placement(every, "side-wise"), "steps to blow-up, explicit", _course,
-            {"good": "ran through", "bad": "blew up after so many steps"},
-        ),
-        _map(
-            f"{dimension}D: most pieces inside out at once, explicit at 0.9, small features",
-            _by_placement(every, "side-wise, 0.9 of its step"), "inverted pieces", _inverted,
-            {"good": "none", "poor": "so many"},
-        ),
-    )  # fmt: skip
+        _map("Critical explicit step over that of the uncut body", _STEP_LEGEND, steps),
+        _map("Condition number, scaled by the diagonal", _CONDITION_LEGEND, conditions),
+    )
 
 
-def sliver_curves(measured: Records, growths: Records, dimension: int) -> Markup:
-    """Return the curves of one dimension, with their exponents beside them."""
-    here = listed(measured, dimension=dimension)
-    laws = listed(growths, dimension=dimension)
-    bases = ("side-wise", "shifted", "heaviside")
-    lumpings = ("side-wise", "thesis", "consistent", "row sum", "HRZ")
-    raw = "along faces" if dimension == 2 else "through vertices"
-    shown = [
-        (f"condition number, unscaled, {raw}", "condition number", raw,
-         [(b, "keep", f"{b}, raw") for b in bases]),
-        ("condition number, scaled by its diagonal", "condition number", _PLACE,
-         [*((b, "keep", f"{b}, Jacobi") for b in bases),
-          ("conforming", "conforming", "side-wise, Jacobi"),
-          ("snapped", "snapped", "side-wise, Jacobi")]),
-        ("critical step in s, slivers kept", "critical step", _PLACE,
-         [(name, "keep", name) for name in lumpings]),
-        ("critical step in s, side-wise or lumped", "critical step", _PLACE,
-         [(t, t, "side-wise")
-          for t in ("keep", "drop", "merge", "ghost penalty", "conforming", "snapped")]),
-        ("compliance of the smallest piece in m/N", "compliance", _PLACE,
-         [(t, t, "") for t in ("keep", "drop", "merge", "conforming", "snapped")]),
-        ("compliance of a strip between two cuts in m/N", "compliance", "two cuts apart",
-         [(t, t, "") for t in ("keep", "conforming", "ghost penalty")]),
-        ("relative L² error of the displacement", "displacement error", _PLACE,
-         [(t, t, "") for t in ("keep", "drop", "merge", "ghost penalty", "conforming")]),
-        ("iterations of conjugate gradients, nodal blocks", "CG iterations", _PLACE,
-         [*((b, "keep", f"{b}, nodal blocks") for b in bases),
-          ("conforming", "conforming", "side-wise, nodal blocks")]),
-    ]  # fmt: skip
+def sliver_curves(measured: Records, growths: Records) -> Markup:
+    """Return the curves of one family, with their exponents beside them."""
+    names = dict.fromkeys(m["quantity"] for m in measured)
+    shown = [n for n in names if is_error(n) or n.startswith(("relative", "deviation"))]
     figures = []
-    for title, quantity, placement, wanted in shown:
-        fixed = {"quantity": quantity, "placement": placement}
+    for quantity in [*shown, *(n for n in _DRAWN if n in names)]:
         curves = []
-        for name, treatment, variant in wanted:
-            series = listed(here, treatment=treatment, variant=variant, **fixed)
-            (law, *_) = [*listed(laws, treatment=treatment, variant=variant, **fixed), {}]
-            curves.append((name, series, _law_text(law)))
+        for solver in dict.fromkeys(m["solver"] for m in measured):
+            series = listed(measured, solver=solver, quantity=quantity)
+            (law, *_) = [*listed(growths, solver=solver, quantity=quantity), {}]
+            curves.append((solver, series, _law_text(law)))
+        unit = ", s" if quantity == _STEP else ""
+        title = error_title(quantity) if is_error(quantity) else f"{quantity}{unit}"
         if drawn := _figure(title, curves):
             figures.append(tag("figure", drawn))
     return tag("div", figures, class_="panels")
 
 
-def _number(records: Records) -> float | None:
-    return records[0]["value"] if records else None
-
-
-def _by_placement(measured: Records, variant: str) -> Records:
-    """One row per placement and treatment of a single variant; along faces has maps of its own."""
-    return [
-        {**m, "variant": m["placement"]}
-        for m in listed(measured, variant=variant)
-        if m["placement"] not in ("uncut", _PLACE)
-    ]
-
-
-def _course(record: Mapping[str, Any]) -> Cell:
-    if record["value"] is not None:
-        return ("bad", f"{record['value']:.0f}", record["reason"])
-    return ("good" if record["reason"].startswith("none in") else "none", "", record["reason"])
-
-
-def _inverted(record: Mapping[str, Any]) -> Cell:
-    count = record["value"]
-    if count is None:
-        return ("none", "", record["reason"])
-    return ("poor", f"{count:.0f}", record["reason"]) if count else ("good", "", record["reason"])
+def _condition(record: Mapping[str, Any]) -> Cell:
+    value, reason = record["value"], record["reason"]
+    if value is None:
+        return ("none", "", reason)
+    grade = next((g for most, g in _CONDITION if value <= most), "bad")
+    return (grade, f"{value:.0f}" if value < 9999.5 else f"{value:.0e}", reason)
 
 
 def _map(
-    title: str,
-    measured: Records,
-    quantity: str,
-    cell: Callable[[Mapping[str, Any]], Cell],
-    legend: Mapping[str, str],
+    title: str, legend: Mapping[str, str], graded_records: list[tuple[Mapping[str, Any], Cell]]
 ) -> Markup | None:
-    chosen = listed(measured, quantity=quantity)
-    if not chosen:
+    if not graded_records:
         return None
-    sizes = sorted({m["size"] for m in chosen}, reverse=True)
-    names = list(dict.fromkeys((m["variant"], m["treatment"]) for m in chosen))
-    variants = list(dict.fromkeys(variant for variant, _ in names))
-    names.sort(key=lambda name: variants.index(name[0]))
+    sizes = sorted({record["size"] for record, _ in graded_records}, reverse=True)
     rows = []
-    for variant, treatment in names:
-        by_size = {m["size"]: m for m in listed(chosen, variant=variant, treatment=treatment)}
-        cells = [cell(by_size[s]) if s in by_size else None for s in sizes]
-        rows.append((f"{variant.removesuffix(', Jacobi')}: {treatment}", cells))
+    for solver in dict.fromkeys(record["solver"] for record, _ in graded_records):
+        cells = {r["size"]: cell for r, cell in graded_records if r["solver"] == solver}
+        rows.append((solver, [cells.get(size) for size in sizes]))
     return stability_map(title, legend, sizes, rows)
 
 
@@ -209,7 +114,7 @@ def _figure(title: str, curves: Sequence[tuple[str, Records, str]]) -> Markup | 
     every = [p for curve, _ in drawn for p in curve.points]
     panel = Panel(
         log_range([p.size for p in every if p.size]), log_range([p.value for p in every]),
-        "sliver size ε, in elements", title,
+        "ε, in elements", title,
     )  # fmt: skip
     parts, names = [], []
     for (curve, law), style in zip(drawn, _STYLES, strict=False):

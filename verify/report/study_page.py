@@ -12,19 +12,17 @@ from verify.report.budget_figures import budget_section
 from verify.report.calibration_figures import calibration_section
 from verify.report.cost_study_figures import cost_section
 from verify.report.markup import Markup, joined, tag
-from verify.report.notation import number
+from verify.report.notation import metric_title, number
 from verify.report.sliver_figures import sliver_curves, sliver_maps
-from verify.report.stability_map import MAP_STYLE
+from verify.report.stability_map import MAP_STYLE, listed
 from verify.report.summary import badge
 from verify.report.thesis_figures import thesis_section
-from verify.report.time_panel import time_panel
 from verify.result import Verdict
 from verify.whole_files import write_whole
 
 __all__ = ["render_study"]
 
 _SCHEMA = 1
-_ACCOUNT = ("mechanical", "kinetic", "strain", "algorithmic")
 _TITLES = {
     "slivers": "What slivers do",
     "energy": "Whether energy and momenta are kept",
@@ -110,69 +108,49 @@ def _findings(record: Mapping[str, Any]) -> Markup:
 
 
 def _slivers(record: Mapping[str, Any]) -> Markup:
+    families = list(dict.fromkeys(m["family"] for m in record["measurements"]))
     return joined(
         [
             tag(
                 "section",
-                tag("h2", f"{dimension}D"),
-                sliver_maps(record["measurements"], dimension),
-                tag("h3", "Against the size"),
+                tag("h2", family),
+                sliver_maps(listed(record["measurements"], family=family)),
                 tag(
                     "p",
-                    "Exponents are fitted from ε = 1e-3 down; ε = 0 is in the maps only. What "
-                    "could not be measured, with its reason, is in the record and the table file.",
+                    "Exponents are fitted from ε = 1e-3 down; ε = 0 is in the maps and the table "
+                    "file. What could not be measured is there too, with its reason.",
                     class_="quiet",
                 ),
-                sliver_curves(record["measurements"], record["growths"], dimension),
+                sliver_curves(
+                    listed(record["measurements"], family=family),
+                    listed(record["growths"], family=family),
+                ),
             )
-            for dimension in record["dimensions"]
+            for family in families
         ]
     )
 
 
 def _energy(record: Mapping[str, Any]) -> Markup:
-    offsets = list(dict.fromkeys(g["offset"] for g in record["gravity"]))
-    value = {(g["lumping"], g["offset"]): g["value"] for g in record["gravity"]}
-    rows = [
-        tag("tr", tag("th", lumping, scope="row"),
-            [tag("td", number(value[lumping, o])) for o in offsets])
-        for lumping in dict.fromkeys(g["lumping"] for g in record["gravity"])
-    ]  # fmt: skip
-    head = tag("tr", tag("th", "ε ="), [tag("th", f"{o:g}", scope="col") for o in offsets])
-    falls = tag(
-        "table",
-        tag("caption", "Acceleration of the freed half in m/s²; it should be −9.8"),
-        tag("thead", head),
-        tag("tbody", rows),
-        class_="map",
-    )
-    figures = []
-    for one in record["spins"]:
-        curves = one["curves"]
-        shown = [(name, _changes(curves[name])) for name in _ACCOUNT]
-        cuts = [jump["time"] for jump in one["jumps"]]
-        note = f" Ended early: {one['failure']}." if one["failure"] else ""
-        figures.append(
-            tag("figure",
-                time_panel(f"{one['scheme']}: change of energy, J", curves["time"], shown, cuts),
-                tag("figcaption", f"Step {one['step']:.3g} s.{note}"))
-        )  # fmt: skip
-    return joined(
-        tag("section", tag("h2", "Freed half"), tag("div", falls, class_="scroll")),
-        tag(
-            "section",
-            tag("h2", "Vibrating, spinning, cut twice"),
-            tag("p", "Changes since the start; mechanical is kinetic and strain energy together. "
-                "Dashed vertical lines are cuts. Algorithmic is what the scheme itself has "
-                "dissipated (negative: produced).", class_="quiet"),
-            tag("div", figures, class_="panels"),
-        ),
-    )  # fmt: skip
-
-
-def _changes(values: list[float | None]) -> list[float]:
-    known = [float("nan") if value is None else value for value in values]
-    return [value - known[0] for value in known]
+    sections = []
+    for family in dict.fromkeys(m["family"] for m in record["measurements"]):
+        own = listed(record["measurements"], family=family)
+        names = list(dict.fromkeys(m["quantity"] for m in own if m["unit"] == "" and m["value"]))
+        rows = []
+        for solver, size in dict.fromkeys((m["solver"], m["size"]) for m in own):
+            mine = listed(own, solver=solver, size=size)
+            value = {m["quantity"]: m["value"] for m in mine}
+            row = "" if size is None else f", {size:g}"
+            cells = [tag("td", number(value.get(name)), class_="number") for name in names]
+            rows.append(tag("tr", tag("th", f"{solver}{row}", scope="row"), cells))
+        heads = [metric_title(name) for name in names]
+        head = tag("tr", [tag("th", text, scope="col") for text in ("solver", *heads)])
+        table = tag("table", tag("thead", head), tag("tbody", rows))
+        scrolled = tag(
+            "div", table, class_="scroll", tabindex="0", role="region", aria_label=family
+        )
+        sections.append(tag("section", tag("h2", family), scrolled))
+    return joined(sections)
 
 
 def _origin(record: Mapping[str, Any]) -> Markup:

@@ -25,8 +25,8 @@ __all__ = [
 _PACKAGE = Path(verify.__file__).resolve().parent
 # what can change any solution, and those of solvers that are built on our own methods
 _SOLVING = (
-    "errors.py", "scene", "solution.py", "handed_over.py", "solvers", "runner/solve.py",
-    "calibration.py",
+    "errors.py", "scene", "solution.py", "handed_over.py", "system.py", "solvers",
+    "runner/solve.py", "calibration.py",
 )  # fmt: skip
 _METHODS = ("xfem", "methods")
 # the layers forbid them to import our methods, so that these do not make them solve again

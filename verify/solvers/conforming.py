@@ -13,6 +13,7 @@ from reference.elasticity import load_form, solve_linear
 from reference.exact import exact_solution
 from reference.fracture.pressure import MIXED
 from reference.large_strain import LargeStrainSolve, solve_large_strain
+from reference.linear_system import linear_system
 from reference.meshing import ConformingMesh
 from reference.nearly_incompressible import solve_mixed, wants_pressure
 from reference.space import ConformingSpace, conforming_space
@@ -22,6 +23,7 @@ from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, move, natural_step
+from verify.system import System
 
 __all__ = ["ConformingSolver", "ReferenceSolver"]
 
@@ -123,6 +125,23 @@ class ConformingSolver:
             repetitions,
             marching,
         )
+
+    def system(
+        self,
+        scene: Scene,
+        level: int,
+        degree: int = 1,
+        mesh: str = "imprinted",
+        **_of_the_solve: Any,
+    ) -> System:
+        """Return stiffness, consistent mass and supports of `scene`; all cuts are open."""
+        if reason := _refusal(scene):
+            raise UnsupportedSceneError(reason)
+        exact = None
+        if scene.exact is not None:
+            exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+        space = conforming_space(peer_mesh(scene, level, mesh), degree, None)
+        return System(*linear_system(scene, space, exact))
 
 
 class ReferenceSolver:

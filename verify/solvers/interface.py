@@ -38,7 +38,12 @@ _MOST_LEVELS = 32  # the coarsest cell halved so often is of round-off size
 
 
 class Solver(Protocol):
-    """What a solver must offer. A solver never sees the reference and never grades itself."""
+    """What a solver must offer. A solver never sees the reference and never grades itself.
+
+    It may offer ``system(scene, level, **parameters) -> verify.system.System`` too: stiffness, mass
+    and held unknowns of the body at rest with all cuts open, for the parameters of `solve`. Studies
+    take condition numbers and critical explicit steps from it.
+    """
 
     name: str
 

@@ -25,6 +25,8 @@ from verify.solvers.xfem_scene import across_interfaces, background_mesh, materi
 from verify.solvers.xfem_static import dismissed_equilibria, path_notes
 from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_supports import path_of_supports, supports_of
+from verify.solvers.xfem_system import system_of
+from verify.system import System
 from verify.xfem.corotation import InternalForce
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
@@ -155,6 +157,29 @@ class MethodSolver:
         if repetitions:
             timings = {phase: [run.timings[phase] for run in runs] for phase in runs[0].timings}
         return _solution(scene, self.name, runs[-1], size, {"meshing": [meshing], **timings})
+
+    def system(self, scene: Scene, level: int, **parameters: Any) -> System:
+        """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.
+
+        Raises
+        ------
+        UnsupportedSceneError, InputError
+            As of `solve`; of springs, which have no linear system of their own here.
+        """
+        if reason := self.refuses(scene):
+            raise UnsupportedSceneError(reason)
+        if self._force is not InternalForce:
+            raise UnsupportedSceneError("springs have no stiffness of elements")
+        taken = list(signature(METHODS[self._method]).parameters)[2:]
+        own = {name: value for name, value in parameters.items() if name in taken}
+        exact = _exact(scene)
+        try:
+            mesh, size = background_mesh(scene, level)
+            body = METHODS[self._method](mesh, cuts_of(scene, size), **own)
+            material = body.material(material_of(scene))
+            return system_of(scene, body.virtual, body.resisting, material, exact)
+        except XfemError as error:
+            raise InputError(str(error), str(scene.file or scene.name)) from None
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         _, _, *offered = signature(METHODS[self._method]).parameters.values()

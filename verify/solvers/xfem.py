@@ -12,15 +12,17 @@ from verify.solution import Solution
 from verify.solvers.xfem_answer import Answer, joined, solution_of
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_motion import MotionChoice, move
-from verify.solvers.xfem_scene import background_mesh
+from verify.solvers.xfem_scene import background_mesh, material_of
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
 from verify.solvers.xfem_supports import supports_of
+from verify.solvers.xfem_system import system_of
+from verify.system import System
 from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.specks import join_specks
-from verify.xfem.virtual import cut_mesh
+from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["XfemSolver"]
 
@@ -147,6 +149,53 @@ class XfemSolver:
         motion = MotionChoice(scheme, mass, step_factor, tip, slivers, spectral_radius)
         return _solve(scene, level, repetitions, _Choice(basis, tip, slivers, load_steps, motion))
 
+    def system(
+        self,
+        scene: Scene,
+        level: int,
+        basis: str = "sidewise",
+        tip: str = "inside",
+        slivers: str = "keep",
+        mass: str = "sidewise",
+        **_of_the_solve: Any,
+    ) -> System:
+        """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.
+
+        Raises
+        ------
+        UnsupportedSceneError, InputError
+            As of `solve`.
+        """
+        if reason := self.refuses(scene):
+            raise UnsupportedSceneError(reason)
+        exact = _exact(scene)
+        try:
+            mesh, size = background_mesh(scene, level)
+            virtual = _cut(scene, mesh, size, exact, tip, slivers)[0]
+            return system_of(
+                scene, virtual, virtual, material_of(scene), exact, mass, basis,
+                slivers == "penalise",
+            )  # fmt: skip
+        except BasisError as error:
+            raise UnsupportedSceneError(str(error)) from None
+        except XfemError as error:
+            raise InputError(str(error), str(scene.file or scene.name)) from None
+
+
+def _cut(
+    scene: Scene, mesh: SimplexMesh, size: float, exact: Any, tip: str, slivers: str
+) -> tuple[VirtualMesh, Any, Any]:
+    """Cut the mesh and treat its slivers; report what was treated, and what was joined."""
+    rule: Any = tip
+    policy: Any = slivers
+    virtual = cut_mesh(mesh, cuts_of(scene, size), rule)
+    virtual, specks = join_specks(virtual, supports_of(scene, virtual, exact))
+    report = None
+    if slivers in ("merge", "drop"):
+        held = supports_of(scene, virtual, exact).fixed.any(axis=1)
+        virtual, report = treat_slivers(virtual, policy, held=held)
+    return virtual, report, specks
+
 
 def _check_penalty(scene: Scene, basis: str, mass: str) -> None:
     """Refuse a ghost penalty where the library has none."""
@@ -200,13 +249,7 @@ def _run(
     if scene.analysis.kind == "dynamic":
         return move(scene, mesh, size, exact, choice.motion, trial)
     start = perf_counter()
-    virtual = cut_mesh(mesh, cuts_of(scene, size), choice.tip)  # type: ignore[arg-type]
-    slivers = None
-    virtual, specks = join_specks(virtual, supports_of(scene, virtual, exact))
-    if choice.slivers in ("merge", "drop"):
-        held = supports_of(scene, virtual, exact).fixed.any(axis=1)
-        policy: Any = choice.slivers
-        virtual, slivers = treat_slivers(virtual, policy, held=held)
+    virtual, slivers, specks = _cut(scene, mesh, size, exact, choice.tip, choice.slivers)
     enrichment = perf_counter() - start
     penalise = choice.slivers == "penalise"
     found = solve_equilibrium(scene, virtual, exact, choice.basis, choice.load_steps, penalise)

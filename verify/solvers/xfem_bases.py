@@ -26,7 +26,7 @@ from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["solve_in_basis"]
+__all__ = ["held_in_basis", "solve_in_basis"]
 
 
 def solve_in_basis(
@@ -56,7 +56,7 @@ def solve_in_basis(
     blocks = LinearStiffness(virtual, material).assemble(pattern)
     matrix = transformed_matrix(virtual, basis, csr_array(pattern.matrix(blocks)))
     known = from_sidewise(virtual, basis, supports.values).ravel()
-    held = _held(virtual, supports, basis)
+    held = held_in_basis(virtual, supports, basis)
     transposed = transformation(virtual, basis).T
     force = (transposed @ load).ravel() - matrix @ np.where(held, known, 0.0)
     free = np.flatnonzero(~held)
@@ -72,7 +72,7 @@ def solve_in_basis(
     return displacement, dict(zip(phases, np.diff(clock).tolist(), strict=True))
 
 
-def _held(virtual: VirtualMesh, supports: Supports, basis: Basis) -> NDArray[np.bool_]:
+def held_in_basis(virtual: VirtualMesh, supports: Supports, basis: Basis) -> NDArray[np.bool_]:
     """Which unknowns (u of all nodes, then a of the enriched) are prescribed.
 
     The plain basis knows the two sides of a node only together; in the shifted one u is the

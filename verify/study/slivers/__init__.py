@@ -1,7 +1,5 @@
-"""What slivers do: conditioning, explicit steps, errors and compliance against their size."""
+"""What cuts near to nodes do to a solver: errors, conditioning, explicit steps."""
 
-from verify.study.slivers.growth import Growth, growth
-from verify.study.slivers.measurement import Measurement
-from verify.study.slivers.sweep import SliverStudy, sliver_study
+from verify.study.slivers.study import SliverStudy, sliver_study
 
-__all__ = ["Growth", "Measurement", "SliverStudy", "growth", "sliver_study"]
+__all__ = ["SliverStudy", "sliver_study"]

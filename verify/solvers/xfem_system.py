@@ -1,0 +1,77 @@
+"""The linear system of a body on virtual nodes: stiffness, mass and supports of a scene."""
+
+from typing import Any
+
+from scipy.sparse import csr_array, identity, kron
+
+from verify.errors import InputError
+from verify.scene import Scene
+from verify.solvers.xfem_bases import held_in_basis
+from verify.solvers.xfem_scene import density_of
+from verify.solvers.xfem_steps import MASSES
+from verify.solvers.xfem_supports import supports_of
+from verify.system import System
+from verify.xfem.bases import transformed_matrix
+from verify.xfem.elasticity import Material
+from verify.xfem.slivers import GhostPenalty
+from verify.xfem.sparsity import body_pattern
+from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["system_of"]
+
+
+def system_of(
+    scene: Scene,
+    virtual: VirtualMesh,
+    resisting: VirtualMesh,
+    material: Material,
+    exact: Any,
+    mass: str = "sidewise",
+    basis: str = "sidewise",
+    penalise: bool = False,
+) -> System:
+    """Assemble the system of a cut body.
+
+    Parameters
+    ----------
+    scene : Scene
+    virtual, resisting : VirtualMesh
+        What has the mass and the supports, and what resists; the same unknowns.
+    material : Material
+        Of the cells of `resisting`.
+    exact : exact solution, optional
+    mass, basis : str
+        As of the solver ``xfem``.
+    penalise : bool
+        With a ghost penalty.
+
+    Raises
+    ------
+    InputError
+        If the mass or the basis is unknown.
+    XfemError
+        If one of them is not defined on this body.
+    """
+    if mass not in MASSES:
+        raise InputError(f"mass '{mass}'; expected one of {', '.join(MASSES)}")
+    pattern = body_pattern(resisting)
+    stiffness = csr_array(pattern.matrix(LinearStiffness(resisting, material).assemble(pattern)))
+    supports = supports_of(scene, virtual, exact)
+    components = supports.fixed.shape[1]
+    inertia = None
+    if scene.material.density is not None:
+        inertia = MASSES[mass](virtual, density_of(scene))
+    if penalise:
+        ghost = GhostPenalty(virtual, material)
+        stiffness = csr_array(stiffness + kron(ghost.matrix, identity(components)))
+        inertia = None if inertia is None else ghost.mass(inertia, density_of(scene))
+    matrix = None if inertia is None else csr_array(kron(inertia.matrix, identity(components)))
+    if basis == "sidewise":
+        return System(stiffness, matrix, supports.fixed.ravel())
+    other: Any = basis
+    return System(
+        transformed_matrix(virtual, other, stiffness),
+        None if matrix is None else transformed_matrix(virtual, other, matrix),
+        held_in_basis(virtual, supports, other),
+    )

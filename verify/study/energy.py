@@ -1,0 +1,131 @@
+"""The energy study: what any solver keeps of energy, momenta and mass in motions."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from time import perf_counter
+from typing import Any
+
+from verify.errors import InputError
+from verify.result import Verdict
+from verify.scene import Scene, scene_content
+from verify.study.energy_account import ACCOUNT
+from verify.study.finding import Finding
+from verify.study.in_processes import in_processes
+from verify.study.measured_scenes import Measurement, measured_scenes
+from verify.study.variants import Variant
+
+__all__ = ["EnergyStudy", "energy_study"]
+
+_DRIFT = 1e-2  # of the energy in play: what a spectator would not see
+_KEPT = 1e-8
+_STATED = 1e-3
+
+
+@dataclass(frozen=True)
+class EnergyStudy:
+    """What the study found.
+
+    Attributes
+    ----------
+    quick : bool
+    measurements : list of Measurement
+    findings : list of Finding
+    seconds : float
+        Wall time.
+    """
+
+    quick: bool
+    measurements: list[Measurement]
+    findings: list[Finding]
+    seconds: float
+
+    def as_record(self) -> dict[str, Any]:
+        """Return all of it as plain data."""
+        return asdict(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the lines of its table."""
+        return [asdict(one) for one in self.measurements]
+
+
+def energy_study(
+    scenes: Sequence[Scene],
+    variants: Sequence[Variant],
+    announce: Callable[[str], None] = lambda text: None,
+    processes: int = 1,
+    quick: bool = False,
+) -> EnergyStudy:
+    """Run every motion with every solver, and measure what is kept.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        Those that do not move are left out.
+    variants : sequence of Variant
+    announce, processes, quick
+        As of `verify.study.slivers.sliver_study`.
+
+    Raises
+    ------
+    InputError
+        If no scene moves.
+    ChildProcessError
+        If a process is killed.
+    """
+    cases: dict[str, list[dict[str, Any]]] = {}
+    for scene in scenes:
+        if scene.analysis.kind == "dynamic":
+            name = scene.row.family if scene.row else scene.name
+            cases.setdefault(name, []).append(scene_content(scene))
+    if not cases:
+        raise InputError("no case with a dynamic analysis; see `verify list`")
+    start = perf_counter()
+    parts = [(variant, rows) for rows in cases.values() for variant in variants]
+    found: dict[int, list[Measurement]] = {}
+    for index, measured in in_processes(measured_scenes, parts, processes):
+        found[index] = measured
+        name = f"{measured[0].family}, {parts[index][0].label}"
+        announce(f"{name}: {len(found)} of {len(parts)} parts")
+    every = [one for index in sorted(found) for one in found[index]]
+    return EnergyStudy(quick, every, list(_findings(every)), perf_counter() - start)
+
+
+def _findings(measured: Sequence[Measurement]) -> Iterator[Finding]:
+    for case in dict.fromkeys(m.family for m in measured):
+        for solver in dict.fromkeys(m.solver for m in measured if m.family == case):
+            own = [m for m in measured if (m.family, m.solver) == (case, solver)]
+            yield from _of_one(f"{case}, {solver}", own)
+
+
+def _of_one(topic: str, own: Sequence[Measurement]) -> Iterator[Finding]:
+    failed = [m for m in own if m.quantity == "solution" and m.value is None]
+    for one in failed:
+        at = "" if one.size is None else f" at {one.size:g}"
+        refused = "UnsupportedSceneError" in one.reason
+        verdict = None if refused else Verdict.FAIL
+        yield Finding(topic, f"No solution{at}: {one.reason}.", "a solution, or a refusal", verdict)
+    drifts = _worst(own, "energy_drift")
+    if drifts is not None:
+        value, at = drifts
+        grade = "kept to round-off" if value <= _KEPT else "drifts"
+        others = [f"{name} {found[0]:.2g}" for name in ACCOUNT[1:] if (found := _worst(own, name))]
+        text = f"The energy {grade}: {value:.3g} of the energy in play{at}"
+        text += f" ({', '.join(others)})." if others else "."
+        verdict = Verdict.PASS if value <= _DRIFT else Verdict.FAIL
+        yield Finding(topic, text, f"at most {_DRIFT:g} over the run", verdict)
+    for name in dict.fromkeys(m.quantity for m in own if m.quantity.startswith("deviation of")):
+        found = _worst(own, name)
+        if found is not None:
+            value, at = found
+            verdict = Verdict.PASS if value <= _STATED else Verdict.FAIL
+            text = f"The {name} from the value that the case states is {value:.2g}{at}."
+            yield Finding(topic, text, f"at most {_STATED:g}", verdict)
+
+
+def _worst(own: Sequence[Measurement], quantity: str) -> tuple[float, str] | None:
+    """Return the largest value of a quantity, and at which value of the parameter."""
+    known = [m for m in own if m.quantity == quantity and m.value is not None]
+    if not known:
+        return None
+    worst = max(known, key=lambda m: abs(m.value or 0.0))
+    return abs(worst.value or 0.0), "" if worst.size is None else f" at {worst.size:g}"

@@ -1,0 +1,128 @@
+"""Scenes solved by a variant of a solver in this process, and read by the comparison."""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from verify.errors import UnsupportedSceneError
+from verify.printable import one_line
+from verify.result import SolveRecord, Status
+from verify.scene import Scene, ValueCheck, restore_scene
+from verify.solution import handed_over
+from verify.solvers import Solver, find_solver
+from verify.solvers.interface import checked_refusal
+from verify.study.accuracy import assess_accuracy
+from verify.study.variants import Variant
+from verify.verdict import NotMeasuredError, error_interval
+
+__all__ = ["Measurement", "exact_of", "measured_scenes"]
+
+Further = Callable[[Solver, Variant, Scene, int], Iterator["tuple[str, str, float | None, str]"]]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One number of one solver on one scene, or the reason why there is none.
+
+    Attributes
+    ----------
+    family : str
+        Case.
+    size : float or None
+        Value of the case's parameter in the row.
+    solver : str
+        As it was asked for, with its parameters.
+    quantity : str
+        Error (relative), or name.
+    unit : str
+    value : float or None
+    reason : str
+        Why there is no value; or a note on it.
+    """
+
+    family: str
+    size: float | None
+    solver: str
+    quantity: str
+    unit: str
+    value: float | None
+    reason: str = ""
+
+
+def measured_scenes(
+    variant: Variant, contents: Sequence[dict[str, Any]], further: Further | None = None
+) -> list[Measurement]:
+    """Solve scenes on their finest level and measure what the comparison measures of each.
+
+    Parameters
+    ----------
+    variant : Variant
+    contents : sequence of dict
+        As `verify.scene.scene_content` writes them.
+    further : callable, optional
+        What else is measured: it yields (quantity, unit, value, reason).
+
+    Notes
+    -----
+    Whatever a solver raises is a row with its reason.
+    """
+    if "" not in sys.path:
+        sys.path.append("")  # a class of the user's own lies where the study was started
+    solver = find_solver(variant.solver)
+    found = []
+    for content in contents:
+        scene = restore_scene(content)
+        family = scene.row.family if scene.row else scene.name
+        size = scene.row.value if scene.row else None
+        level = scene.mesh.count - 1
+        try:
+            if refusal := checked_refusal(solver.refuses(scene)):
+                raise UnsupportedSceneError(refusal)
+            rows = list(_solved(solver, variant, scene, level))
+        except Exception as problem:  # a guest may raise anything
+            rows = [("solution", "", None, one_line(f"{type(problem).__name__}: {problem}"))]
+        if further is not None:
+            rows += further(solver, variant, scene, level)
+        found += [Measurement(family, size, variant.label, *row) for row in rows]
+    return found
+
+
+def _solved(
+    solver: Solver, variant: Variant, scene: Scene, level: int
+) -> Iterator[tuple[str, str, float | None, str]]:
+    solution = handed_over(solver.solve(scene, level, repetitions=1, **variant.parameters))
+    record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
+    solutions = {variant.solver: {level: solution}}
+    result = assess_accuracy(scene, [record], solutions, exact_of(scene))
+    (measured,) = result.solves
+    if measured.status is not Status.SOLVED:
+        raise NotMeasuredError(measured.reason)
+    for metric in measured.metrics:
+        if metric.unit == "1" and metric.reference is None:
+            yield metric.name, "", metric.value, ""
+            continue
+        yield metric.name, metric.unit, metric.value, ""
+        if metric.reference:
+            yield f"relative error of {metric.name}", "", error_interval(metric).value, ""
+    for check in scene.acceptance:
+        stated = measured.metric(check.metric) if isinstance(check, ValueCheck) else None
+        if isinstance(check, ValueCheck) and stated is not None and check.equals:
+            off = abs(stated.value - check.equals) / abs(check.equals)
+            yield f"deviation of {check.metric}", "", off, check.source
+    for name, why in measured.notes.items():
+        if measured.metric(name) is None and name in ("energy_drift", "displacement_l2"):
+            yield name, "", None, why
+    if not np.isfinite(solution.displacement).all():
+        yield "solution", "", None, "not finite"
+
+
+def exact_of(scene: Scene) -> Any:
+    """Return the exact solution that a scene names, or None."""
+    if scene.exact is None:
+        return None
+    from reference.exact import exact_solution
+
+    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)

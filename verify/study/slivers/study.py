@@ -1,0 +1,176 @@
+"""The sliver study: families of scenes whose cuts come ever nearer to nodes, by any solver."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from time import perf_counter
+from typing import Any
+
+from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import one_line
+from verify.scene import Scene, scene_content
+from verify.solvers import Solver
+from verify.study.finding import Finding
+from verify.study.in_processes import in_processes
+from verify.study.measured_scenes import Measurement, measured_scenes
+from verify.study.slivers.findings import findings
+from verify.study.slivers.growth import growth
+from verify.study.slivers.step_by_running import step_by_running
+from verify.study.slivers.system_numbers import (
+    CONDITION,
+    SCALED,
+    STEP,
+    condition_numbers,
+    critical_step,
+)
+from verify.study.variants import Variant
+from verify.system import checked_system
+
+__all__ = ["SliverStudy", "sliver_study"]
+
+_FITTED = (CONDITION, SCALED, STEP)
+Row = tuple[str, str, float | None, str]
+
+
+@dataclass(frozen=True)
+class SliverStudy:
+    """What the study found.
+
+    Attributes
+    ----------
+    quick : bool
+    measurements : list of Measurement
+    growths : list of dict
+        Exponent of each series over small ε, with its uncertainty and reason.
+    findings : list of Finding
+    seconds : float
+        Wall time.
+    """
+
+    quick: bool
+    measurements: list[Measurement]
+    growths: list[dict[str, Any]]
+    findings: list[Finding]
+    seconds: float
+
+    def as_record(self) -> dict[str, Any]:
+        """Return all of it as plain data."""
+        return asdict(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the lines of its table."""
+        return [asdict(one) for one in self.measurements]
+
+
+def sliver_study(
+    scenes: Sequence[Scene],
+    variants: Sequence[Variant],
+    announce: Callable[[str], None] = lambda text: None,
+    processes: int = 1,
+    quick: bool = False,
+) -> SliverStudy:
+    """Solve every row of every family with every solver, and measure.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        Rows of families.
+    variants : sequence of Variant
+    announce : callable, optional
+        Told what is done.
+    processes : int
+        Side by side; nothing that is measured is a time.
+    quick : bool
+        For the record.
+
+    Raises
+    ------
+    InputError
+        If no scene is a row of a family.
+    ChildProcessError
+        If a process is killed.
+    """
+    families: dict[str, list[dict[str, Any]]] = {}
+    for scene in scenes:
+        if scene.row is not None:
+            families.setdefault(scene.row.family, []).append(scene_content(scene))
+    if not families:
+        raise InputError("no case with a list of values for a parameter; see `verify list`")
+    start = perf_counter()
+    parts = [(variant, rows) for rows in families.values() for variant in variants]
+    found: dict[int, list[Measurement]] = {}
+    for index, measured in in_processes(_measured, parts, processes):
+        found[index] = measured
+        name = f"{measured[0].family}, {parts[index][0].label}"
+        announce(f"{name}: {len(found)} of {len(parts)} parts")
+    every = [one for index in sorted(found) for one in found[index]]
+    growths = _growths(every)
+    judged = list(findings(every, growths))
+    return SliverStudy(quick, every, growths, judged, perf_counter() - start)
+
+
+def _measured(variant: Variant, rows: list[dict[str, Any]]) -> list[Measurement]:
+    return measured_scenes(variant, rows, _further)
+
+
+def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
+    """Measure condition and critical step, from the system or by running."""
+    if scene.analysis.kinematics != "linear" or scene.analysis.kind != "static":
+        return
+    system: Any = getattr(solver, "system", None)
+    if system is None:
+        yield _by_running(solver, variant, scene, level)
+        return
+    try:
+        own = checked_system(system(scene, level, **variant.parameters))
+        uncut = scene.model_copy(update={"cuts": [], "quantities": [], "acceptance": []})
+        whole = checked_system(system(uncut, level, **variant.parameters))
+    except Exception as problem:  # a guest may raise anything
+        refused = isinstance(problem, UnsupportedSceneError | InputError)
+        why = str(problem) if refused else f"{type(problem).__name__}: {problem}"
+        yield STEP, "s", None, one_line(why)
+        return
+    try:
+        raw, scaled = condition_numbers(own)
+        yield CONDITION, "", raw, ""
+        yield SCALED, "", scaled, ""
+    except InputError as problem:
+        yield SCALED, "", None, str(problem)
+    for name, one in ((STEP, own), (f"{STEP}, uncut", whole)):
+        try:
+            yield name, "s", critical_step(one), ""
+        except InputError as problem:
+            yield name, "s", None, str(problem)
+
+
+def _by_running(solver: Solver, variant: Variant, scene: Scene, level: int) -> Row:
+    try:
+        low, high = step_by_running(solver, scene, level, _guess(scene, level), variant.parameters)
+    except Exception as problem:  # a guest may raise anything
+        return STEP, "s", None, one_line(str(problem))
+    return STEP, "s", float((low * high) ** 0.5), f"by running: {low:.4g} to {high:.4g} s"
+
+
+def _guess(scene: Scene, level: int) -> float:
+    """Time in which a pressure wave crosses about a third of an element, s."""
+    cells, box = scene.mesh.cells, scene.geometry
+    material = scene.material
+    assert material.density is not None
+    speed = (material.young / material.density) ** 0.5
+    if cells is None:
+        assert scene.mesh.sizes is not None
+        return scene.mesh.sizes[level] / speed / 3.0
+    lower, upper = getattr(box, "lower", (0.0,)), getattr(box, "upper", (1.0,))
+    sides = [(b - a) / n for a, b, n in zip(lower, upper, cells[level], strict=True)]
+    return float(min(sides) / speed / 3.0)
+
+
+def _growths(found: Sequence[Measurement]) -> list[dict[str, Any]]:
+    series: dict[tuple[str, str, str], list[Measurement]] = {}
+    for one in found:
+        if one.quantity in _FITTED and one.size is not None:
+            series.setdefault((one.family, one.solver, one.quantity), []).append(one)
+    return [
+        {"family": family, "solver": solver, "quantity": quantity}
+        | asdict(growth([m.size or 0.0 for m in own], [m.value for m in own]))
+        for (family, solver, quantity), own in series.items()
+    ]
