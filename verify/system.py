@@ -45,7 +45,7 @@ def checked_system(given: Any) -> System:
     n = len(fixed) if fixed.ndim == 1 else -1
     if fixed.dtype != bool or n < 1:
         raise InputError(f"system.fixed of shape {fixed.shape}; expected one bool per unknown")
-    checked = {}
+    checked: dict[str, Any] = {}
     for name in ("stiffness", "mass"):
         matrix = getattr(given, name)
         if matrix is None and name == "mass":

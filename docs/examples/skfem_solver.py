@@ -4,13 +4,11 @@ from time import perf_counter
 
 import numpy as np
 import skfem
-from skfem.helpers import dot
 from skfem.models.elasticity import linear_elasticity
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange import problem_of
 from verify.solution import Solution
-from verify.system import System
 
 
 class SkfemSolver:
@@ -43,17 +41,3 @@ class SkfemSolver:
         displacement = u.reshape(1, -1, 2)
         return Solution(problem.points, problem.cells, displacement, cut_facets=problem.cut_facets,
                         unknowns=u.size, size=problem.size, timings={"solve": seconds})  # fmt: skip
-
-    def system(self, scene, level):
-        problem = problem_of(scene, level, conforming=True)
-        mesh = skfem.MeshTri(problem.points.T, problem.cells.T)
-        basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1()))
-        stiffness, mass = linear_elasticity(*problem.lame()).assemble(basis), None
-        if scene.material.density is not None:
-            mass = scene.material.density * inertia.assemble(basis)
-        return System(stiffness, mass, problem.prescribed()[0].ravel())
-
-
-@skfem.BilinearForm
-def inertia(u, v, w):
-    return dot(u, v)

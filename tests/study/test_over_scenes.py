@@ -97,10 +97,10 @@ class Broken:
 
 def test_a_solver_that_raises_is_a_row_and_a_failed_finding(monkeypatch):
     from verify.scene import scene_content
-    from verify.study import measured_scenes as module
+    from verify.study import variants
     from verify.study.variants import Variant
 
-    monkeypatch.setattr(module, "find_solver", lambda name: Broken())
+    monkeypatch.setattr(variants, "find_solver", lambda name: Broken())
     rows = [scene_content(scene) for scene in load_scenes("slivers/plane_edges_quick")]
     measured = measured_scenes(Variant("broken", "broken"), rows)
     assert [m.size for m in measured] == [0.5, 1e-12, 0.0]

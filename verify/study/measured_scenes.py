@@ -1,6 +1,5 @@
 """Scenes solved by a variant of a solver in this process, and read by the comparison."""
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +11,7 @@ from verify.printable import one_line
 from verify.result import SolveRecord, Status
 from verify.scene import Scene, ValueCheck, restore_scene
 from verify.solution import handed_over
-from verify.solvers import Solver, find_solver
+from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
 from verify.study.accuracy import assess_accuracy
 from verify.study.variants import Variant
@@ -69,9 +68,7 @@ def measured_scenes(
     -----
     Whatever a solver raises is a row with its reason.
     """
-    if "" not in sys.path:
-        sys.path.append("")  # a class of the user's own lies where the study was started
-    solver = find_solver(variant.solver)
+    solver = variant.found()
     found = []
     for content in contents:
         scene = restore_scene(content)

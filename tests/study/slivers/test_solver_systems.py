@@ -16,7 +16,7 @@ from verify.study.slivers.system_numbers import condition_numbers, critical_step
 from verify.system import checked_system
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
-NEEDED = {"conforming": "dolfinx", "skfem_solver:SkfemSolver": "skfem"}
+NEEDED = {"conforming": "dolfinx", "skfem_system:SkfemWithSystem": "skfem"}
 SOLVERS = [
     pytest.param(
         name,
@@ -26,7 +26,7 @@ SOLVERS = [
     )
     for name in (
         "xfem", "conforming", "virtual_node", "subdivision", "snapping", "uncut",
-        "skfem_solver:SkfemSolver",
+        "skfem_system:SkfemWithSystem",
     )
 ]  # fmt: skip
 CASE = "slivers/plane_edges[epsilon=0.5]"
