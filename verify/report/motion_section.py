@@ -6,6 +6,7 @@ from typing import Any
 
 from verify.report.markup import Markup, tag
 from verify.report.notation import metric_title, number, solver_title, with_interval
+from verify.report.released_line import released_lines
 from verify.report.summary import badge
 from verify.report.tables import table
 from verify.report.time_panel import time_panel
@@ -16,7 +17,7 @@ __all__ = ["ACCOUNT_METRICS", "motion_section"]
 ACCOUNT_METRICS = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
     "linear_momentum_drift", "angular_momentum_drift",
-    "part_linear_momentum_drift", "part_angular_momentum_drift",
+    "part_linear_momentum_drift", "part_angular_momentum_drift", "released_mismatch",
 )  # fmt: skip
 _PER_PANEL = 4
 # parts of a ledger, the ones that tell most first; a panel has room for four
@@ -50,6 +51,7 @@ def motion_section(result: CaseResult) -> Markup | None:
         tag("h3", "Over time"),
         tag("div", panels, class_="panels"),
         tag("p", said, class_="quiet"),
+        *released_lines(moving),
         _kept_table(result, moving),
         _parts_table(moving),
     )

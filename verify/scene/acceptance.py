@@ -30,7 +30,7 @@ OF_MOTION = (
     "jump_l2_max", "jump_l2_mean",
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
     "linear_momentum_drift", "angular_momentum_drift",
-    "part_linear_momentum_drift", "part_angular_momentum_drift",
+    "part_linear_momentum_drift", "part_angular_momentum_drift", "released_mismatch",
 )  # fmt: skip
 # measured whether a quantity asks for them or not
 METRICS = tuple(dict.fromkeys((

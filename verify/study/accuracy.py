@@ -34,6 +34,7 @@ from verify.study.reference import (
     conforming_reference,
     exact_reference,
 )
+from verify.study.released import released_metrics
 from verify.study.sufficiency import sufficiency
 from verify.study.unavailable import unavailable_quantities
 from verify.verdict import error_interval, judge
@@ -102,7 +103,7 @@ def assess_accuracy(
                 announce(records[i])
                 try:
                     one = Measured(solution, body, law, scene)
-                    measured[i] = _measure(records[i], one, judge_of, missing, rules)
+                    measured[i] = _measure(records[i], one, judge_of, missing, rules, exact)
                 except Exception as problem:  # of this one: the others are measured all the same
                     measured[i] = _incomparable(records[i], problem)
     rates = _rates(scene, measured)
@@ -181,6 +182,7 @@ def _measure(
     reference: Reference | None,
     missing: str,
     rules: Rules | None,
+    exact: ExactField | None,
 ) -> SolveRecord:
     """Fill in the metrics of one solve; what cannot be measured gets a note that says why."""
     scene = one.scene
@@ -198,7 +200,13 @@ def _measure(
     if scene.analysis.kind == "dynamic":
         account = motion_account(scene, one.solution, one.law)
         parts = part_records(scene, one.solution, account)
-        for kept, why in (account_metrics(scene, account), part_metrics(parts, account)):
+        truth = exact if scene.judged_by_exact else None
+        size = compared_size(one.solution, one.body)
+        for kept, why in (
+            account_metrics(scene, account),
+            part_metrics(parts, account),
+            released_metrics(scene, one.solution, size, one.law, account, truth),
+        ):
             metrics, notes = metrics + kept, notes | why
         if account.lighter:
             notes["parts"] = f"{account.lighter} lighter parts are not listed"

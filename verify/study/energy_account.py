@@ -14,7 +14,7 @@ _ENERGIES = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
 )  # fmt: skip
 _MOMENTA = ("linear_momentum_drift", "angular_momentum_drift")
-ACCOUNT = (*_ENERGIES, *_MOMENTA, *PART_METRICS)
+ACCOUNT = (*_ENERGIES, *_MOMENTA, *PART_METRICS, "released_mismatch")
 
 
 def account_metrics(scene: Scene, account: MotionAccount) -> tuple[list[Metric], dict[str, str]]:

@@ -142,7 +142,7 @@ def _unaccountable(scene: Scene) -> str:
         return "the work of tractions is not known between output times"
     if uniform_force(scene) is None:
         return "the work of body forces that are not uniform is not known between output times"
-    moved = [s for s in scene.supports if s.history is not None or s.displacement == "exact"]
+    moved = [s for s in scene.supports if s.history or s.timed or s.displacement == "exact"]
     if scene.initial.kind != "equilibrium":
         moved += [s for s in scene.supports if _moves(s.displacement) or s.rotation is not None]
     return "the work of supports that move is not known between output times" if moved else ""

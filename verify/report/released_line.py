@@ -1,0 +1,45 @@
+"""Where the energy went that a blade released: one line per solver."""
+
+from collections.abc import Iterator, Sequence
+
+from verify.report.markup import Markup, tag
+from verify.report.notation import solver_title
+from verify.result import SolveRecord
+
+__all__ = ["released_line", "released_lines"]
+
+_PARTS = {
+    "released_to_scheme": "dissipated by the scheme",
+    "released_to_damping": "by damping",
+    "released_to_kinetic": "left as kinetic energy beside the exact field",
+    "released_to_strain": "as strain energy beside it",
+    "released_to_short_waves": "left as kinetic energy of waves shorter than four elements",
+}
+
+
+def released_lines(solves: Sequence[SolveRecord]) -> Iterator[Markup]:
+    """Return a paragraph for each solve that knows where its released energy went."""
+    for solve in solves:
+        if line := released_line(solve):
+            yield tag("p", line, class_="prose")
+
+
+def released_line(solve: SolveRecord) -> str:
+    """Say where the energy went, per unit advance; empty if no blade advances."""
+    found = {name: m.value for name in _PARTS if (m := solve.metric(name)) is not None}
+    lacking = {name: why for name in _PARTS if (why := solve.notes.get(name))}
+    if not found and not lacking:
+        return ""
+    whole = solve.metric("released")
+    said = [f"{_amount(value, whole and whole.value)} {_PARTS[name]}"
+            for name, value in found.items()]  # fmt: skip
+    said += [f"{_PARTS[name]}: unavailable ({why})" for name, why in lacking.items()]
+    of = "" if whole is None else f"of the {whole.value:.3g} J/m² released "
+    return f"{solver_title(solve.solver)}: {of}per unit advance of the blade: {', '.join(said)}."
+
+
+def _amount(value: float, whole: float | None) -> str:
+    if not whole:
+        return f"{value:.3g} J/m²"
+    # round-off of nothing is nothing
+    return f"{round(100 * value / whole) + 0:d} %"
