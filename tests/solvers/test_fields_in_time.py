@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from verify.errors import InputError
 from verify.scene import Scene
 from verify.solvers import find_solver
 
@@ -136,3 +137,13 @@ def test_two_halves_behind_the_blade_move_each_as_its_own_side(solver):
     errors = [_strip_error(_solved(scene, solver, level), scene) for level in (0, 1)]
     assert errors[1] < 1e-2
     assert errors[0] / errors[1] > 2.5
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_node_at_the_tip_where_the_velocity_is_infinite_is_refused(solver):
+    scene = _strip([])
+    scene["exact"]["parameters"] |= {"tip": [0.25, -0.4 + 0.8 / 3]}
+    with pytest.raises(
+        InputError, match=r"initial.velocity: .* unbounded at the node \(0.25, -0.13"
+    ):
+        _solved(scene, solver)

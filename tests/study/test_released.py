@@ -59,17 +59,20 @@ def test_short_waves_are_told_from_a_slow_motion():
         short_wave_energy(solution, 0.05, 7.0)
 
 
-def strip(speed=0.6, cells=(18, 7, 1), angle=0.0, **changes):
+TIP = (0.0123, 0.0031)  # at the time 0, no node
+
+
+def strip(speed=0.6, cells=(45, 11, 1), angle=0.0, **changes):
     """Take the exact strip: b = 0.1 m, G = 0.36 J/m², c = 1 m/s."""
     c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
-    start, end = ([float(r * c), float(r * s), -0.001] for r in (-0.5, 0.15 * speed))
+    start, end = ([TIP[0] + r * c, TIP[1] + r * s, -0.001] for r in (-0.5, 0.15 * speed))
     content = {
         "title": "strip",
         "requirement": "none",
-        "geometry": {"kind": "box", "lower": [-0.2, -0.06, 0.0], "upper": [0.2, 0.06, 0.01]},
+        "geometry": {"kind": "box", "lower": [-0.2, -0.05, 0.0], "upper": [0.2, 0.05, 0.01]},
         "mesh": {"cells": [list(cells)]},
         "material": {"young": 2500.0, "poisson": 0.25, "density": 1000.0},
-        "analysis": {"kind": "dynamic", "duration": 0.15, "time_step": 0.005, "outputs": 4},
+        "analysis": {"kind": "dynamic", "duration": 0.15, "time_step": 0.005, "outputs": 3},
         "initial": {"kind": "field", "displacement": "exact", "velocity": "exact"},
         "supports": [
             {"where": w, "displacement": [0.0, 0.0], "components": ["x", "y"]}
@@ -78,7 +81,8 @@ def strip(speed=0.6, cells=(18, 7, 1), angle=0.0, **changes):
         + [{"where": w, "displacement": "exact"} for w in ("left", "right", "front", "back")],
         "exact": {
             "solution": "blade_strip",
-            "parameters": {"half_width": 0.1, "grip": 0.006, "speed": speed, "angle": angle},
+            "parameters": {"half_width": 0.1, "grip": 0.006, "speed": speed, "angle": angle,
+                           "tip": list(TIP)},
         },
         "cuts": [{"kind": "tool_path", "points": [start, end], "speed": speed,
                   "starts_at": -0.5 / speed, "depth": 0.012, "direction": [0.0, 0.0, 1.0]}],
@@ -98,22 +102,30 @@ def test_the_advance_of_a_blade_is_what_it_sweeps_inside_the_body(angle):
             "mesh": {"cells": [[4, 4]]},
             "material": {"young": 1.0, "poisson": 0.3, "density": 1.0, "plane": "strain"},
             "analysis": {"kind": "dynamic", "duration": 2.0},
-            "cuts": [{"kind": "tool_path", "points": [[-0.5, 0.2], [1.5, 0.7]],
-                      "times": [-1.0, 3.0]}],
+            "cuts": [{"kind": "tool_path", "points": [[-0.5, 0.2], [1.0, 0.575]],
+                      "times": [-1.0, 2.0]}],
         }
     )  # fmt: skip
-    # from (0, 0.325) on its way to (1, 0.575): half of its length
-    assert advance(plane) == pytest.approx(0.5 * np.hypot(2.0, 0.5), rel=1e-9)
+    # at the time 0 it is at (0, 0.325), on its way to (1, 0.575)
+    assert advance(plane) == pytest.approx(np.hypot(1.0, 0.25), rel=1e-9)
 
 
-@pytest.mark.parametrize("solver", ["xfem", "conforming"])
-@pytest.mark.parametrize("scheme, least", [("newmark", 0.0), ("implicit_euler", 0.5)])
-@pytest.mark.parametrize("angle", [0.0, 17.0])
-def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle):
+@pytest.mark.parametrize(
+    "solver, scheme, least, angle, most",
+    [
+        ("xfem", "newmark", 0.0, 0.0, 0.15),
+        ("xfem", "implicit_euler", 0.5, 17.0, 0.25),
+        ("conforming", "newmark", 0.0, 17.0, 0.25),
+        ("conforming", "implicit_euler", 0.5, 0.0, 0.15),
+    ],
+)
+def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most):
     """G = μ w₀²/b per unit advance: as waves, or dissipated; a general position is no exception.
 
-    Energies of the waves and of the smooth field add up but for their product, which oscillates;
-    the advance of twelve elements has its ends within one: 12 %.
+    What is open has its end up to an element and a step behind the blade, at the start as at the
+    end: 1.3 elements of the ten of the advance. The energies of the waves and of the smooth field
+    add up but for their product. That changes with the same delay where the sides of the body
+    move, in the inclined part of the strip: by 1.3 h/b, a ninth.
     """
     from reference.exact import exact_solution
     from verify.solvers import find_solver
@@ -128,7 +140,7 @@ def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle):
     metrics, _ = released_metrics(scene, found, found.size, law, account, exact)
     values = {metric.name: metric.value for metric in metrics}
     assert values["released"] == pytest.approx(0.36)
-    assert values["released_mismatch"] < 0.12
+    assert values["released_mismatch"] < most
     assert least * 0.36 <= values["released_to_scheme"] + 1e-9
     if scheme == "newmark":  # nothing takes it: all of it is in the mesh
         assert abs(values["released_to_scheme"]) < 1e-9
@@ -153,7 +165,7 @@ def test_the_line_of_a_report_gives_shares_of_what_is_released():
     values = {"released": 0.36, "released_to_scheme": 0.2556, "released_to_damping": 0.0,
               "released_to_kinetic": 0.0936}  # fmt: skip
     metrics = [Metric(name, value, "J/m²") for name, value in values.items()]
-    solve = SolveRecord("xfem", 0, Status.SOLVED, "", metrics=metrics)
+    solve = SolveRecord("strip", "xfem", 0, Status.SOLVED, metrics=metrics)
     assert released_line(solve) == (
         "XFEM: of the 0.36 J/m² released per unit advance of the blade: 71 % dissipated by the "
         "scheme, 0 % by damping, 26 % left as kinetic energy beside the exact field."

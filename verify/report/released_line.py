@@ -31,8 +31,8 @@ def released_line(solve: SolveRecord) -> str:
     if not found and not lacking:
         return ""
     whole = solve.metric("released")
-    said = [f"{_amount(value, whole and whole.value)} {_PARTS[name]}"
-            for name, value in found.items()]  # fmt: skip
+    rate = None if whole is None else whole.value
+    said = [f"{_amount(value, rate)} {_PARTS[name]}" for name, value in found.items()]
     said += [f"{_PARTS[name]}: unavailable ({why})" for name, why in lacking.items()]
     of = "" if whole is None else f"of the {whole.value:.3g} J/m² released "
     return f"{solver_title(solve.solver)}: {of}per unit advance of the blade: {', '.join(said)}."

@@ -6,10 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from verify.errors import InputError
 from verify.scene.physics import field_values
 from verify.scene.strict import Components, Finite, Point3, Strict, Vector
 
 __all__ = ["AtRest", "Equilibrium", "Initial", "InitialField", "Moving", "starts_open"]
+
+_LARGEST = 30.0  # of a velocity like r^-½: a tip less than 1/1000 of a cell away
 
 
 class AtRest(Strict):
@@ -89,15 +92,37 @@ class InitialField(Strict):
         near : (n, d) array
             Points of the material that they move: on which side of a cut they are.
         exact : ExactSolution or None
+
+        Raises
+        ------
+        InputError
+            If a point lies at the tip of a crack, where the exact velocity is unbounded.
         """
         at_start = None if exact is None else exact.at(0.0)
         fields = []
         for given, name in ((self.displacement, "displacement"), (self.velocity, "velocity")):
             if given == "exact":
-                fields.append(np.asarray(getattr(at_start, name)(points, near)))
+                values = getattr(at_start, name)
+                fields.append(_bounded(values(points, near), values(near, near), points, name))
             else:
                 fields.append(field_values(given or [0.0] * points.shape[1], points))
         return fields[0], fields[1]
+
+
+def _bounded(
+    values: NDArray[np.float64], beside: NDArray[np.float64], points: NDArray[np.float64], name: str
+) -> NDArray[np.float64]:
+    """Refuse values (n, d) that stand out from all of those beside the points."""
+    size = np.linalg.norm(values, axis=1)
+    most = _LARGEST * float(np.linalg.norm(beside, axis=1).max(initial=0.0))
+    wrong = np.flatnonzero(~(size <= most) & (most > 0.0))
+    if len(wrong):
+        at = ", ".join(f"{x:.6g}" for x in points[wrong[0]])
+        raise InputError(
+            f"initial.{name}: the exact field is unbounded at the node ({at}); expected no node at "
+            "the tip at the time 0: another mesh, or another place of the tip"
+        )
+    return np.asarray(values)
 
 
 Initial = Annotated[AtRest | Equilibrium | InitialField | Moving, Field(discriminator="kind")]

@@ -126,7 +126,7 @@ def _between(cut: ToolPathCut, start: float, end: float) -> ToolPathCut | None:
 
 
 def _dissipated(account: MotionAccount) -> tuple[dict[str, float], dict[str, str]]:
-    """What the scheme and the dampers took, J."""
+    """Find what the scheme and the dampers took, J."""
     ledger = account.ledger if account.is_own_ledger else {}
     values, notes = {}, {}
     for name, column in (("scheme", "algorithmic"), ("damping", "damping")):
@@ -147,9 +147,7 @@ def _difference(
     times, density = solution.times, scene.material.density
     try:
         first, last = (
-            np.array(
-                difference_energy(solution, k, field_at(exact, float(times[k])), law, density)
-            )
+            np.array(difference_energy(solution, k, field_at(exact, float(times[k])), law, density))
             for k in (0, len(times) - 1)
         )
     except InputError as problem:
