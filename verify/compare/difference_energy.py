@@ -1,4 +1,4 @@
-"""Energy of the difference of a moving solution from an exact field: waves that are only its own."""
+"""Energy of what a moving solution has beside an exact field, or above a frequency."""
 
 from typing import Any
 

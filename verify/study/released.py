@@ -39,9 +39,9 @@ def released_metrics(
     ``released``: G, if the exact solution states it; ``released_to_scheme`` and ``_damping``: what
     the solution's ledger says of both; ``_kinetic`` and ``_strain``: energy of the difference
     from the exact field since the start, kinetic energy by the solver's own mass (a lumped one
-    holds up to three times the energy of short waves than their field); ``_short_waves``: without one, kinetic energy of motions
-    of periods below 4h/c. ``released_mismatch``: the share of G by which scheme, damping and
-    difference miss it.
+    holds more of short waves than their field); ``_short_waves``: without an exact field, kinetic
+    energy of motions of periods below 4h/c. ``released_mismatch``: the share of G by which scheme,
+    damping and difference miss it.
 
     Parameters
     ----------
