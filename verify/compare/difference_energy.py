@@ -14,11 +14,12 @@ from verify.solution import Solution
 __all__ = ["difference_energy", "short_wave_energy"]
 
 Array = NDArray[np.float64]
+Density = float | Array
 _ORDER = 3  # points per direction: the exact field may be singular in a cell
 
 
 def difference_energy(
-    solution: Solution, step: int, exact: Any, law: Law, density: float
+    solution: Solution, step: int, exact: Any, law: Law, density: Density
 ) -> tuple[float, float]:
     """Kinetic and strain energy of the difference at an output time, J (2D: per metre).
 
@@ -31,8 +32,8 @@ def difference_energy(
     exact : object with ``gradient`` and ``velocity``
         The field at that time.
     law : Law
-    density : float
-        kg/m³.
+    density : float or (m,) array
+        kg/m³, of each cell.
 
     Raises
     ------
@@ -50,13 +51,13 @@ def difference_energy(
         points = np.einsum("k,mka->ma", weights, field.shape.corners)
         measure = share * field.shape.volume
         off = field.in_cells(points, every)[1] - exact.gradient(points, near)
-        strain += float(measure @ law.energy_density(off))
+        strain += float(measure @ law.at(points).energy_density(off))
         slip = moving.in_cells(points, every)[0] - exact.velocity(points, near)
-        kinetic += 0.5 * density * float(measure @ np.sum(slip**2, axis=1))
+        kinetic += 0.5 * float((density * measure) @ np.sum(slip**2, axis=1))
     return kinetic, strain
 
 
-def short_wave_energy(solution: Solution, period: float, density: float) -> float:
+def short_wave_energy(solution: Solution, period: float, density: Density) -> float:
     """Kinetic energy in motions faster than a period at the end, J (2D: per metre).
 
     That of the velocity less its mean over the last period, averaged over that period. A motion
@@ -88,5 +89,6 @@ def short_wave_energy(solution: Solution, period: float, density: float) -> floa
         points = np.einsum("k,mka->ma", weights, field.shape.corners)
         for one in fast:
             slip = field.with_nodal(one).in_cells(points, every)[0]
-            energy += 0.5 * density * share * float(field.shape.volume @ np.sum(slip**2, axis=1))
+            mass = density * share * field.shape.volume
+            energy += 0.5 * float(mass @ np.sum(slip**2, axis=1))
     return energy / len(fast)

@@ -14,6 +14,7 @@ from verify.compare.body import body_of
 from verify.compare.difference_energy import difference_energy, short_wave_energy
 from verify.compare.hooke import Law
 from verify.compare.integration import cut_rules
+from verify.compare.kinetic import density_of
 from verify.compare.motion import field_at
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Metric
@@ -143,8 +144,7 @@ def _difference(
     names = ("released_to_kinetic", "released_to_strain")
     if scene.analysis.kinematics != "linear" or scene.cell_dimension < scene.dimension:
         return {}, dict.fromkeys(names, "energies of differences add up in linear solids only")
-    assert scene.material.density is not None
-    times, density = solution.times, scene.material.density
+    times, density = solution.times, density_of(scene, solution)
     try:
         first, last = (
             np.array(difference_energy(solution, k, field_at(exact, float(times[k])), law, density))
@@ -174,7 +174,6 @@ def _short_waves(
     shear = material.young / (2 * (1 + material.poisson))
     period = _PERIODS * size / float(np.sqrt(shear / material.density))
     try:
-        density = material.density * (material.thickness or 1.0)
-        return {name: short_wave_energy(solution, period, density)}, {}
+        return {name: short_wave_energy(solution, period, density_of(scene, solution))}, {}
     except InputError as problem:
         return {}, {name: str(problem)}
