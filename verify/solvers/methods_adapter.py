@@ -176,7 +176,7 @@ class MethodSolver:
         try:
             mesh, size = background_mesh(scene, level)
             body = METHODS[self._method](mesh, cuts_of(scene, size), **own)
-            material = body.material(material_of(scene))
+            material = material_of(scene, body.resisting.mesh)
             return system_of(scene, body.virtual, body.resisting, material, exact)
         except XfemError as error:
             raise InputError(str(error), str(scene.file or scene.name)) from None

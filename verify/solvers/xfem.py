@@ -173,7 +173,7 @@ class XfemSolver:
             mesh, size = background_mesh(scene, level)
             virtual = _cut(scene, mesh, size, exact, tip, slivers)[0]
             return system_of(
-                scene, virtual, virtual, material_of(scene), exact, mass, basis,
+                scene, virtual, virtual, material_of(scene, virtual.mesh), exact, mass, basis,
                 slivers == "penalise",
             )  # fmt: skip
         except BasisError as error:

@@ -61,11 +61,11 @@ def system_of(
     components = supports.fixed.shape[1]
     inertia = None
     if scene.material.density is not None:
-        inertia = MASSES[mass](virtual, density_of(scene))
+        inertia = MASSES[mass](virtual, density_of(scene, virtual.mesh))
     if penalise:
         ghost = GhostPenalty(virtual, material)
         stiffness = csr_array(stiffness + kron(ghost.matrix, identity(components)))
-        inertia = None if inertia is None else ghost.mass(inertia, density_of(scene))
+        inertia = None if inertia is None else ghost.mass(inertia, density_of(scene, virtual.mesh))
     matrix = None if inertia is None else csr_array(kron(inertia.matrix, identity(components)))
     if basis == "sidewise":
         return System(stiffness, matrix, supports.fixed.ravel())
