@@ -17,6 +17,7 @@ from reference.exact.linear import Linear
 from reference.exact.parameters import Parameters
 from reference.exact.patch import Patch
 from reference.exact.penny import Penny
+from reference.exact.rolled_halves import RolledHalves
 from reference.exact.sinusoidal import Sinusoidal
 from reference.exact.solid_patch import SolidPatch
 from reference.exact.solid_sinusoidal import SolidSinusoidal
@@ -37,6 +38,11 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         Bending,
         "pure bending on each side of a straight cut: point, slope or angle, stress_gradient, "
         "shift",
+    ),
+    "rolled_halves": (
+        RolledHalves,
+        "finite rotation: each side of a straight cut bent away to a circle: point, slope or "
+        "angle, thickness, curvature, shift",
     ),
     "airy": (
         Airy,

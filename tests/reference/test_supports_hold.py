@@ -38,3 +38,26 @@ def test_a_piece_held_just_enough_is_solved():
 def test_a_body_on_rollers_only_is_refused_without_any_cut():
     with pytest.raises(InputError, match="can still move in x"):
         energy_of(square(supports=[ROLLERS]), "conforming")
+
+
+@pytest.mark.parametrize(
+    ("solver", "kinematics"),
+    [
+        ("conforming", "linear"),
+        ("conforming", "corotational"),
+        ("reference", "linear"),
+        ("xfem", "linear"),
+        ("xfem", "corotational"),
+    ],
+)
+def test_a_part_that_ends_at_a_cut_holds_what_lies_on_its_own_side(solver, kinematics):
+    # the halves are drawn apart rigidly, by parts of the bottom and top that end where the cut does
+    moved = [(-0.1, "x < 0.45"), (0.2, "x > 0.45")]
+    supports = [
+        {"where": f"{where} and ({edge})", "displacement": [u, 0.0]}
+        for u, where in moved
+        for edge in ("y < 1e-9", "y > 1 - 1e-9")
+    ]
+    cut = polyline("a", (0.45, -0.1), (0.45, 1.1))
+    scene = square([cut], supports=supports, loads=[], analysis={"kinematics": kinematics})
+    assert energy_of(scene, solver) < 1e-20
