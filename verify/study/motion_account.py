@@ -140,6 +140,8 @@ def _unaccountable(scene: Scene) -> str:
         return "what the damping takes is not known between output times"
     if any(isinstance(load, Traction) for load in scene.loads):
         return "the work of tractions is not known between output times"
+    if any(not isinstance(load, Gravity | BodyForce) for load in scene.loads):
+        return "the work of loads on the faces of cuts is not known between output times"
     if uniform_force(scene) is None:
         return "the work of body forces that are not uniform is not known between output times"
     moved = [s for s in scene.supports if s.history or s.timed or s.displacement == "exact"]
