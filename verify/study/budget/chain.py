@@ -14,6 +14,7 @@ from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.solution import Solution
+from verify.study.budget.crossing_delay import mean_wait
 from verify.study.budget.links import Chain, Missing, is_realised_as_asked, link
 from verify.study.budget.references import OUTSIDE, References
 from verify.study.budget.scenes import (
@@ -140,7 +141,8 @@ class _Maker:
         self._method("XFEM", self._judged)
 
     def _move(self) -> None:
-        """Change the mesh and the method at the fine time step, then mass, step and scheme."""
+        """Open late, change mesh and method at the fine time step, then mass, step and scheme."""
+        self._open_late()
         scheme = "newmark" if self._own == "linear" else "energy_momentum"
         step = self._fine_step()
         own = on_one_level(with_kinematics(self._scene, self._own), self._level)
@@ -175,6 +177,28 @@ class _Maker:
             self._take("XFEM, trapezoidal rule", f"{words} → trapezoidal", self._judged)
         else:
             self._take("XFEM at the scene's time step", "fine → own time step", self._judged)
+
+    def _open_late(self) -> None:
+        """Let the reference wait for the blade as long as the judged elements do."""
+        wait = mean_wait(self._scene, self._judged)
+        if wait is None:
+            return
+        change = "crossing delay"
+        self.chain.notes.append(
+            f"{change}: a place of the cut waits {wait:.3g} s on average until the blade leaves "
+            "its element; so late opens the reference of that part"
+        )
+        if self._references.finest is None:
+            text = "an exact solution does not open late"
+            self._waiting.append(change)
+            self.chain.missing.append(Missing(change, text, "in the next part"))
+            return
+        own = with_kinematics(self._scene, self._own)
+        self._try(
+            f"the same, opened {wait:.3g} s late",
+            change,
+            lambda: self._references.of(own, f"late-{self._own}", delay=wait),
+        )
 
     def _method(self, name: str, answer: "Solution | Callable[[], Solution]") -> None:
         """Change to the judged method, and with it to its cut if that was not taken before."""

@@ -1,5 +1,7 @@
 """The references among a budget's links: of the user's problem, or of scenes derived from it."""
 
+from typing import Any
+
 from verify.compare.body import AnyBody
 from verify.compare.hooke import law_of
 from verify.errors import InputError
@@ -66,15 +68,15 @@ class References:
         self.steps = solved.solutions[REFERENCE][self.finest].iterations.get("steps", 0)
         return found
 
-    def of(self, scene: Scene, place: str) -> Reference:
-        """Solve a scene and measure it as if it were that of the problem.
+    def of(self, scene: Scene, place: str, **parameters: Any) -> Reference:
+        """Solve a scene, with parameters of the reference; measure it as if it were the problem.
 
         Raises
         ------
         InputError
             If there is no reference, with the reason.
         """
-        (solved,) = self._solve([scene], place, (REFERENCE,))
+        (solved,) = self._solve([scene], place, (REFERENCE,), {REFERENCE: parameters})
         return self._measured(solved)
 
     def _measured(self, solved: Solved) -> Reference:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from verify.errors import UnsupportedSceneError
-from verify.scene import Scene
+from verify.scene import Scene, ToolPathCut
 from verify.study.budget.realised_cut import polylines_of, triangles_of
 
 __all__ = [
@@ -63,7 +63,7 @@ def at_rest(scene: Scene) -> Scene:
         "analysis": {"kind": "static", "duration": None, "time_step": None, "outputs": None,
                      "damping": [0.0, 0.0]},
         "initial": {"kind": "rest"},
-        "cuts": [{**cut, "opens_at": 0.0} for cut in content["cuts"]],
+        "cuts": [{**cut.model_dump(mode="json"), "opens_at": 0.0} for cut in scene.final_cuts],
         "quantities": [
             {key: value for key, value in q.items() if key != "time"} for q in content["quantities"]
         ],
@@ -91,6 +91,8 @@ def on_realised_cut(scene: Scene, facets: Array, level: int, kinematics: str) ->
     UnsupportedSceneError
         If its cuts open at different times, or a part of the realised cut can be none of a scene.
     """
+    if any(isinstance(cut, ToolPathCut) for cut in scene.cuts):
+        raise UnsupportedSceneError("a realised cut does not say when the blade passes")
     opens = {float(getattr(cut, "opens_at", 0.0)) for cut in scene.cuts}
     if len(opens) > 1:
         raise UnsupportedSceneError(
