@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
+from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.sparse.solver_by_cost import SolverByCost
 from verify.xfem.sparse.system_shapes import check_blocks, checked_load
 
-__all__ = ["LinearSolver", "NearlySymmetric", "SparseLU"]
+__all__ = ["LinearSolver", "NearlySymmetric", "SparseLU", "default_solver"]
 
 _Floats = NDArray[np.float64]
 
@@ -30,6 +32,13 @@ class LinearSolver(Protocol):
     def solve(self, load: _Floats) -> _Floats:
         """Solution (N, d) for a right-hand side (N, d)."""
         ...
+
+
+def default_solver(body: DynamicBody, tolerance: float) -> SolverByCost:
+    """Make the solver that has least to do for a body; the tolerance is that of iterations."""
+    solid = body.force.virtual.cells.shape[1] == 4
+    held = body.fixed.all(axis=1)
+    return SolverByCost(body.pattern, body.shape[1], held, solid, tolerance)
 
 
 class SparseLU:

@@ -7,23 +7,25 @@ from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
 from verify.xfem.corotation.internal_force import TangentKind
-from verify.xfem.dynamics.body import DynamicBody, MotionState
+from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
 from verify.xfem.dynamics.integrator import (
     StepFailedError,
     StepForces,
     check_state,
     check_step,
 )
-from verify.xfem.dynamics.linear_solver import LinearSolver
+from verify.xfem.dynamics.linear_solver import LinearSolver, default_solver
 from verify.xfem.errors import XfemError
-from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
+from verify.xfem.sparse.cholesky import SingularStiffnessError
 
 __all__ = ["NewtonIntegrator"]
 
 _Floats = NDArray[np.float64]
 
 _HALVINGS = 10
+_SLOW = 0.5  # of the residual: what a correction leaves that takes too little off
 _JUST = 1e-9  # of a step: more than the round-off of a time that some thousand steps have added up
+_INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
 _ROUND_OFF = 64.0 * np.finfo(float).eps
 
 
@@ -42,7 +44,8 @@ class NewtonIntegrator(ABC):
         Allowed per step; if they do not suffice the step fails rather than go on unsolved. Most
         take 2 to 4; where pieces that are inside out stand up, it may be 50.
     solver : LinearSolver, optional
-        For the sparsity of the body; by default a Cholesky factorisation.
+        For the sparsity of the body; by default conjugate gradients or a Cholesky factorisation,
+        whichever has less to do.
 
     Attributes
     ----------
@@ -77,10 +80,12 @@ class NewtonIntegrator(ABC):
         self._mass_places = body.mass.places(body.pattern)
         self._inverse_mass = (1.0 / body.mass.matrix.diagonal())[:, None]
         self._noise = self._round_off()
+        self._factorised: tuple[float, RayleighDamping] | None = None
+        self._is_slow = False  # whether the last correction of this step took too little off
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
     def _default_solver(self) -> LinearSolver:
-        return Cholesky(self.body.pattern, self.body.shape[1], self.body.fixed.all(axis=1))
+        return default_solver(self.body, _INEXACT)
 
     @abstractmethod
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
@@ -156,7 +161,7 @@ class NewtonIntegrator(ABC):
         prescribed, _ = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
         residual, norm, forces, scale = self._residual(displacement)
-        leaps = 0
+        leaps, self._is_slow = 0, False
         for _ in range(self.iterations):
             # round-off of positions, seen through the stiffness
             noise = np.abs(body.force.virtual.node_points + displacement).max() * self._noise
@@ -179,6 +184,7 @@ class NewtonIntegrator(ABC):
                 leaps += 1
                 trial = displacement + correction
                 residual, size, forces, scale = self._residual(trial)
+            self._is_slow = not size < _SLOW * norm
             displacement, norm = trial, size
         raise StepFailedError(
             f"{type(self).__name__}: step from t = {self._start.time:.6g} s by "
@@ -216,24 +222,29 @@ class NewtonIntegrator(ABC):
         return f"{'; '.join(found)}. A shorter step may help"
 
     def _correction(self, displacement: _Floats, residual: _Floats) -> _Floats:
-        try:
-            self._assemble(displacement, "exact")
-            self._solver.factorize(self._blocks)
-        except SingularStiffnessError:
-            # the exact stiffness may be indefinite far from equilibrium; that without turns is not
-            self._assemble(displacement, "tensioned")
-            try:
-                self._solver.factorize(self._blocks)
-            except SingularStiffnessError as failure:
-                raise StepFailedError(f"{type(self).__name__}: {failure}") from failure
         self.solves += 1
         try:
-            return self._solver.solve(residual)
+            try:
+                return self._solved(displacement, residual, "exact")
+            except SingularStiffnessError:
+                # the exact one may be indefinite far from equilibrium; that without turns is not
+                return self._solved(displacement, residual, "tensioned")
+        except SingularStiffnessError as failure:
+            raise StepFailedError(f"{type(self).__name__}: {failure}") from failure
         except XfemError as failure:
             raise StepFailedError(
                 f"{type(self).__name__}: step from t = {self._start.time:.6g} s: {failure}. The "
                 "step is too long, or a load is not finite"
             ) from failure
+
+    def _solved(self, displacement: _Floats, residual: _Floats, kind: TangentKind) -> _Floats:
+        given = None if self.body.force.turning else (self.step_size, self.body.damping)
+        if given is None or given != self._factorised:  # the matrix of linear motion stays
+            self._factorised = None
+            self._assemble(displacement, kind)
+            self._solver.factorize(self._blocks)
+            self._factorised = given
+        return self._solver.solve(residual)
 
     def _assemble(self, displacement: _Floats, kind: TangentKind) -> None:
         body, h = self.body, self.step_size

@@ -16,16 +16,19 @@ from verify.xfem.dynamics.integrator import (
     check_state,
     check_step,
 )
-from verify.xfem.dynamics.linear_solver import LinearSolver
+from verify.xfem.dynamics.linear_solver import LinearSolver, default_solver
 from verify.xfem.errors import XfemError
 from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.xfem.sparse.solver_by_cost import SolverByCost
 from verify.xfem.sparse.symmetric_sweep_kernels import symmetric_product, vector_width
 from verify.xfem.supports import Supports
 
 __all__ = ["RealTimeEuler"]
 
 _Floats = NDArray[np.float64]
+
+_EXACT = 1e-10  # residual that conjugate gradients leave of the right-hand side of a step
 
 
 class RealTimeEuler:
@@ -37,7 +40,8 @@ class RealTimeEuler:
     step_size : float
         In seconds.
     solver : LinearSolver, optional
-        For the sparsity of the body; by default a Cholesky factorisation.
+        For the sparsity of the body; by default conjugate gradients or a Cholesky factorisation,
+        whichever has less to do.
     """
 
     def __init__(
@@ -48,25 +52,26 @@ class RealTimeEuler:
         space = body.shape[1]
         self.blocks = np.zeros((len(body.pattern.columns), space, space))
         self.load = np.empty(body.shape)
-        if solver is None:
-            solver = Cholesky(body.pattern, space, body.fixed.all(axis=1))
-        self.solver: LinearSolver = solver
+        self.solver: LinearSolver = default_solver(body, _EXACT) if solver is None else solver
         self._places = body.mass.places(body.pattern)
         self._values = body.mass.entries[2]
         self._internal = np.empty(body.shape)
-        # sweeps of the matrix' upper half are all that conjugate gradients need
-        self._whole = not isinstance(self.solver, ConjugateGradients)
         self._change = np.zeros(body.shape)  # of the velocity, in this step
         self._changes = [np.zeros(body.shape) for _ in range(3)]  # in the last ones, the last first
         self._supported = np.flatnonzero(body.fixed.any(axis=1))
         pattern = body.pattern
-        held = _held_entries(pattern.starts, pattern.columns, pattern.diagonal, body.fixed)
-        if not self._whole:
-            row = np.repeat(np.arange(len(body.fixed)), np.diff(pattern.starts))
-            held = held[(pattern.columns >= row)[held // space**2]]
-        self._held = held
+        self._held = _held_entries(pattern.starts, pattern.columns, pattern.diagonal, body.fixed)
+        row = np.repeat(np.arange(len(body.fixed)), np.diff(pattern.starts))
+        self._held_above = self._held[(pattern.columns >= row)[self._held // space**2]]
         self._driven = np.zeros((len(body.fixed), vector_width(space)))
         self._resisted = np.empty_like(self._driven)
+
+    @property
+    def _iterates(self) -> bool:
+        """Whether the solver goes on from a guess, and reads the matrix' upper half only."""
+        if isinstance(self.solver, SolverByCost):
+            return self.solver.is_iterative
+        return isinstance(self.solver, ConjugateGradients)
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
@@ -118,7 +123,7 @@ class RealTimeEuler:
         eight off those of ten, and adds one in twenty where steps are so long that nothing goes on
         as it was (measured with the bodies of the benchmarks).
         """
-        if isinstance(self.solver, ConjugateGradients):
+        if isinstance(self.solver, ConjugateGradients | SolverByCost):
             last, before, first = self._changes
             _extrapolate(last, before, first, self._change)
             self.solver.improve(self.load, self._change, self._change)
@@ -136,7 +141,7 @@ class RealTimeEuler:
         implicit = h + damping.stiffness
         body.force.linearise(
             body.pattern, state.displacement, state.velocity, implicit, h * implicit,
-            self._internal, self.blocks, self._whole,
+            self._internal, self.blocks, not self._iterates,
         )  # fmt: skip
         if body.force.is_membrane:
             # what tension holds it with across its plane is as stiff as it is thin: implicit too
@@ -169,8 +174,9 @@ class RealTimeEuler:
             )  # fmt: skip
             self.load -= self._resisted[:, : self.load.shape[1]]
         _hold(
-            body.pattern.diagonal, self._supported, body.fixed, self._held, self._driven,
-            self.blocks, self.load,
+            body.pattern.diagonal, self._supported, body.fixed,
+            self._held_above if self._iterates else self._held, self._driven, self.blocks,
+            self.load,
         )  # fmt: skip
 
 

@@ -162,7 +162,7 @@ class Cholesky:
         self._entry_block = blocks.take(self._entry_block)
         width = np.diff(bounds) * self._block
         below = np.diff(row_start) * self._block
-        self._work = float(width @ (width + below) ** 2)  # about the operations of a factorisation
+        self._work = float(width @ (width + below) ** 2)
         self._entries = int((width * (width + below) - width * (width - 1) // 2).sum())
         below = _full(below, ROWS)
         height = _full(width, ROWS) + below
@@ -181,6 +181,11 @@ class Cholesky:
     def factor_entries(self) -> int:
         """Stored entries of the factor."""
         return self._entries
+
+    @property
+    def operations(self) -> float:
+        """About the operations of a factorisation."""
+        return self._work
 
     def factorize(self, blocks: NDArray[np.float64]) -> None:
         """Factorise the matrix with these blocks (B, block, block).

@@ -46,6 +46,8 @@ class ConjugateGradients:
 
     Attributes
     ----------
+    limit : int
+        Most iterations of the next solve.
     iterations : int
         Of the last solve.
     """
@@ -55,7 +57,7 @@ class ConjugateGradients:
     ) -> None:
         if not 0.0 < tolerance < 1.0 or limit < 1:
             raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
-        self._pattern, self._tolerance, self._limit = pattern, tolerance, limit
+        self._pattern, self._tolerance, self.limit = pattern, tolerance, limit
         width = vector_width(block)
         self._inverse = np.zeros((pattern.node_count, block, width))
         self._work = np.zeros((8, pattern.node_count, width))
@@ -120,7 +122,7 @@ class ConjugateGradients:
             return
         iterations, residual = conjugate_gradients(
             pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._inverse,
-            load, x, start is None, self._work, self._tolerance, self._limit,
+            load, x, start is None, self._work, self._tolerance, self.limit,
         )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)

@@ -1,0 +1,140 @@
+"""Conjugate gradients or Cholesky factorisation: whichever has less to do for a matrix.
+
+How many iterations a motion needs depends on its step, and what a factorisation costs on how thick
+a body is. Iterations are counted and the operations of a factorisation known from its analysis, so
+that no clock decides, and the same motion takes the same way twice.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.sparse.cholesky import Cholesky
+from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
+
+__all__ = ["SolverByCost"]
+
+_Floats = NDArray[np.float64]
+
+# measured, docs/xfem-linear-solvers.md: in ns, per operation and entry of the factor of a
+# factorisation with its solution, and per node and iteration of conjugate gradients
+_OPERATION, _ENTRY, _ITERATION = 0.020, 6.0, 50.0
+_SMALL = 500  # nodes, up to which a factorisation takes less than a millisecond
+_LARGE = 2000  # nodes of a solid, from which it is not even analysed ...
+_MANY = 100  # ... before so many iterations were not enough
+_MOST = 10_000  # iterations where there is no memory for a factor
+
+
+class SolverByCost:
+    """Solver of K x = b, first iterative and direct from the first solution that takes too long.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+    held : (N,) bool array
+        As of `Cholesky`.
+    solid : bool
+        Whether the nodes are those of a solid, which fills a factor quickly.
+    tolerance : float
+        As of `ConjugateGradients`.
+
+    Attributes
+    ----------
+    is_iterative : bool
+        Whether the next solution will be by conjugate gradients; what is below the diagonal of a
+        matrix is then not read.
+    """
+
+    def __init__(
+        self,
+        pattern: BlockPattern,
+        block: int,
+        held: NDArray[np.bool_],
+        solid: bool,
+        tolerance: float,
+    ) -> None:
+        self._pattern, self._block, self._held = pattern, block, held
+        self._direct: Cholesky | None = None
+        self._blocks: _Floats | None = None
+        self._iterative = ConjugateGradients(pattern, block, tolerance, _MANY)
+        self.is_iterative = pattern.node_count > _SMALL
+        self._is_analysed = not self.is_iterative or not (solid and pattern.node_count >= _LARGE)
+        if self._is_analysed:
+            self._analyse()
+
+    def _analyse(self) -> None:
+        """Allow as many iterations as a factorisation is worth."""
+        self._is_analysed = True
+        try:
+            self._direct = direct = Cholesky(self._pattern, self._block, self._held)
+        except MemoryError:
+            self._iterative.limit = _MOST
+            return
+        cost = _OPERATION * direct.operations + _ENTRY * direct.factor_entries
+        self._iterative.limit = max(1, int(cost / (_ITERATION * self._pattern.node_count)))
+
+    def factorize(self, blocks: _Floats) -> None:
+        """Take the matrix with these nodal blocks (B, d, d), kept by reference.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If it is seen not to be positive definite.
+        XfemError
+            If the blocks are not those of the pattern.
+        """
+        self._blocks = blocks
+        if self.is_iterative:
+            self._iterative.factorize(blocks)
+        else:
+            assert self._direct is not None
+            self._direct.factorize(blocks)
+
+    def solve(self, load: _Floats) -> _Floats:
+        """Solution (N, d) for a right-hand side (N, d).
+
+        Raises
+        ------
+        SingularStiffnessError
+            If the matrix turns out not to be positive definite.
+        NotConvergedError
+            If the iterations run out and there is no memory for a factor.
+        XfemError
+            If a shape is wrong or a number is not finite.
+        RuntimeError
+            If nothing was factorised before.
+        """
+        x = np.empty(np.shape(load))
+        self.improve(load, x)
+        return x
+
+    def improve(self, load: _Floats, x: _Floats, start: _Floats | None = None) -> None:
+        """Overwrite x (N, d) with the solution, as `ConjugateGradients.improve` does."""
+        while self.is_iterative:
+            allowed = self._iterative.limit
+            try:
+                self._iterative.improve(load, x, start)
+                return
+            except NotConvergedError:
+                start = x
+                if not self._is_analysed:
+                    self._analyse()
+                if self._direct is None and allowed == _MOST:
+                    raise
+                if self._iterative.limit <= allowed:
+                    self._turn()
+        assert self._direct is not None
+        self._direct.solve(load, x)
+
+    def _turn(self) -> None:
+        """Factorise this matrix and all that follow."""
+        assert self._blocks is not None
+        assert self._direct is not None
+        self.is_iterative = False
+        pattern = self._pattern
+        row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
+        below = np.flatnonzero(pattern.columns < row)
+        self._blocks[below] = self._blocks[pattern.mirror[below]].transpose(0, 2, 1)
+        self._direct.factorize(self._blocks)
