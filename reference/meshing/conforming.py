@@ -96,20 +96,18 @@ def _add_cut(gmsh: ModuleType, cut: object, origin: Array, scale: float) -> list
     occ = gmsh.model.occ
     if isinstance(cut, ArcCut):
         x, y = (np.asarray(cut.centre) - origin) / scale
-        # two arcs, so that a full circle has end points too
+        # each part is less than half a turn: of half a turn gmsh does not know which half is meant
         start, sweep = np.deg2rad(cut.start), np.deg2rad(cut.sweep)
-        stops = (start, start + sweep / 2, start + sweep)
+        stops = start + sweep * np.linspace(0.0, 1.0, 3 if cut.sweep <= 180.0 else 4)
         ends = [
             occ.addPoint(x + cut.radius / scale * np.cos(t), y + cut.radius / scale * np.sin(t), 0)
-            for t in (stops[:2] if cut.sweep == 360.0 else stops)
+            for t in (stops[:-1] if cut.sweep == 360.0 else stops)
         ]
-        centre = occ.addPoint(x, y, 0.0)
-        following = [*ends[1:], ends[0]] if cut.sweep == 360.0 else ends[1:]
         if cut.sweep == 360.0:
-            half = [occ.addCircleArc(a, centre, b) for a, b in zip(ends, following, strict=True)]
-        else:
-            half = [occ.addCircleArc(a, centre, b) for a, b in zip(ends, following, strict=False)]
-        return [int(tag) for tag in half]
+            ends.append(ends[0])
+        centre = occ.addPoint(x, y, 0.0)
+        parts = [occ.addCircleArc(a, centre, b) for a, b in pairwise(ends)]
+        return [int(tag) for tag in parts]
     assert isinstance(cut, PolylineCut)
     vertices = (cut.vertices() - origin) / scale
     closed = np.array_equal(vertices[0], vertices[-1])

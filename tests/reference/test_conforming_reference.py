@@ -55,6 +55,19 @@ def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape,
     assert area.sum() == pytest.approx(1.0, rel=1e-13)
 
 
+@pytest.mark.parametrize("sweep", [180.0, 270.0, 359.0, 360.0])
+def test_an_arc_is_cut_as_far_as_it_goes(sweep):
+    """Chords of a circle are short by (h/R)²/24."""
+    from reference.meshing import Grading, conforming_mesh
+
+    arc = {"kind": "arc", "centre": [0.51, 0.47], "radius": 0.31, "start": 20.0, "sweep": sweep}
+    mesh = conforming_mesh(square([arc]), Grading(0.06, np.zeros((0, 2)), 0.5))
+    ends = mesh.realised_cut
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+    assert length == pytest.approx(np.deg2rad(sweep) * 0.31, rel=2e-3)
+    assert mesh.pieces.max() + 1 == (2 if sweep == 360.0 else 1)
+
+
 def test_the_same_scene_gives_the_same_mesh_twice():
     from reference.meshing import Grading, conforming_mesh, singular_points
 
