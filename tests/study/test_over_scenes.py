@@ -107,7 +107,7 @@ def test_a_solver_that_raises_is_a_row_and_a_failed_finding(monkeypatch):
     assert all(m.value is None and "the pivot is zero" in m.reason for m in measured)
     (finding,) = findings(measured, [])
     assert finding.verdict is Verdict.FAIL
-    assert "No solution at ε = 0.5, 1e-12, 0" in finding.sentence
+    assert "No solution at 0.5, 1e-12, 0" in finding.sentence
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,10 @@ from verify.scene import Scene, scene_content
 from verify.study.energy_account import ACCOUNT
 from verify.study.finding import Finding
 from verify.study.in_processes import in_processes
-from verify.study.measured_scenes import Measurement, measured_scenes
+from verify.study.measured_scenes import Measurement, measured_scenes, missing_solutions
 from verify.study.variants import Variant
 
-__all__ = ["EnergyStudy", "energy_study"]
+__all__ = ["EnergyStudy", "account_findings", "energy_study"]
 
 _DRIFT = 1e-2  # of the energy in play: what a spectator would not see
 _KEPT = 1e-8
@@ -94,16 +94,12 @@ def _findings(measured: Sequence[Measurement]) -> Iterator[Finding]:
     for case in dict.fromkeys(m.family for m in measured):
         for solver in dict.fromkeys(m.solver for m in measured if m.family == case):
             own = [m for m in measured if (m.family, m.solver) == (case, solver)]
-            yield from _of_one(f"{case}, {solver}", own)
+            yield from missing_solutions(f"{case}, {solver}", own)
+            yield from account_findings(f"{case}, {solver}", own)
 
 
-def _of_one(topic: str, own: Sequence[Measurement]) -> Iterator[Finding]:
-    failed = [m for m in own if m.quantity == "solution" and m.value is None]
-    for one in failed:
-        at = "" if one.size is None else f" at {one.size:g}"
-        refused = "UnsupportedSceneError" in one.reason
-        verdict = None if refused else Verdict.FAIL
-        yield Finding(topic, f"No solution{at}: {one.reason}.", "a solution, or a refusal", verdict)
+def account_findings(topic: str, own: Sequence[Measurement]) -> Iterator[Finding]:
+    """Judge what one solver keeps of its energy, and of the values that the case states."""
     drifts = _worst(own, "energy_drift")
     if drifts is not None:
         value, at = drifts

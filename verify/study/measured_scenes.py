@@ -8,16 +8,17 @@ import numpy as np
 
 from verify.errors import UnsupportedSceneError
 from verify.printable import one_line
-from verify.result import SolveRecord, Status
+from verify.result import SolveRecord, Status, Verdict
 from verify.scene import Scene, ValueCheck, restore_scene
 from verify.solution import handed_over
 from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
 from verify.study.accuracy import assess_accuracy
+from verify.study.finding import Finding
 from verify.study.variants import Variant
 from verify.verdict import NotMeasuredError, error_interval
 
-__all__ = ["Measurement", "exact_of", "measured_scenes"]
+__all__ = ["Measurement", "measured_scenes", "missing_solutions"]
 
 Further = Callable[[Solver, Variant, Scene, int], Iterator["tuple[str, str, float | None, str]"]]
 
@@ -93,7 +94,7 @@ def _solved(
     solution = handed_over(solver.solve(scene, level, repetitions=1, **variant.parameters))
     record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
     solutions = {variant.solver: {level: solution}}
-    result = assess_accuracy(scene, [record], solutions, exact_of(scene))
+    result = assess_accuracy(scene, [record], solutions, _exact_of(scene))
     (measured,) = result.solves
     if measured.status is not Status.SOLVED:
         raise NotMeasuredError(measured.reason)
@@ -116,10 +117,20 @@ def _solved(
         yield "solution", "", None, "not finite"
 
 
-def exact_of(scene: Scene) -> Any:
+def _exact_of(scene: Scene) -> Any:
     """Return the exact solution that a scene names, or None."""
     if scene.exact is None:
         return None
     from reference.exact import exact_solution
 
     return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+
+
+def missing_solutions(topic: str, own: Sequence[Measurement]) -> Iterator[Finding]:
+    """Say in which rows a solver has no solution; a refusal is no failure."""
+    failed = [m for m in own if m.value is None and m.quantity == "solution"]
+    if failed:
+        where = ", ".join(f"{m.size:g}" for m in failed if m.size is not None)
+        text = f"No solution{f' at {where}' if where else ''}: {failed[0].reason}."
+        refused = all("UnsupportedSceneError" in m.reason for m in failed)
+        yield Finding(topic, text, "a solution, or a refusal", None if refused else Verdict.FAIL)

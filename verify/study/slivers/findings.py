@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from verify.result import Verdict
+from verify.study.energy import account_findings
 from verify.study.finding import Finding
-from verify.study.measured_scenes import Measurement
+from verify.study.measured_scenes import Measurement, missing_solutions
 from verify.study.slivers.system_numbers import CONDITION, SCALED, STEP
 
 __all__ = ["NEAR", "findings"]
@@ -40,7 +41,9 @@ def findings(
                     others = _values(own, _OTHER, error)
                     yield from _far(topic, error, _values(own, solver, error), others)
             yield from _system(topic, own, solver, growths)
-            yield from _missing(topic, [m for m in own if m.solver == solver])
+            mine = [m for m in own if m.solver == solver]
+            yield from account_findings(topic, mine)
+            yield from missing_solutions(topic, mine)
 
 
 def _values(measured: Sequence[Measurement], solver: str, quantity: str) -> Values:
@@ -106,12 +109,3 @@ def _system(
         text = f"The {quantity} is {low:.3g} to {high:.3g}{grows}."
         expected = f"bounded: at most {_SCALED_LIMIT:g} times its least"
         yield Finding(topic, text, expected if quantity == SCALED else "shown", judge(high / low))
-
-
-def _missing(topic: str, own: Sequence[Measurement]) -> Iterator[Finding]:
-    failed = [m for m in own if m.value is None and m.quantity == "solution"]
-    if failed:
-        where = ", ".join(f"{m.size:g}" for m in failed)
-        text = f"No solution at ε = {where}: {failed[0].reason}."
-        refused = all("UnsupportedSceneError" in m.reason for m in failed)
-        yield Finding(topic, text, "a solution, or a refusal", None if refused else Verdict.FAIL)

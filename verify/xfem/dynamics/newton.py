@@ -78,7 +78,10 @@ class NewtonIntegrator(ABC):
         self._blocks = np.zeros((len(body.pattern.columns), space, space))
         self._solver = self._default_solver() if solver is None else solver
         self._mass_places = body.mass.places(body.pattern)
-        self._inverse_mass = (1.0 / body.mass.matrix.diagonal())[:, None]
+        # a consistent mass has ε³ on the diagonal for a sliver whose weight is ε²: over the former
+        # that weight alone, 1/ε, would be the scale, beside which nothing else is left to solve
+        mass = np.maximum(body.mass.matrix.diagonal(), body.mass.weights)
+        self._inverse_mass = (1.0 / mass)[:, None]
         self._noise = self._round_off()
         self._factorised: tuple[float, RayleighDamping] | None = None
         self._is_slow = False  # whether the last correction of this step took too little off
