@@ -12,6 +12,7 @@ from verify.scene import (
     Scene,
     list_cases,
     load_scene,
+    load_scenes,
     parse_region,
     read_mesh,
     restore_scene,
@@ -28,7 +29,8 @@ def test_every_case_of_the_project_is_valid():
     cases = list_cases()
     assert cases
     for name, path in cases.items():
-        assert load_scene(path).name == name
+        for scene in load_scenes(path):
+            assert scene.name == name + (scene.row.label if scene.row else "")
 
 
 def test_the_hash_is_that_of_the_physics(tmp_path):
