@@ -125,17 +125,29 @@ class PartQuantity(Strict):
 
 
 class StressIntensityQuantity(Strict):
-    """A stress-intensity factor at an end of a plane cut, Pa √m."""
+    """A stress-intensity factor at an end of a plane cut, or of mode III at a blade, Pa √m."""
 
     kind: Literal["stress_intensity"]
     name: Line
     cut: str = "cut"
     end: Literal["start", "end"] = Field(description="which end of the cut")
-    mode: Literal["I", "II"] = "I"
+    mode: Literal["I", "II", "III"] = "I"
+    radius: Positive | None = Field(
+        default=None,
+        description="mode III: how far behind the blade of a tool path in space the cut is read, m",
+    )
     time: Annotated[
         NonNegative | None,
         Field(description="dynamic: an output time, s; default the last"),
     ] = None
+
+    @model_validator(mode="after")
+    def _radius_belongs(self) -> "StressIntensityQuantity":
+        if (self.mode == "III") != (self.radius is not None):
+            raise ValueError("a radius belongs to mode III, which needs one")
+        if self.mode == "III" and self.end != "end":
+            raise ValueError("mode III is asked for at the blade: end = 'end'")
+        return self
 
 
 Quantity = Annotated[

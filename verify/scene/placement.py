@@ -15,6 +15,7 @@ from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, CutFaces, Gravity, Rotation, Traction
 from verify.scene.regions import parse_expression, parse_region
 from verify.scene.skin import Skin
+from verify.scene.tool_path import ToolPathCut
 
 if TYPE_CHECKING:
     from verify.scene.scene import Scene
@@ -189,9 +190,12 @@ def _check_exact(scene: "Scene") -> None:
         raise ValueError(f"{wants[0]}: 'exact' needs an [exact] solution")
 
 
-def _check_tip(scene: "Scene", name: str, place: str) -> None:
+def _check_tip(scene: "Scene", name: str, mode: str, place: str) -> None:
     cut = next(cut for cut in scene.cuts if cut.name == name)
-    if cut.dimension == 3:
+    if mode == "III":
+        if not isinstance(cut, ToolPathCut) or cut.dimension != 3:
+            raise ValueError(f"{place}.mode: III is measured behind the blade of a tool_path in 3D")
+    elif cut.dimension == 3:
         raise ValueError(f"{place}: stress-intensity factors are asked for in 2D scenes only")
     if isinstance(cut, ArcCut) and cut.sweep == 360.0:
         raise ValueError(f"{place}.cut: '{name}' is closed and has no end")
@@ -267,7 +271,7 @@ def _check_names(scene: "Scene") -> None:
                     f"quantities[{i}].{key}: an opening in {scene.dimension}D is at '{key} = …'"
                 )
         if quantity.kind == "stress_intensity":
-            _check_tip(scene, quantity.cut, f"quantities[{i}]")
+            _check_tip(scene, quantity.cut, quantity.mode, f"quantities[{i}]")
     for i, name in enumerate(quantities):
         if name in METRICS:
             raise ValueError(f"quantities[{i}].name: '{name}' names an error; take another")

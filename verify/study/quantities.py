@@ -22,6 +22,7 @@ from verify.scene.acceptance import (
     StressIntensityQuantity,
 )
 from verify.solution import Solution
+from verify.study.blade_intensity import blade_intensity
 from verify.study.part_quantity import part_quantity, part_unit
 from verify.study.stress_intensity import solution_intensity
 
@@ -85,6 +86,8 @@ class Measured:
         if isinstance(asked, StressIntensityQuantity):
             if self.scene is None:
                 raise UnsupportedSceneError("a stress-intensity factor needs the scene")
+            if asked.mode == "III":
+                return blade_intensity(self.scene, self.motion, self.body, asked)
             return solution_intensity(self.scene, self.solution, asked)
         if isinstance(asked, PartQuantity):
             if self.scene is None:

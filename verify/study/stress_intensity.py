@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, BodyForce, Gravity, Material, PolylineCut, Scene
+from verify.scene import ArcCut, BodyForce, Gravity, Material, PolylineCut, Scene, ToolPathCut
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.history import factor_at, jumps
 from verify.solution import Solution
@@ -21,8 +21,13 @@ _AROUND = 65  # directions, and distances, in which the material around a tip is
 
 def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     """Why a factor cannot be had from any solution of a scene, or None."""
+    if asked.mode == "III":  # the scene was checked: at a blade
+        return None
     if scene.dimension != 2 or scene.analysis.kinematics != "linear":
         return "stress-intensity factors are measured in plane scenes of linear kinematics"
+    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+    if isinstance(cut, ToolPathCut) and asked.end == "end" and _time(scene, asked) <= cut.ends_at:
+        return "a tip that advances has another field than one at rest: measured of mode III only"
     if any(isinstance(load, BodyForce) and load.force == "exact" for load in scene.loads):
         return "stress-intensity factors are not measured under the body force of an exact solution"
     if reason := _defect_in_time(scene, asked):
@@ -130,7 +135,8 @@ def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) ->
         stated = exact.intensity_at(cut.vertices()[0 if asked.end == "start" else -1])
     else:
         stated = getattr(exact, "stress_intensity", None)
-    return None if stated is None else float(stated[0 if asked.mode == "I" else 1])
+    place = ("I", "II", "III").index(asked.mode)
+    return None if stated is None or len(stated) <= place else float(stated[place])
 
 
 def _time(scene: Scene, asked: StressIntensityQuantity) -> float:
@@ -151,7 +157,7 @@ def _body_force(scene: Scene, time: float) -> Callable[[Array], Array] | None:
             density = np.nan_to_num(scene.material.at(points).density)
             total += np.multiply.outer(density, np.asarray(weight.acceleration))
         for given in forces:
-            total += factor_at(given.history, time) * given.values(points)
+            total += factor_at(given.history, time) * given.values(points, time)
         return total
 
     return force

@@ -1,0 +1,68 @@
+"""K_III at a blade that advances, from the jump behind it: exact field, signs, times."""
+
+import numpy as np
+import pytest
+
+from reference.exact import exact_solution
+from verify.compare.body import body_of
+from verify.compare.motion import ExactMotion
+from verify.errors import UnsupportedSceneError
+from verify.scene import Scene
+from verify.scene.acceptance import StressIntensityQuantity
+from verify.study.blade_intensity import blade_front, blade_intensity
+
+
+def _strip(speed, angle, upwards=True):
+    c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    start, end = ([0.02 + r * c, 0.01 + r * s, -0.01] for r in (-0.6, 0.1 * speed))
+    blade = 1.0
+    if not upwards:
+        start, end, blade = [*start[:2], 0.03], [*end[:2], 0.03], -1.0
+    return Scene.model_validate({
+        "title": "strip",
+        "requirement": "none",
+        "geometry": {"kind": "box", "lower": [-0.3, -0.05, 0.0], "upper": [0.3, 0.05, 0.02]},
+        "mesh": {"cells": [[8, 3, 1]]},
+        "material": {"young": 2500.0, "poisson": 0.25, "density": 1000.0},
+        "analysis": {"kind": "dynamic", "duration": 0.1},
+        "supports": [{"where": "boundary", "displacement": "exact"}],
+        "exact": {"solution": "blade_strip",
+                  "parameters": {"half_width": 0.1, "grip": 0.006, "speed": speed,
+                                 "angle": angle, "tip": [0.02, 0.01]}},
+        "initial": {"kind": "field", "displacement": "exact", "velocity": "exact"},
+        "cuts": [{"kind": "tool_path", "points": [start, end], "speed": speed,
+                  "starts_at": -0.6 / speed, "depth": 0.05, "direction": [0.0, 0.0, blade]}],
+        "quantities": [{"kind": "stress_intensity", "name": "K", "end": "end", "mode": "III",
+                        "radius": 0.03, "time": 0.05}],
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("upwards", [True, False])
+@pytest.mark.parametrize("speed, angle", [(0.1, 0.0), (0.6, 14.0), (0.3, -14.0)])
+def test_the_exact_field_has_its_own_intensity(speed, angle, upwards):
+    """Terms beyond the fit: (πr/2bg)² of the jump over 160, below 0.2 % for r = 0.3 b, g = 0.8."""
+    scene = _strip(speed, angle, upwards)
+    body = body_of(scene)
+    exact = exact_solution("blade_strip", scene.exact.parameters, scene.material)
+    found = blade_intensity(scene, ExactMotion(exact, 0.1), body, scene.quantities[0])
+    assert found == pytest.approx(exact.stress_intensity[2], rel=2e-3)
+    front = blade_front(scene.cuts[0], body, 0.05)
+    assert front.speed == pytest.approx(speed)
+    tip = [0.02 + 0.05 * speed * np.cos(np.deg2rad(angle)),
+           0.01 + 0.05 * speed * np.sin(np.deg2rad(angle)), 0.01]  # fmt: skip
+    np.testing.assert_allclose(front.point, tip, atol=1e-9)
+
+
+def test_where_the_blade_does_not_advance_there_is_no_intensity():
+    scene = _strip(0.3, 0.0)
+    body = body_of(scene)
+    with pytest.raises(UnsupportedSceneError, match="does not advance"):
+        blade_front(scene.cuts[0], body, 0.2)
+
+
+def test_mode_3_says_what_it_needs():
+    with pytest.raises(ValueError, match="a radius belongs to mode III"):
+        StressIntensityQuantity(kind="stress_intensity", name="K", end="end", mode="III")
+    with pytest.raises(ValueError, match="at the blade: end = 'end'"):
+        StressIntensityQuantity(kind="stress_intensity", name="K", end="start", mode="III",
+                                radius=0.1)  # fmt: skip
