@@ -20,7 +20,9 @@ from verify.verdict import NotMeasuredError, error_interval
 
 __all__ = ["Measurement", "measured_scenes", "missing_solutions"]
 
-Further = Callable[[Solver, Variant, Scene, int], Iterator["tuple[str, str, float | None, str]"]]
+# quantity, unit, value, reason and, if the case states one, limit
+Row = tuple[str, str, float | None, str] | tuple[str, str, float | None, str, float]
+Further = Callable[[Solver, Variant, Scene, int], Iterator[Row]]
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,8 @@ class Measurement:
     value : float or None
     reason : str
         Why there is no value; or a note on it.
+    limit : float, optional
+        What the case allows of it.
     """
 
     family: str
@@ -50,6 +54,7 @@ class Measurement:
     unit: str
     value: float | None
     reason: str = ""
+    limit: float | None = None
 
 
 def measured_scenes(
@@ -76,6 +81,7 @@ def measured_scenes(
         family = scene.row.family if scene.row else scene.name
         size = scene.row.value if scene.row else None
         level = scene.mesh.count - 1
+        rows: list[Row]
         try:
             if refusal := checked_refusal(solver.refuses(scene)):
                 raise UnsupportedSceneError(refusal)
@@ -88,9 +94,7 @@ def measured_scenes(
     return found
 
 
-def _solved(
-    solver: Solver, variant: Variant, scene: Scene, level: int
-) -> Iterator[tuple[str, str, float | None, str]]:
+def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
     solution = handed_over(solver.solve(scene, level, repetitions=1, **variant.parameters))
     record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
     solutions = {variant.solver: {level: solution}}
@@ -109,7 +113,8 @@ def _solved(
         stated = measured.metric(check.metric) if isinstance(check, ValueCheck) else None
         if isinstance(check, ValueCheck) and stated is not None and check.equals:
             off = abs(stated.value - check.equals) / abs(check.equals)
-            yield f"deviation of {check.metric}", "", off, check.source
+            limit = check.relative_tolerance
+            yield f"deviation of {check.metric}", "", off, check.source, limit
     for name, why in measured.notes.items():
         if measured.metric(name) is None and name in ("energy_drift", "displacement_l2"):
             yield name, "", None, why
