@@ -175,7 +175,7 @@ def test_a_step_of_two_hundred_thousand_tetrahedra_grows_with_their_number():
         sizes.append(6 * n**3)
         medians.append(float(np.median(times[2:])))
     exponent = np.polyfit(np.log(sizes), np.log(medians), 1)[0]
-    # measured: 0.28 to 0.33 s at 196 608 tetrahedra, where a factorisation takes 18.5 s
+    # measured: 0.25 to 0.33 s at 196 608 tetrahedra, where a factorisation takes 18.5 s
     assert medians[-1] <= 0.4
-    # measured: 1.1 to 1.2; as many iterations at every size, and caches that hold less of it
+    # measured: 1.16 to 1.27; as many iterations at every size, and caches that hold less of it
     assert exponent < 1.3
