@@ -226,6 +226,7 @@ class NoticeKind(StrEnum):
 
     WARNING = "warning"  # an answer whose meaning is in doubt, whatever its verdict
     UNAVAILABLE = "unavailable"  # a quantity that was asked for and cannot be had
+    ADEQUACY = "adequacy"  # what the model of the case costs in error, or a cheaper one would
 
 
 @_closed

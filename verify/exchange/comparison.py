@@ -192,7 +192,7 @@ def _assess(
     key = digest_of([scene_content(scene), [file_digest(s / "record.json") for s in solves]])
     memory = options.memory or 0.8 * origin["memory"]
     comparison = Comparison(
-        scene, key, (), solves, folder, directory.root, origin, options.timeout, memory
+        scene, key, (), solves, {}, folder, directory.root, origin, options.timeout, memory
     )
     try:
         while (result := comparison.poll()) is None:

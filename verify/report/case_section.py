@@ -7,7 +7,7 @@ from verify.report.figures_cost import time_figure, unknowns_figure
 from verify.report.markup import Markup, joined, tag
 from verify.report.motion_section import motion_section
 from verify.report.notation import error_title, number, number_text, solver_title
-from verify.report.notices import warning_banner, warning_mark
+from verify.report.notices import adequacy_lines, warning_banner, warning_mark
 from verify.report.opening_section import opening_section
 from verify.report.pictures import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
@@ -46,6 +46,7 @@ def case_section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup
             tag("span", entry.name, class_="path"),
         ),
         tag("p", result.requirement, class_="requirement") if result else None,
+        *(adequacy_lines(result) if result else []),
     )
     if result is None:
         solved = sum(solve.status == "solved" for solve in entry.unjudged)

@@ -4,7 +4,7 @@ from verify.report.markup import Markup, joined, tag
 from verify.report.notation import metric_title, solver_title
 from verify.result import CaseResult, Notice, NoticeKind
 
-__all__ = ["unavailable_rows", "warning_banner", "warning_mark"]
+__all__ = ["adequacy_lines", "unavailable_rows", "warning_banner", "warning_mark"]
 
 
 def warning_mark(result: CaseResult | None) -> Markup | None:
@@ -25,6 +25,15 @@ def warning_banner(result: CaseResult) -> Markup | None:
         for notice in result.warnings
     ]
     return tag("div", said, class_="banner", role="alert")
+
+
+def adequacy_lines(result: CaseResult) -> list[Markup]:
+    """Return a line for each other model that was measured beside the case's own."""
+    return [
+        tag("p", tag("b", "Adequacy of the model"), ": ", notice.text, class_="adequacy")
+        for notice in result.notices
+        if notice.kind is NoticeKind.ADEQUACY
+    ]
 
 
 def unavailable_rows(result: CaseResult, columns: int) -> list[Markup]:

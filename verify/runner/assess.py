@@ -38,6 +38,7 @@ from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in
 from verify.study.accuracy import assess_accuracy
+from verify.study.adequacy import adequacy_notice
 from verify.study.closing import with_openings
 from verify.whole_files import write_whole
 
@@ -63,6 +64,8 @@ def main(question_file: Path) -> None:
         scene, records, solutions, exact, question["judge_only"], announce
     )
     (folder / JUDGING).unlink(missing_ok=True)
+    notices = _adequacy(root, question["models"], scene, result)
+    result = replace(result, notices=[*result.notices, *notices])
     solutions = _comparable(result, solutions)
     result = _with_openings(result, scene, solutions, exact)
     result = replace(result, provenance=question["provenance"])
@@ -105,6 +108,26 @@ def _stored(
     at.unlink()
     where = {(r.solver, r.level): name for r, name in zip(records, folders, strict=True)}
     return records, solutions, where
+
+
+def _adequacy(
+    root: Path, models: Mapping[str, Sequence[str]], scene: Scene, result: CaseResult
+) -> list[Notice]:
+    """State what the model of the case costs beside others that were solved."""
+    found = []
+    for model, folders in models.items():
+        solutions: dict[int, Solution] = {}
+        for name in folders:
+            record = load_record(root / name)
+            if record.status is Status.SOLVED:
+                solutions[record.level] = read_solution(root / name / "solution")
+        try:
+            found.append(adequacy_notice(scene, model, solutions, result))
+        except Exception as error:  # it costs nobody a verdict
+            traceback.print_exc()
+            text = f"was not measured: {words_of(error)}"
+            found.append(Notice(NoticeKind.ADEQUACY, model, None, text))
+    return found
 
 
 def _with_openings(

@@ -5,7 +5,7 @@ others are compared again: a solution that cannot be compared costs nobody else 
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,8 @@ class Comparison:
         Solvers that are judged; empty: all.
     folders : sequence of Path
         Of the solves.
+    models : mapping of str to sequence of Path
+        Of the reference's solves of other models.
     folder : Path
         Of the case.
     root : Path
@@ -52,6 +54,7 @@ class Comparison:
         key: str,
         judge_only: Sequence[str],
         folders: Sequence[Path],
+        models: Mapping[str, Sequence[Path]],
         folder: Path,
         root: Path,
         origin: dict[str, Any],
@@ -65,6 +68,9 @@ class Comparison:
             "key": key,
             "judge_only": list(judge_only),
             "folders": [os.path.relpath(one, root) for one in folders],
+            "models": {
+                name: [os.path.relpath(one, root) for one in own] for name, own in models.items()
+            },
             "root": str(root.resolve()),
             "provenance": origin,
             "unfit": self._unfit,

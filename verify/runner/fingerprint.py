@@ -64,7 +64,9 @@ def physics_digest(scene: Scene) -> str:
     Defaults are left out, so that a key that a later version adds does not make another scene
     of it; a default whose meaning changes needs another version of the schema.
     """
-    words = {"title", "requirement", "tags", "acceptance", "known_findings", "contact"}
+    words = {
+        "title", "requirement", "tags", "acceptance", "known_findings", "contact", "adequacy",
+    }  # fmt: skip
     physics = scene.model_dump(mode="json", by_alias=True, exclude=words, exclude_defaults=True)
     content: list[Any] = [scene.schema_, physics]
     if isinstance(scene.geometry, MeshFile):

@@ -26,7 +26,7 @@ class Job:
     """Solve `case` with `solver` on mesh `level`, in `folder`.
 
     `key` identifies what is computed: scene, solver, level, repetitions, parameters and the
-    code of today.
+    code of today. With a `model` it is not the case's own, but another that it is measured by.
     """
 
     case: str
@@ -36,11 +36,13 @@ class Job:
     key: str
     folder: Path
     parameters: dict[str, Any] = field(default_factory=dict)
+    model: str = ""
 
     @property
     def label(self) -> str:
         """What a progress line calls it."""
-        return f"{self.case} · {self.solver} · level {self.level}"
+        whose = f"{self.solver} (other {self.model})" if self.model else self.solver
+        return f"{self.case} · {whose} · level {self.level}"
 
     def blank(self, status: Status, reason: str) -> SolveRecord:
         """Return a record of this solve without numbers."""

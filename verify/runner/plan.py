@@ -15,6 +15,7 @@ from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.interruption import StopRequest
 from verify.runner.job import Job
+from verify.runner.models import model_jobs
 from verify.runner.options import Options
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
@@ -30,7 +31,8 @@ Survey = dict[str, dict[str, Any]]
 class CasePlan:
     """The solves of one case, and the records of those that are known not to run.
 
-    `spare` are levels of the reference that are solved only if the others do not suffice.
+    `spare` are levels of the reference that are solved only if the others do not suffice, `models`
+    those of other models, whose scenes are `other_scenes`.
     """
 
     scene: Scene
@@ -38,6 +40,12 @@ class CasePlan:
     jobs: list[Job] = field(default_factory=list)
     refused: list[tuple[Job, SolveRecord]] = field(default_factory=list)
     spare: list[Job] = field(default_factory=list)
+    models: list[Job] = field(default_factory=list)
+    other_scenes: dict[str, Scene] = field(default_factory=dict)
+
+    def scene_of(self, job: Job) -> Scene:
+        """Return the scene that a job solves: that of the case, or of another model of it."""
+        return self.other_scenes.get(job.model, self.scene)
 
 
 def solvers_of(scene: Scene, options: Options) -> list[str]:
@@ -168,4 +176,7 @@ def plan_case(
         else:
             plan.jobs += jobs[:planned]
             plan.spare += jobs[planned:most]
+    if options.judged and bundle is None:
+        folder = directory.case_folder(scene.name)
+        plan.models, plan.other_scenes = model_jobs(scene, folder)
     return plan

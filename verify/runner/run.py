@@ -142,8 +142,8 @@ class _Work:
         self.plans = {plan.scene.name: plan for plan in plans}
         for plan in plans:
             take_up_known_levels(plan)
-        self.waiting: list[Job] = [job for plan in plans for job in plan.jobs]
-        self.open = {name: len(plan.jobs) for name, plan in self.plans.items()}
+        self.waiting: list[Job] = [job for plan in plans for job in (*plan.jobs, *plan.models)]
+        self.open = {n: len(plan.jobs) + len(plan.models) for n, plan in self.plans.items()}
         self.to_judge = [name for name, count in self.open.items() if not count]
         self.running: dict[Running, Job] = {}
         self.comparing: list[Comparison] = []
@@ -158,7 +158,7 @@ class _Work:
     def until_done(self, stop: StopRequest) -> list[CaseResult]:
         """Run everything; kill what runs if that is interrupted or fails."""
         self.progress.planned(
-            sum(len(plan.jobs) + len(plan.refused) for plan in self.plans.values()),
+            sum(self.open.values()) + sum(len(plan.refused) for plan in self.plans.values()),
             len(self.plans),
         )
         try:
@@ -220,7 +220,7 @@ class _Work:
             self._solve_done(job, self._kept(job, record), reused=True)
             return
         content = {
-            "scene": scene_content(self.plans[job.case].scene),
+            "scene": scene_content(self.plans[job.case].scene_of(job)),
             "solver": job.solver,
             "level": job.level,
             "repetitions": job.repetitions,
@@ -237,7 +237,7 @@ class _Work:
 
     def _known(self, job: Job) -> SolveRecord | None:
         """Take a reference from the bundle or the cache."""
-        scene = self.plans[job.case].scene
+        scene = self.plans[job.case].scene_of(job)
         if job.solver != REFERENCE:
             return None
         if self.bundle is not None:
@@ -247,7 +247,7 @@ class _Work:
     def _ended(self, job: Job, solve: Running, ending: Ending) -> None:
         record = self._record(job, solve, ending)
         if job.solver == REFERENCE and self.cache is not None:
-            trouble = self.cache.keep(self.plans[job.case].scene, job, record)
+            trouble = self.cache.keep(self.plans[job.case].scene_of(job), job, record)
             if trouble:
                 record.notes["cache"] = trouble
         record = self._kept(job, record)
@@ -318,7 +318,8 @@ class _Work:
 
     def _judge(self, case: str) -> None:
         plan, folder = self.plans[case], self.directory.case_folder(case)
-        jobs = [*plan.jobs, *(job for job, _ in plan.refused)]
+        own = [*plan.jobs, *(job for job, _ in plan.refused)]
+        jobs = [*own, *plan.models]
         self._restore(plan, jobs)
         if lost := self._lost(jobs):
             self.waiting = [*lost, *self.waiting]
@@ -334,7 +335,11 @@ class _Work:
             plan.scene,
             key,
             judge_only,
-            [job.folder for job in jobs],
+            [job.folder for job in own],
+            {
+                model: [j.folder for j in plan.models if j.model == model]
+                for model in plan.other_scenes
+            },
             folder,
             self.directory.root,
             self.origin,

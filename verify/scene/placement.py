@@ -36,6 +36,7 @@ def check_placement(scene: "Scene") -> None:
     _check_names(scene)
     _check_acceptance(scene)
     _check_known_findings(scene)
+    _check_adequacy(scene)
     check_parts_act(scene)
     _check_times(scene)
     check_cuts(scene)
@@ -313,6 +314,16 @@ def _check_acceptance(scene: "Scene") -> None:
             raise ValueError(f"{place}: {check.metric} belongs to a dynamic analysis")
         if check.check == "rate" and scene.mesh.count < 2:
             raise ValueError(f"acceptance[{i}]: a rate needs at least two mesh levels")
+
+
+def _check_adequacy(scene: "Scene") -> None:
+    """Refuse models that the scene has no other one of."""
+    if scene.adequacy.motion and scene.analysis.kind == "static":
+        raise ValueError("adequacy.motion: belongs to a dynamic analysis")
+    if scene.adequacy.kinematics and scene.cell_dimension < scene.dimension:
+        raise ValueError("adequacy.kinematics: a membrane has no linear kinematics")
+    if scene.adequacy.models and scene.played_only:
+        raise ValueError(f"adequacy: {scene.played_only}")
 
 
 def _check_known_findings(scene: "Scene") -> None:

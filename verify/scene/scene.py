@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr, model_validator
 
 from verify.scene.acceptance import Acceptance, KnownFinding, Quantity, StrainEnergyQuantity
+from verify.scene.adequacy import Adequacy
 from verify.scene.contact import Contact
 from verify.scene.cuts import Cut, whole_cut
 from verify.scene.family import Row
@@ -55,6 +56,7 @@ class Scene(Strict):
     )
     acceptance: list[Acceptance] = Field(default_factory=list)
     known_findings: list[KnownFinding] = Field(default_factory=list)
+    adequacy: Adequacy = Field(default_factory=Adequacy)
 
     # where it was read from; set by `load_scene`
     _file: Path | None = PrivateAttr(default=None)

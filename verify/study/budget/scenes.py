@@ -140,7 +140,7 @@ def _at_last(part: dict[str, Any], value: str) -> dict[str, Any]:
 
 def _changed(scene: Scene, name: str, update: dict[str, Any]) -> Scene:
     content = scene.model_dump(mode="json", by_alias=True)
-    content |= {"acceptance": [], "known_findings": [], "tags": []}
+    content |= {"acceptance": [], "known_findings": [], "tags": [], "adequacy": {}}
     for key, value in update.items():
         merged = isinstance(value, dict) and key != "initial"  # of which each kind has its own keys
         content[key] = {**content[key], **value} if merged else value

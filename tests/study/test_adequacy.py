@@ -1,0 +1,96 @@
+"""What a model costs in error is said beside the verdict, by the run, and does not move it."""
+
+import re
+
+import pytest
+from pydantic import ValidationError
+
+from verify.compare.hooke import law_of
+from verify.compare.strain_energy import strain_energy
+from verify.result import NoticeKind
+from verify.runner.fingerprint import physics_digest
+from verify.scene import Scene, scene_hash
+from verify.solvers import find_solver
+from verify.study.accuracy import assess_accuracy
+from verify.study.adequacy import adequacy_notice, other_scene
+
+CASE = {
+    "title": "t",
+    "requirement": "r",
+    "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [0.4, 0.1]},
+    "mesh": {"cells": [[4, 2]]},
+    "material": {"young": 1e3, "poisson": 0.3, "plane": "strain", "density": 100.0},
+    "supports": [{"where": "left", "displacement": [0.0, 0.0]}],
+    "loads": [{"kind": "gravity", "acceleration": [0.0, -0.13]}],
+    "reference": {"size": 0.03},
+    "quantities": [
+        {"kind": "strain_energy"},
+        {"kind": "displacement", "name": "sag", "point": [0.4, 0.05], "component": "y"},
+    ],
+}
+
+
+def scene(**changes) -> Scene:
+    return Scene.model_validate(CASE | changes)
+
+
+@pytest.mark.parametrize("kinematics", ["linear", "finite_rotation"])
+def test_a_beam_that_bends_far_says_what_linear_kinematics_costs(kinematics: str) -> None:
+    """The same pair of references whichever is asked, so the same per cents within their widths.
+
+    A cantilever that linear theory bends far bends less at finite rotation.
+    """
+    one = scene(analysis={"kinematics": kinematics}, adequacy={"kinematics": True})
+    other = other_scene(one, "kinematics")
+    reference = find_solver("reference")
+    own, beside = ({k: reference.solve(s, k, 0) for k in range(3)} for s in (one, other))
+    judged = find_solver("conforming").solve(one, 0, 0)
+    record = _record(judged)
+    result = assess_accuracy(one, [record], {"conforming": {0: judged}, "reference": own})
+    notice = adequacy_notice(one, "kinematics", beside, result)
+    assert notice.kind is NoticeKind.ADEQUACY
+    linear, rotating = (own, beside) if kinematics == "linear" else (beside, own)
+    rich = strain_energy(rotating[2], law_of(one if kinematics != "linear" else other))
+    poor = strain_energy(linear[2], law_of(one if kinematics == "linear" else other))
+    assert "in strain_energy" in notice.text, notice.text
+    said = float(re.search(r"([\d.]+) % \(± [^)]*\) in strain_energy", notice.text)[1])  # type: ignore[index]
+    assert said == pytest.approx(100 * abs(poor / rich - 1), rel=0.06)  # two digits
+    assert said > 0.5
+    word = "against" if kinematics == "linear" else "instead of"
+    assert notice.text.startswith(f"linear kinematics {word} finite rotation: ")
+
+
+def _record(solution):
+    from verify.result import SolveRecord, Status
+
+    return SolveRecord("scene", "conforming", 0, Status.SOLVED, "", size=solution.size, unknowns=10)
+
+
+def test_what_cannot_be_measured_is_said() -> None:
+    one = scene(adequacy={"kinematics": True})
+    judged = find_solver("conforming").solve(one, 0, 0)
+    result = assess_accuracy(one, [_record(judged)], {"conforming": {0: judged}})
+    notice = adequacy_notice(one, "kinematics", {}, result)
+    assert "was not measured" in notice.text
+    assert "0 solved levels" in notice.text
+
+
+def test_the_question_does_not_change_the_scene_that_is_solved() -> None:
+    """References stay in the cache; the other scene asks nothing further."""
+    asked, plain = scene(adequacy={"kinematics": True}), scene()
+    assert physics_digest(asked) == physics_digest(plain)
+    assert scene_hash(asked) == scene_hash(plain)
+    other = other_scene(asked, "kinematics")
+    assert not other.adequacy.models
+    assert other.analysis.kinematics == "corotational"
+    assert other.reference.levels == 3
+
+
+def test_the_static_answer_beside_a_motion_is_that_of_the_last_loads() -> None:
+    moving = scene(
+        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.1},
+        adequacy={"motion": True},
+    )
+    assert other_scene(moving, "motion").analysis.kind == "static"
+    with pytest.raises(ValidationError, match=r"adequacy\.motion: belongs to a dynamic"):
+        scene(adequacy={"motion": True})
