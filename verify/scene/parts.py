@@ -11,7 +11,6 @@ from verify.scene.scene import Scene
 __all__ = ["copies_on_part", "lie_on_part", "on_edges", "on_part"]
 
 _TOLERANCE = 1e-9  # of the body's size: a point closer than that to a part is on it
-_BESIDE = 0.01  # of the way from a node into a facet: what decides for the copies of one node
 
 
 def on_part(scene: Scene, where: str, points: NDArray[np.float64], key: str) -> NDArray[np.bool_]:
@@ -55,9 +54,10 @@ def copies_on_part(
 ) -> NDArray[np.bool_]:
     """Tell which nodes of the boundary of a cut body lie on the part `where`, each on its own side.
 
-    Where a cut comes out of the body, a place has a copy of its node for every side. A part may
-    end there: a copy is on it if the boundary of its own material beside it is. Where that is so
-    of no copy, the part is a mere point or line and holds them all.
+    Where a cut comes out of the body, a place has a copy of its node for every side. A copy is on
+    the part if the boundary of its own material beside it is, in the middle of a facet: so a part
+    may end there, and the cut may come out beside that end by less than half a facet. Where no
+    copy is on it so, the part is a mere point or line and holds those whose place is on it.
 
     Parameters
     ----------
@@ -67,19 +67,28 @@ def copies_on_part(
         Places of the nodes, m, equal to the last bit for the copies of one.
     beside : (k,) int array and (k, d) array
         Facets of the boundary, or parts of such: a node of each, and its centroid, m.
+
+    Raises
+    ------
+    InputError
+        If there is none.
     """
-    found = on_part(scene, where, points, key)
+    size = float(np.ptp(points, axis=0).max(initial=0.0))
     _, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     place = place.ravel()
-    asked = found & (count[place] > 1)
-    node, centroid = beside[0][asked[beside[0]]], beside[1][asked[beside[0]]]
-    inward = points[node] + _BESIDE * (centroid - points[node])
-    size = float(np.ptp(points, axis=0).max(initial=0.0))
+    copied = count[place] > 1
+    node, centroid = beside[0][copied[beside[0]]], beside[1][copied[beside[0]]]
     own = np.zeros(len(points), dtype=bool)
-    own[node[lie_on_part(scene, where, inward, size)]] = True
+    own[node[_found(scene.geometry, where, centroid, size)]] = True
     decided = np.zeros(len(count), dtype=bool)
     decided[place[own]] = True
-    return found & (own | ~asked | ~decided[place])
+    if decided.all():
+        return own
+    rest = ~decided[place]
+    own[rest] = _found(scene.geometry, where, points[rest], size)
+    if not own.any():
+        return on_part(scene, where, points, key)  # which says so
+    return own
 
 
 def lie_on_part(
