@@ -16,7 +16,7 @@ from reference.meshing.session import gmsh_session, simplices
 from reference.meshing.solid import solid_mesh
 from reference.meshing.tip_rings import shrink_to_points
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene
+from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene, ToolPathCut
 
 __all__ = ["conforming_mesh"]
 
@@ -66,7 +66,8 @@ def conforming_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
             curves = [tag for cut in scene.final_cuts for tag in _add_cut(gmsh, cut, origin, scale)]
             met = [_add_interface(gmsh, f, origin, scale) for f in plane_interfaces(scene)]
             cut_curves = _fragment(gmsh, surface, curves, met)
-            _set_sizes(gmsh, grading, features, origin, scale)
+            ways = [one for one in features if one.name in _ways(scene)]
+            _set_sizes(gmsh, grading, (features, ways), origin, scale)
             gmsh.option.setNumber("Mesh.Algorithm", 5 if len(grading.points) else 6)
             gmsh.model.mesh.generate(2)
             points, cells, number = simplices(gmsh, 2)
@@ -156,9 +157,19 @@ def _fragment(gmsh: ModuleType, surface: int, curves: list[int], met: list[int])
     return inside
 
 
+def _ways(scene: Scene) -> list[str]:
+    """Names of the features that a blade cuts on its way."""
+    return [f"cut '{cut.name}'" for cut in scene.cuts if isinstance(cut, ToolPathCut)]
+
+
 def _set_sizes(
-    gmsh: ModuleType, grading: Grading, features: list[Feature], origin: Array, scale: float
+    gmsh: ModuleType,
+    grading: Grading,
+    features: tuple[list[Feature], list[Feature]],
+    origin: Array,
+    scale: float,
 ) -> None:
+    """Set the sizes around all features, and along those that a blade makes on its way."""
     size, radius, smallest = (
         value / scale for value in (grading.size, grading.radius, grading.meshed)
     )
@@ -177,14 +188,20 @@ def _set_sizes(
         terms.append(tag)
         smallest = min(smallest, at_point / scale)
     if grading.strip is not None:
-        close = close_pairs(features, APART * scale, grading.size / grading.strip)
+        close = close_pairs(features[0], APART * scale, grading.size / grading.strip)
         for i, j in close:
             tag = field.add("MathEval")
-            apart = " + ".join(_distance(features[k], origin, scale) for k in (i, j))
+            apart = " + ".join(_distance(features[0][k], origin, scale) for k in (i, j))
             field.setString(tag, "F", f"{grading.strip:.17g}*({apart})")
             terms.append(tag)
-            gap = grading.strip * features[i].gap(features[j]) / scale
+            gap = grading.strip * features[0][i].gap(features[0][j]) / scale
             smallest = min(smallest, gap)
+    for one in features[1] if grading.way is not None else []:
+        tag = field.add("MathEval")
+        away = f"0.5*({_distance(one, origin, scale)})"
+        field.setString(tag, "F", f"{grading.way / scale:.17g} + {away}")
+        terms.append(tag)
+        smallest = min(smallest, grading.way / scale)
     far = field.add("MathEval")
     field.setString(far, "F", f"{size:.17g}")
     least = field.add("Min")

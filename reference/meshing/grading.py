@@ -56,6 +56,9 @@ class Grading:
         In space: whether to grade to fronts, kinks and junctions of the cuts and to the edges
         where supports end. With exponent ⅔, where quadratic elements reach order 3 in energy
         around an edge, the unknowns grow by no more than h⁻³ (but for a logarithm).
+    way : float, optional
+        Element size along cuts that a blade makes on its way, m: the tip is everywhere there once.
+        Elements grow by half of their distance from them.
     """
 
     size: float
@@ -66,6 +69,7 @@ class Grading:
     clear: Array | None = None
     share: float = 1 / 3
     curves: bool = False
+    way: float | None = None
 
     @property
     def smallest(self) -> float:
@@ -81,7 +85,9 @@ class Grading:
     def halved(self, level: int) -> "Grading":
         """Divide all sizes by 2^level."""
         strip = None if self.strip is None else self.strip / 2**level
-        return replace(self, size=self.size / 2**level, strip=strip, share=self.share / 2**level)
+        way = None if self.way is None else self.way / 2**level
+        size, share = self.size / 2**level, self.share / 2**level
+        return replace(self, size=size, strip=strip, share=share, way=way)
 
     def close_points(self) -> list[tuple[Array, float]]:
         """Points that are graded to anew, each with the distance r₀ from which on, m.

@@ -34,6 +34,7 @@ from verify.scene import (
     Rectangle,
     Scene,
     SweptCut,
+    ToolPathCut,
     read_mesh,
 )
 from verify.scene.cuts import Cut
@@ -41,6 +42,7 @@ from verify.scene.cuts import Cut
 __all__ = ["Structure", "not_imprinted", "peer_mesh", "reference_mesh", "structure"]
 
 Array = NDArray[np.float64]
+_WAY = 1 / 16  # size of elements along the way of a blade, over that far away
 Cells = NDArray[np.int64]
 
 
@@ -123,7 +125,9 @@ def _plane_grading(scene: Scene) -> Grading:
     extent = np.sqrt(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
     size = scene.reference.size or extent / 12
     points = singular_points(scene)
-    return Grading(size, points, extent / 2, strip=1.0, clear=clear_radii(scene, points))
+    on_its_way = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
+    way = size * _WAY if on_its_way else None
+    return Grading(size, points, extent / 2, strip=1.0, clear=clear_radii(scene, points), way=way)
 
 
 def _solid_grading(scene: Scene) -> Grading:
