@@ -1,16 +1,24 @@
-"""Factor by which errors that are none of the elements' fall from level to level."""
+"""How errors can be counted on to fall from level to level: the elements', and what is not theirs."""
 
 from collections.abc import Sequence
 from math import inf
 
 from verify.compare.body import AnyBody
 from verify.compare.realised import cut_deviation
-from verify.scene import Scene
+from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
 
-__all__ = ["error_fall"]
+__all__ = ["counted_order", "error_fall"]
 
 _ON_THE_CUT = 1e-10  # of the body's size
+
+
+def counted_order(scene: Scene | None, solution: Solution) -> float:
+    """Return the order in the energy norm that can be counted on: that of the elements.
+
+    It is ½ where a blade goes on its way: its tip is everywhere once, and no mesh graded to it.
+    """
+    return 0.5 if scene is not None and _cut_on_the_way(scene) else solution.order
 
 
 def error_fall(
@@ -20,7 +28,8 @@ def error_fall(
 
     Straight facets approach a curved cut like h². How far they are off it is measured: along a
     short arc their number does not double exactly. Time steps are of second order, and halve
-    with the elements. Infinite where neither limits the order of the elements.
+    with the elements. What opens behind a blade is late by the length of a facet, which halves.
+    Infinite where none limits the order of the elements.
 
     Parameters
     ----------
@@ -34,8 +43,14 @@ def error_fall(
     """
     ratio = sizes[-2] / sizes[-1]
     found = inf if scene.analysis.kind == "static" else ratio**2
+    if _cut_on_the_way(scene):
+        found = ratio
     before, last = (cut_deviation(solution, body) for solution in solutions[-2:])
     if last > _ON_THE_CUT * body.size:
         # an unlucky pair of meshes is still one refinement apart
         found = min(found, max(before / last, ratio))
     return found
+
+
+def _cut_on_the_way(scene: Scene) -> bool:
+    return any(isinstance(cut, ToolPathCut) for cut in scene.cuts)

@@ -29,7 +29,7 @@ from verify.scene.acceptance import (
     StressIntensityQuantity,
 )
 from verify.solution import Solution
-from verify.study.error_fall import error_fall
+from verify.study.error_fall import counted_order, error_fall
 from verify.study.error_history import ERROR_NAMES, base_of, compared_times, error_history
 from verify.study.local_difference import local_difference
 from verify.study.quantities import Measured, field_quantity
@@ -232,7 +232,7 @@ def conforming_reference(
         )
     sizes = [size_of(solution) for solution in solutions]
     measured = [Measured(solution, body, law, scene) for solution in solutions]
-    order = solutions[-1].order
+    order = counted_order(scene, solutions[-1])
     falls = error_fall(scene, solutions, sizes, body)
     norms, entries = _field_norms(scene, measured, sizes, order, size, falls)
     field_order = entries["energy_norm"]["order"]
@@ -251,7 +251,7 @@ def conforming_reference(
         entry = _entry([*[None] * coarse, *values], known)
         metrics[asked.name] = entry | _second_opinion(scene, asked, second, known)
     metrics |= entries
-    source = f"conforming P{order}, {len(solutions)} levels, GCI"
+    source = f"conforming P{solutions[-1].order}, {len(solutions)} levels, GCI"
     record = {
         "kind": "conforming",
         "source": source,
@@ -290,7 +290,7 @@ def known_quantity(
     falls : float
         See `verify.study.richardson.extrapolate`.
     """
-    order = measured[-1].solution.order
+    order = counted_order(measured[-1].scene, measured[-1].solution)
     if isinstance(asked, DisplacementQuantity | OpeningQuantity):
         around = [local_difference(asked, *pair) for pair in pairwise(measured)]
         return place_uncertainty(values[-1], around, sizes, order + 1, falls)
@@ -318,7 +318,7 @@ def _field_norms(
     scene: Scene,
     measured: Sequence[Measured],
     sizes: Sequence[float],
-    order: int,
+    order: float,
     size: float,
     falls: float,
 ) -> tuple[dict[str, float], dict[str, Any]]:
