@@ -13,12 +13,15 @@ from reference.elasticity import load_form, mass_form
 from reference.large_strain import solve_large_strain
 from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
+from reference.tied_solver import TiedSolver
 from verify.scene import Gravity, Scene, Support
 from verify.scene.history import factor_at, first_factor, slope_at
 
 __all__ = ["MovingBody"]
 
 Array = NDArray[np.float64]
+_ROUND_OFF = 1e-14  # of the accelerations
+_MOST_ITERATIONS = 1000
 
 
 @dataclass(frozen=True)
@@ -116,8 +119,10 @@ class MovingBody:
             mark[one.place] = True
         self._own_held = np.flatnonzero(mark.ravel()).astype(np.int32)
         self.ties = TiedUnknowns(self.law.unknowns, space)
-        alone = self.law.unknowns is space
-        self._moving = self.ties if alone else TiedUnknowns(space, space)
+        self._lasting: NDArray[np.int64] | None = None
+        diagonal = self.mass.petsc.getDiagonal()
+        self._mass_diagonal = space.everywhere(diagonal.array).ravel()
+        diagonal.destroy()
         self.tie(np.zeros((0, 2), dtype=np.int64))
 
     def tie(self, pairs: NDArray[np.int64]) -> None:
@@ -125,8 +130,7 @@ class MovingBody:
 
         A support that holds one node of a group holds all; of several the lowest number decides.
         """
-        for ties in {id(one): one for one in (self.ties, self._moving)}.values():
-            ties.tie(pairs)
+        self.ties.tie(pairs)
         self.held = self.ties.all_tied_to(self._own_held)
         d = self.space.dimension
         node, component = np.divmod(self._own_held, d)
@@ -177,15 +181,52 @@ class MovingBody:
         return found.displacement.ravel()
 
     def accelerations(self, forces: Array) -> Array:
-        """Solve M a = forces, with a = 0 where held."""
-        return self._solved(self.mass.petsc.copy(), self._moving, "definite", forces)
+        """Solve M a = forces, with a = 0 where held.
 
-    def step_solver(self, matrix: Any, kind: Literal["symmetric", "general"]) -> NodalSolver:
+        By conjugate gradients: over its diagonal a consistent mass has a condition of a few tens,
+        whatever the mesh, and no factorisation lasts longer than until a facet opens.
+
+        Raises
+        ------
+        RuntimeError
+            If they do not converge.
+        """
+        ties, d = self.ties, self.space.dimension
+        free = np.ones(len(forces))
+        free[self.held] = 0.0
+        free.reshape(-1, d)[ties.followers] = 0.0
+        scale = 1.0 / np.where(free > 0.0, ties.summed(self._mass_diagonal), 1.0)
+        a, left = np.zeros_like(forces), free * ties.summed(forces)
+        along = scale * left
+        size = first = float(left @ along)
+        for _ in range(_MOST_ITERATIONS):
+            if size <= _ROUND_OFF**2 * first:
+                return ties.spread(a)
+            product = free * ties.summed(self.mass @ ties.spread(along))
+            share = size / float(along @ product)
+            a += share * along
+            left -= share * product
+            before, size = size, float(left @ (scale * left))
+            along = scale * left + size / before * along
+        raise RuntimeError("the accelerations are not found: the mass has an element without any")
+
+    def plan(self, lasting: NDArray[np.int64] | None) -> None:
+        """Take ties (p, 2) of `lasting_ties` for all that will ever be tied; see `step_solver`."""
+        self._lasting = lasting
+
+    def step_solver(
+        self, matrix: Any, kind: Literal["symmetric", "general"]
+    ) -> NodalSolver | TiedSolver:
         """Factorise a matrix of all unknowns, which is destroyed with the solver.
 
-        What a solve misses the next iteration of a step corrects, if it is little.
+        What a solve misses the next iteration of a step corrects, if it is little. It is good
+        until a tie goes; of linear laws with a plan also then.
         """
-        return NodalSolver(self.ties.projected(matrix), self.ties, self.held, kind, largest=1e-3)
+        if self._lasting is None:
+            ties = self.ties
+            return NodalSolver(ties.projected(matrix), ties, self.held, kind, largest=1e-3)
+        whole = NodalSolver(matrix, self.law.unknowns, self._own_held, kind, largest=1e-3)
+        return TiedSolver(whole, self.ties, self._lasting, self._own_held)
 
     def _linear_equilibrium(self, factors: list[float]) -> Array:
         load = self.weight.copy()
@@ -197,20 +238,10 @@ class MovingBody:
         pairs = zip(self._supports, factors, strict=True)
         u[self.held] = self._filled([one.values(factor, 0.0) for one, factor in pairs])
         left = load - self.law.force(u)
-        return u + self._solved(self.law.tangent(u), self.ties, "symmetric", left)
-
-    def _solved(
-        self,
-        matrix: Any,
-        ties: TiedUnknowns,
-        kind: Literal["definite", "symmetric"],
-        forces: Array,
-    ) -> Array:
-        """Solve a system, with zero where held, and destroy it."""
-        right = forces.copy()
-        right[self.held] = 0.0
-        solver = NodalSolver(ties.projected(matrix), ties, self.held, kind)
-        found = solver.solve(right)
+        left[self.held] = 0.0
+        matrix = self.ties.projected(self.law.tangent(u))
+        solver = NodalSolver(matrix, self.ties, self.held, "symmetric")
+        found = u + solver.solve(left)
         solver.destroy()
         return found
 

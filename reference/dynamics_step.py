@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from reference.dynamics import Scheme
 from reference.dynamics_body import MovingBody
 from reference.nodal_algebra import NodalSolver
+from reference.tied_solver import TiedSolver
 
 __all__ = ["State", "StepForces", "Stepper"]
 
@@ -76,7 +77,7 @@ class Stepper:
     def __init__(self, body: MovingBody, scheme: Scheme, averaged: bool, size: float) -> None:
         self.body, self.scheme, self.averaged, self.size = body, scheme, averaged, size
         self.solves = 0
-        self._solver: NodalSolver | None = None
+        self._solver: NodalSolver | TiedSolver | None = None
         self._before = np.zeros(0)  # internal and viscous force at the start of the step
         self._load = np.zeros(0)
         self._travelled: Array | None = None  # in the last step

@@ -57,10 +57,12 @@ class TiedUnknowns(SharedUnknowns):
         The node that leads the group of each node.
     followers : (f,) int array
         Nodes that another one leads.
+    dimension : int
+        Of the space.
     """
 
     def __init__(self, unknowns: SharedUnknowns, space: ConformingSpace) -> None:
-        self._whole, self._d = unknowns, space.dimension
+        self._whole, self.dimension = unknowns, space.dimension
         self.function_space = unknowns.function_space
         self.leader = np.arange(len(space.node_points))
         self.followers = self.leader[:0]
@@ -81,14 +83,14 @@ class TiedUnknowns(SharedUnknowns):
             self._expansion = None
         if not len(self.followers):
             return
-        led = np.zeros((count, self._d))
+        led = np.zeros((count, self.dimension))
         led[self.followers] = 1.0
         self._kept = whole.own_part(led) == 0.0
         size = int(self._kept.sum())
         first = int(self.function_space.mesh.comm.scan(size)) - size
         own = first + np.cumsum(self._kept) - 1
         numbers = whole.everywhere(own.astype(float))[self.leader]
-        moves = whole.own_part(np.ones((count, self._d))) > 0.0
+        moves = whole.own_part(np.ones((count, self.dimension))) > 0.0
         self._column = np.where(moves, whole.own_part(numbers).astype(np.int64), own)
         self._assemble(size)
 
@@ -116,7 +118,7 @@ class TiedUnknowns(SharedUnknowns):
         """Sum forces (k,) over each group, and give them to its leader."""
         if not len(self.followers):
             return forces
-        total = forces.reshape(-1, self._d).copy()
+        total = forces.reshape(-1, self.dimension).copy()
         np.add.at(total, self.leader[self.followers], total[self.followers])
         total[self.followers] = 0.0
         return total.ravel()
@@ -124,12 +126,16 @@ class TiedUnknowns(SharedUnknowns):
     def mean(self, values: Array) -> Array:
         """Give each group the mean of its displacements (k,)."""
         shares = np.bincount(self.leader, minlength=len(self.leader))
-        mean = self.summed(values).reshape(-1, self._d) / np.maximum(shares, 1)[:, None]
-        return mean[self.leader].ravel()
+        mean = self.summed(values).reshape(-1, self.dimension) / np.maximum(shares, 1)[:, None]
+        return self.spread(mean)
+
+    def spread(self, values: Array) -> Array:
+        """Give each node the displacement (k,) of its leader."""
+        return np.asarray(values.reshape(-1, self.dimension)[self.leader].ravel())
 
     def all_tied_to(self, unknowns: NDArray[np.int32]) -> NDArray[np.int32]:
         """All scalar displacements in groups of which one is among some, ascending."""
-        mark = np.zeros((len(self.leader), self._d), dtype=bool)
+        mark = np.zeros((len(self.leader), self.dimension), dtype=bool)
         mark.ravel()[unknowns] = True
         np.logical_or.at(mark, self.leader, mark.copy())
         return np.flatnonzero(mark[self.leader]).astype(np.int32)

@@ -17,6 +17,7 @@ from reference.dynamics_ties import facing_nodes
 from reference.fracture.pressure import MIXED
 from reference.moduli import wave_speed
 from reference.space import ConformingSpace, conforming_space
+from reference.tied_solver import lasting_ties
 from reference.weak_place import naming_weak_places
 from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.cuts import Cut
@@ -27,6 +28,8 @@ __all__ = ["SCHEMES", "ConformingMotion", "Marching", "move", "natural_step"]
 Array = NDArray[np.float64]
 _SAME = 1e-12  # of the duration: times that close are one
 _PASSED = 1e-9  # of the duration: what is passed so little later counts as passed
+_MOST_TIES = 6000  # of which the dense factor has 0.3 GB
+_SOLVES = 20  # that take as long as a factorisation
 SCHEMES = ("newmark", "energy_momentum", "implicit_euler", "generalised_alpha")
 
 
@@ -153,6 +156,7 @@ class _Mover:
         self.facing = facing_nodes(space)
         self.opening = self._snapped(opening_times(scene, space.mesh, marching.delay))
         self.closed = np.ones(len(self.opening), dtype=bool)
+        self.planned = self._plan()
         self.ledger = Ledger()
         phases = ("loading", "initial state", "steps", "accounting")
         self.timings = dict.fromkeys(phases, 0.0)
@@ -186,6 +190,21 @@ class _Mover:
             self._notes(),
         )
 
+    def _plan(self) -> bool:
+        """Choose between one factorisation with all that is ever tied, and one per opening.
+
+        The first takes as many solves as there are ties, once.
+        """
+        if self.scene.analysis.kinematics != "linear":
+            return False
+        lasting = lasting_ties(self.facing, self.opening)
+        ties = lasting.size // 2 * self.space.dimension
+        openings = len(np.unique(np.ceil(self.opening / self.marching.largest)))
+        if not 0 < ties <= min(_MOST_TIES, _SOLVES * openings):
+            return False
+        self.body.plan(lasting)
+        return True
+
     def _snapped(self, times: Array) -> Array:
         """Give output times for those that are the same up to round-off."""
         if not len(times):
@@ -207,7 +226,7 @@ class _Mover:
     def _tie(self, closed: NDArray[np.bool_]) -> None:
         self.closed = closed
         self.body.tie(self.facing[closed].reshape(-1, 2))
-        for stepper in self.steppers.values():
+        for stepper in self.steppers.values() if not self.planned else ():
             stepper.close()
 
     def _initial(self) -> State:
