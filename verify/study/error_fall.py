@@ -1,4 +1,4 @@
-"""How errors can be counted on to fall from level to level: the elements', and what is not theirs."""
+"""How errors fall from level to level: those of the elements, and what is not theirs."""
 
 from collections.abc import Sequence
 from math import inf
