@@ -196,12 +196,13 @@ def _set_sizes(
             terms.append(tag)
             gap = grading.strip * features[0][i].gap(features[0][j]) / scale
             smallest = min(smallest, gap)
-    for one in features[1] if grading.way is not None else []:
+    near = (grading.way or grading.size) / scale
+    for one in features[1]:
         tag = field.add("MathEval")
         away = f"0.5*({_distance(one, origin, scale)})"
-        field.setString(tag, "F", f"{grading.way / scale:.17g} + {away}")
+        field.setString(tag, "F", f"{near:.17g} + {away}")
         terms.append(tag)
-        smallest = min(smallest, grading.way / scale)
+        smallest = min(smallest, near)
     far = field.add("MathEval")
     field.setString(far, "F", f"{size:.17g}")
     least = field.add("Min")

@@ -62,7 +62,7 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
             graded = []
             if grading.curves:
                 graded = [*cut.singular, *_clamped(gmsh, scene, cut, lower, scale)]
-            _set_sizes(gmsh, grading, graded, scale)
+            _set_sizes(gmsh, grading, graded, cut.faces if grading.way else [], scale)
             gmsh.option.setNumber("Mesh.Algorithm3D", _HXT)
             gmsh.model.mesh.generate(3)
             points, cells, number = simplices(gmsh, 3)
@@ -77,11 +77,15 @@ def solid_mesh(scene: Scene, grading: Grading) -> ConformingMesh:
     return mesh
 
 
-def _set_sizes(gmsh: ModuleType, grading: Grading, curves: list[int], scale: float) -> None:
+def _set_sizes(
+    gmsh: ModuleType, grading: Grading, curves: list[int], way: list[int], scale: float
+) -> None:
+    """Set the sizes around curves, and along faces that a blade makes on its way."""
     size, radius, smallest = (
         value / scale for value in (grading.size, grading.radius, grading.smallest)
     )
     field = gmsh.model.mesh.field
+    terms: list[int] = []
     if curves:
         longest = max(gmsh.model.occ.getMass(1, curve) for curve in curves)
         distance = field.add("Distance")
@@ -90,8 +94,20 @@ def _set_sizes(gmsh: ModuleType, grading: Grading, curves: list[int], scale: flo
         graded = field.add("MathEval")
         law = f"{size:.17g}*(F{distance}/{radius:.17g})^{grading.exponent:.17g} + {smallest:.17g}"
         field.setString(graded, "F", law)
-        field.setAsBackgroundMesh(graded)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5 if curves else size)
+        terms.append(graded)
+    if way and grading.way is not None:
+        near = grading.way / scale
+        smallest = min(smallest, near) if curves else near
+        distance, graded = field.add("Distance"), field.add("MathEval")
+        field.setNumbers(distance, "SurfacesList", way)
+        field.setNumber(distance, "Sampling", min(_MOST_SAMPLES, 20 + 2 / near))
+        field.setString(graded, "F", f"{near:.17g} + 0.5*F{distance}")
+        terms.append(graded)
+    if terms:
+        least = field.add("Min")
+        field.setNumbers(least, "FieldsList", terms)
+        field.setAsBackgroundMesh(least)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", smallest * 0.5 if terms else size)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
 
 

@@ -42,7 +42,7 @@ from verify.scene.cuts import Cut
 __all__ = ["Structure", "not_imprinted", "peer_mesh", "reference_mesh", "structure"]
 
 Array = NDArray[np.float64]
-_WAY = 1 / 16  # size of elements along the way of a blade, over that far away
+_WAY = {2: 1 / 16, 3: 1 / 2}  # size of elements along the way of a blade, over that far away
 Cells = NDArray[np.int64]
 
 
@@ -125,9 +125,8 @@ def _plane_grading(scene: Scene) -> Grading:
     extent = np.sqrt(0.5 * abs(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
     size = scene.reference.size or extent / 12
     points = singular_points(scene)
-    on_its_way = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
-    way = size * _WAY if on_its_way else None
-    return Grading(size, points, extent / 2, strip=1.0, clear=clear_radii(scene, points), way=way)
+    clear, way = clear_radii(scene, points), _way(scene, size)
+    return Grading(size, points, extent / 2, strip=1.0, clear=clear, way=way)
 
 
 def _solid_grading(scene: Scene) -> Grading:
@@ -135,7 +134,15 @@ def _solid_grading(scene: Scene) -> Grading:
     sides = np.subtract(scene.geometry.upper, scene.geometry.lower)
     extent = float(np.prod(sides)) ** (1 / 3)
     size = scene.reference.size or extent / 4
-    return Grading(size, np.zeros((0, 3)), extent / 2, exponent=2 / 3, curves=True)
+    way = _way(scene, size)  # where the front has been everywhere, its last place is nothing apart
+    curves = way is None
+    return Grading(size, np.zeros((0, 3)), extent / 2, exponent=2 / 3, curves=curves, way=way)
+
+
+def _way(scene: Scene, size: float) -> float | None:
+    """Size of elements along what a blade cuts on its way, m; None if none does."""
+    on_its_way = any(isinstance(cut, ToolPathCut) for cut in scene.cuts)
+    return size * _WAY[scene.dimension] if on_its_way else None
 
 
 def _background(scene: Scene, level: Structure) -> tuple[Array, Cells]:
