@@ -10,6 +10,7 @@ from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.study.blade_intensity import blade_front, blade_intensity
+from verify.study.stress_intensity import intensity_defect
 
 
 def _strip(speed, angle, upwards=True):
@@ -66,3 +67,20 @@ def test_mode_3_says_what_it_needs():
     with pytest.raises(ValueError, match="at the blade: end = 'end'"):
         StressIntensityQuantity(kind="stress_intensity", name="K", end="start", mode="III",
                                 radius=0.1)  # fmt: skip
+
+
+def test_modes_1_and_2_are_not_measured_at_a_tip_that_advances():
+    """Their fields are not those of a tip at rest; after it has stopped they are."""
+    content = {
+        "title": "plate",
+        "requirement": "none",
+        "geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [1, 1]},
+        "mesh": {"cells": [[4, 4]]},
+        "material": {"young": 1.0, "poisson": 0.3, "density": 1.0, "plane": "strain"},
+        "analysis": {"kind": "dynamic", "duration": 2.0, "outputs": 5},
+        "cuts": [{"kind": "tool_path", "points": [[-0.5, 0.2], [0.5, 0.4]], "times": [-1.0, 1.0]}],
+    }
+    scene = Scene.model_validate(content)
+    for time, refused in ((0.5, True), (1.0, True), (1.5, False)):
+        asked = StressIntensityQuantity(kind="stress_intensity", name="K", end="end", time=time)
+        assert ("a tip that advances" in (intensity_defect(scene, asked) or "")) == refused

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
+from verify.exchange import problem_of
 from verify.scene import Scene
 from verify.solvers import find_solver
 
@@ -147,3 +148,10 @@ def test_a_node_at_the_tip_where_the_velocity_is_infinite_is_refused(solver):
         InputError, match=r"initial.velocity: .* unbounded at the node \(0.25, -0.13"
     ):
         _solved(scene, solver)
+
+
+def test_what_no_list_of_values_holds_is_not_exported():
+    moved = [{"where": "left", "displacement": ["0.01*t", 0.0]}]
+    for content, key in ((_wave(supports=moved), "supports"), (_strip([]), "supports")):
+        with pytest.raises(UnsupportedSceneError, match=rf"{key}\[\d\] is another field at every"):
+            problem_of(Scene.model_validate(content), 0)
