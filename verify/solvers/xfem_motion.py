@@ -375,7 +375,7 @@ class Mover:
         notes = {
             "scheme": self.choice.scheme,
             "mass": self.choice.mass,
-            "time step": " … ".join(f"{s:.6g} s" for s in dict.fromkeys((sizes[0], sizes[-1])))
+            "time step": " … ".join(dict.fromkeys(f"{s:.6g} s" for s in (sizes[0], sizes[-1])))
             if sizes
             else "none",
             "step from": self.said,
