@@ -59,12 +59,16 @@ class Front(Protocol):
 
 @dataclass(frozen=True)
 class CircularFront:
-    """The rim of a penny-shaped crack: anticlockwise about its normal."""
+    """The rim of a penny-shaped crack: anticlockwise about its normal.
+
+    Its arc length starts in the direction `towards`, by default that of a coordinate axis.
+    """
 
     centre: ArrayLike
     normal: ArrayLike
     radius: float
     closed: bool = True
+    towards: ArrayLike | None = None
 
     @property
     def length(self) -> float:
@@ -81,6 +85,8 @@ class CircularFront:
         normal = np.asarray(self.normal, dtype=float)
         normal = normal / np.linalg.norm(normal)
         first = np.eye(3)[np.argmin(np.abs(normal))]
+        if self.towards is not None:
+            first = np.asarray(self.towards, dtype=float)
         first = first - (first @ normal) * normal
         first /= np.linalg.norm(first)
         second = np.cross(normal, first)

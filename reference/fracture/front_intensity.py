@@ -53,6 +53,7 @@ def front_intensity(
     body_force: Force = None,
     drag: float = 0.0,
     step: int = -1,
+    fitted: bool = True,
 ) -> FrontIntensity:
     """K_I, K_II and K_III along the front of a plane crack.
 
@@ -81,6 +82,9 @@ def front_intensity(
         α, Rayleigh's damping by the mass, 1/s.
     step : int
         Which output time; default the last.
+    fitted : bool
+        Whether cells of the mesh must touch the front. Where they need not, as in a mesh whose cut
+        ends beside the front, hats are integrated along the front itself.
 
     Raises
     ------
@@ -99,7 +103,7 @@ def front_intensity(
     centres, width = _stations(front, stations)
     on = away <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
     for radius in radii:
-        _check_fit(solution, place, away, radius)
+        _check_fit(solution, place, away, radius, fitted)
     within = np.flatnonzero((away[place[solution.cells[:, :4]]] < radii.max()).any(axis=1))
     nodes = place[solution.cells[within, :4]]
     force = net_force(solution, material, body_force, drag, step)
@@ -108,6 +112,8 @@ def front_intensity(
     falls = [np.clip(2.0 - 2.0 * away / radius, 0.0, 1.0) for radius in radii]
     modulus = 0.5 * material.young / (1 - material.poisson**2)
     extents = np.array([_mean_length(front, at.along[on], hat[on]) for hat in hats])
+    if not fitted:
+        extents[:] = front.length if width is None else width
     if not extents.all():
         raise InputError(
             f"{stations} stations along a front of {np.count_nonzero(on)} nodes: one of them has "
@@ -149,9 +155,13 @@ def _mean_length(front: Front, along: Array, weight: Array) -> float:
     return float(np.sum(0.5 * (w[1:] + w[:-1]) * np.diff(s)))
 
 
-def _check_fit(solution: Solution, place: NDArray[np.int64], away: Array, radius: float) -> None:
+def _check_fit(
+    solution: Solution, place: NDArray[np.int64], away: Array, radius: float, fitted: bool
+) -> None:
     corner = away[place[solution.cells[:, :4]]]
     touching = corner.min(axis=1) <= 1e-9 * float(np.ptp(solution.points, axis=0).max())
+    if not fitted:  # what reaches from within a quarter of the radius may hold the front
+        touching = corner.min(axis=1) <= 0.25 * radius
     if not touching.any():
         raise InputError("no cell of the mesh touches the front: is it where the cut ends?")
     if not corner[touching].max() < radius:

@@ -185,7 +185,10 @@ def test_two_cuts_that_lie_on_each_other_are_named(tmp_path):
             'kind = "displacement"\nname = "q"\ncomponent = "z"\npoint = [0.5, 0.6, 0.5]',
             "lies on cut 'cut', where the displacement has two values",
         ),
-        ('kind = "stress_intensity"\nname = "q"\nend = "start"', "asked for in 2D scenes only"),
+        (
+            'kind = "stress_intensity"\nname = "q"\nend = "start"',
+            "a factor in 3D is at 'point = …'",
+        ),
     ],
 )
 def test_what_is_measured_in_space_lies_where_it_can_be(tmp_path, asked, said):

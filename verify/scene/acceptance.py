@@ -125,13 +125,16 @@ class PartQuantity(Strict):
 
 
 class StressIntensityQuantity(Strict):
-    """A stress-intensity factor at an end of a plane cut, or of mode III at a blade, Pa √m."""
+    """A factor at an end of a plane cut, a point of a front, or of mode III at a blade, Pa √m."""
 
     kind: Literal["stress_intensity"]
     name: Line
     cut: str = "cut"
-    end: Literal["start", "end"] = Field(description="which end of the cut")
-    mode: Literal["I", "II", "III"] = "I"
+    end: Literal["start", "end"] | None = Field(
+        default=None, description="2D, and at a blade: which end of the cut"
+    )
+    point: Point3 | None = Field(default=None, description="3D: a point of the front of a disc, m")
+    mode: Literal["I", "II", "III"] = Field(default="I", description="III in 3D only")
     radius: Positive | None = Field(
         default=None,
         description="mode III: how far behind the blade of a tool path in space the cut is read, m",

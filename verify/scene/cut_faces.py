@@ -1,5 +1,6 @@
 """The cut that a point of its faces, as a solver realises them, belongs to."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from verify.scene.spatial_cuts import SpatialCut
 if TYPE_CHECKING:
     from verify.scene.scene import Scene
 
-__all__ = ["Faces", "faces_of"]
+__all__ = ["Faces", "distance_to_cuts", "faces_of"]
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,12 @@ def faces_of(scene: "Scene", points: Array) -> Faces:
             distance[closer], k, normals[nearest[closer]],
         )  # fmt: skip
     return Faces(cut, normal)
+
+
+def distance_to_cuts(cuts: Sequence[Any], points: Array) -> Array:
+    """Distances (n, c) of points (n, d) to cuts, of which curves are faceted, m."""
+    found = [_nearest(points, _parts(cut)[0])[0] for cut in cuts]
+    return np.array(found).reshape(len(cuts), len(points)).T
 
 
 def _parts(cut: Any) -> tuple[Array, Array]:

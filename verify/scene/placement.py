@@ -3,8 +3,15 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from verify.scene.acceptance import METRICS, OF_CUTS, OF_MOTION, PartQuantity
+from verify.scene.acceptance import (
+    METRICS,
+    OF_CUTS,
+    OF_MOTION,
+    PartQuantity,
+    StressIntensityQuantity,
+)  # fmt: skip
 from verify.scene.cut_placement import check_cuts, check_points
 from verify.scene.cuts import ArcCut
 from verify.scene.empty_parts import check_parts_act
@@ -15,6 +22,7 @@ from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, CutFaces, Gravity, Rotation, Traction
 from verify.scene.regions import parse_expression, parse_region
 from verify.scene.skin import Skin
+from verify.scene.spatial_cuts import DiscCut
 from verify.scene.tool_path import ToolPathCut
 
 if TYPE_CHECKING:
@@ -22,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["boundary_condition_names", "check_placement"]
 
+_ON_FRONT = 1e-3  # of the radius: what is given in a few digits is on the front
 # quantities that need no name of their own
 _QUANTITIES = ("strain_energy", "maximum_displacement")
 
@@ -191,15 +200,31 @@ def _check_exact(scene: "Scene") -> None:
         raise ValueError(f"{wants[0]}: 'exact' needs an [exact] solution")
 
 
-def _check_tip(scene: "Scene", name: str, mode: str, place: str) -> None:
-    cut = next(cut for cut in scene.cuts if cut.name == name)
-    if mode == "III":
-        if not isinstance(cut, ToolPathCut) or cut.dimension != 3:
-            raise ValueError(f"{place}.mode: III is measured behind the blade of a tool_path in 3D")
-    elif cut.dimension == 3:
-        raise ValueError(f"{place}: stress-intensity factors are asked for in 2D scenes only")
+def _check_tip(scene: "Scene", asked: StressIntensityQuantity, place: str) -> None:
+    cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+    blade = isinstance(cut, ToolPathCut) and cut.dimension == 3
+    if asked.mode == "III" and cut.dimension == 2:
+        raise ValueError(f"{place}.mode: III belongs to 3D scenes")
+    if blade and asked.mode != "III":
+        raise ValueError(f"{place}.mode: III alone is measured behind the blade of a tool_path")
+    key, other = ("end", "point") if cut.dimension == 2 or blade else ("point", "end")
+    if getattr(asked, key) is None or getattr(asked, other) is not None:
+        raise ValueError(f"{place}.{key}: a factor in {cut.dimension}D is at '{key} = …'")
     if isinstance(cut, ArcCut) and cut.sweep == 360.0:
-        raise ValueError(f"{place}.cut: '{name}' is closed and has no end")
+        raise ValueError(f"{place}.cut: '{asked.cut}' is closed and has no end")
+    if cut.dimension == 3 and not blade:
+        _check_front(cut, np.asarray(asked.point), place)
+
+
+def _check_front(cut: Any, point: NDArray[np.float64], place: str) -> None:
+    """Refuse a point that is not on the rim of a round disc."""
+    if not isinstance(cut, DiscCut) or cut.radius is None:
+        raise ValueError(f"{place}.cut: factors in 3D are known along the front of round discs")
+    spoke = point - np.asarray(cut.centre)
+    height = float(spoke @ cut.axes()[2])
+    off = float(np.hypot(np.linalg.norm(spoke - height * cut.axes()[2]) - cut.radius, height))
+    if off > _ON_FRONT * cut.radius:
+        raise ValueError(f"{place}.point: is {off:.3g} m away from the front of '{cut.name}'")
 
 
 def _check_times(scene: "Scene") -> None:
@@ -272,7 +297,7 @@ def _check_names(scene: "Scene") -> None:
                     f"quantities[{i}].{key}: an opening in {scene.dimension}D is at '{key} = …'"
                 )
         if quantity.kind == "stress_intensity":
-            _check_tip(scene, quantity.cut, quantity.mode, f"quantities[{i}]")
+            _check_tip(scene, quantity, f"quantities[{i}]")
     for i, name in enumerate(quantities):
         if name in METRICS:
             raise ValueError(f"quantities[{i}].name: '{name}' names an error; take another")

@@ -86,7 +86,7 @@ class Measured:
         if isinstance(asked, StressIntensityQuantity):
             if self.scene is None:
                 raise UnsupportedSceneError("a stress-intensity factor needs the scene")
-            if asked.mode == "III":
+            if asked.mode == "III" and asked.point is None:  # at a blade
                 return blade_intensity(self.scene, self.motion, self.body, asked)
             return solution_intensity(self.scene, self.solution, asked)
         if isinstance(asked, PartQuantity):

@@ -1,16 +1,29 @@
 """Stress-intensity factors of any solver's solution, by the reference's interaction integral."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import ArcCut, BodyForce, Gravity, Material, PolylineCut, Scene, ToolPathCut
+from verify.scene import (
+    ArcCut,
+    BodyForce,
+    CutFaces,
+    DiscCut,
+    Gravity,
+    Material,
+    PolylineCut,
+    Scene,
+    ToolPathCut,
+    is_uniform,
+)  # fmt: skip
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.history import factor_at, jumps
 from verify.solution import Solution
+from verify.study.front_factors import front_defect, front_factors
 
 __all__ = ["exact_intensity", "intensity_defect", "solution_intensity"]
 
@@ -21,20 +34,43 @@ _AROUND = 65  # directions, and distances, in which the material around a tip is
 
 def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     """Why a factor cannot be had from any solution of a scene, or None."""
-    if asked.mode == "III":  # the scene was checked: at a blade
-        return None
-    if scene.dimension != 2 or scene.analysis.kinematics != "linear":
-        return "stress-intensity factors are measured in plane scenes of linear kinematics"
     cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
+    if asked.mode == "III" and isinstance(cut, ToolPathCut):  # the scene was checked: at a blade
+        return None
+    if scene.cell_dimension < scene.dimension or scene.analysis.kinematics != "linear":
+        return "stress-intensity factors are measured in linear kinematics, and not in membranes"
     if isinstance(cut, ToolPathCut) and asked.end == "end" and _time(scene, asked) <= cut.ends_at:
         return "a tip that advances has another field than one at rest: measured of mode III only"
     if any(isinstance(load, BodyForce) and load.force == "exact" for load in scene.loads):
         return "stress-intensity factors are not measured under the body force of an exact solution"
     if reason := _defect_in_time(scene, asked):
         return reason
+    if reason := _defect_on_faces(scene, asked):
+        return reason
+    if scene.dimension == 3:
+        return front_defect(scene, asked)
     from reference.fracture import no_tip
 
     return no_tip(scene, asked.cut, asked.end)
+
+
+def _defect_on_faces(scene: Scene, asked: StressIntensityQuantity) -> str | None:
+    """Why a factor cannot be had from a cut whose faces are loaded, or None."""
+    for load in _face_loads(scene, asked):
+        if not is_uniform(load.components):
+            return f"the load on the faces of cut '{asked.cut}' is not uniform"
+        if load.traction is not None and not _is_plane(scene, asked.cut):
+            return f"tractions are borne by the faces of cut '{asked.cut}', which is not plane"
+    return None
+
+
+def _face_loads(scene: Scene, asked: StressIntensityQuantity) -> list[CutFaces]:
+    return [load for load in scene.loads if isinstance(load, CutFaces) and load.cut == asked.cut]
+
+
+def _is_plane(scene: Scene, name: str) -> bool:
+    cut = next(cut for cut in scene.final_cuts if cut.name == name)
+    return isinstance(cut, DiscCut) or (isinstance(cut, PolylineCut) and len(cut.points) == 2)
 
 
 def _defect_in_time(scene: Scene, asked: StressIntensityQuantity) -> str | None:
@@ -76,9 +112,6 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
     """
     if reason := intensity_defect(scene, asked):
         raise UnsupportedSceneError(reason)
-    from reference.fracture import stress_intensity, tips
-
-    tip = next(t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end))
     time = _time(scene, asked)
     step = int(np.argmin(np.abs(solution.times - time)))
     moving = scene.analysis.kind == "dynamic"
@@ -89,21 +122,70 @@ def solution_intensity(scene: Scene, solution: Solution, asked: StressIntensityQ
     drag = scene.analysis.damping[0]
     if drag and solution.velocity is None:
         raise UnsupportedSceneError("the solution carries no velocities: its damping is unknown")
+    modes = _front_modes if scene.dimension == 3 else _tip_modes
+    given = {"body_force": _body_force(scene, time), "drag": drag, "step": step}
     try:
-        found = stress_intensity(
-            solution,
-            _material_around(scene, tip.point, max(tip.radii())),
-            tip.point,
-            tip.direction,
-            tip.radii(),
-            _body_force(scene, time),
-            drag,
-            step,
-            tip.arc,
-        )
+        found = modes(scene, _with_free_faces(scene, solution, asked, time), asked, given)
     except InputError as problem:
         raise UnsupportedSceneError(str(problem)) from None
-    return found.mode_1 if asked.mode == "I" else found.mode_2
+    return found[("I", "II", "III").index(asked.mode)]
+
+
+def _tip_modes(
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
+) -> tuple[float, ...]:
+    from reference.fracture import stress_intensity, tips
+
+    tip = next(t for t in tips(scene) if (t.cut, t.end) == (asked.cut, asked.end))
+    material = _material_around(scene, tip.point, max(tip.radii()))
+    found = stress_intensity(
+        solution, material, tip.point, tip.direction, tip.radii(), arc=tip.arc, **given
+    )
+    return found.mode_1, found.mode_2
+
+
+def _front_modes(
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, given: dict[str, Any]
+) -> tuple[float, ...]:
+    if len(scene.material.each) > 1:
+        raise UnsupportedSceneError("factors along a front are measured in one material")
+    return front_factors(scene, solution, scene.material.each[0], asked, **given)
+
+
+def _with_free_faces(
+    scene: Scene, solution: Solution, asked: StressIntensityQuantity, time: float
+) -> Solution:
+    """Add the uniform stress that frees the loaded faces of a cut: K is that of both fields."""
+    loads = _face_loads(scene, asked)
+    if not loads:
+        return solution
+    d = scene.dimension
+    stress = np.zeros((d, d))
+    for load in loads:
+        factor = factor_at(load.history, time)
+        values = factor * load.given(np.zeros((1, d)), time)[0]
+        if load.traction is None:
+            stress += values[0] * np.eye(d)
+        else:
+            normal = _normal(scene, asked.cut)
+            stress += np.outer(values, normal) + np.outer(normal, values)
+            stress -= (values @ normal) * np.outer(normal, normal)
+    from reference.exact.hooke import hooke
+
+    law = hooke(scene.material.each[0])
+    trace = np.trace(stress) / (d * law.lame + 2 * law.shear)
+    strain = (stress - law.lame * trace * np.eye(d)) / (2 * law.shear)
+    return replace(solution, displacement=solution.displacement + solution.points @ strain)
+
+
+def _normal(scene: Scene, name: str) -> Array:
+    """Give the unit normal of a plane cut, towards its positive side."""
+    cut = next(cut for cut in scene.final_cuts if cut.name == name)
+    if isinstance(cut, DiscCut):
+        return cut.axes()[2]
+    assert isinstance(cut, PolylineCut)
+    along = np.subtract(cut.points[1], cut.points[0])
+    return np.array([-along[1], along[0]]) / np.linalg.norm(along)
 
 
 def _material_around(scene: Scene, tip: Array, radius: float) -> Material:
@@ -131,8 +213,10 @@ def exact_intensity(scene: Scene, exact: Any, asked: StressIntensityQuantity) ->
     """Factor that an exact solution states, Pa √m; None if it states none."""
     if hasattr(exact, "intensity_at"):  # its tips differ
         cut = next(cut for cut in scene.final_cuts if cut.name == asked.cut)
-        assert isinstance(cut, PolylineCut | ArcCut)  # the scene is plane
-        stated = exact.intensity_at(cut.vertices()[0 if asked.end == "start" else -1])
+        point = asked.point
+        if isinstance(cut, PolylineCut | ArcCut):
+            point = cut.vertices()[0 if asked.end == "start" else -1]
+        stated = exact.intensity_at(point)
     else:
         stated = getattr(exact, "stress_intensity", None)
     place = ("I", "II", "III").index(asked.mode)
