@@ -51,6 +51,7 @@ def intensity_defect(scene: Scene, asked: StressIntensityQuantity) -> str | None
         return front_defect(scene, asked)
     from reference.fracture import no_tip
 
+    assert asked.end is not None  # the scene is plane
     return no_tip(scene, asked.cut, asked.end)
 
 
