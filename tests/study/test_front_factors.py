@@ -89,7 +89,7 @@ def test_what_is_no_point_of_a_front_is_refused(asked, words):
 
 def test_mode_three_belongs_to_space():
     content = load_scene("statics/griffith_inside").model_dump(mode="json", by_alias=True)
-    asked = {"kind": "stress_intensity", "name": "K", "end": "end", "mode": "III"}
+    asked = {"kind": "stress_intensity", "name": "K", "end": "end", "mode": "III", "radius": 0.1}
     with pytest.raises(ValidationError, match="III belongs to 3D"):
         Scene.model_validate(content | {"quantities": [asked]})
 

@@ -146,9 +146,10 @@ class StressIntensityQuantity(Strict):
 
     @model_validator(mode="after")
     def _radius_belongs(self) -> "StressIntensityQuantity":
-        if (self.mode == "III") != (self.radius is not None):
-            raise ValueError("a radius belongs to mode III, which needs one")
-        if self.mode == "III" and self.end != "end":
+        blade = self.mode == "III" and self.point is None  # else it is a point of a front
+        if blade != (self.radius is not None):
+            raise ValueError("a radius belongs to mode III at a blade, which needs one")
+        if blade and self.end != "end":
             raise ValueError("mode III is asked for at the blade: end = 'end'")
         return self
 
