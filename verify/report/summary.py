@@ -4,7 +4,7 @@ from collections import Counter
 
 from verify.report.markup import Markup, joined, tag
 from verify.report.notation import error_title, metric_title, number, solver_title, with_interval
-from verify.report.notices import warning_mark
+from verify.report.notices import adequacy_lines, warning_mark
 from verify.report.run_directory import CaseEntry, Run
 from verify.result import Status, Verdict, VerdictRecord
 
@@ -123,6 +123,7 @@ def verdict_table(run: Run) -> Markup:
             tag("a", title, href=f"#{anchor(index)}"),
             tag("span", entry.name, class_="path"),
             tag("p", requirement, class_="requirement"),
+            *(adequacy_lines(entry.result) if entry.result else []),
             colspan=3,
             scope="rowgroup",
         )
