@@ -100,6 +100,30 @@ class Stepper:
         self._travelled = state.displacement - start.displacement
         return forces
 
+    def restart(self, state: State, forces: Array) -> None:
+        """Give a state, of which something has jumped, an acceleration to go on with.
+
+        That which balances the forces is c/m v of a mode whose damping c, of the stiffness, is
+        suddenly out of balance. If c Δt ≫ m the mode has long settled within the step; a scheme
+        that weighs the old acceleration by itself (α_m ≠ α_f) throws it by Δt² c/m v, the more
+        the finer the mesh. The matrix of the step, (1 − α_m) M + (1 − α_f)(γ Δt C + β Δt² K),
+        stands for (1 − α_m) M instead: the same to O(Δt) where a mode is resolved, so that the
+        order stays; bounded by v/Δt where it is not.
+
+        Parameters
+        ----------
+        state : State
+            Its acceleration is replaced.
+        forces : (k,) array
+            Loads less internal and viscous forces, N.
+        """
+        if self._solver is None:
+            self._factorise(state.displacement, state.displacement)
+        assert self._solver is not None
+        right = self.body.ties.summed(forces).copy()
+        right[self.body.held] = 0.0
+        state.acceleration = (1 - self.scheme.alpha_m) * self._solver.solve(right)
+
     def _first(self, start: State) -> Array:
         """Acceleration at which Newton's method starts: the body travels on as in the last step.
 

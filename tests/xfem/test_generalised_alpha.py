@@ -68,6 +68,24 @@ def test_errors_of_a_damped_mode_fall_with_the_square_of_the_step(rho):
 
 
 @pytest.mark.parametrize("rho", RADII)
+def test_damping_that_is_out_of_balance_does_not_throw_a_stiff_mode(rho):
+    """It stops within the step: no farther than it would have gone, whatever c Δt/m."""
+    body = _body(cut_square(3))
+    omegas, shapes = _modes(body)
+    shape = shapes[:, -1].reshape(body.shape)
+    step = 100.0 / omegas[-1]
+    body.damping = RayleighDamping(0.0, step)  # c Δt/m = 1e4
+    state = body.rest()
+    state.velocity[:] = shape
+    far = []
+    scheme = GeneralisedAlpha(body, step, spectral_radius=rho)
+    for _ in range(5):
+        scheme.step(state)
+        far.append(np.linalg.norm(state.displacement))
+    assert max(far) < step * np.linalg.norm(shape)
+
+
+@pytest.mark.parametrize("rho", RADII)
 def test_what_a_step_does_not_resolve_is_multiplied_by_the_radius(rho):
     """All three roots are −ρ at infinite frequency, so that (E + ρ)³ u = 0 with the shift E."""
     body = _body(cut_square(2))

@@ -163,6 +163,9 @@ class _Mover:
         self.timings["loading"] = perf_counter() - clock
         self.steppers: dict[float, Stepper] = {}
         self.steps = self.openings = 0
+        scheme, _ = marching.scheme()
+        # of others the old acceleration has no part in the step, or only with the forces of then
+        self.softly = scene.analysis.damping[1] > 0.0 and scheme.alpha_m != scheme.alpha_f
 
     def run(self, trial: bool) -> ConformingMotion:
         """Run to the end, or for one step."""
@@ -279,12 +282,13 @@ class _Mover:
                 break
             if not begun and np.abs(breaks - stop).min(initial=np.inf) <= _SAME * self.end:
                 self._begin(state)
-            self._advance(state, float(stops[k + 1]), 1 if trial else None)
+                begun = True
+            self._advance(state, float(stops[k + 1]), begun, 1 if trial else None)
             if trial:
                 break
         return outputs
 
-    def _advance(self, state: State, end: float, most: int | None) -> None:
+    def _advance(self, state: State, end: float, begun: bool, most: int | None) -> None:
         """Step to a time by equal steps, and open on the way what was passed."""
         span = end - state.time
         count = max(1, int(np.ceil(span / self.marching.largest * (1 - 1e-9))))
@@ -295,7 +299,14 @@ class _Mover:
         for n in range(most or count):
             if n and self._open(state.time):
                 self._begin(state)
+                begun = True
+            if begun and self.softly:
+                clock = perf_counter()
+                forces = self._unbalanced(state, state.time + _SAME * self.end)
+                self.steppers[size].restart(state, forces)
+                self.timings["loading"] += perf_counter() - clock
             self._step(self.steppers[size], state)
+            begun = False
 
     def _begin(self, state: State) -> None:
         """Take up what jumps at this time: velocities of supports, accelerations."""
@@ -320,13 +331,17 @@ class _Mover:
 
     def _acceleration(self, state: State, time: float) -> Array:
         """Acceleration of a state in balance with the loads at a time."""
+        return self.body.accelerations(self._unbalanced(state, time))
+
+    def _unbalanced(self, state: State, time: float) -> Array:
+        """Sum the forces of a state at a time that inertia has to balance, N."""
         body = self.body
         law, (mass, stiffness) = body.law, self.scene.analysis.damping
         forces = body.external(time) - law.force(state.displacement)
         forces -= mass * (body.mass @ state.velocity)
         if stiffness:
             forces -= stiffness * law.viscous(state.displacement, state.velocity)
-        return body.accelerations(forces)
+        return forces
 
     def _step(self, stepper: Stepper, state: State) -> None:
         clock = perf_counter()
