@@ -10,6 +10,7 @@ from synthetic_run import cut_square, make_run
 
 from verify.compare.hooke import Hooke
 from verify.report import render
+from verify.scene import Material
 from verify.solution import Solution
 from verify.study.motion_account import motion_account
 from verify.study.motion_history import motion_history
@@ -102,7 +103,8 @@ def test_momenta_of_a_rigid_motion_are_mass_times_velocity_and_inertia_times_spi
     solution = Solution(points=points, cells=body.cells, displacement=np.zeros((2, *points.shape)),
                         times=np.array([0.0, 1.0]), velocity=speed, ledger=ledger)  # fmt: skip
     scene = SimpleNamespace(
-        material=SimpleNamespace(density=density, thickness=None), loads=[SimpleNamespace()]
+        material=Material(young=1.0, poisson=0.3, plane="strain", density=density),
+        loads=[SimpleNamespace()],
     )
     found = motion_history(motion_account(scene, solution, Hooke(1.0, 1.0)))
     corners = points[body.cells]

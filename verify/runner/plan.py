@@ -15,7 +15,6 @@ from verify.runner.directory import RunDirectory
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.interruption import StopRequest
 from verify.runner.job import Job
-from verify.runner.models import model_jobs
 from verify.runner.options import Options
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
@@ -176,7 +175,10 @@ def plan_case(
         else:
             plan.jobs += jobs[:planned]
             plan.spare += jobs[planned:most]
-    if options.judged and bundle is None:
+    if options.judged and bundle is None and scene.adequacy.models:
+        # what only reads cases shall not wait for the comparison that this imports
+        from verify.runner.models import model_jobs
+
         folder = directory.case_folder(scene.name)
         plan.models, plan.other_scenes = model_jobs(scene, folder)
     return plan
