@@ -1,4 +1,4 @@
-"""What moves, as a scene states it: mass, elasticity, damping, loads and supports over time."""
+"""Body in motion, as a scene states it: mass, elasticity, damping, loads and supports over time."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -14,8 +14,9 @@ from reference.large_strain import solve_large_strain
 from reference.nodal_algebra import NodalMatrix, NodalSolver, assembled_matrix, nodal_forces
 from reference.space import ConformingSpace
 from reference.tied_solver import TiedSolver
-from verify.scene import Gravity, Scene, Support
-from verify.scene.history import factor_at, first_factor, slope_at
+from verify.scene import Gravity, Scene
+from verify.scene.history import factor_at, first_factor
+from verify.scene.prescribed import PrescribedMotion
 
 __all__ = ["MovingBody"]
 
@@ -25,33 +26,10 @@ _MOST_ITERATIONS = 1000
 
 
 @dataclass(frozen=True)
-class _Held:
-    """Nodes and components that a support holds, and the exact field where that holds them."""
+class _Held(PrescribedMotion):
+    """Motion that a support prescribes, and where: nodes and components."""
 
-    support: Support
     place: tuple[NDArray[np.int64], NDArray[np.int64]]
-    points: Array
-    near: Array
-    exact: Any
-
-    def values(self, factor: float, time: float) -> Array:
-        if self.exact is None:
-            return self.support.values(self.points, factor, time)
-        return factor * self._own(self.exact.at(time).displacement(self.points, self.near))
-
-    def velocities(self, time: float) -> Array:
-        factor = factor_at(self.support.history, time)
-        slope = slope_at(self.support.history, time)
-        if self.exact is None:
-            return self.support.velocities(self.points, factor, slope, time)
-        field = self.exact.at(time)
-        speed = factor * field.velocity(self.points, self.near)
-        if slope:
-            speed = speed + slope * field.displacement(self.points, self.near)
-        return self._own(speed)
-
-    def _own(self, values: Array) -> Array:
-        return np.asarray(values[:, list(self.support.held(values.shape[1]))])
 
 
 class MovingBody:
@@ -274,7 +252,7 @@ class MovingBody:
             held = list(support.held(space.dimension))
             exact = self.exact if support.displacement == "exact" else None
             place: Any = np.ix_(nodes, held)
-            found.append(_Held(support, place, space.node_points[nodes], near, exact))
+            found.append(_Held(support, space.node_points[nodes], near, exact, place))
         return found
 
     def _filled(self, values: list[Array]) -> Array:

@@ -1,4 +1,4 @@
-"""What is still closed of a cut: nodes on its two sides that move as one.
+"""Ties of a cut that is still closed: nodes on its two sides that move as one.
 
 Matrices and forces are assembled once, on the mesh with the whole cut open. Until a facet opens,
 its nodes on one side are tied to those on the other. Around each node the nodes that are left are

@@ -1,4 +1,4 @@
-"""What tests of motions share."""
+"""Fixtures of the tests of motions."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a model costs in error is said beside the verdict, by the run, and does not move it."""
+"""Cost of a model in error: it is said beside the verdict, by the run, and does not move it."""
 
 import re
 

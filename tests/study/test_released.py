@@ -1,4 +1,4 @@
-"""Where the energy went that a blade released: differences, short waves, advance, the balance."""
+"""Account of the energy that a blade released: differences, short waves, advance, the balance."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Where the energy went that a blade released: one line per solver."""
+"""Account of the energy that a blade released: one line per solver."""
 
 from collections.abc import Iterator, Sequence
 

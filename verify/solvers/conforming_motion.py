@@ -298,7 +298,7 @@ class _Mover:
             self.steppers[size] = Stepper(self.body, scheme, averaged, size)
         for n in range(most or count):
             if n and self._open(state.time):
-                self._begin(state)
+                self._begin(state, balanced=not self.softly)
                 begun = True
             if begun and self.softly:
                 clock = perf_counter()
@@ -308,12 +308,13 @@ class _Mover:
             self._step(self.steppers[size], state)
             begun = False
 
-    def _begin(self, state: State) -> None:
-        """Take up what jumps at this time: velocities of supports, accelerations."""
+    def _begin(self, state: State, balanced: bool = True) -> None:
+        """Take up what jumps: velocities of supports and, if balanced, accelerations."""
         clock, body = perf_counter(), self.body
         state.velocity[body.held] = body.prescribed(state.time)[1]
         self.ledger.started(body, state)
-        state.acceleration = self._acceleration(state, state.time + _SAME * self.end)
+        if balanced:
+            state.acceleration = self._acceleration(state, state.time + _SAME * self.end)
         self.timings["loading"] += perf_counter() - clock
 
     def _balanced(self, state: State, begun: bool) -> State:

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.scene import Scene, Support
-from verify.scene.history import factor_at, first_factor, slope_at
+from verify.scene import Scene
+from verify.scene.history import factor_at, first_factor
 from verify.scene.parts import copies_on_part, lie_on_part
+from verify.scene.prescribed import PrescribedMotion
 from verify.solvers.xfem_boundary import boundary_nodes, facet_parts, own_corners
 from verify.xfem.dynamics import MovingSupports
 from verify.xfem.supports import Supports
@@ -21,46 +22,11 @@ _Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Held:
-    """Unknowns (k,) that a support holds, and the exact field where the scene says 'exact'.
+class _Held(PrescribedMotion):
+    """Motion that a support prescribes, and of which unknowns (k,) and components."""
 
-    `near` are points of the material that the unknowns move.
-    """
-
-    support: Support
     unknowns: NDArray[np.int64]
     components: tuple[int, ...]
-    points: _Floats
-    near: _Floats
-    exact: Any
-
-    @property
-    def moves(self) -> bool:
-        """Whether the values change in time."""
-        timed = self.support.timed if self.exact is None else self.exact.moves
-        return bool(timed or self.support.history)
-
-    def values(self, factor: float, time: float = 0.0) -> _Floats:
-        """Prescribed displacement (k, held), m."""
-        if self.exact is None:
-            return self.support.values(self.points, factor, time)
-        return factor * self._own(self.exact.at(time).displacement(self.points, self.near))
-
-    def velocities(self, time: float) -> _Floats:
-        """Prescribed velocity (k, held), m/s."""
-        history = self.support.history
-        factor, slope = factor_at(history, time), slope_at(history, time)
-        if self.exact is None:
-            return self.support.velocities(self.points, factor, slope, time)
-        field = self.exact.at(time)
-        speed = factor * field.velocity(self.points, self.near)
-        if slope:
-            speed = speed + slope * field.displacement(self.points, self.near)
-        return self._own(speed)
-
-    def _own(self, values: _Floats) -> _Floats:
-        own: _Floats = values[:, list(self.components)]
-        return own
 
 
 def supports_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports:
@@ -148,5 +114,5 @@ def _held(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[_Held]:
         components = support.held(scene.dimension)
         field = exact if support.displacement == "exact" else None
         points, near = virtual.node_points[at], virtual.node_piece_points[at]
-        found.append(_Held(support, at, components, points, near, field))
+        found.append(_Held(support, points, near, field, at, components))
     return found

@@ -1,4 +1,4 @@
-"""What a scene's model costs in error: its reference beside that of a cheaper or richer model."""
+"""Cost of a scene's model in error: its reference beside that of a cheaper or richer model."""
 
 from collections.abc import Mapping
 

@@ -9,8 +9,12 @@ from verify.errors import InputError
 from verify.result import Verdict
 from verify.scene import Scene, scene_content
 from verify.study.finding import Finding
-from verify.study.in_processes import in_processes
-from verify.study.measured_scenes import Measurement, measured_scenes, missing_solutions
+from verify.study.measured_scenes import (
+    Measurement,
+    measured_families,
+    measured_scenes,
+    missing_solutions,
+)
 from verify.study.variants import Variant
 
 __all__ = ["EnergyStudy", "account_findings", "energy_study"]
@@ -80,13 +84,7 @@ def energy_study(
     if not cases:
         raise InputError("no case with a dynamic analysis; see `verify list`")
     start = perf_counter()
-    parts = [(variant, rows) for rows in cases.values() for variant in variants]
-    found: dict[int, list[Measurement]] = {}
-    for index, measured in in_processes(measured_scenes, parts, processes):
-        found[index] = measured
-        name = f"{measured[0].family}, {parts[index][0].label}"
-        announce(f"{name}: {len(found)} of {len(parts)} parts")
-    every = [one for index in sorted(found) for one in found[index]]
+    every = measured_families(measured_scenes, cases, variants, announce, processes)
     return EnergyStudy(quick, every, list(_findings(every)), perf_counter() - start)
 
 

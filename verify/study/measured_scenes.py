@@ -1,6 +1,6 @@
 """Scenes solved by a variant of a solver in this process, and read by the comparison."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,10 +15,11 @@ from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
 from verify.study.accuracy import assess_accuracy
 from verify.study.finding import Finding
+from verify.study.in_processes import in_processes
 from verify.study.variants import Variant
 from verify.verdict import NotMeasuredError, error_interval
 
-__all__ = ["Measurement", "measured_scenes", "missing_solutions"]
+__all__ = ["Measurement", "measured_families", "measured_scenes", "missing_solutions"]
 
 # quantity, unit, value, reason and, if the case states one, limit
 Row = tuple[str, str, float | None, str] | tuple[str, str, float | None, str, float]
@@ -92,6 +93,40 @@ def measured_scenes(
             rows += further(solver, variant, scene, level)
         found += [Measurement(family, size, variant.label, *row) for row in rows]
     return found
+
+
+def measured_families(
+    measure: Callable[[Variant, list[dict[str, Any]]], list[Measurement]],
+    families: Mapping[str, list[dict[str, Any]]],
+    variants: Sequence[Variant],
+    announce: Callable[[str], None],
+    processes: int,
+) -> list[Measurement]:
+    """Measure the scenes of every family by every variant, side by side, in their order.
+
+    Parameters
+    ----------
+    measure : callable
+        Of a variant and the contents of a family's scenes; as `measured_scenes`.
+    families : mapping of str to list of dict
+        Contents of scenes by family.
+    variants : sequence of Variant
+    announce : callable
+        Told what is done.
+    processes : int
+
+    Raises
+    ------
+    ChildProcessError
+        If a process is killed.
+    """
+    parts = [(variant, rows) for rows in families.values() for variant in variants]
+    found: dict[int, list[Measurement]] = {}
+    for index, measured in in_processes(measure, parts, processes):
+        found[index] = measured
+        name = f"{measured[0].family}, {parts[index][0].label}"
+        announce(f"{name}: {len(found)} of {len(parts)} parts")
+    return [one for index in sorted(found) for one in found[index]]
 
 
 def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:

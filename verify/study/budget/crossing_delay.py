@@ -1,4 +1,4 @@
-"""How long places of a cut wait until the blade has left the element in which they are.
+"""Wait of the places of a cut until the blade has left the element in which they are.
 
 A blade opens elements as a whole, behind it. The tip of the cut lags by something between nothing
 and an element; its mean is the delay that costs as much in a solution that opens everywhere in

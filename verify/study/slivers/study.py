@@ -5,13 +5,14 @@ from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
-from verify.scene import Scene, scene_content
+from verify.scene import Box, Rectangle, Scene, scene_content
 from verify.solvers import Solver
 from verify.study.finding import Finding
-from verify.study.in_processes import in_processes
-from verify.study.measured_scenes import Measurement, measured_scenes
+from verify.study.measured_scenes import Measurement, measured_families, measured_scenes
 from verify.study.slivers.findings import findings
 from verify.study.slivers.growth import growth
 from verify.study.slivers.step_by_running import step_by_running
@@ -96,13 +97,7 @@ def sliver_study(
     if not families:
         raise InputError("no case with a list of values for a parameter; see `verify list`")
     start = perf_counter()
-    parts = [(variant, rows) for rows in families.values() for variant in variants]
-    found: dict[int, list[Measurement]] = {}
-    for index, measured in in_processes(_measured, parts, processes):
-        found[index] = measured
-        name = f"{measured[0].family}, {parts[index][0].label}"
-        announce(f"{name}: {len(found)} of {len(parts)} parts")
-    every = [one for index in sorted(found) for one in found[index]]
+    every = measured_families(_measured, families, variants, announce, processes)
     growths = _growths(every)
     judged = list(findings(every, growths))
     return SliverStudy(quick, every, growths, judged, perf_counter() - start)
@@ -159,9 +154,9 @@ def _guess(scene: Scene, level: int) -> float:
     if cells is None:
         assert scene.mesh.sizes is not None
         return scene.mesh.sizes[level] / speed / 3.0
-    lower, upper = getattr(box, "lower", (0.0,)), getattr(box, "upper", (1.0,))
-    sides = [(b - a) / n for a, b, n in zip(lower, upper, cells[level], strict=True)]
-    return float(min(sides) / speed / 3.0)
+    assert isinstance(box, Rectangle | Box)
+    sides = np.subtract(box.upper, box.lower) / cells[level]
+    return float(sides.min() / speed / 3.0)
 
 
 def _growths(found: Sequence[Measurement]) -> list[dict[str, Any]]:
