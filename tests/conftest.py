@@ -1,10 +1,18 @@
-"""What all tests share: none of them reads or writes the user's own cache."""
+"""Fixtures of all tests: a cache of their own, and claims about time that a busy machine spoils."""
 
 import os
 import shutil
 import tempfile
+import time
+from pathlib import Path
+
+import pytest
+from _pytest.runner import runtestprotocol
 
 _VARIABLE = "VERIFY_CACHE"
+
+ATTEMPTS = 3  # at a claim about time that fails while other programs run
+BUSY = 0.1  # cores; other programs that take more than this can spoil a timing
 
 
 def pytest_configure(config):
@@ -17,3 +25,40 @@ def pytest_unconfigure(config):
     """Remove it."""
     if folder := getattr(config, "cache_of_session", None):
         shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item, nextitem):
+    """Repeat a claim about time that fails on a busy machine; then call it undecided, not wrong."""
+    if item.get_closest_marker("timing") is None:
+        return None
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for attempt in range(1, ATTEMPTS + 1):
+        clock, others = time.monotonic(), time_of_others()
+        reports = runtestprotocol(item, nextitem=nextitem, log=False)
+        taken = (time_of_others() - others) / max(time.monotonic() - clock, 1e-9)
+        failed = [report for report in reports if report.when == "call" and report.failed]
+        if not failed or taken <= BUSY:
+            break
+        if attempt == ATTEMPTS:
+            reason = f"undecided: other programs took {taken:.1f} cores, {ATTEMPTS} times"
+            failed[0].outcome = "skipped"
+            failed[0].longrepr = (str(item.path), item.location[1], reason)
+        else:
+            item._initrequest()
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def time_of_others():
+    """Processor time in s that programs other than this one and its children have taken so far."""
+    try:
+        words = Path("/proc/stat").read_text(encoding="ascii").split("\n", 1)[0].split()[1:9]
+    except OSError:  # not Linux: nobody else is seen
+        return 0.0
+    user, nice, system, _, _, irq, softirq, stolen = map(int, words)
+    every = (user + nice + system + irq + softirq + stolen) / os.sysconf("SC_CLK_TCK")
+    own = os.times()
+    return every - (own.user + own.system + own.children_user + own.children_system)

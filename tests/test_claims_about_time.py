@@ -1,0 +1,73 @@
+"""Claims about time: repeated beside other programs, then undecided; wrong on a quiet machine."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+CONFTEST = (Path(__file__).parent / "conftest.py").read_text(encoding="utf-8")
+# a test that passes when it is called for the `passes`-th time; its fixture serves once
+CLAIM = """
+import pathlib
+import pytest
+
+@pytest.fixture
+def fresh():
+    return []
+
+@pytest.mark.timing
+def test_claim(fresh):
+    fresh.append(0)
+    calls = pathlib.Path("calls")
+    count = len(calls.read_text()) + 1 if calls.exists() else 1
+    calls.write_text("x" * count)
+    assert len(fresh) == 1
+    assert count == {passes}
+"""
+
+
+def run(pytester, taken, passes):
+    """Run the claim where other programs take so many cores."""
+    clock = f"\ndef time_of_others():\n    return {taken} * time.monotonic()\n"
+    pytester.makeconftest(CONFTEST + clock)
+    pytester.makeini("[pytest]\nmarkers = timing: claims about time\n")
+    pytester.makepyfile(CLAIM.format(passes=passes))
+    found = pytester.runpytest_subprocess("-rs", "-p", "no:cacheprovider")
+    return found, len((pytester.path / "calls").read_text())
+
+
+@pytest.mark.parametrize(
+    ("taken", "passes", "outcome", "calls"),
+    [
+        (0.0, 1, "passed", 1),
+        (0.9, 1, "passed", 1),
+        (0.9, 2, "passed", 2),
+        (0.9, 9, "skipped", 3),
+        (0.0, 2, "failed", 1),
+    ],
+)
+def test_a_claim_fails_only_on_a_quiet_machine(pytester, taken, passes, outcome, calls):
+    found, count = run(pytester, taken, passes)
+    found.assert_outcomes(**{outcome: 1})
+    assert count == calls
+    if outcome == "skipped":
+        found.stdout.fnmatch_lines(["*undecided: other programs took 0.9 cores*"])
+
+
+def test_a_program_sees_the_processor_time_of_another():
+    program = (
+        f"import runpy, time; own = runpy.run_path({str(Path(__file__).parent / 'conftest.py')!r})\n"
+        "before, start = own['time_of_others'](), time.process_time()\n"
+        "while time.process_time() - start < 1.0: pass\n"
+        "print(own['time_of_others']() - before)\n"
+    )
+    both = [
+        subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    seen = [float(one.communicate(timeout=60)[0]) for one in both]
+    # whoever starts later sees less of the other's second; on a busy machine both see more
+    assert max(seen) > 0.3
