@@ -58,8 +58,9 @@ def test_a_claim_fails_only_on_a_quiet_machine(pytester, taken, passes, outcome,
 
 
 def test_a_program_sees_the_processor_time_of_another():
+    conftest = str(Path(__file__).parent / "conftest.py")
     program = (
-        f"import runpy, time; own = runpy.run_path({str(Path(__file__).parent / 'conftest.py')!r})\n"
+        f"import runpy, time; own = runpy.run_path({conftest!r})\n"
         "before, start = own['time_of_others'](), time.process_time()\n"
         "while time.process_time() - start < 1.0: pass\n"
         "print(own['time_of_others']() - before)\n"
