@@ -1,7 +1,7 @@
 """Where the cuts of a scene lie: in the body, as expected, not on each other; what lies on them."""
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,7 @@ from verify.scene.spatial import (
     rim_edges,
 )
 from verify.scene.spatial_cuts import SpatialCut
-
-if TYPE_CHECKING:
-    from verify.scene.scene import Scene
+from verify.scene.tables import SceneTables
 
 __all__ = ["check_cuts", "check_points"]
 
@@ -38,7 +36,7 @@ _TOLERANCE = 1e-9  # of the size of what is compared
 _ON_CUT = 1e-3  # of the body: the cut that a point is held against is triangulated
 
 
-def check_cuts(scene: "Scene") -> None:
+def check_cuts(scene: SceneTables) -> None:
     """Raise ValueError if a cut lies outside the body, other than expected, or on another."""
     for i, cut in enumerate(_known(scene)):
         _check_cut(scene, cut, f"cuts[{i}] ('{cut.name}')")
@@ -47,7 +45,7 @@ def check_cuts(scene: "Scene") -> None:
             raise ValueError(f"cuts: '{a.name}' and '{b.name}' lie on each other over {common}")
 
 
-def _known(scene: "Scene") -> list[Any]:
+def _known(scene: SceneTables) -> list[Any]:
     """Return the final cuts; a blade that sweeps no known surface stays a tool path."""
     known: list[Any] = []
     for cut in scene.cuts:
@@ -58,7 +56,7 @@ def _known(scene: "Scene") -> list[Any]:
     return known
 
 
-def _check_cut(scene: "Scene", cut: Any, place: str) -> None:
+def _check_cut(scene: SceneTables, cut: Any, place: str) -> None:
     body = scene.geometry
     nothing = f"{place}: lies outside the body or along its boundary; it cuts nothing"
     if isinstance(body, Rectangle | Polygon) and cut.dimension == 2:
@@ -114,7 +112,7 @@ def _common_arc(a: ArcCut, b: ArcCut) -> float:
     return length if length > tolerance else 0.0
 
 
-def check_points(scene: "Scene") -> None:
+def check_points(scene: SceneTables) -> None:
     """Raise ValueError if a quantity is asked for where there is no material, or two values."""
     for i, asked in enumerate(scene.quantities):
         if isinstance(asked, PartQuantity) and asked.point is None:
@@ -133,7 +131,7 @@ def check_points(scene: "Scene") -> None:
         _check_point(scene, asked, point, where)
 
 
-def _check_point(scene: "Scene", asked: Any, point: Array, where: str) -> None:
+def _check_point(scene: SceneTables, asked: Any, point: Array, where: str) -> None:
     size = _body_size(scene)
     if size is None:
         return
@@ -153,7 +151,7 @@ def _check_point(scene: "Scene", asked: Any, point: Array, where: str) -> None:
             raise ValueError(f"{where} is {off:.3g} m away from cut '{asked.cut}'")
 
 
-def _body_size(scene: "Scene") -> float | None:
+def _body_size(scene: SceneTables) -> float | None:
     body = scene.geometry
     if isinstance(body, Rectangle | Polygon):
         return float(np.ptp(body.outline(), axis=0).max())
@@ -162,7 +160,7 @@ def _body_size(scene: "Scene") -> float | None:
     return None
 
 
-def _holds(scene: "Scene", point: Array, tolerance: float) -> bool:
+def _holds(scene: SceneTables, point: Array, tolerance: float) -> bool:
     body = scene.geometry
     if isinstance(body, Box):
         low, high = np.array(body.lower) - tolerance, np.array(body.upper) + tolerance
@@ -173,7 +171,7 @@ def _holds(scene: "Scene", point: Array, tolerance: float) -> bool:
     return bool(on_boundary or inside_polygon(point[None], outline)[0])
 
 
-def _cut_distances(scene: "Scene", point: Array) -> dict[str, float]:
+def _cut_distances(scene: SceneTables, point: Array) -> dict[str, float]:
     """Distance of a point to every cut whose shape is known, by the name of the cut."""
     found = {}
     for cut in _known(scene):

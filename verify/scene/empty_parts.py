@@ -6,7 +6,6 @@ boundary is sampled much finer than their elements are.
 """
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,7 @@ from numpy.typing import NDArray
 from verify.scene.geometry import Box, Polygon, Rectangle
 from verify.scene.physics import Traction
 from verify.scene.regions import parse_region
-
-if TYPE_CHECKING:
-    from verify.scene.scene import Scene
+from verify.scene.tables import SceneTables
 
 __all__ = ["check_parts_act", "check_parts_of_mesh"]
 
@@ -26,7 +23,7 @@ _PER_EDGE = 4096  # samples of an edge of the boundary of an unstructured mesh
 _TOLERANCE = 1e-9  # of the body: as where the nodes are found
 
 
-def check_parts_act(scene: "Scene") -> None:
+def check_parts_act(scene: SceneTables) -> None:
     """Raise ValueError if an inequality holds no node, or for a traction no facet, of a level."""
     parts = _inequalities(scene)
     if not parts:
@@ -35,12 +32,12 @@ def check_parts_act(scene: "Scene") -> None:
         _check(scene, parts, facets, f" on mesh level {level}" if scene.mesh.count > 1 else "")
 
 
-def check_parts_of_mesh(scene: "Scene", points: Array, cells: NDArray[np.int64]) -> None:
+def check_parts_of_mesh(scene: SceneTables, points: Array, cells: NDArray[np.int64]) -> None:
     """Raise ValueError if an inequality holds no node or facet of the boundary of a given mesh.
 
     Parameters
     ----------
-    scene : Scene
+    scene : SceneTables
     points : (n, d) array
     cells : (m, k) int array
     """
@@ -54,7 +51,7 @@ def check_parts_of_mesh(scene: "Scene", points: Array, cells: NDArray[np.int64])
     _check(scene, parts, points[distinct[count == 1]], "")
 
 
-def _inequalities(scene: "Scene") -> list[tuple[str, str, bool]]:
+def _inequalities(scene: SceneTables) -> list[tuple[str, str, bool]]:
     """Key, inequality, and whether a whole facet is needed, of supports and tractions."""
     parts = [(f"supports[{i}].where", s.where, False) for i, s in enumerate(scene.supports)]
     parts += [
@@ -67,7 +64,7 @@ def _inequalities(scene: "Scene") -> list[tuple[str, str, bool]]:
 
 
 def _check(
-    scene: "Scene", parts: list[tuple[str, str, bool]], facets: Array, where_it_is: str
+    scene: SceneTables, parts: list[tuple[str, str, bool]], facets: Array, where_it_is: str
 ) -> None:
     """Refuse a part that holds too few of the corners of all facets (k, corners, d)."""
     points = facets.reshape(-1, scene.dimension)
@@ -88,7 +85,7 @@ def _inside(where: str, points: Array, tolerance: float) -> NDArray[np.bool_]:
     return found
 
 
-def _boundary(scene: "Scene") -> list[Array]:
+def _boundary(scene: SceneTables) -> list[Array]:
     """Facets (k, corners, d) of the boundary of each level, or pieces in their place."""
     body, mesh = scene.geometry, scene.mesh
     if isinstance(body, Rectangle | Box) and mesh.pattern == "structured":

@@ -1,16 +1,12 @@
 """Checks of the regions of a scene's materials: they can be read, and lie in the body."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.scene.geometry import Box, Polygon, Rectangle
 from verify.scene.planar import inside_polygon
 from verify.scene.regions import parse_region
-
-if TYPE_CHECKING:
-    from verify.scene.scene import Scene
+from verify.scene.tables import SceneTables
 
 __all__ = ["check_material_regions", "check_regions_of_mesh"]
 
@@ -21,7 +17,7 @@ _SAMPLES = 2**16  # of the body: a region of less than about 1e-4 of it may be m
 _STEPS = {2: (0.75487766625, 0.56984029100), 3: (0.81917251340, 0.67104360670, 0.54970047790)}
 
 
-def check_material_regions(scene: "Scene") -> None:
+def check_material_regions(scene: SceneTables) -> None:
     """Raise ValueError if a region cannot be read, is empty, or is alone in having a density."""
     for i, region in enumerate(scene.material.regions):
         place = f"material.regions[{i}]"
@@ -35,13 +31,13 @@ def check_material_regions(scene: "Scene") -> None:
         _check_not_empty(scene, _samples(scene))
 
 
-def check_regions_of_mesh(scene: "Scene", points: Array, cells: NDArray[np.int64]) -> None:
+def check_regions_of_mesh(scene: SceneTables, points: Array, cells: NDArray[np.int64]) -> None:
     """Raise ValueError if a region holds no centroid of the cells (m, k) of a given mesh."""
     if scene.material.regions:
         _check_not_empty(scene, points[cells].mean(axis=1))
 
 
-def _check_not_empty(scene: "Scene", points: Array) -> None:
+def _check_not_empty(scene: SceneTables, points: Array) -> None:
     if not len(points):
         return
     found = np.bincount(scene.material.number_at(points), minlength=len(scene.material.each))
@@ -55,7 +51,7 @@ def _check_not_empty(scene: "Scene", points: Array) -> None:
         raise ValueError("material.regions: they cover the body; [material] is that of no part")
 
 
-def _samples(scene: "Scene") -> Array:
+def _samples(scene: SceneTables) -> Array:
     """Points (n, d) all over the body; none of a body that only its mesh file knows."""
     body, d = scene.geometry, scene.dimension
     if isinstance(body, Rectangle | Polygon):

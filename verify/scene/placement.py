@@ -1,6 +1,6 @@
 """Checks that take more than one part of a scene: dimensions, names, times."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,8 @@ from verify.scene.physics import BodyForce, CutFaces, Gravity, Rotation, Tractio
 from verify.scene.regions import parse_expression, parse_region
 from verify.scene.skin import Skin
 from verify.scene.spatial_cuts import DiscCut
+from verify.scene.tables import SceneTables
 from verify.scene.tool_path import ToolPathCut
-
-if TYPE_CHECKING:
-    from verify.scene.scene import Scene
 
 __all__ = ["boundary_condition_names", "check_placement"]
 
@@ -35,7 +33,7 @@ _ON_FRONT = 1e-3  # of the radius: what is given in a few digits is on the front
 _QUANTITIES = ("strain_energy", "maximum_displacement")
 
 
-def check_placement(scene: "Scene") -> None:
+def check_placement(scene: SceneTables) -> None:
     """Raise ValueError with one clear line if the parts of `scene` do not fit together."""
     _check_dimensions(scene)
     _check_regions(scene)
@@ -52,12 +50,12 @@ def check_placement(scene: "Scene") -> None:
     check_points(scene)
 
 
-def boundary_condition_names(scene: "Scene") -> tuple[str, ...]:
+def boundary_condition_names(scene: SceneTables) -> tuple[str, ...]:
     """Names that `where` may use: the boundary parts, and ``boundary`` for all of it."""
     return (*scene.geometry.parts(), "boundary")
 
 
-def _check_dimensions(scene: "Scene") -> None:
+def _check_dimensions(scene: SceneTables) -> None:
     d = scene.dimension
     if d == 2 and scene.material.plane is None:
         raise ValueError("material.plane: a 2D scene needs plane = 'strain' or 'stress'")
@@ -112,7 +110,7 @@ def _check_dimensions(scene: "Scene") -> None:
         raise ValueError("material.density: a dynamic analysis needs it")
 
 
-def _check_faces(scene: "Scene", load: CutFaces, place: str) -> None:
+def _check_faces(scene: SceneTables, load: CutFaces, place: str) -> None:
     names = [cut.name for cut in scene.cuts]
     if load.cut not in names:
         raise ValueError(f"{place}.cut: no cut '{load.cut}'{nearest(load.cut, names)}")
@@ -135,7 +133,7 @@ def _check_rotation(rotation: Rotation, dimension: int, place: str) -> None:
         raise ValueError(f"{place}.axis: is zero")
 
 
-def _check_regions(scene: "Scene") -> None:
+def _check_regions(scene: SceneTables) -> None:
     names = boundary_condition_names(scene)
     places = [(f"supports[{i}].where", s.where) for i, s in enumerate(scene.supports)]
     places += [
@@ -154,7 +152,7 @@ def _check_regions(scene: "Scene") -> None:
             raise ValueError(f"{place}: {error}") from None
 
 
-def _check_formulas(scene: "Scene") -> None:
+def _check_formulas(scene: SceneTables) -> None:
     """Refuse formulas that cannot be read; where they are no finite number is found on meshes."""
     given = {f"supports[{i}].displacement": s.displacement for i, s in enumerate(scene.supports)}
     for i, load in enumerate(scene.loads):
@@ -183,7 +181,7 @@ def _check_components(components: Any, dimension: int, timed: bool, place: str) 
                 raise ValueError(f"{place}: {error}") from None
 
 
-def _check_exact(scene: "Scene") -> None:
+def _check_exact(scene: SceneTables) -> None:
     wants = [f"supports[{i}]" for i, s in enumerate(scene.supports) if s.displacement == "exact"]
     wants += [
         f"loads[{i}]"
@@ -200,7 +198,7 @@ def _check_exact(scene: "Scene") -> None:
         raise ValueError(f"{wants[0]}: 'exact' needs an [exact] solution")
 
 
-def _check_tip(scene: "Scene", asked: StressIntensityQuantity, place: str) -> None:
+def _check_tip(scene: SceneTables, asked: StressIntensityQuantity, place: str) -> None:
     cut = next(cut for cut in scene.cuts if cut.name == asked.cut)
     blade = isinstance(cut, ToolPathCut) and cut.dimension == 3
     if asked.mode == "III" and cut.dimension == 2:
@@ -227,7 +225,7 @@ def _check_front(cut: Any, point: NDArray[np.float64], place: str) -> None:
         raise ValueError(f"{place}.point: is {off:.3g} m away from the front of '{cut.name}'")
 
 
-def _check_times(scene: "Scene") -> None:
+def _check_times(scene: SceneTables) -> None:
     """Refuse times in a static scene, and times after the end."""
     duration = scene.analysis.duration
     times: dict[str, float | None] = {
@@ -262,7 +260,7 @@ def _check_times(scene: "Scene") -> None:
                 raise ValueError(f"initial.{key}: {len(given)} values; expected {scene.dimension}")
 
 
-def _check_motion(scene: "Scene", motion: Moving) -> None:
+def _check_motion(scene: SceneTables, motion: Moving) -> None:
     d = scene.dimension
     for key in ("velocity", "centre"):
         vector = getattr(motion, key)
@@ -272,7 +270,7 @@ def _check_motion(scene: "Scene", motion: Moving) -> None:
         raise ValueError(f"initial.spin: expected {'a number' if d == 2 else 'three numbers'}")
 
 
-def _check_names(scene: "Scene") -> None:
+def _check_names(scene: SceneTables) -> None:
     cuts = [cut.name for cut in scene.cuts]
     if len(set(cuts)) != len(cuts):
         raise ValueError(f"cuts: names must differ, got {cuts}")
@@ -303,7 +301,7 @@ def _check_names(scene: "Scene") -> None:
             raise ValueError(f"quantities[{i}].name: '{name}' names an error; take another")
 
 
-def _check_part(scene: "Scene", asked: PartQuantity, place: str) -> None:
+def _check_part(scene: SceneTables, asked: PartQuantity, place: str) -> None:
     d = scene.dimension
     if asked.point is not None and len(asked.point) != d:
         raise ValueError(f"{place}.point: expected {d} coordinates")
@@ -323,7 +321,7 @@ def _check_part(scene: "Scene", asked: PartQuantity, place: str) -> None:
             raise ValueError(f"{place}.time: {asked.time:g} s is no output time")
 
 
-def _check_acceptance(scene: "Scene") -> None:
+def _check_acceptance(scene: SceneTables) -> None:
     """Refuse checks of what is not measured in this scene."""
     known = dict.fromkeys((*METRICS, *(quantity.name for quantity in scene.quantities)))
     for i, check in enumerate(scene.acceptance):
@@ -341,7 +339,7 @@ def _check_acceptance(scene: "Scene") -> None:
             raise ValueError(f"acceptance[{i}]: a rate needs at least two mesh levels")
 
 
-def _check_adequacy(scene: "Scene") -> None:
+def _check_adequacy(scene: SceneTables) -> None:
     """Refuse models that the scene has no other one of."""
     if scene.adequacy.motion and scene.analysis.kind == "static":
         raise ValueError("adequacy.motion: belongs to a dynamic analysis")
@@ -351,7 +349,7 @@ def _check_adequacy(scene: "Scene") -> None:
         raise ValueError(f"adequacy: {scene.played_only}")
 
 
-def _check_known_findings(scene: "Scene") -> None:
+def _check_known_findings(scene: SceneTables) -> None:
     made = [f"{check.check} of {check.metric}" for check in scene.acceptance]
     for i, finding in enumerate(scene.known_findings):
         if not any(map(finding.concerns, scene.acceptance)):
