@@ -6,50 +6,21 @@ check needs is missing.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isfinite
 
 from verify.applied_checks import applied_checks, limit_text, unjudged
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
-from verify.study.energy_account import ACCOUNT
-from verify.study.error_history import ERROR_NAMES
+from verify.study.intervals import Interval, NotMeasuredError, error_interval
 from verify.study.rates import ROUND_OFF
 
-__all__ = [
-    "ERROR_METRICS",
-    "Interval",
-    "NotMeasuredError",
-    "error_interval",
-    "judge",
-    "judged_against_rows",
-]
+__all__ = ["judge", "judged_against_rows", "with_verdicts"]
 
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
 
-# metrics that are relative errors themselves; all others are quantities with a reference
-ERROR_METRICS = (*ERROR_NAMES, *ACCOUNT)
-
 # "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly
 _SAME_SIZE = 0.1
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A measured number and the bounds of its true value."""
-
-    value: float
-    low: float
-    high: float
-
-    @property
-    def half_width(self) -> float:
-        """Largest distance of the bounds from the value."""
-        return max(self.value - self.low, self.high - self.value)
-
-
-class NotMeasuredError(Exception):
-    """A solve, a metric or its reference that the check needs is not there."""
 
 
 def judge(
@@ -91,6 +62,11 @@ def judge(
         except NotMeasuredError as problem:
             verdicts.append(unjudged(check, Verdict.ERROR, str(problem)))
     return [_marked(scene, verdict) for verdict in verdicts]
+
+
+def with_verdicts(scene: Scene, result: CaseResult, judge_only: Sequence[str] = ()) -> CaseResult:
+    """Return what was measured of a case with its verdicts; see `judge`."""
+    return replace(result, verdicts=judge(scene, result.solves, result.rates, judge_only))
 
 
 def judged_against_rows(
@@ -149,30 +125,6 @@ def _marked(scene: Scene, found: VerdictRecord) -> VerdictRecord:
             text = "it passes, and is listed as a known finding: the entry can go"
             return replace(found, reason=f"{found.reason}; {text}")
     return found
-
-
-def error_interval(metric: Metric) -> Interval:
-    """Relative error that a metric stands for, with the bounds of its true value.
-
-    For an error metric that is its value; for a quantity its distance from the reference.
-
-    Raises
-    ------
-    NotMeasuredError
-        If the metric is a quantity without a reference, or with one that is 0.
-    """
-    if metric.name in ERROR_METRICS:
-        return _interval(metric.value, metric.uncertainty)
-    if metric.reference is None:  # never take the quantity itself for an error
-        raise NotMeasuredError(f"{metric.name} has no reference to be compared with")
-    if metric.reference == 0.0:
-        raise NotMeasuredError(f"the reference of {metric.name} is 0: it has no relative error")
-    scale = abs(metric.reference)
-    return _interval(abs(metric.value - metric.reference) / scale, metric.uncertainty / scale)
-
-
-def _interval(error: float, width: float) -> Interval:
-    return Interval(error, max(0.0, error - width), error + width)
 
 
 def _judge_bound(

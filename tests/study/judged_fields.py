@@ -5,6 +5,7 @@ import numpy as np
 from verify.errors import InputError
 from verify.result import SolveRecord, Status
 from verify.study.accuracy import assess_accuracy
+from verify.verdict import with_verdicts
 
 
 def judged(scene, solvers, exact=None):
@@ -14,7 +15,7 @@ def judged(scene, solvers, exact=None):
         for name, own in solvers.items()
         for level, s in own.items()
     ]
-    return assess_accuracy(scene, rows, solvers, exact)
+    return with_verdicts(scene, assess_accuracy(scene, rows, solvers, exact))
 
 
 class _TwoSided:

@@ -8,6 +8,7 @@ from judged_fields import Cubic, judged
 from verify.errors import InputError
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
 from verify.study.accuracy import assess_accuracy
+from verify.verdict import with_verdicts
 
 
 def line(x):
@@ -144,7 +145,7 @@ def test_a_failed_solve_stays_a_record_and_is_an_error_not_a_pass():
     rows = records("xfem", {0: 8, 1: 16, 2: 32})
     rows[2] = replace(rows[2], status=Status.TIMEOUT, reason="stopped after 1 s")
     solved = {"xfem": {0: LEVELS[0], 1: LEVELS[1]}}
-    result = assess_accuracy(case([BOUND]), rows, solved, EXACT)
+    result = with_verdicts(case([BOUND]), assess_accuracy(case([BOUND]), rows, solved, EXACT))
     assert result.verdicts[0].verdict is Verdict.ERROR
     assert "stopped after 1 s" in result.verdicts[0].reason
     assert len(result.solves) == 3
@@ -154,7 +155,8 @@ def test_a_failed_solve_stays_a_record_and_is_an_error_not_a_pass():
 
 def test_no_solve_at_all_is_still_a_result():
     rows = [SolveRecord("a test", "xfem", 0, Status.FAILED, "no memory")]
-    result = assess_accuracy(case([BOUND], exact=False), rows, {}, None)
+    asked = case([BOUND], exact=False)
+    result = with_verdicts(asked, assess_accuracy(asked, rows, {}, None))
     assert result.verdicts[0].verdict is Verdict.ERROR
     assert result.reference["kind"] == "none"
 
@@ -189,7 +191,7 @@ def test_a_solution_on_a_sixth_of_a_cube_is_not_measured_but_named():
         acceptance=[BOUND],
     )
     rows = [SolveRecord("a test", "xfem", 0, Status.SOLVED, size=1.0)]
-    result = assess_accuracy(asked, rows, {"xfem": {0: tetrahedron}}, None)
+    result = with_verdicts(asked, assess_accuracy(asked, rows, {"xfem": {0: tetrahedron}}, None))
     assert result.verdicts[0].verdict is Verdict.ERROR
     assert "cover 0.1667 of the body" in result.verdicts[0].reason
 
@@ -223,7 +225,7 @@ def test_an_uncut_body_has_no_jump_metric():
     one = solution(points, cells, 0.1 * points, size=1 / 6)
     asked = scene([], exact={"solution": "linear"})
     rows = [SolveRecord("a test", "xfem", 0, Status.SOLVED, size=1 / 6)]
-    result = assess_accuracy(asked, rows, {"xfem": {0: one}}, Linear())
+    result = with_verdicts(asked, assess_accuracy(asked, rows, {"xfem": {0: one}}, Linear()))
     assert result.solves[0].metric("jump_l2") is None
     assert result.solves[0].metric("energy_norm").value < 1e-13
 

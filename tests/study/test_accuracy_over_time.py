@@ -9,6 +9,7 @@ from cut_meshes import STRAIGHT, layered, scene
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
 from verify.solution import Solution
 from verify.study.accuracy import assess_accuracy
+from verify.verdict import with_verdicts
 
 DURATION = 2.0
 
@@ -73,7 +74,7 @@ def assess(checks, solvers, exact=None, **more):
         for name, own in solvers.items()
         for level, s in own.items()
     ]
-    return assess_accuracy(asked, rows, solvers, exact)
+    return with_verdicts(asked, assess_accuracy(asked, rows, solvers, exact))
 
 
 TIMES = np.linspace(0, DURATION, 9)

@@ -40,6 +40,7 @@ from verify.solvers.interface import is_built_in
 from verify.study.accuracy import assess_accuracy
 from verify.study.adequacy import adequacy_notice
 from verify.study.closing import with_openings
+from verify.verdict import with_verdicts
 from verify.whole_files import write_whole
 
 __all__ = ["main"]
@@ -60,9 +61,8 @@ def main(question_file: Path) -> None:
 
     records, solutions, at = _stored(root, question["folders"], question["unfit"], folder / JUDGING)
     exact = _exact(scene)
-    result: CaseResult = assess_accuracy(
-        scene, records, solutions, exact, question["judge_only"], announce
-    )
+    measured = assess_accuracy(scene, records, solutions, exact, announce)
+    result: CaseResult = with_verdicts(scene, measured, question["judge_only"])
     (folder / JUDGING).unlink(missing_ok=True)
     notices = _adequacy(root, question["models"], scene, result)
     result = replace(result, notices=[*result.notices, *notices])

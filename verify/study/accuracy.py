@@ -1,4 +1,4 @@
-"""How accurate are the solutions of a case? Metrics, rates, the reference, verdicts.
+"""Accuracy of the solutions of a case: metrics, rates, the reference.
 
 A pure function of the scene and the stored solutions: it solves nothing and writes nothing.
 """
@@ -21,6 +21,7 @@ from verify.scene import Scene, scene_hash
 from verify.solution import Solution
 from verify.study.energy_account import ACCOUNT, account_metrics
 from verify.study.error_history import ERROR_NAMES, History, compared_times, error_history
+from verify.study.intervals import error_interval
 from verify.study.motion_account import motion_account
 from verify.study.motion_history import motion_history
 from verify.study.part_account import part_metrics, part_records
@@ -37,7 +38,6 @@ from verify.study.reference import (
 from verify.study.released import released_metrics
 from verify.study.sufficiency import sufficiency
 from verify.study.unavailable import unavailable_quantities
-from verify.verdict import error_interval, judge
 
 __all__ = ["assess_accuracy"]
 
@@ -54,10 +54,9 @@ def assess_accuracy(
     records: Sequence[SolveRecord],
     solutions: Mapping[str, Mapping[int, Solution]],
     exact: ExactField | None = None,
-    judge_only: Sequence[str] = (),
     announce: Callable[[SolveRecord], None] = lambda record: None,
 ) -> CaseResult:
-    """Measure all solutions of a case and judge its requirements.
+    """Measure all solutions of a case.
 
     Parameters
     ----------
@@ -69,15 +68,13 @@ def assess_accuracy(
         exact solution judges.
     exact : object with ``displacement``, ``gradient`` and ``singular_points``, optional
         The exact solution that the scene names.
-    judge_only : sequence of str
-        Solvers that are judged; empty: all that were asked and do not refuse the case.
     announce : callable
         Is told of each solve before it is measured.
 
     Returns
     -------
     CaseResult
-        Without pictures and provenance.
+        Without verdicts, pictures and provenance.
 
     Raises
     ------
@@ -120,7 +117,7 @@ def assess_accuracy(
         reference=record,
         solves=measured,
         rates=rates,
-        verdicts=judge(scene, measured, rates, judge_only),
+        verdicts=[],
         notices=unavailable_quantities(scene, measured),
         row=asdict(scene.row) if scene.row else None,
     )

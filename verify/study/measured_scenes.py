@@ -16,8 +16,8 @@ from verify.solvers.interface import checked_refusal
 from verify.study.accuracy import assess_accuracy
 from verify.study.finding import Finding
 from verify.study.in_processes import in_processes
+from verify.study.intervals import NotMeasuredError, error_interval
 from verify.study.variants import Variant
-from verify.verdict import NotMeasuredError, error_interval
 
 __all__ = ["Measurement", "measured_families", "measured_scenes", "missing_solutions"]
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from math import isfinite
 
 from verify.result import CaseResult, SolveRecord, Status
+from verify.study.intervals import Interval, NotMeasuredError, error_interval
 from verify.study.ranking.standing import Item
-from verify.verdict import Interval, NotMeasuredError, error_interval
 
 __all__ = ["interval_of", "item_on_finest"]
 

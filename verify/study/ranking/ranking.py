@@ -7,11 +7,11 @@ from typing import Any
 from verify.ranking import LeftOut, Ranking
 from verify.result import CaseResult, Status, Verdict
 from verify.study.energy_account import ACCOUNT
+from verify.study.intervals import ERROR_METRICS
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
 from verify.study.ranking.energy import energy_comparisons
 from verify.study.ranking.stability import stability_standings
-from verify.verdict import ERROR_METRICS
 
 __all__ = ["rank_solvers", "ranked_solvers"]
 
