@@ -29,8 +29,10 @@ __all__ = ["StrainEquations"]
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
 _UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the work
-_ROUND_OFF = 1e-14  # of stiffness times size squared, J
-_GOOD_ENOUGH = 1e-8  # of it, where round-off does not let the residual fall further
+# of stiffness times size squared, J; of stiffness times displacement, N: forces of a rigid motion,
+# whose own scale ‖K u‖ is nothing else
+_ROUND_OFF = 1e-14
+_GOOD_ENOUGH = 1e-8  # of the force scale, where round-off does not let the residual fall further
 _MOST_ITERATIONS = 25
 # share of the body that may be inside out: the corotated energy has no barrier, and at a tip or a
 # clamped corner its strains are unbounded, so that a well graded mesh always has such cells there
@@ -153,7 +155,8 @@ class StrainEquations:
         self._take(x)
         self.iterations += solver.getIterationNumber()
         reason = solver.getConvergedReason()
-        if reason <= 0 and not solver.getFunctionNorm() <= _GOOD_ENOUGH * self._force:
+        lost = _ROUND_OFF * abs(self._diagonal) * float(np.linalg.norm(self.displacement()))
+        if reason <= 0 and not solver.getFunctionNorm() <= max(_GOOD_ENOUGH * self._force, lost):
             from petsc4py import PETSc
 
             names = vars(PETSc.SNES.ConvergedReason)
