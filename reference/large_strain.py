@@ -19,6 +19,7 @@ Energy = Literal[
     "corotated", "corotated_mixed", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"
 ]
 _SMALLEST_STEP = 1e-4
+_MOST_STEPS = 100  # taken or refused: a path in smaller ones has met what no mesh resolves
 _SHORT = 1 / 64  # step that is not halved because energy is lost: something has snapped through
 _FINER = 2.7  # steps of a second path: another, but no multiple of the first
 _SAME = 1e-6  # of the energy, between two paths
@@ -108,8 +109,8 @@ def solve_large_strain(
     IllConditionedError
         If the body is held so weakly somewhere that the tangent at rest is lost in round-off.
     RuntimeError
-        If steps below 1e-4 do not converge; with the load factor reached and PETSc's reason. If
-        neither of two paths ends in a stable state; with both energies.
+        If steps below 1e-4, or the last of 100, do not converge; with the load factor reached and
+        PETSc's reason. If neither of two paths ends in a stable state; with both energies.
     """
 
     def path(step: float) -> LargeStrainSolve:
@@ -169,6 +170,12 @@ def _follow(
         step *= 0.5
         if step < _SMALLEST_STEP:
             raise RuntimeError(f"no equilibrium beyond load factor {factor:.4g}: {refused[-1]}")
+        if steps + len(refused) >= _MOST_STEPS:
+            raise RuntimeError(
+                f"no equilibrium beyond load factor {factor:.4g} in {_MOST_STEPS} steps, of which "
+                f"{len(refused)} were refused, the last {refused[-1]}. Edges held or pulled in "
+                "part, whose strains in compression have no bound, may lead there"
+            )
     result = LargeStrainSolve(
         equations.displacement(),
         equations.energy(),

@@ -175,3 +175,21 @@ def test_a_load_beyond_any_equilibrium_says_how_far_it_came_and_why():
     with pytest.raises(RuntimeError, match=r"no equilibrium beyond load factor 0\.\d+: at 0\.\d+"):
         # pressed to nothing and through itself
         solve(space, nodes, lambda f: -1.5 * f * space.node_points[nodes] * [0, 1])
+
+
+def test_a_path_that_advances_by_tiny_steps_only_ends_in_a_bounded_number(monkeypatch):
+    from reference.strain_equations import StrainEquations
+
+    space, tried = body(1, (2, 2)), []
+    nodes = ends(space)
+    advance = StrainEquations.advance
+
+    def stumble(self, target, values, is_short=False):
+        tried.append(target)
+        done = max((t for t in tried[:-1] if t < target), default=0.0)
+        return "stumbled" if target - done > 5e-4 else advance(self, target, values, is_short)
+
+    monkeypatch.setattr(StrainEquations, "advance", stumble)
+    with pytest.raises(RuntimeError, match=r"no equilibrium beyond load factor 0\.0\d* in 100 steps"):
+        solve(space, nodes, lambda factor: 0.1 * factor * space.node_points[nodes])
+    assert len(tried) == 100
