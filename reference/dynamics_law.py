@@ -258,8 +258,11 @@ class CorotatedLaw:
     def _put(self, after: Array, before: Array | None = None) -> None:
         self._after.x.array[:] = self._space.local_part(after)
         self._last.update()
-        if before is not None:
-            self._before.x.array[:] = self._space.local_part(before)
+        if before is None:
+            return
+        values = self._space.local_part(before)
+        if not np.array_equal(self._before.x.array, values):  # it stays the same within a step
+            self._before.x.array[:] = values
             self._first.update()
 
 

@@ -142,35 +142,58 @@ def stretch_trace(H: Array) -> Array:
         Sum of the singular values of F, the least one with the sign of det F, less 3; right to
         round-off of H.
     """
-    e = _stretch_sum(np.eye(3) + H) - 3
+    parts = np.ascontiguousarray(np.reshape(H, (-1, 9)).T).reshape(3, 3, -1)
+    e = _stretch_sum(parts + np.eye(3)[:, :, None]) - 3
     # one more of Newton's steps, on the quartic in e = s − 3: there nothing cancels. The slope is
     # 64 at rest; where it is small H is not
-    G = H + H.swapaxes(1, 2) + np.einsum("nki,nkj->nij", H, H)
-    g, h = np.einsum("nii->n", G), np.einsum("nii->n", H)
-    second = 0.5 * (h**2 - np.einsum("nij,nji->n", H, H))
-    j = h + second + np.linalg.det(H)  # J − 1
-    k = 0.5 * (g**2 - np.einsum("nij,nij->n", G, G))
-    value = 64 * e + 48 * e**2 + 12 * e**3 + e**4
-    value += g**2 - 4 * k - 20 * g - 24 * j - 12 * g * e - 2 * g * e**2 - 8 * j * e
-    slope = 64 + 96 * e + 36 * e**2 + 4 * e**3 - 12 * g - 4 * g * e - 8 * j
+    G = _right(parts) + parts + parts.swapaxes(0, 1)
+    g, k = _first(G), _second(G)
+    j = _first(parts) + _second(parts) + _third(parts)  # J − 1
+    value = e * (64 + e * (48 + e * (12 + e))) - e * (g * (12 + 2 * e) + 8 * j)
+    value += g * g - 4 * k - 20 * g - 24 * j
+    slope = 64 + e * (96 + e * (36 + 4 * e)) - g * (12 + 4 * e) - 8 * j
     return e - np.divide(value, slope, out=np.zeros_like(e), where=slope > 1.0)
 
 
 def _stretch_sum(F: Array) -> Array:
-    """Sum (n,) of the singular values of F (n, 3, 3), the least one with the sign of det F."""
-    C = np.einsum("nki,nkj->nij", F, F)
-    one = np.einsum("nii->n", C)
-    two = 0.5 * (one**2 - np.einsum("nij,nij->n", C, C))
-    J = np.linalg.det(F)
+    """Sum (n,) of the singular values of F (3, 3, n), the least one with the sign of det F."""
+    C = _right(F)
+    one, two, J = _first(C), _second(C), _third(F)
     s = np.sqrt(3 * one)  # an upper bound: all roots are real, so Newton's steps only descend
     going = np.flatnonzero(s > 0)
     for _ in range(_MOST_ITERATIONS):
         a, b, c, x = one[going], two[going], J[going], s[going]
-        slope = 4 * (x**3 - a * x - 2 * c)
-        value = x**4 - 2 * a * x**2 - 8 * c * x + a**2 - 4 * b
+        square = x * x
+        slope = 4 * (x * (square - a) - 2 * c)
+        value = square * (square - 2 * a) - 8 * c * x + a * a - 4 * b
         step = np.divide(value, slope, out=np.zeros_like(x), where=slope > 0)
         s[going] = x - step
         going = going[step > 1e-16 * x]
         if not len(going):
             break
     return s
+
+
+# Invariants of matrices (3, 3, n), entry by entry: less than half of the time of einsum and det.
+
+
+def _right(F: Array) -> Array:
+    """Fᵀ F."""
+    C = np.empty_like(F)
+    for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
+        C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
+        C[j, i] = C[i, j]
+    return C
+
+
+def _first(A: Array) -> Array:
+    return np.asarray(A[0, 0] + A[1, 1] + A[2, 2])
+
+
+def _second(A: Array) -> Array:
+    minors = [A[i, i] * A[j, j] - A[i, j] * A[j, i] for i, j in ((0, 1), (0, 2), (1, 2))]
+    return np.asarray(minors[0] + minors[1] + minors[2])
+
+
+def _third(A: Array) -> Array:
+    return np.asarray(np.sum(A[0] * np.cross(A[1], A[2], axis=0), axis=0))
