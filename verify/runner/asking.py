@@ -17,6 +17,7 @@ from verify.runner.child import Child, Ending
 from verify.runner.childhood import ANSWER, ASKING
 from verify.runner.log import telling_line
 from verify.scene import Scene, scene_content
+from verify.solvers.interface import is_built_in
 
 __all__ = ["Asking"]
 
@@ -84,7 +85,8 @@ class Asking:
         write_json(asked, question)
         least, most = _LOADING_SECONDS
         limit = min(most, max(least, self._timeout))
-        return Child("verify.runner.survey", question, self._place / "log.txt", limit, self._memory)
+        log, own = self._place / "log.txt", is_built_in(self.name)
+        return Child("verify.runner.survey", question, log, limit, self._memory, own=own)
 
     def _number(self) -> int | None:
         try:

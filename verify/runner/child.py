@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from uuid import uuid4
 
+from verify.runner.warm import PARENT_VARIABLE, Forked, fork
 from verify.threads import ONE_THREAD
 
-__all__ = ["PARENT_VARIABLE", "POLL_SECONDS", "Child", "Ending"]
+__all__ = ["PARENT_VARIABLE", "POLL_SECONDS", "Child", "Ending", "descendants"]
 
 POLL_SECONDS = 0.02
-PARENT_VARIABLE = "VERIFY_RUNNER_PID"
 _MARK_VARIABLE = "VERIFY_CHILD"
 _LONGEST_LOG = 64 * 2**20  # bytes; beyond, only its beginning and what comes next are kept
 _BEGINNING = 2**20
@@ -51,7 +51,8 @@ class Child:
     """A running ``python -m MODULE ARGUMENT`` with its log, watched by calling `poll`.
 
     With more than one of `ranks` it is mpiexec that runs it as often; the limits are for all
-    ranks together.
+    ranks together. One that is `own`, and runs no code of a guest, is forked from a process that
+    has imported what it needs, where there is one.
     """
 
     def __init__(
@@ -62,19 +63,21 @@ class Child:
         timeout: float,
         memory: float,
         ranks: int = 1,
+        own: bool = False,
     ) -> None:
         environment = {**os.environ, **ONE_THREAD}
         environment[PARENT_VARIABLE] = str(os.getpid())
         self._mark = environment[_MARK_VARIABLE] = uuid4().hex
         self.log, self.timeout, self.memory = log, timeout, memory
         self.peak, self.killed_for = 0.0, ""
-        self.start, self._starved_before = time.monotonic(), _starved()
-        run = [module, str(argument.resolve())]  # a solver may change the working directory
+        argument = argument.resolve()  # a solver may change the working directory
+        run = [module, str(argument)]
         if ranks > 1:
-            run = ["verify.runner.ranks", str(ranks), *run]
+            run, own = ["verify.runner.ranks", str(ranks), *run], False
         log.unlink(missing_ok=True)
         with log.open("ab") as stream:  # appending, so that it can be cut from outside
-            self._process = subprocess.Popen(
+            forked = fork(module, argument, stream.fileno(), environment) if own else None
+            self._process: Forked | subprocess.Popen[bytes] = forked or subprocess.Popen(
                 # -P: a stray numpy.py in the working directory is not imported
                 [sys.executable, "-P", "-X", "faulthandler", "-m", *run],
                 stdin=subprocess.DEVNULL,
@@ -83,6 +86,7 @@ class Child:
                 env=environment,
                 start_new_session=True,
             )
+        self.start, self._starved_before = time.monotonic(), _starved()
 
     def poll(self) -> Ending | None:
         """Look once; kill it if it is over a limit; tell how it ended if it has."""
@@ -111,9 +115,12 @@ class Child:
 
     def _kill_all(self) -> None:
         """Kill its group, its descendants, and what bears its mark, until nothing is left."""
+        if isinstance(self._process, Forked):
+            self._process.end()
+            return
         mark = f"{_MARK_VARIABLE}={self._mark}".encode()
         for _ in range(_ROUNDS):
-            found = {*_descendants(self._process.pid), *_marked(mark)}
+            found = {*descendants(self._process.pid), *_marked(mark)}
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self._process.pid, signal.SIGKILL)  # it leads its own session and group
             for pid in found - {self._process.pid}:
@@ -123,8 +130,8 @@ class Child:
                 return
 
 
-def _descendants(pid: int) -> list[int]:
-    """Process `pid` and all that it started and that has not been orphaned."""
+def descendants(pid: int) -> list[int]:
+    """Return process `pid` and all that it started and that has not been orphaned."""
     found, waiting = [], [pid]
     while waiting:
         found.append(waiting.pop())
@@ -147,7 +154,7 @@ def _marked(mark: bytes) -> list[int]:
 def _resident_memory(pid: int) -> float:
     """Resident memory in bytes of a process and its descendants (0 if it has gone)."""
     total = 0.0
-    for one in _descendants(pid):
+    for one in descendants(pid):
         with contextlib.suppress(OSError, IndexError, ValueError):
             pages = int(Path("/proc", str(one), "statm").read_bytes().split()[1])
             total += pages * os.sysconf("SC_PAGE_SIZE")

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from verify.runner.child import Child, Ending
+from verify.solvers.interface import is_built_in
 
 __all__ = ["Engine", "LocalEngine", "Running"]
 
@@ -64,6 +65,7 @@ class LocalEngine:
             self._timeout,
             self._memory,
             job.get("ranks", 1),
+            own=is_built_in(job["solver"]),
         )
 
     def close(self) -> None:

@@ -29,6 +29,7 @@ from verify.runner.plan import CasePlan, check_judged, plan_case, survey_solvers
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
+from verify.runner.warm import warm_parent
 from verify.scene import Scene, scene_content
 from verify.whole_files import write_whole
 
@@ -103,7 +104,7 @@ def run_cases(
     cluster = (
         ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
     )
-    with listening() as stop:
+    with listening() as stop, warm_parent():
         survey = survey_solvers(scenes, options, stop, bundle)
         with claimed(out, identity) as directory:
             origin = provenance()

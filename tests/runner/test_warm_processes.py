@@ -1,0 +1,217 @@
+"""Processes forked from a warm parent: as apart from each other as fresh ones, ended as whole."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from verify.json_files import read_json, write_json
+from verify.runner import warm
+from verify.runner.child import Child
+from verify.runner.warm import Forked, warm_parent
+from verify.scene import load_scene, scene_content
+
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Linux only")
+
+SOLVER = """
+    import os, subprocess, sys, time
+    import numpy as np
+    from pathlib import Path
+    class Mine:
+        name = "mine"
+        def refuses(self, scene): return None
+        def levels(self, scene): return 1
+        def solve(self, scene, level, repetitions=1):
+            {body}
+            raise ValueError({said})
+"""
+
+
+@pytest.fixture
+def prepared(tmp_path, case_text, monkeypatch):
+    """Give a function that makes a folder with a solver, and goes there."""
+    (tmp_path / "square.toml").write_text(case_text)
+    content = scene_content(load_scene(tmp_path / "square.toml"))
+
+    def prepare(name, body="", said="''"):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "mine.py").write_text(textwrap.dedent(SOLVER.format(body=body, said=said)))
+        job = {"scene": content, "solver": "mine:Mine", "level": 0, "repetitions": 1}
+        write_json({**job, "parameters": {}}, folder / "job.json")
+        monkeypatch.chdir(folder)
+        return folder
+
+    return prepare
+
+
+@pytest.fixture(scope="module")
+def parent():
+    with warm_parent():
+        yield
+
+
+@pytest.fixture
+def solved(parent, prepared):
+    """Give a function that runs a solver of a folder of its own, forked."""
+
+    def start(name, body="", said="''"):
+        folder = prepared(name, body, said)
+        child = _child(folder)
+        assert isinstance(child._process, Forked)
+        return child, folder
+
+    return start
+
+
+def _child(folder):
+    job, log = folder / "job.json", folder / "log.txt"
+    return Child("verify.runner.solve", job, log, 60.0, 4e9, own=True)
+
+
+def ended(child):
+    while (ending := child.poll()) is None:
+        time.sleep(0.02)
+    return ending
+
+
+def reason(folder):
+    return read_json(folder / "outcome.json")["reason"]
+
+
+def written(file):
+    """Wait for the words in a file."""
+    for _ in range(3000):
+        if file.exists() and (words := file.read_text().split()):
+            return words
+        time.sleep(0.02)
+    raise AssertionError(f"{file} was not written")
+
+
+def test_nothing_leaks_from_one_to_the_next(solved):
+    """Two solvers of one name in two folders, and what one has done to a library."""
+    for number in (1, 2):
+        child, folder = solved(
+            f"number_{number}", said=f"f'{number} {{np.spoilt}}'", body="np.spoilt = 7"
+        )
+        assert ended(child).returncode == 0
+        assert reason(folder) == f"ValueError: {number} 7"
+    child, folder = solved("clean", said="str(hasattr(np, 'spoilt'))")
+    ended(child)
+    assert reason(folder) == "ValueError: False"
+
+
+def test_it_is_in_its_folder_with_its_environment_and_random_numbers(solved, monkeypatch):
+    said = "' '.join([os.getcwd(), os.environ.get('WORD', 'none'), str(np.random.rand())])"
+    answers = []
+    for word in ("none", "said"):
+        if word != "none":
+            monkeypatch.setenv("WORD", word)
+        child, folder = solved(f"folder_{word}", said=said)
+        ended(child)
+        answers.append(reason(folder).split())
+        assert answers[-1][1:3] == [str(folder), word]
+    assert answers[0][3] != answers[1][3]
+
+
+def test_the_parent_has_started_neither_threads_nor_mpi_and_has_one_thread(solved):
+    said = (
+        "str([m for m in ('mpi4py.MPI', 'dolfinx', 'petsc4py.PETSc', 'gmsh', 'vtk') "
+        "if m in sys.modules]) + str(len(os.listdir('/proc/self/task'))) "
+        "+ str('verify.solvers.xfem' in sys.modules)"
+        "+ str(sys.modules['numba'].get_num_threads())"
+    )
+    child, folder = solved("imports", said=said)
+    ended(child)
+    assert reason(folder) == "ValueError: []1True1"
+
+
+@pytest.mark.parametrize("ends", ["alone", "at its limit", "killed"])
+def test_a_grandchild_in_a_session_of_its_own_that_nobody_waits_for_ends_too(solved, ends):
+    """Forked twice and never started anew, so that no mark is in its environment."""
+    body = (
+        "if os.fork() == 0:\n"
+        "                os.setsid()\n"
+        "                if os.fork() == 0:\n"
+        "                    Path('pid').write_text(str(os.getpid()))\n"
+        "                    time.sleep(600)\n"
+        "                os._exit(0)\n"
+        "            while not Path('pid').exists() or not Path('pid').read_text():\n"
+        "                time.sleep(0.01)\n"
+    ) + ("" if ends == "alone" else "            time.sleep(600)\n")
+    child, folder = solved("leaving", body=body)
+    (pid,) = written(folder / "pid")
+    if ends == "at its limit":
+        child.timeout = 0.0
+    if ends == "killed":
+        child.kill()
+    assert ended(child).killed_for == ("timeout" if ends == "at its limit" else "")
+    assert not Path("/proc", pid, "exe").exists()
+
+
+def test_a_signal_that_kills_it_is_told_and_one_that_kills_its_keeper_too(solved):
+    body = "sys.modules['faulthandler'].disable(); os.kill({}, {}); time.sleep(60)"
+    for name, target, signum in (
+        ("crash", "os.getpid()", signal.SIGSEGV),
+        ("keeper", "os.getppid()", signal.SIGKILL),
+    ):
+        child, _ = solved(name, body=body.format(target, int(signum)))
+        assert ended(child).returncode == -signum
+
+
+def test_memory_is_that_of_the_process_without_its_keeper(solved):
+    child, _ = solved("memory", body="x = np.ones(50_000_000); time.sleep(1)")
+    assert 4e8 < ended(child).peak < 7e8  # 400 MB of it, and what is imported
+
+
+def test_without_a_parent_or_after_its_death_a_process_is_started_anew(prepared, monkeypatch):
+    folder = prepared("outside")
+    monkeypatch.setattr(warm._own, "parent", None, raising=False)
+    assert isinstance(_child(folder)._process, subprocess.Popen)
+    with warm_parent():
+        assert isinstance((one := _child(prepared("before")))._process, Forked)
+        ended(one)
+        warm._own.parent._process.kill()
+        folder = prepared("after", said="'two'")
+        assert isinstance((two := _child(folder))._process, subprocess.Popen)
+        ended(two)
+    assert reason(folder) == "ValueError: two"
+
+
+def test_all_of_them_die_with_the_runner(prepared):
+    """Killed with no chance to end anything: parent, keeper, process and what that has started."""
+    body = (
+        "p = subprocess.Popen(['sleep', '600'], start_new_session=True)\n"
+        "            Path('new').write_text(f'{os.getpid()} {os.getppid()} {p.pid}')\n"
+        "            os.rename('new', 'pids'); time.sleep(600)"
+    )
+    folder = prepared("running", body=body)
+    runner = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent("""
+            import time
+            from pathlib import Path
+            from verify.runner import warm
+            from verify.runner.child import Child
+            with warm.warm_parent():
+                job, log = Path("job.json"), Path("log.txt")
+                child = Child("verify.runner.solve", job, log, 600, 4e9, own=True)
+                Path("parent").write_text(str(warm._own.parent._process.pid))
+                while child.poll() is None:
+                    time.sleep(0.02)
+        """)],
+        cwd=folder,
+    )  # fmt: skip
+    pids = [*written(folder / "pids"), *written(folder / "parent")]
+    os.kill(runner.pid, signal.SIGKILL)
+    runner.wait()
+    for _ in range(500):
+        left = [pid for pid in pids if Path("/proc", pid, "exe").exists()]
+        if not left:
+            return
+        time.sleep(0.02)
+    raise AssertionError(f"still running: {left}")

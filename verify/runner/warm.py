@@ -1,0 +1,159 @@
+"""Processes forked from one that has imported what they need: `verify.runner.warm_parent`.
+
+``multiprocessing`` has a server like it. That one imports the caller's main module into whatever it
+forks, looks for modules in the working directory, and loses sight of what a process leaves behind.
+"""
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from verify.threads import ONE_THREAD
+
+__all__ = ["LONGEST_REQUEST", "PARENT_VARIABLE", "Forked", "fork", "warm_parent"]
+
+PARENT_VARIABLE = "VERIFY_RUNNER_PID"
+LONGEST_REQUEST = 1 << 17  # bytes, most of them the environment
+_LOADING_SECONDS, _ENDING_SECONDS = 120.0, 0.2
+
+
+class Forked:
+    """A forked process, known by its keeper: an ancestor of all that it starts.
+
+    Parameters
+    ----------
+    pid : int
+        Of the keeper, which ends when nothing of the process is left.
+    status : int
+        File descriptor from which the exit code is read then.
+    """
+
+    def __init__(self, pid: int, status: int) -> None:
+        self.pid, self._status = pid, status
+        self._returncode: int | None = None
+        os.set_blocking(status, False)
+
+    def poll(self) -> int | None:
+        """Return the exit code, or minus the signal, if it has ended."""
+        if self._returncode is None:
+            try:
+                said = os.read(self._status, 64)
+            except BlockingIOError:
+                return None
+            os.close(self._status)
+            self._returncode = int(said) if said else -signal.SIGKILL  # the keeper was killed
+        return self._returncode
+
+    def wait(self) -> int:
+        """Wait until it has ended."""
+        while (returncode := self.poll()) is None:
+            time.sleep(0.001)
+        return returncode
+
+    def end(self) -> None:
+        """Have its keeper kill it, and all that it has started."""
+        if self.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, signal.SIGTERM)
+
+
+class _Parent:
+    """The process to fork from, which begins to import at once."""
+
+    def __init__(self) -> None:
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.settimeout(_LOADING_SECONDS)
+        module = ["verify.runner.warm_parent", str(theirs.fileno())]
+        with theirs:
+            self._process = subprocess.Popen(
+                # -P: a stray numpy.py in the working directory is not imported
+                [sys.executable, "-P", "-X", "faulthandler", "-m", *module],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, **ONE_THREAD, PARENT_VARIABLE: str(os.getpid())},
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
+
+    def fork(self, request: bytes, log: int) -> Forked:
+        """Have a process forked, with its output in `log`; `OSError` if there is no parent."""
+        status, theirs = os.pipe()
+        try:
+            socket.send_fds(self._socket, [request], [log, theirs])
+            if not (said := self._socket.recv(64)):
+                raise BrokenPipeError("the warm parent has gone")
+        except OSError:
+            os.close(status)
+            raise
+        finally:
+            os.close(theirs)
+        return Forked(int(said), status)
+
+    def close(self) -> None:
+        """End it, and what it has forked with it."""
+        self._socket.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_ENDING_SECONDS)
+        self._process.kill()
+        self._process.wait()
+
+
+_own = threading.local()  # the parent dies with the thread that started it
+
+
+@contextlib.contextmanager
+def warm_parent() -> Iterator[None]:
+    """Keep a process for the time of the block from which this thread can `fork`."""
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    before, _own.parent = getattr(_own, "parent", None), _Parent()
+    try:
+        yield
+    finally:
+        _forget()
+        _own.parent = before
+
+
+def fork(module: str, argument: Path, log: int, environment: Mapping[str, str]) -> Forked | None:
+    """Have ``python -m MODULE ARGUMENT`` run by a process that begins with all imports done.
+
+    Parameters
+    ----------
+    module : str
+    argument : Path
+    log : int
+        File descriptor of its output.
+    environment : mapping
+        Its environment.
+
+    Returns
+    -------
+    Forked or None
+        None outside a block of `warm_parent`, and where it could not be loaded.
+    """
+    parent: _Parent | None = getattr(_own, "parent", None)
+    said = {"module": module, "argument": str(argument), "folder": os.getcwd()}
+    request = json.dumps({**said, "environment": dict(environment)}).encode()
+    if parent is None or len(request) > LONGEST_REQUEST:
+        return None
+    try:
+        return parent.fork(request, log)
+    except (OSError, ValueError):
+        _forget()
+        return None
+
+
+def _forget() -> None:
+    parent, _own.parent = getattr(_own, "parent", None), None
+    if parent is not None:
+        parent.close()
