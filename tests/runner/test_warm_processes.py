@@ -174,11 +174,13 @@ def test_without_a_parent_or_after_its_death_a_process_is_started_anew(prepared,
     monkeypatch.setattr(warm._own, "parent", None, raising=False)
     assert isinstance(_child(folder)._process, subprocess.Popen)
     with warm_parent():
-        assert isinstance((one := _child(prepared("before")))._process, Forked)
+        one = _child(prepared("before"))
+        assert isinstance(one._process, Forked)
         ended(one)
         warm._own.parent._process.kill()
         folder = prepared("after", said="'two'")
-        assert isinstance((two := _child(folder))._process, subprocess.Popen)
+        two = _child(folder)
+        assert isinstance(two._process, subprocess.Popen)
         ended(two)
     assert reason(folder) == "ValueError: two"
 
