@@ -98,11 +98,8 @@ def test_a_comparison_that_dies_is_an_error_of_its_checks_and_the_solves_stay(ve
     (verify.folder / "saboteur").mkdir()
     (verify.folder / "saboteur" / "sitecustomize.py").write_text(
         "import os, sys\n"
-        "def overflow(question):\n"
+        "if 'verify.runner.assess' in sys.orig_argv:\n"
         "    print('FloatingPointError: overflow'); sys.stdout.flush(); os._exit(7)\n"
-        "if 'verify.runner.warm_parent' in sys.orig_argv:\n"
-        "    from verify.runner import assess\n"
-        "    assess.main = overflow\n"
     )
     with_checks(verify, check(INSTANT))
     command = ("run", "square.toml", "--out", "out", "--json", "--solver", INSTANT)

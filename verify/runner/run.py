@@ -1,6 +1,7 @@
 """The run: solves in parallel processes, then the comparison of each finished case."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,12 +26,13 @@ from verify.runner.interruption import StopRequest, listening
 from verify.runner.job import Job, load_record, store_record, stored_record
 from verify.runner.options import Options
 from verify.runner.outcome import death, outcome_in
-from verify.runner.plan import CasePlan, check_judged, plan_case, survey_solvers
+from verify.runner.plan import CasePlan, check_judged, plan_case, solvers_of, survey_solvers
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
 from verify.runner.warm import warm_parent
 from verify.scene import Scene, scene_content
+from verify.solvers.interface import is_built_in
 from verify.whole_files import write_whole
 
 __all__ = ["Progress", "RunSummary", "run_cases"]
@@ -104,7 +106,8 @@ def run_cases(
     cluster = (
         ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
     )
-    with listening() as stop, warm_parent():
+    own = any(is_built_in(name) for scene in scenes for name in solvers_of(scene, options))
+    with listening() as stop, warm_parent() if own else nullcontext():
         survey = survey_solvers(scenes, options, stop, bundle)
         with claimed(out, identity) as directory:
             origin = provenance()
