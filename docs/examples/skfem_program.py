@@ -27,8 +27,10 @@ for support in problem["held"]:  # a later support wins
     held[at], values[at] = True, support["values"]
 
 basis = skfem.Basis(skfem.MeshTri(points.T, cells.T), skfem.ElementVector(skfem.ElementTriP1()))
-material = case["material"]
-stiffness = linear_elasticity(material["lame"], material["shear"]).assemble(basis)
+each = case["material"].get("each", [case["material"]])  # one, or those that cells have a number of
+number = grid.cell_data["material"][0] if len(each) > 1 else np.zeros(len(cells), dtype=int)
+lame, shear = (np.array([one[name] for one in each])[number, None] for name in ("lame", "shear"))
+stiffness = linear_elasticity(lame, shear).assemble(basis)
 force = np.ravel(problem["nodal_forces"])
 fixed = np.flatnonzero(held)
 u = skfem.solve(*skfem.condense(stiffness, force, x=values.ravel(), D=fixed)).reshape(-1, 2)

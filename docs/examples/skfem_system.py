@@ -11,7 +11,7 @@ from verify.system import System
 
 @skfem.BilinearForm
 def inertia(u, v, w):
-    return dot(u, v)
+    return w.density * dot(u, v)
 
 
 class SkfemWithSystem(SkfemSolver):
@@ -21,5 +21,5 @@ class SkfemWithSystem(SkfemSolver):
         basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP1()))
         stiffness, mass = linear_elasticity(*problem.lame()).assemble(basis), None
         if scene.material.density is not None:
-            mass = scene.material.density * inertia.assemble(basis)
+            mass = inertia.assemble(basis, density=problem.density())
         return System(stiffness, mass, problem.prescribed()[0].ravel())

@@ -3,7 +3,9 @@
 import json
 import re
 import stat
+import subprocess
 import sys
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -270,3 +272,30 @@ def test_a_program_may_refuse_and_its_failure_says_what_it_said(tmp_path):
     type(missing).command = ("no-such-program",)
     with pytest.raises(InputError, match="no program 'no-such-program'"):
         missing.solve(scene, 0)
+
+
+def test_several_materials_go_out_and_a_program_solves_their_patch_test(tmp_path):
+    pytest.importorskip("skfem")
+    from reference.exact import exact_solution
+
+    scene = load_scene("material/layers_patch")
+    export_case(scene, tmp_path / "out", [0], conforming=True)
+    case = json.loads((tmp_path / "out/case.json").read_text())
+    # none of them may be taken for that of the whole body
+    assert list(case["material"]) == ["each"]
+    assert [one["young"] for one in case["material"]["each"]] == [1.0, 5.0]
+    assert [one["poisson"] for one in case["material"]["each"]] == [0.24, 0.2]
+    for name in ("mesh", "conforming"):
+        mesh = meshio.read(tmp_path / f"out/level-0/{name}.vtu")
+        middle = mesh.points[mesh.cells_dict["triangle"]].mean(axis=1)
+        stiff = middle[:, 1] > middle[:, 0]
+        np.testing.assert_array_equal(mesh.cell_data["material"][0], stiff)
+    program = Path(__file__).parents[2] / "docs/examples/skfem_program.py"
+    subprocess.run([sys.executable, program, tmp_path / "out", "0"], check=True)
+    answers = read_answers(scene, tmp_path / "out")
+    found = answers.solutions[0]
+    exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    near = np.zeros_like(found.points)
+    near[found.cells] = found.points[found.cells].mean(axis=1)[:, None]
+    expected = exact.displacement(found.points, near)
+    np.testing.assert_allclose(found.displacement[0], expected, atol=1e-12)

@@ -183,3 +183,31 @@ def test_a_piece_that_too_little_holds_is_found_where_it_is():
     both = [*bottom, {"where": "top", "displacement": [0.0], "components": ["y"]}]
     assert len(problem_of(scene(supports=both), 0, conforming=True).free_pieces()) == 0
     assert len(problem_of(scene(**BOX), 0).free_pieces()) == 0
+
+
+REGIONS = {
+    "young": 1.0,
+    "poisson": 0.3,
+    "plane": "stress",
+    "density": 3.0,
+    "regions": [{"where": "y > 0.5", "young": 5.0}, {"where": "x > 1.2", "density": 7.0}],
+}
+
+
+@pytest.mark.parametrize("conforming", [False, True])
+def test_the_weight_of_several_materials_is_that_of_each_part(conforming):
+    # x = 1.2 and y = 0.5 are lines of the mesh
+    loads = [{"kind": "gravity", "acceleration": [1.0, -2.0]}]
+    problem = problem_of(scene(material=REGIONS, loads=loads), 0, conforming)
+    mass = 3.0 * 1.2 + 7.0 * 0.8
+    np.testing.assert_allclose(problem.nodal_forces().sum(axis=0), mass * np.array([1.0, -2.0]))
+
+
+def test_each_cell_has_the_constants_of_its_own_material():
+    problem = problem_of(scene(material=REGIONS), 0, conforming=True)
+    middle = problem.points[problem.cells].mean(axis=1)
+    young = np.where((middle[:, 1] > 0.5) & (middle[:, 0] < 1.2), 5.0, 1.0)
+    lam, mu = problem.lame()
+    np.testing.assert_allclose(mu[:, 0], young / 2.6)
+    np.testing.assert_allclose(lam[:, 0], young * 0.3 / (1 - 0.09))
+    np.testing.assert_allclose(problem.density()[:, 0], np.where(middle[:, 0] > 1.2, 7.0, 3.0))

@@ -116,7 +116,6 @@ def _is_foreign(path: Path) -> bool:
 
 
 def _case(scene: Scene, levels: list[dict[str, Any]]) -> dict[str, Any]:
-    law = hooke(scene.material)
     content = scene.model_dump(mode="json", by_alias=True)
     return {
         "schema": EXPORT_SCHEMA,
@@ -125,7 +124,7 @@ def _case(scene: Scene, levels: list[dict[str, Any]]) -> dict[str, Any]:
         "title": scene.title,
         "requirement": scene.requirement,
         "dimension": scene.dimension,
-        "material": {**content["material"], "lame": law.lame, "shear": law.shear},
+        "material": _material(scene),
         "analysis": content["analysis"],
         "output_times": list(scene.analysis.output_times),
         "initial": content["initial"],
@@ -134,6 +133,16 @@ def _case(scene: Scene, levels: list[dict[str, Any]]) -> dict[str, Any]:
         "levels": levels,
         "scene": content,
     }
+
+
+def _material(scene: Scene) -> dict[str, Any]:
+    """One material; of several only their list, so that none is taken for that of the body."""
+    constants = []
+    for one in scene.material.each:
+        law = hooke(one)
+        content = one.model_dump(mode="json", exclude={"regions"})
+        constants.append({**content, "lame": law.lame, "shear": law.shear})
+    return constants[0] if scene.material.is_uniform else {"each": constants}
 
 
 def _cut(cut: Any, asked: dict[str, Any]) -> dict[str, Any]:
@@ -168,7 +177,10 @@ def _write_problem(problem: Problem, folder: Path, name: str) -> list[Path]:
     points[:, :d] = problem.points
     cell_type = {2: "triangle", 3: "tetra"}[problem.scene.cell_dimension]
     with whole_file(mesh) as partial:
-        meshio.Mesh(points, [(cell_type, problem.cells)]).write(partial, file_format="vtu")
+        numbers = [problem.material_number().astype(np.int32)]
+        data = {} if problem.scene.material.is_uniform else {"material": numbers}
+        blocks = [(cell_type, problem.cells)]
+        meshio.Mesh(points, blocks, cell_data=data).write(partial, file_format="vtu")
     content = {
         "schema": EXPORT_SCHEMA,
         "mesh": mesh.name,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from verify.compare.hooke import hooke
 from verify.compare.splitting import measures
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange.quadrature import simplex_rule
@@ -21,6 +22,7 @@ from verify.scene import (
     Box,
     CutFaces,
     Gravity,
+    Material,
     Polygon,
     PolylineCut,
     Rectangle,
@@ -157,13 +159,28 @@ class Problem:
             -1, self.points.shape[1]
         )
 
-    def lame(self) -> tuple[float, float]:
-        """Lamé constants λ, μ in Pa; in plane stress the λ of the plane problem."""
+    def material_number(self) -> NDArray[np.int64]:
+        """Return the number (m,) of each cell's material: 0, or 1 + that of a region."""
+        return self.scene.material.number_at(self.points[self.cells].mean(axis=1))
+
+    def lame(self) -> tuple[Any, Any]:
+        """Lamé constants λ, μ in Pa; in plane stress the λ of the plane problem.
+
+        Two numbers; where materials differ by region (m, 1) arrays, one row for each cell, which
+        multiply what an element has at its quadrature points.
+        """
         material = self.scene.material
-        assert material.is_uniform  # `problem_of` refuses others
-        mu = material.young / (2 * (1 + material.poisson))
-        lam = 2 * mu * material.poisson / (1 - 2 * material.poisson)
-        return (2 * lam * mu / (lam + 2 * mu) if material.plane == "stress" else lam), mu
+        pairs = np.array([_lame(one) for one in material.each])
+        if material.is_uniform:
+            return float(pairs[0, 0]), float(pairs[0, 1])
+        lam, mu = pairs[self.material_number()].T
+        return lam[:, None], mu[:, None]
+
+    def density(self) -> Any:
+        """Density in kg/m³, NaN if there is none: a number, or (m, 1) like `lame`."""
+        material = self.scene.material
+        each = np.array([np.nan if one.density is None else one.density for one in material.each])
+        return float(each[0]) if material.is_uniform else each[self.material_number()][:, None]
 
 
 def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
@@ -181,7 +198,7 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
     ------
     UnsupportedSceneError
         If a conforming mesh of the scene is not offered, a support or load is another field at
-        every time, a load acts on the faces of a cut, or materials differ by region.
+        every time, or a load acts on the faces of a cut.
     InputError
         If a support or load acts nowhere, or a mesh file is bad.
     """
@@ -190,8 +207,6 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
         raise UnsupportedSceneError("loads on the faces of a cut are not exported")
     if reason := _at_every_time(scene, exact):
         raise UnsupportedSceneError(reason)
-    if not scene.material.is_uniform:
-        raise UnsupportedSceneError("several materials by region are not handed to other programs")
     background, size = background_mesh(scene, level)
     points, cells, facet_cell = background.points, background.cells, background.boundary_facets
     cut_facets = np.zeros((0, scene.cell_dimension, scene.dimension))
@@ -340,6 +355,9 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
     # a membrane's forces per volume and area count times its thickness
     measured = measures(corners)[:, None] * weights * (scene.material.thickness or 1.0)
     history = getattr(load, "history", None)
+    if isinstance(load, Gravity) and not scene.material.is_uniform:
+        values = np.broadcast_to(_weights(scene, load, corners.mean(axis=1))[:, None], points.shape)
+        return Load(simplices, None, points, measured, values, barycentric, history)
     if isinstance(load, Gravity) or is_uniform(given):
         constant = np.asarray(given, dtype=float)
         values = np.broadcast_to(constant, points.shape)
@@ -361,6 +379,16 @@ def _load(scene: Scene, mesh: _Mesh, i: int, exact: Any) -> Load:
 def _weight(scene: Scene, load: Gravity) -> Array:
     assert scene.material.density is not None  # the scene has checked it
     return scene.material.density * np.asarray(load.acceleration, dtype=float)
+
+
+def _weights(scene: Scene, load: Gravity, centroids: Array) -> Array:
+    """Weight (m, d) of the material at each cell's centroid, N/m³."""
+    return scene.material.at(centroids).density[:, None] * np.asarray(load.acceleration)
+
+
+def _lame(material: Material) -> tuple[float, float]:
+    law = hooke(material)
+    return float(law.lame), float(law.shear)
 
 
 def _outward_normals(corners: Array, inside: Array) -> Array:
