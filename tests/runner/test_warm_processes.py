@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from verify import warm
 from verify.json_files import read_json, write_json
-from verify.runner import warm
 from verify.runner.child import Child
-from verify.runner.warm import Forked, warm_parent
 from verify.scene import load_scene, scene_content
+from verify.warm import Forked, warm_parent
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Linux only")
 
@@ -197,7 +197,7 @@ def test_all_of_them_die_with_the_runner(prepared):
         [sys.executable, "-c", textwrap.dedent("""
             import time
             from pathlib import Path
-            from verify.runner import warm
+            from verify import warm
             from verify.runner.child import Child
             with warm.warm_parent():
                 job, log = Path("job.json"), Path("log.txt")
@@ -217,3 +217,23 @@ def test_all_of_them_die_with_the_runner(prepared):
             return
         time.sleep(0.02)
     raise AssertionError(f"still running: {left}")
+
+
+def test_the_parent_compiles_nothing_and_what_it_forks_does(prepared, tmp_path, monkeypatch):
+    """A cache that is empty stays so until a process needs a kernel."""
+    monkeypatch.setattr(warm._own, "parent", None, raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    compiling = (
+        "kept = Path(os.environ['NUMBA_CACHE_DIR']).rglob('*.nbi')\n"
+        "            found = {file.stem.partition('-')[0] for file in kept}\n"
+        "            from verify.xfem.arrays.short_sort import sort_short\n"
+        "            sort_short(np.array([2, 1], dtype=np.int32))\n"
+    )
+    with warm_parent():
+        for name in ("one", "two"):
+            folder = prepared(name, compiling, "str(found)")
+            child = _child(folder)
+            assert isinstance(child._process, Forked)
+            ended(child)
+            found = "set()" if name == "one" else "{'short_sort.sort_short'}"
+            assert reason(folder) == f"ValueError: {found}"

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from uuid import uuid4
 
-from verify.runner.warm import PARENT_VARIABLE, Forked, fork
 from verify.threads import ONE_THREAD
+from verify.warm import PARENT_VARIABLE, Forked, fork
 
 __all__ = ["PARENT_VARIABLE", "POLL_SECONDS", "Child", "Ending", "descendants"]
 
@@ -97,7 +97,9 @@ class Child:
             starved = _starved() > self._starved_before
             return Ending(returncode, wall, self.peak, self.killed_for, starved)
         _shorten(self.log)
-        resident = _resident_memory(self._process.pid)
+        # a keeper shares all that it holds with the process that it keeps
+        own = descendants(self._process.pid)[isinstance(self._process, Forked) :]
+        resident = _resident_memory(own)
         self.peak = max(self.peak, resident)
         if not self.killed_for:
             if resident > self.memory:
@@ -151,10 +153,10 @@ def _marked(mark: bytes) -> list[int]:
     return found
 
 
-def _resident_memory(pid: int) -> float:
-    """Resident memory in bytes of a process and its descendants (0 if it has gone)."""
+def _resident_memory(pids: list[int]) -> float:
+    """Resident memory in bytes of processes (0 of one that has gone)."""
     total = 0.0
-    for one in descendants(pid):
+    for one in pids:
         with contextlib.suppress(OSError, IndexError, ValueError):
             pages = int(Path("/proc", str(one), "statm").read_bytes().split()[1])
             total += pages * os.sysconf("SC_PAGE_SIZE")

@@ -30,9 +30,9 @@ from verify.runner.plan import CasePlan, check_judged, plan_case, solvers_of, su
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
-from verify.runner.warm import warm_parent
 from verify.scene import Scene, scene_content
 from verify.solvers.interface import is_built_in
+from verify.warm import warm_parent
 from verify.whole_files import write_whole
 
 __all__ = ["Progress", "RunSummary", "run_cases"]

@@ -3,7 +3,7 @@
 A fresh Python takes longer to import what solving and judging need than many a solve takes. What is
 forked here begins as a fresh one would, with an environment, a working directory and a log of its
 own. Nothing that starts threads or MPI is imported before the fork: FEniCSx is not, only the Python
-packages that it builds on.
+packages that it builds on. While nothing is asked, it loads the compiled kernels; it compiles none.
 
 Between both there is a keeper. The kernel makes it the parent of whatever that process starts and
 leaves behind, so that all of it is found and ended with it.
@@ -15,16 +15,18 @@ import gc
 import json
 import os
 import random
+import select
 import signal
 import socket
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from verify.runner.child import descendants
 from verify.runner.childhood import die_with_parent
-from verify.runner.warm import LONGEST_REQUEST, PARENT_VARIABLE
+from verify.warm import LONGEST_REQUEST, PARENT_VARIABLE
 
 __all__ = ["main"]
 
@@ -36,6 +38,7 @@ _NEEDED = (
     "verify.runner.survey",
     "verify.solvers.methods_adapter",
     "verify.solvers.xfem",
+    "verify.first_use",
     "meshio",
     "reference.exact",
 )
@@ -51,14 +54,16 @@ def main(descriptor: int) -> None:
     for name in _IF_THERE:
         with contextlib.suppress(ImportError):
             import_module(name)
-    _call_a_kernel()
-    if len(os.listdir("/proc/self/task")) > 1:
-        return  # a thread would be missing in what is forked, with the locks that it holds
     gc.collect()
     gc.freeze()  # what all share is not touched by their collections
     signal.signal(signal.SIGCHLD, lambda *_: _reap())  # waited for, their times are counted
+    kernels = _kernels()
     with socket.socket(fileno=descriptor) as runner:
         while True:
+            while not select.select([runner], [], [], 0.0)[0] and next(kernels, False):
+                pass
+            if len(os.listdir("/proc/self/task")) > 1:
+                os._exit(1)  # a fork would lack that thread, and keep the locks that it holds
             said, files, _, _ = socket.recv_fds(runner, LONGEST_REQUEST, 2)
             if not said:
                 os._exit(0)
@@ -73,13 +78,30 @@ def main(descriptor: int) -> None:
     _work(request)
 
 
-def _call_a_kernel() -> None:
-    """Have numba set itself up, which it does at the first call."""
-    import numpy as np
+def _kernels() -> Iterator[bool]:
+    """Call the kernels of one kind of scene after another, as far as they have been compiled."""
+    from numba.core import event
 
-    from verify.xfem.arrays.short_sort import sort_short
+    from verify.first_use import STAGES
 
-    sort_short(np.zeros(1, dtype=np.int32))
+    class Refusing(event.Listener):  # type: ignore[misc]
+        def on_start(self, event_: Any) -> None:
+            raise _NotCompiledError
+
+        def on_end(self, event_: Any) -> None:
+            pass
+
+    for stage in (call for name, call in STAGES.items() if "scalpel" not in name):
+        with (
+            contextlib.suppress(_NotCompiledError),
+            event.install_listener("numba:compile", Refusing()),
+        ):
+            stage()
+        yield True
+
+
+class _NotCompiledError(Exception):
+    """A kernel is not in the cache; who needs it compiles it."""
 
 
 def _reap() -> None:

@@ -71,6 +71,7 @@ class _Parent:
     def __init__(self) -> None:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.settimeout(_LOADING_SECONDS)
+        self._forked = False
         module = ["verify.runner.warm_parent", str(theirs.fileno())]
         with theirs:
             self._process = subprocess.Popen(
@@ -89,6 +90,7 @@ class _Parent:
         status, theirs = os.pipe()
         try:
             socket.send_fds(self._socket, [request], [log, theirs])
+            self._forked = True
             if not (said := self._socket.recv(64)):
                 raise BrokenPipeError("the warm parent has gone")
         except OSError:
@@ -102,7 +104,7 @@ class _Parent:
         """End it, and what it has forked with it."""
         self._socket.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_ENDING_SECONDS)
+            self._process.wait(_ENDING_SECONDS if self._forked else 0.0)
         self._process.kill()
         self._process.wait()
 
@@ -112,16 +114,18 @@ _own = threading.local()  # the parent dies with the thread that started it
 
 @contextlib.contextmanager
 def warm_parent() -> Iterator[None]:
-    """Keep a process for the time of the block from which this thread can `fork`."""
-    if not sys.platform.startswith("linux"):
+    """Keep a process for the time of the block from which this thread can `fork`.
+
+    It is that of the block around this one, if there is one.
+    """
+    if not sys.platform.startswith("linux") or getattr(_own, "parent", None) is not None:
         yield
         return
-    before, _own.parent = getattr(_own, "parent", None), _Parent()
+    _own.parent = _Parent()
     try:
         yield
     finally:
         _forget()
-        _own.parent = before
 
 
 def fork(module: str, argument: Path, log: int, environment: Mapping[str, str]) -> Forked | None:

@@ -1,0 +1,108 @@
+"""What ``verify run`` does: select, run, render, and say what came out."""
+
+import argparse
+import contextlib
+import json
+import shlex
+import sys
+import threading
+from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
+
+from verify.cli.progress import progress_on
+from verify.cli.solver_parameters import of_solvers
+from verify.cli.verdict_text import verdict_lines
+from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
+from verify.runner.checking import check_solver_name
+from verify.runner.ending import NOTHING_RAN
+from verify.runner.ranking import rank_run
+from verify.runner.reference_cache import cache_folder
+
+__all__ = ["execute"]
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Select, run, render, and say what came out."""
+    names = [name for entry in arguments.solvers for name in entry.split(",") if name]
+    for name in names:
+        check_solver_name(name, "--solver")
+    parameters = of_solvers(arguments.parameters)
+    for name in parameters:
+        check_solver_name(name, "--set")
+    weight = "quick" if arguments.quick else "heavy" if arguments.heavy else "normal"
+    scenes = select_cases(arguments.cases, arguments.expression, weight)
+    if not scenes:
+        print("verify: no case matches; `verify list` shows them all", file=sys.stderr)
+        return NOTHING_RAN
+    options = Options(
+        solvers=tuple(dict.fromkeys(names)),
+        repetitions=arguments.repetitions,
+        parameters=parameters,
+        jobs=arguments.jobs,
+        timeout=arguments.timeout,
+        memory=arguments.memory * 1e9 if arguments.memory else None,
+        cache=None if arguments.no_cache else cache_folder(),
+        references=arguments.references,
+        cluster=arguments.cluster,
+        ranks=arguments.ranks,
+        judge_only=tuple(dict.fromkeys(arguments.judge_only)),
+    )
+    if not arguments.no_report:
+        threading.Thread(target=_load_report).start()  # while processes solve
+    with progress_on(sys.stderr) as progress:
+        try:
+            summary = run_cases(
+                scenes, arguments.out, options, progress, shlex.join(["verify", *sys.argv[1:]])
+            )
+        except RunStoppedError as stop:
+            progress.close()
+            print(
+                f"verify: {stop}; the same command resumes it, "
+                f"`verify report {shlex.quote(str(arguments.out))}` renders what is finished",
+                file=sys.stderr,
+            )
+            return 128 + stop.signum
+    rank_run(
+        arguments.out, summary.results, parameters, arguments.conform, arguments.timeout, _announce
+    )
+    report = None if arguments.no_report else _rendered(arguments.out)
+    code = exit_code(summary.results, arguments.strict)
+    if arguments.json:
+        cases = [
+            {
+                "case": result.case,
+                "verdict": result.verdict,
+                "verdicts": [asdict(record) for record in result.verdicts],
+                "notices": [asdict(notice) for notice in result.notices],
+                "solves": [
+                    {"solver": s.solver, "level": s.level, "status": s.status, "reason": s.reason}
+                    for s in result.solves
+                ],
+            }
+            for result in summary.results
+        ]
+        print(json.dumps({"exit": code, "report": report, "cases": cases}, indent=2))
+        return code
+    for line in verdict_lines(summary.results):
+        print(line)
+    if summary.reused:
+        print(f"{summary.reused} finished solves were taken over from before")
+    if report:
+        print(f"report: {report}")
+    return code
+
+
+def _announce(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _load_report() -> None:
+    with contextlib.suppress(Exception):  # it is said when the report is to be written
+        import_module("verify.report")
+
+
+def _rendered(directory: Path) -> str:
+    from verify.report import render
+
+    return str(render(directory))
