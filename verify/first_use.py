@@ -24,10 +24,12 @@ import numpy as np
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
+from verify.compare.overlap import OverlapSearch
 from verify.compare.simplices import simplices
 from verify.compile_times import compile_times
 from verify.replay.session import Session
 from verify.replay.stage import Stage
+from verify.solution import Solution
 from verify.threads import ONE_THREAD
 from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane, ToolPath
@@ -137,7 +139,7 @@ def _scalpel(mesh: SimplexMesh, kind: State) -> None:
 
 
 def _comparison() -> None:
-    """Ask fields in the plane and in space for values, and cuts for distances."""
+    """Ask fields in the plane and in space for values, cuts for distances and overlaps."""
     for mesh in (rectangle_mesh((3, 3)), box_mesh((2, 2, 2))):
         points, corners = mesh.points[:3] + 0.1, mesh.points[mesh.cells]
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1))
@@ -153,6 +155,16 @@ def _comparison() -> None:
         nodes = np.ascontiguousarray(np.resize(mesh.cells, (len(mesh.cells), 10)))
         evaluate_quadratic(points, cells, nodes, mesh.points, shape.corners, shape.gradients)
         distance_to_segments(points, points, points)
+    below, above = rectangle_mesh((2, 2)), rectangle_mesh((2, 2))
+    above.points[:, 1] += 1.0
+    pressed = np.concatenate([np.zeros_like(below.points), np.full_like(above.points, -0.1)])
+    OverlapSearch(
+        Solution(
+            np.concatenate([below.points, above.points]),
+            np.concatenate([below.cells, above.cells + len(below.points)]),
+            pressed[None],
+        )
+    ).at()
 
 
 _STAGES: list[tuple[str, Callable[[], None]]] = [

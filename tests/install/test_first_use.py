@@ -5,10 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from verify import first_use
 from verify.cli.main import main
+from verify.compare.overlap import OverlapSearch
+from verify.compile_times import compile_times
+from verify.solution import Solution
+from verify.xfem.structured_meshes import box_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -36,6 +41,21 @@ def test_two_processes_share_the_work_and_their_accounts_are_added(monkeypatch, 
     found = json.loads(capsys.readouterr().out)
     assert found["kernels"] == 0
     assert list(found["stages"]) == ["comparison"]
+
+
+def test_overlaps_in_space_need_no_kernel_that_the_comparison_has_not_compiled():
+    first_use.compile_here(["comparison"])
+    block = box_mesh((2, 2, 2))
+    apart, n = block.points + np.array([0.0, 0.0, 1.0]), len(block.points)
+    points = np.concatenate([block.points, apart])
+    moved = np.zeros((1, 2 * n, 3))
+    moved[0, n:, 2] = -0.1
+    with compile_times() as times:
+        found = OverlapSearch(
+            Solution(points, np.concatenate([block.cells, block.cells + n]), moved)
+        ).at()
+    assert found.depth == pytest.approx(0.1)
+    assert times.kernels == 0
 
 
 def test_every_stage_is_in_exactly_one_share():

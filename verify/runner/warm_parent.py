@@ -84,7 +84,7 @@ def _kernels() -> Iterator[bool]:
 
     from verify.first_use import STAGES
 
-    class Refusing(event.Listener):  # type: ignore[misc]
+    class Refusing(event.Listener):
         def on_start(self, event_: Any) -> None:
             raise _NotCompiledError
 
