@@ -3,7 +3,12 @@
 from dataclasses import dataclass
 from math import inf
 
-__all__ = ["ErrorNorm"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ErrorNorm", "Squares"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -27,3 +32,26 @@ class ErrorNorm:
         if self.absolute == 0.0:
             return 0.0
         return self.absolute / self.scale if self.scale > 0.0 else inf
+
+
+@dataclass(frozen=True)
+class Squares:
+    """Integrands of the squares of both norms at the points of a rule.
+
+    What is near a tip and what is far from it are the same integrands with other weights.
+
+    Parameters
+    ----------
+    difference, expected : (n,) arrays
+        Of the difference and of the reference.
+    """
+
+    difference: Array
+    expected: Array
+
+    def norm(self, weights: Array, whole: Array | None = None) -> ErrorNorm:
+        """Norms with the weights (n,) of the points; with those of the `whole`, of the scale."""
+        of_scale = weights if whole is None else whole
+        return ErrorNorm(
+            float(np.sqrt(weights @ self.difference)), float(np.sqrt(of_scale @ self.expected))
+        )

@@ -1,15 +1,15 @@
 """The errors that are measured: of what, where, and with which order they should fall."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from verify.compare.body import AnyBody
-from verify.compare.displacement_error import displacement_error
-from verify.compare.energy_error import energy_error
-from verify.compare.error_norm import ErrorNorm
+from verify.compare.displacement_error import displacement_squares
+from verify.compare.energy_error import energy_squares
+from verify.compare.error_norm import ErrorNorm, Squares
 from verify.compare.hooke import Law
 from verify.compare.integration import cut_rules, rules
 from verify.compare.jump_error import jump_error
@@ -21,7 +21,7 @@ from verify.compare.slabs import Rule
 
 __all__ = ["ERRORS", "OVER_TIME", "ErrorMetric", "Rules"]
 
-Measure = Callable[[Field, Field, Any, Law], ErrorNorm]
+Measure = Callable[[Field, Field, Any, Law], ErrorNorm | Squares]
 Where = Literal["body", "near", "far", "cut"]
 
 
@@ -32,7 +32,7 @@ class ErrorMetric:
     Parameters
     ----------
     measure : callable
-        Norm of the difference of two fields, and of the second.
+        Norm of the difference of two fields, and of the second, or the integrands of both.
     where : {"body", "near", "far", "cut"}
         Over the body, over its points near to tips or far from them, or along the cuts.
     beyond : int
@@ -44,21 +44,21 @@ class ErrorMetric:
     beyond: int
 
 
-def _l2(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorNorm:
-    return displacement_error(field, reference, rule)
+def _l2(field: Field, reference: Field, rule: Rule, law: Law) -> Squares:
+    return displacement_squares(field, reference, rule)
 
 
 ERRORS: dict[str, ErrorMetric] = {
     "displacement_l2": ErrorMetric(_l2, "body", 1),
-    "energy_norm": ErrorMetric(energy_error, "body", 0),
+    "energy_norm": ErrorMetric(energy_squares, "body", 0),
     "jump_l2": ErrorMetric(lambda f, r, rule, law: jump_error(f, r, rule), "cut", 1),
     "displacement_max": ErrorMetric(lambda f, r, rule, law: maximum_error(f, r, rule), "body", 1),
     "opening_l2": ErrorMetric(lambda f, r, rule, law: opening_error(f, r, rule), "cut", 1),
     "opening_max": ErrorMetric(lambda f, r, rule, law: opening_maximum_error(f, r, rule), "cut", 1),
     "displacement_l2_near": ErrorMetric(_l2, "near", 1),
     "displacement_l2_far": ErrorMetric(_l2, "far", 1),
-    "energy_norm_near": ErrorMetric(energy_error, "near", 0),
-    "energy_norm_far": ErrorMetric(energy_error, "far", 0),
+    "energy_norm_near": ErrorMetric(energy_squares, "near", 0),
+    "energy_norm_far": ErrorMetric(energy_squares, "far", 0),
 }
 
 # in dynamics these are also reported as their maximum and mean over time
@@ -79,32 +79,41 @@ class Rules:
 
     def __init__(self, body: AnyBody, size: float, count: int = 3) -> None:
         self.radius = near_radius(body)
-        whole = rules(body, size, count)
-        self._by_place: dict[str, list[Any]] = {"body": whole, "near": [], "far": []}
+        self._rules: dict[str, list[Any]] = {"body": rules(body, size, count), "cut": []}
+        self._weights = {"body": [rule.weights for rule in self._rules["body"]]}
         if self.radius:
-            for rule in whole:
-                near = near_tip(body, rule.points, self.radius)
-                # the points are the same arrays: what a field is there is found once
-                self._by_place["near"].append(
-                    replace(rule, weights=np.where(near, rule.weights, 0))
-                )
-                self._by_place["far"].append(replace(rule, weights=np.where(near, 0, rule.weights)))
+            near = [near_tip(body, rule.points, self.radius) for rule in self._rules["body"]]
+            whole = list(zip(near, self._weights["body"], strict=True))
+            self._weights["near"] = [np.where(here, weights, 0.0) for here, weights in whole]
+            self._weights["far"] = [np.where(here, 0.0, weights) for here, weights in whole]
         cuts = cut_rules(body, size, count) if body.has_cuts else []
-        self._by_place["cut"] = [rule for rule in cuts if len(rule.weights)]
+        self._rules["cut"] = [rule for rule in cuts if len(rule.weights)]
+        if self._rules["cut"]:
+            self._weights["cut"] = [rule.weights for rule in self._rules["cut"]]
 
     def measured(self) -> list[str]:
         """Names of the errors that mean something on this body."""
-        return [name for name, metric in ERRORS.items() if self._by_place[metric.where]]
+        return [name for name, metric in ERRORS.items() if metric.where in self._weights]
 
-    def norms(self, name: str, field: Field, reference: Field, law: Law) -> list[ErrorNorm]:
-        """Error norm by each rule of the family.
+    def norms(
+        self, names: Iterable[str], field: Field, reference: Field, law: Law
+    ) -> dict[str, list[ErrorNorm]]:
+        """Error norms by name and by rule of the family.
 
         What is measured near a tip or far from it is held against the norm of the reference
-        over the whole body: the squares of both add up to the square of the whole.
+        over the whole body: the squares of both add up to the square of the whole. All three
+        have the same integrands, which are evaluated once.
         """
-        metric = ERRORS[name]
-        found = [metric.measure(field, reference, r, law) for r in self._by_place[metric.where]]
-        if metric.where in ("near", "far"):
-            whole = self.norms(name.rsplit("_", 1)[0], field, reference, law)
-            found = [ErrorNorm(n.absolute, w.scale) for n, w in zip(found, whole, strict=True)]
+        found: dict[str, list[ErrorNorm]] = {name: [] for name in names}
+        for measure in dict.fromkeys(ERRORS[name].measure for name in found):
+            alike = [name for name in found if ERRORS[name].measure is measure]
+            place = "cut" if ERRORS[alike[0]].where == "cut" else "body"
+            for k, rule in enumerate(self._rules[place]):
+                value = measure(field, reference, rule, law)
+                for name in alike:
+                    if isinstance(value, Squares):
+                        weights = self._weights[ERRORS[name].where][k]
+                        found[name].append(value.norm(weights, rule.weights))
+                    else:
+                        found[name].append(value)
         return found

@@ -19,24 +19,24 @@ class Sampled:
 
     def __init__(self, field: Field) -> None:
         self._field = field
-        self._kept: dict[tuple[int, int], tuple[Array, Array | None, Array, Array]] = {}
+        self._kept: dict[tuple[int, int, str], tuple[Array, Array | None, Array]] = {}
 
-    def _at(self, points: Array, near: Array | None) -> tuple[Array, Array]:
+    def _at(self, what: str, points: Array, near: Array | None) -> Array:
         key = id(points), id(near)
-        if key not in self._kept:
+        if (*key, what) not in self._kept:
             evaluate = getattr(self._field, "evaluate", None)
-            u, gradient = (
-                evaluate(points, near)
-                if evaluate is not None
-                else (self._field.displacement(points, near), self._field.gradient(points, near))
-            )
-            self._kept[key] = points, near, u, gradient  # holds the arrays, so ids stay theirs
-        return self._kept[key][2:]
+            if evaluate is None:  # a formula: only what is asked for
+                found = {what: getattr(self._field, what)(points, near)}
+            else:
+                found = dict(zip(("displacement", "gradient"), evaluate(points, near), strict=True))
+            for name, values in found.items():  # holds the arrays, so ids stay theirs
+                self._kept[(*key, name)] = points, near, values
+        return self._kept[(*key, what)][2]
 
     def displacement(self, points: Array, near: Array | None = None) -> Array:
         """Displacement (n, d) in m at `points` (n, d)."""
-        return self._at(points, near)[0]
+        return self._at("displacement", points, near)
 
     def gradient(self, points: Array, near: Array | None = None) -> Array:
         """Displacement gradient (n, d, d) at `points` (n, d)."""
-        return self._at(points, near)[1]
+        return self._at("gradient", points, near)

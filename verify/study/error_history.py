@@ -97,6 +97,6 @@ def error_history(
     norms: dict[str, list[list[ErrorNorm]]] = {name: [] for name in rules.measured()}
     for time in times:
         one, other = field.at(time), reference.at(time)
-        for name, rows in norms.items():
-            rows.append(rules.norms(name, one, other, law))
+        for name, row in rules.norms(norms, one, other, law).items():
+            norms[name].append(row)
     return History(times, norms)

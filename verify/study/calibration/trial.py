@@ -100,10 +100,8 @@ def _judged(
     own = Measured(finest, body, law, scene).field
     rules = Rules(body, size, count=2)
     found = []
-    for name in NORMS:
-        if name not in stated.norms:
-            continue
-        fine, check = rules.norms(name, own, exact, law)[:2]
+    known_norms = [name for name in NORMS if name in stated.norms]
+    for name, (fine, check) in rules.norms(known_norms, own, exact, law).items():
         known = abs(fine.absolute - check.absolute) / fine.scale
         found.append(Trial("", 0, 0, name, stated.norms[name] / fine.scale, fine.relative, known))
     for name, (value, width) in values.items():
