@@ -22,6 +22,7 @@ from reference.exact.sinusoidal import Sinusoidal
 from reference.exact.solid_patch import SolidPatch
 from reference.exact.solid_sinusoidal import SolidSinusoidal
 from reference.exact.solution import ExactSolution
+from reference.exact.straight_front import StraightFrontField
 from verify.errors import InputError
 from verify.scene import Material
 from verify.scene.nearest import nearest
@@ -88,6 +89,11 @@ _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] 
         "3D: penny-shaped crack in infinite space: centre, normal, a, remote tension or stress "
         "(three rows), pressure on its faces",
     ),
+    "straight_front": (
+        StraightFrontField,
+        "3D: field of modes I, II and III at the straight front of a plane crack: point, normal, "
+        "axis (the direction ahead), intensity (K_I, K_II, K_III)",
+    ),
     "blade_strip": (
         BladeStrip,
         "3D, moving: mode III crack that advances through a strip gripped at ±grip: half_width, "
@@ -98,7 +104,10 @@ _LAYERS = (
     "linear on each of four parts, two materials and a cut: point, slope or angle, interface_slope "
     "or interface_angle, stress, shift"
 )
-_IN_SPACE = ("linear", "solid_patch", "solid_smooth", "spherical_cut", "penny", "blade_strip")
+_IN_SPACE = (
+    "linear", "solid_patch", "solid_smooth", "spherical_cut", "penny", "straight_front",
+    "blade_strip",
+)  # fmt: skip
 _GROUP = "verify.exact_solutions"  # entry points of other packages
 
 

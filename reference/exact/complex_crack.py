@@ -86,6 +86,10 @@ class ComplexCrack(ExactSolution):
         t = float(y0 / (y0 - y1))
         return [t] if 0.0 < t < 1.0 and self._on_crack(np.array([x0 + t * (x1 - x0)]))[0] else []
 
+    def potentials(self, points: Array, near: Array | None = None) -> Potentials:
+        """Potentials at points (n, 2), on the sides of `near` (n, 2)."""
+        return self._evaluate(points, near)[1]
+
     def _evaluate(self, points: Array, near: Array | None) -> tuple[Complex, Potentials]:
         x, y = ((np.asarray(points, dtype=float) - self._origin) @ self._axes.T).T
         y = y + 0.0  # −0 would choose the lower face

@@ -27,6 +27,7 @@ SOLUTIONS = {
     },
     "spherical_cut": {"centre": [0.1, 0.2, -0.1], "radius": 0.4, "outward": 0.1, "at": 1.0},
     "penny": {"centre": [0.4, 0.5, 0.45], "normal": [1.0, 2.0, 2.0], "a": 0.3, "tension": 1.5},
+    "straight_front": {**INCLINED, "intensity": [1.0, 0.5, -0.7]},
 }
 
 
@@ -70,6 +71,30 @@ def test_faces_of_a_plane_cut_are_free_of_traction(name, sign, points):
     face = points - ((points - 0.5) @ NORMAL)[:, None] * NORMAL
     traction = u.stress(face, face + sign * 0.01 * NORMAL) @ NORMAL
     assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_faces_behind_a_straight_front_are_free_of_traction(sign, points):
+    u, ahead = solution("straight_front"), np.array([2.0, -1.0, 0.0]) / np.sqrt(5)
+    face = points - ((points - 0.5) @ NORMAL)[:, None] * NORMAL
+    face -= (0.1 + np.abs((face - 0.5) @ ahead) + (face - 0.5) @ ahead)[:, None] * ahead
+    traction = u.stress(face, face + sign * 0.01 * NORMAL) @ NORMAL
+    assert np.abs(traction).max() < 1e-14 * (1 + np.abs(u.stress(face)).max())
+
+
+def test_the_stress_ahead_of_a_straight_front_has_its_three_intensities():
+    """Ahead √(2πr) times the traction is K_I, K_II, K_III; the jump behind likewise."""
+    u, ahead = solution("straight_front"), np.array([2.0, -1.0, 0.0]) / np.sqrt(5)
+    axes, r = np.stack([NORMAL, ahead, np.cross(ahead, NORMAL)]), 0.07
+    traction = u.stress(np.array([[0.5] * 3]) + r * ahead)[0] @ NORMAL
+    assert axes @ traction * np.sqrt(2 * np.pi * r) == pytest.approx(u.stress_intensity, rel=1e-12)
+    behind = np.array([[0.5] * 3]) - r * ahead
+    jump = u.displacement(behind, behind + 0.01 * NORMAL) - u.displacement(
+        behind, behind - 0.01 * NORMAL
+    )
+    plane, shear = 1.0 / (1 - 0.3**2), 1.0 / 2.6
+    factors = np.array([8 / plane, 8 / plane, 4 / shear]) * np.sqrt(r / (2 * np.pi))
+    assert axes @ jump[0] == pytest.approx(factors * np.array(u.stress_intensity), rel=1e-12)
 
 
 def penny_ring(radius):

@@ -1,13 +1,16 @@
 """Stress-intensity factors at points of a front in space, and of cuts whose faces are loaded."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from reference.exact import exact_solution
-from verify.errors import InputError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
+from verify.solution import Solution
 from verify.solvers import find_solver
 from verify.study.stress_intensity import exact_intensity, solution_intensity
 
@@ -73,6 +76,77 @@ def test_the_factors_of_a_pressed_crack_are_those_of_its_closed_form():
     for asked in scene.quantities:
         stated = exact_intensity(scene, exact, asked)
         assert solution_intensity(scene, found, asked) == pytest.approx(stated, abs=2e-3)
+
+
+def straight(n, *asked, **changes):
+    """A box that is cut in the plane z = 0 up to a straight front, 20 degrees off y."""
+    ahead, along = np.array([[0.94, -0.342, 0.0], [0.342, 0.94, 0.0]])
+    point = np.array([0.04, -0.03, 0.0])
+    corners = [point + a * along - b * ahead for a, b in ((-2, 0), (2, 0), (2, 3), (-2, 3))]
+    content = {
+        "title": "box",
+        "requirement": "none",
+        "geometry": {"kind": "box", "lower": [-0.5] * 3, "upper": [0.5] * 3},
+        "mesh": {"cells": [[n, n, n]]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "supports": [{"where": "boundary", "displacement": "exact"}],
+        "exact": {
+            "solution": "straight_front",
+            "parameters": {"point": point.tolist(), "normal": [0.0, 0.0, 1.0],
+                           "axis": ahead.tolist(), "intensity": [1.0, 0.6, -0.8]},
+        },
+        "cuts": [{"kind": "polygon", "points": [c.tolist() for c in corners]}],
+        "quantities": [
+            {"kind": "stress_intensity", "name": f"q{i}", "point": point.tolist()} | one
+            for i, one in enumerate(asked)
+        ],
+    }  # fmt: skip
+    return Scene.model_validate(content | changes)
+
+
+def sampled(scene, n):
+    """The exact field at the corners of every tetrahedron of a grid, on the side of its centre."""
+    places = np.linspace(-0.5, 0.5, n + 1)
+    grid = np.stack(np.meshgrid(places, places, places, indexing="ij"), axis=-1)
+    corners = []
+    for path in permutations(range(3)):
+        at = np.zeros(3, dtype=int)
+        row = [at.copy()]
+        for axis in path:
+            at[axis] += 1
+            row.append(at.copy())
+        corners.append(np.stack([grid[i : n + i, j : n + j, k : n + k] for i, j, k in row], axis=3))
+    cells = np.stack(corners).reshape(-1, 4, 3)
+    turned = np.linalg.det(cells[:, 1:] - cells[:, :1]) < 0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    points = cells.reshape(-1, 3)
+    u = exact_of(scene).displacement(points, np.repeat(cells.mean(axis=1), 4, axis=0))
+    return Solution(points, np.arange(len(points)).reshape(-1, 4), u[None], np.zeros(1))
+
+
+def test_the_three_modes_at_a_straight_front_are_those_of_its_field():
+    """Interpolated linearly on a mesh whose cells the front runs through: order h over the radius.
+
+    At h = 1/16 and a mean radius of 0.3 that is the share h/r = 0.2 of the squares of the strain
+    next to the front, whose own share of the integral is h/r again: 4 % of the largest factor.
+    """
+    modes = ("I", "II", "III")
+    scene = straight(16, *({"mode": mode} for mode in modes))
+    values = [solution_intensity(scene, sampled(scene, 16), asked) for asked in scene.quantities]
+    assert values == pytest.approx([1.0, 0.6, -0.8], abs=0.04)
+    exact = exact_of(scene)
+    assert [exact_intensity(scene, exact, q) for q in scene.quantities] == [1.0, 0.6, -0.8]
+
+
+def test_a_straight_front_that_has_no_room_for_a_domain_is_refused():
+    beside = {"kind": "polygon", "name": "beside",
+              "points": [[0.1, -2, -2], [0.1, 2, -2], [0.1, 2, 2], [0.1, -2, 2]]}  # fmt: skip
+    cuts = [*straight(16, {"mode": "I"}).model_dump(mode="json")["cuts"], beside]
+    with pytest.raises(InputError, match="meets another cut"):
+        check_scene(straight(16, {"mode": "I"}, cuts=cuts))
+    scene = straight(4, {"mode": "I"})
+    with pytest.raises(UnsupportedSceneError, match="too small"):
+        solution_intensity(scene, sampled(scene, 4), scene.quantities[0])
 
 
 @pytest.mark.parametrize(

@@ -133,7 +133,9 @@ class StressIntensityQuantity(Strict):
     end: Literal["start", "end"] | None = Field(
         default=None, description="2D, and at a blade: which end of the cut"
     )
-    point: Point3 | None = Field(default=None, description="3D: a point of the front of a disc, m")
+    point: Point3 | None = Field(
+        default=None, description="3D: a point of the front of a disc or polygon, m"
+    )
     mode: Literal["I", "II", "III"] = Field(default="I", description="III in 3D only")
     radius: Positive | None = Field(
         default=None,

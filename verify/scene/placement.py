@@ -22,13 +22,13 @@ from verify.scene.nearest import nearest
 from verify.scene.physics import BodyForce, CutFaces, Gravity, Rotation, Traction
 from verify.scene.regions import parse_expression, parse_region
 from verify.scene.skin import Skin
-from verify.scene.spatial_cuts import DiscCut
+from verify.scene.spatial_cuts import DiscCut, PolygonCut
 from verify.scene.tables import SceneTables
 from verify.scene.tool_path import ToolPathCut
 
 __all__ = ["boundary_condition_names", "check_placement"]
 
-_ON_FRONT = 1e-3  # of the radius: what is given in a few digits is on the front
+_ON_FRONT = 1e-3  # of the radius or the edge: what is given in a few digits is on the front
 # quantities that need no name of their own
 _QUANTITIES = ("strain_energy", "maximum_displacement")
 
@@ -215,13 +215,21 @@ def _check_tip(scene: SceneTables, asked: StressIntensityQuantity, place: str) -
 
 
 def _check_front(cut: Any, point: NDArray[np.float64], place: str) -> None:
-    """Refuse a point that is not on the rim of a round disc."""
-    if not isinstance(cut, DiscCut) or cut.radius is None:
-        raise ValueError(f"{place}.cut: factors in 3D are known along the front of round discs")
-    spoke = point - np.asarray(cut.centre)
-    height = float(spoke @ cut.axes()[2])
-    off = float(np.hypot(np.linalg.norm(spoke - height * cut.axes()[2]) - cut.radius, height))
-    if off > _ON_FRONT * cut.radius:
+    """Refuse a point that is neither on the rim of a round disc nor on an edge of a polygon."""
+    if isinstance(cut, DiscCut) and cut.radius is not None:
+        spoke, size = point - np.asarray(cut.centre), cut.radius
+        height = float(spoke @ cut.axes()[2])
+        off = float(np.hypot(np.linalg.norm(spoke - height * cut.axes()[2]) - size, height))
+    elif isinstance(cut, PolygonCut):
+        start, end = cut.edge_of(point)
+        way, size = end - start, float(np.linalg.norm(end - start))
+        share = np.clip((point - start) @ way / size**2, 0.0, 1.0)
+        off = float(np.linalg.norm(point - start - share * way))
+    else:
+        raise ValueError(
+            f"{place}.cut: factors in 3D are known along the fronts of round discs and of polygons"
+        )
+    if off > _ON_FRONT * size:
         raise ValueError(f"{place}.point: is {off:.3g} m away from the front of '{cut.name}'")
 
 

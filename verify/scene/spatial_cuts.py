@@ -74,6 +74,15 @@ class PolygonCut(_SpatialCut):
         corners = np.array(self.points, dtype=float)
         return corners, ear_clipping(corners)
 
+    def edge_of(self, point: Array) -> tuple[Array, Array]:
+        """Start and end (3,) of the edge nearest to a point (3,)."""
+        corners = np.array(self.points, dtype=float)
+        ways = np.roll(corners, -1, axis=0) - corners
+        shares = np.sum((point - corners) * ways, axis=1) / np.sum(ways**2, axis=1)
+        feet = corners + np.clip(shares, 0.0, 1.0)[:, None] * ways
+        nearest = int(np.argmin(np.linalg.norm(point - feet, axis=1)))
+        return corners[nearest], corners[nearest] + ways[nearest]
+
 
 class DiscCut(_SpatialCut):
     """A plane disc or ellipse in space."""
