@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from verify.xfem.corotation.averaged_stress_kernels import stress
 from verify.xfem.corotation.polar_kernels import nearest_rotation
-from verify.xfem.dynamics.averaged_stress_kernels import stress
 from verify.xfem.dynamics.averaged_stress_tangent import stress_slope
 
 LAM, MU = 1.3, 0.7

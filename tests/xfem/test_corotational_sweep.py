@@ -5,6 +5,8 @@ import pytest
 from cut_bodies import SOFT, cut_body, cut_membrane, cut_square, material
 
 from verify.xfem.corotation import InternalForce
+from verify.xfem.corotation.averaged_stress_kernels import averaged_force
+from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import consistent_mass
 from verify.xfem.sparse.block_pattern import block_pattern
@@ -51,7 +53,61 @@ def test_force_and_stiffness_are_those_of_evaluation_and_assembly(kinematics, si
         _agree(_in_one(force, pattern, u, v, 0.02, 0.3), two, 1e-13 if size < 1.0 else 1e-10)
         assert np.abs(force.rotations - other.rotations).max() < (1e-13 if size < 1.0 else 1e-9)
     if size > 1.0:
-        assert len(force.inverted(u)) > 0
+        assert len(inverted_pieces(force, u)) > 0
+
+
+@pytest.mark.parametrize("size", [0.0, 0.05, 0.4])
+def test_the_exact_stiffness_is_that_of_assembly(size):
+    """With another share of what frozen rotations give, as damping wants it."""
+    virtual = cut_body(3)
+    pattern = block_pattern(virtual.cells, virtual.node_count)
+    force, other = (InternalForce(virtual, material(3, SOFT)) for _ in range(2))
+    u, _ = _moving(virtual, size)
+    found, wanted = np.full((2, len(pattern.columns), 3, 3), np.nan)
+    for whole in (True, False):
+        force.linearise(pattern, u, u, 0.0, 0.7, np.empty_like(u), found, whole, 0.3)
+        wanted[:] = 0.0
+        other.evaluate(u)
+        other.add_stiffness(pattern, wanted, 0.4)
+        other.add_stiffness(pattern, wanted, 0.3, "exact", u)
+        read = np.ones(len(wanted), dtype=bool)
+        if not whole:
+            row = np.repeat(np.arange(virtual.node_count), np.diff(pattern.starts))
+            read = pattern.columns >= row
+        assert np.abs(found - wanted)[read].max() < 1e-12 * np.abs(wanted).max()
+        found[:] = np.nan
+
+
+@pytest.mark.parametrize("size", [0.0, 0.05, 1.0])
+def test_the_averaged_force_is_that_of_the_loop_over_pieces(size):
+    """Also where pieces are inside out and take the substitute, and again from another start."""
+    virtual = cut_body(3)
+    pattern = block_pattern(virtual.cells, virtual.node_count)
+    force, other = (InternalForce(virtual, material(3, SOFT)) for _ in range(2))
+    blocks = np.empty((len(pattern.columns), 3, 3))
+    taken_somewhere = False
+    for turn in range(3):
+        start, change = _moving(virtual, size, turn)
+        end = start + size * np.abs(start).max() * change
+        taken, wanted_taken = np.zeros((2, len(virtual.cells)), dtype=bool)
+        taken[turn] = wanted_taken[turn] = True
+        found, wanted = np.empty_like(start), np.zeros_like(start)
+        force.linearise_average(pattern, start, end, taken, 1.0, found, blocks)
+        other.evaluate(start)
+        first = other.rotations.copy()
+        other.evaluate(end)
+        averaged_force(
+            virtual.cells, *other.geometry, first, other.rotations, start, end, wanted_taken,
+            wanted,
+        )  # fmt: skip
+        assert np.array_equal(taken, wanted_taken)
+        assert taken.sum() < len(taken)
+        taken_somewhere |= taken.sum() > 1
+        # a rotation is as sensitive as 1/(σ₂ + σ₃), and of inverted pieces that may be large
+        assert (
+            np.abs(found - wanted).max() <= (1e-12 if size < 1.0 else 1e-9) * np.abs(wanted).max()
+        )
+    assert taken_somewhere == (size == 1.0)
 
 
 @pytest.mark.parametrize("body", [cut_square, cut_membrane])

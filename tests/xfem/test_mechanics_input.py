@@ -6,6 +6,7 @@ from cut_bodies import DENSITY, cut_body, cut_membrane, material
 from time_schemes import SCHEMES
 
 from verify.xfem.corotation import InternalForce
+from verify.xfem.corotation.crushed_pieces import collapsed_pieces
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -47,7 +48,7 @@ def test_no_array_of_another_shape_or_type_reaches_a_compiled_loop(v):
             lambda x: force.linearise(pattern, x, good, 1.0, 1.0, good, blocks),
             lambda x: force.linearise(pattern, good, x, 1.0, 1.0, good, blocks),
             lambda x: force.linearise(pattern, good, good, 1.0, 1.0, x, blocks),
-            lambda x: force.collapsed(x, 1e-3),
+            lambda x: collapsed_pieces(force, x, 1e-3),
         ):
             with pytest.raises(XfemError, match=r"of shape .*; expected \(\d+, \d\), float64"):
                 call(wrong)

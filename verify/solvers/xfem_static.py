@@ -15,6 +15,7 @@ from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_scene import material_of
 from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.xfem.corotation import InternalForce
+from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.slivers import GhostPenalty
 from verify.xfem.statics import StaticEquilibrium, solve_static, static_equilibrium
 from verify.xfem.stiffness import LinearStiffness
@@ -150,4 +151,4 @@ def _inverted(force: InternalForce, displacement: _Floats) -> str:
     mesh = force.virtual.mesh
     if mesh.dim < mesh.space:
         return "not defined for a membrane"
-    return str(len(force.inverted(displacement)))
+    return str(len(inverted_pieces(force, displacement)))

@@ -134,10 +134,8 @@ class InternalForce:
         if v.aggregation is not None:
             corner_force = np.zeros_like(extended)
         if self.turning:
-            self._kernels.turn(
-                v.cells, self._gradients, v.parent, self._normals, extended,
-                self._quaternions, self._rotations,
-            )  # fmt: skip
+            where = v.cells, self._gradients, v.parent, self._normals, extended
+            self._kernels.turn(*where, self._quaternions, self._rotations)
             self._swept = False
         energy = self._kernels.internal_force(
             v.cells, *self.geometry, self._rotations, extended, corner_force
@@ -153,6 +151,10 @@ class InternalForce:
     def _check(self, name: str, values: _Floats) -> None:
         check_floats(name, values, self._shape)
 
+    def _check_all(self, **arrays: _Floats) -> None:
+        for name, values in arrays.items():
+            self._check(name, values)
+
     def _check_blocks(self, pattern: BlockPattern, blocks: _Floats) -> None:
         check_blocks(blocks, len(pattern.columns), self._shape[1])
         if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.virtual.cells):
@@ -163,11 +165,11 @@ class InternalForce:
 
     def prepare(self, pattern: BlockPattern) -> None:
         """Do what `linearise` does otherwise when it is first called with a sparsity."""
-        if self._is_swept:
+        if self.is_swept:
             self._sweep = self._sweep_over(pattern)
 
     @property
-    def _is_swept(self) -> bool:
+    def is_swept(self) -> bool:
         """Whether one sweep gives force and stiffness: of tetrahedra with unknowns of their own."""
         return self.virtual.mesh.dim == 3 and self.virtual.aggregation is None
 
@@ -186,10 +188,11 @@ class InternalForce:
         force: _Floats,
         blocks: _Floats,
         whole: bool = True,
+        spin: float = 0.0,
     ) -> None:
-        """Overwrite force and stiffness as a semi-implicit step wants them; update rotations.
+        """Overwrite force and stiffness as an implicit step wants them; update rotations.
 
-        Tetrahedra are swept once, which takes half of the time of `evaluate` and `add_stiffness`.
+        Tetrahedra are swept once, in a fraction of the time of `evaluate` and `add_stiffness`.
 
         Parameters
         ----------
@@ -199,34 +202,69 @@ class InternalForce:
         implicit : float
             In seconds; the force is f_int(u) + `implicit` K v, K with frozen rotations.
         scale : float
-            Of the stiffness in the blocks.
+            Of the stiffness with frozen rotations in the blocks.
         force : (N, d) float array
             Overwritten.
         blocks : (B, d, d) float array
             Overwritten.
         whole : bool
             Without it what is below the diagonal may be anything.
+        spin : float
+            Of what the exact stiffness has beyond that with frozen rotations.
 
         Raises
         ------
         XfemError
             If an array is not of the body, or not of the pattern.
         """
-        for name, values in (
-            ("displacement", displacement),
-            ("velocity", velocity),
-            ("force", force),
-        ):
-            self._check(name, values)
+        self._check_all(displacement=displacement, velocity=velocity, force=force)
         self._check_blocks(pattern, blocks)
-        if not self._is_swept:
+        if not self.is_swept:
             self.evaluate(displacement, force, velocity, implicit)
             blocks[:] = 0.0
-            self.add_stiffness(pattern, blocks, scale)
+            self.add_stiffness(pattern, blocks, scale - spin)
+            if spin != 0.0:
+                self.add_stiffness(pattern, blocks, spin, "exact", displacement)
             return
         self._sweep = self._sweep_over(pattern)
-        self._sweep(displacement, velocity, implicit, scale, force, blocks, whole)
+        moved = displacement, velocity, implicit
+        self.left_out = self._sweep(*moved, scale, force, blocks, whole, spin)
         self._swept = self.turning
+
+    def linearise_average(
+        self,
+        pattern: BlockPattern,
+        start: _Floats,
+        end: _Floats,
+        substituted: NDArray[np.bool_],
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+        spin: float = 0.0,
+    ) -> None:
+        """Overwrite the force averaged over a step, of tetrahedra, and the stiffness at its end.
+
+        Parameters
+        ----------
+        start, end : (N, 3) float array
+            Displacements.
+        substituted : (p,) bool array
+            Pieces that have taken the substitute for the averaged stress; updated.
+        pattern, scale, force, blocks, whole, spin
+            As for `linearise`.
+
+        Raises
+        ------
+        XfemError
+            If an array is not of the body, or not of the pattern.
+        """
+        assert self.is_swept
+        self._check_all(start=start, end=end, force=force)
+        self._check_blocks(pattern, blocks)
+        self._sweep = sweep = self._sweep_over(pattern)
+        self.left_out = sweep.average(start, end, scale, spin, substituted, force, blocks, whole)
+        self._swept = True
 
     def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
         """Add `scale` K v (N, d), K with the rotations of the last `evaluate`, to `out`.
@@ -328,8 +366,7 @@ class InternalForce:
         """
         if not self.is_membrane:
             raise XfemError("stiffness from tension of a solid; expected a membrane in space")
-        for name, values in (("displacement", displacement), ("vector", vector), ("force", force)):
-            self._check(name, values)
+        self._check_all(displacement=displacement, vector=vector, force=force)
         self._check_blocks(pattern, blocks)
         v, added = self.virtual, pattern.unfold(blocks)
         extended = v.extend(displacement)
@@ -351,43 +388,6 @@ class InternalForce:
         blocks = np.zeros((len(pattern.columns), space, space))
         self.add_stiffness(pattern, blocks, 1.0, kind, displacement)
         return blocks
-
-    def inverted(self, displacement: _Floats) -> NDArray[np.int64]:
-        """Pieces whose deformation gradient has a negative determinant (solids only)."""
-        if self.is_membrane:
-            raise XfemError("inversion of a membrane in space is not defined")
-        return np.flatnonzero(np.linalg.det(self._deformation(displacement)) < 0.0)
-
-    def collapsed(self, displacement: _Floats, ratio: float) -> NDArray[np.int64]:
-        """Pieces whose rotation, and with it the force, is not unique, or nearly so.
-
-        That is where the two principal stretches of a plane piece cancel (of an inverted piece the
-        smallest is negative), where the two smallest do in space, and where a membrane has shrunk
-        to a line.
-
-        Parameters
-        ----------
-        displacement : (N, d) float array
-        ratio : float
-            Of what is left to the largest stretch, below which a piece counts.
-        """
-        F = self._deformation(displacement)
-        stretches = np.linalg.svd(F, compute_uv=False)
-        left = stretches[:, 1]
-        if not self.is_membrane:
-            left = np.abs(stretches[:, -2] + np.sign(np.linalg.det(F)) * stretches[:, -1])
-        return np.flatnonzero(left <= ratio * stretches[:, 0])
-
-    def _deformation(self, displacement: _Floats) -> _Floats:
-        """Deformation gradients (p, d, d) of the pieces; of a membrane zero across its plane."""
-        self._check("displacement", displacement)
-        v = self.virtual
-        F = np.einsum("pik,pil->pkl", v.extend(displacement)[v.cells], v.mesh.gradients[v.parent])
-        F += np.eye(self._shape[1])
-        if self.is_membrane:
-            normals = self._normals[v.parent]
-            F -= np.einsum("pk,pl->pkl", normals, normals)
-        return F
 
 
 def _unit_normals(virtual: VirtualMesh) -> _Floats:

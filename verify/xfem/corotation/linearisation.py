@@ -1,4 +1,4 @@
-"""Force and stiffness of corotational tetrahedra in one sweep: what a real-time step needs.
+"""Force and stiffness of corotational tetrahedra in one sweep: what an implicit step needs.
 
 The arrays are in the order and form in which `tetrahedron_lanes` reads them once: pieces sorted by
 their nodes, eight to a batch, eight batches to a window; blocks above the diagonal are added up in
@@ -9,10 +9,11 @@ complete.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.corotation.lane_layout import ENTRIES
 from verify.xfem.corotation.polar_kernels import new_lanes
 from verify.xfem.corotation.sweep_order_kernels import assign_slots, fill_lanes, order_pieces
 from verify.xfem.corotation.symmetric_rows import RECORD
-from verify.xfem.corotation.tetrahedron_lanes import ENTRIES, linearise, unpack_rotations
+from verify.xfem.corotation.tetrahedron_lanes import linearise, unpack_rotations
 from verify.xfem.lanes.vectors import LANES
 from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.virtual import VirtualMesh
@@ -69,6 +70,9 @@ class Linearisation:
         )  # fmt: skip
         self._quaternions = _aligned_zeros(batches, 4 * LANES)
         self._quaternions.reshape(-1, LANES)[::4] = 1.0
+        self._first = self._quaternions  # at the start of a step, once one is averaged
+        self._at = np.full((2, pattern.node_count, 3), np.nan)  # of which both are the rotations
+        self._taken = np.zeros(batches * LANES, dtype=np.bool_)
         self._lanes = _aligned_zeros(ENTRIES, LANES).reshape(-1)
         rest = new_lanes()
         self._lanes[: len(rest)] = rest
@@ -86,7 +90,8 @@ class Linearisation:
         force: _Floats,
         blocks: _Floats,
         whole: bool = True,
-    ) -> None:
+        spin: float = 0.0,
+    ) -> int:
         """Overwrite force (N, 3) and blocks (B, 3, 3): `scale` times the stiffness.
 
         Parameters
@@ -100,18 +105,77 @@ class Linearisation:
         scale : float
         whole : bool
             Without it blocks below the diagonal are not written, which are symmetric.
+        spin : float
+            Times what the exact stiffness has beyond that with frozen rotations is added.
+
+        Returns
+        -------
+        int
+            Pieces without the latter, their rotation not being differentiable.
         """
+        moved = displacement, velocity, implicit
+        return self._sweep(*moved, scale, spin, False, force, blocks, whole)
+
+    def average(
+        self,
+        start: _Floats,
+        end: _Floats,
+        scale: float,
+        spin: float,
+        substituted: NDArray[np.bool_],
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+    ) -> int:
+        """Overwrite the force with that averaged over a step; the stiffness is that at its end.
+
+        Parameters
+        ----------
+        start, end : (N, 3) float array
+            Displacements.
+        substituted : (p,) bool array
+            Pieces that have taken the substitute; updated.
+        scale, spin, force, blocks, whole
+            As of a call.
+        """
+        if not np.array_equal(self._at[1], start):
+            if not np.array_equal(self._at[0], start):
+                self._sweep(start, start, 0.0, 0.0, 0.0, False, force, blocks, False)
+            self._first, self._at[1] = self._quaternions.copy(), start
+        count = len(self._pieces)
+        self._taken[:count] = substituted[self._pieces]
+        found = self._sweep(end, start - end, 1.0, scale, spin, True, force, blocks, whole)
+        substituted[self._pieces] = self._taken[:count]
+        return found
+
+    def _sweep(
+        self,
+        displacement: _Floats,
+        velocity: _Floats,
+        implicit: float,
+        scale: float,
+        spin: float,
+        averaged: bool,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool,
+    ) -> int:
+        self._at[0] = displacement
         pattern = self.pattern
-        linearise(
-            self._lanes, self._corners, self._slots, self._constants, self._quaternions, self._ends,
-            pattern.starts, pattern.diagonal, pattern.mirror, self._slot_of,
-            displacement, velocity, implicit, self.turning, whole, scale, self._motion,
-            self._waiting, self._ninths, self._nodes, force, blocks,
+        return int(
+            linearise(
+                self._lanes, self._corners, self._slots, self._constants, self._quaternions,
+                self._ends, pattern.starts, pattern.diagonal, pattern.mirror, self._slot_of,
+                displacement, velocity, implicit, self.turning, whole, scale, spin, self._first,
+                averaged, self._taken, self._motion, self._waiting, self._ninths, self._nodes,
+                force, blocks,
+            )
         )  # fmt: skip
 
-    def write_rotations(self, rotations: _Floats) -> None:
-        """Write the rotations (p, 3, 3) of the last sweep."""
-        unpack_rotations(self._pieces, self._quaternions, rotations)
+    def write_rotations(self, rotations: _Floats, first: bool = False) -> None:
+        """Write the rotations (p, 3, 3) of the last sweep, or of the start of an averaged step."""
+        found = self._first if first else self._quaternions
+        unpack_rotations(self._pieces, found, rotations)
 
     @property
     def least_traffic(self) -> int:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-__all__ = ["add_spin_stiffness", "turned_normal"]
+__all__ = ["SINGULAR", "add_spin_stiffness", "turned_normal"]
 
-_SINGULAR = 1e-8  # of the trace of the stretch: a spin without stiffness of its own
+SINGULAR = 1e-8  # of the trace of the stretch: a spin without stiffness of its own
 
 
 @njit(cache=True)
@@ -66,7 +66,7 @@ def _spin_stiffness(V, lam_trace, mu, H):
     e = -0.5 * (V[0, 2] + V[2, 0])
     f = -0.5 * (V[1, 2] + V[2, 1])
     determinant = a * (b * c - f * f) - d * (d * c - e * f) + e * (d * f - b * e)
-    if not determinant > _SINGULAR * abs(trace) ** 3:
+    if not determinant > SINGULAR * abs(trace) ** 3:
         H[:] = 0.0
         return False
     scale = factor / determinant

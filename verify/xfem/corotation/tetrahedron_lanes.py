@@ -14,22 +14,29 @@ write one array and read another are not turned into vector instructions.
 import numpy as np
 from numba import njit
 
+from verify.xfem.corotation.averaged_stress_lanes import average, average_lane
+from verify.xfem.corotation.lane_layout import (
+    BLOCKS,
+    CORNERS,
+    FIRST,
+    FORCE,
+    GRADIENTS,
+    IRREGULAR,
+    MODULI,
+    MOVED,
+    TURNED,
+    matrix_at,
+    rotation_at,
+)
 from verify.xfem.corotation.polar_kernels import mend_lane, rotation_matrix, turn_lanes
+from verify.xfem.corotation.spin_lanes import add_spin
 from verify.xfem.corotation.symmetric_rows import RECORD, add_blocks, add_forces, finish_row
 from verify.xfem.lanes.shuffles import address, gather_records
 from verify.xfem.lanes.vectors import LANES, fetch, load, store
 
-__all__ = ["ENTRIES", "linearise", "unpack_rotations"]
+__all__ = ["linearise", "unpack_rotations"]
 
-# places in the memory of the lanes, in entries of `LANES` numbers; 0 to 14 are of the rotations
-_MOVED = 15  # deformation gradient of what is moved
-_B = 24  # b_1, b_2, b_3
-_MODULI = 33  # w λ and w μ
-_FORCE = 35
-_BLOCKS = 47
-_CORNERS = 101  # displacement and what is moved, of four corners
 _AHEAD = 2  # batches by which constants are brought to the cache before they are read
-ENTRIES = 125  #: of the memory of the lanes
 
 
 @njit(cache=True)
@@ -45,7 +52,7 @@ def _pack(displacement, velocity, implicit, motion):
 @njit(cache=True)
 def _gather(corners, start, motion, v):
     for corner in range(4):
-        first, at = 4 * start + corner, (_CORNERS + 6 * corner) * LANES
+        first, at = 4 * start + corner, (CORNERS + 6 * corner) * LANES
         gather_records(motion, corners, first, 4, v, at, 6)
 
 
@@ -73,7 +80,7 @@ def _fetch_ahead(batch, batches, corners, slots, constants, quaternions, motion,
 @njit(cache=True, inline="always")
 def _gradient_row(v, l, component, into, x, y, z):
     """Write one row of a gradient, from a component at the corners and rows of b_1, b_2, b_3."""
-    at = (_CORNERS + component) * LANES + l
+    at = (CORNERS + component) * LANES + l
     first = v[at]
     p, q, r = v[at + 6 * LANES] - first, v[at + 12 * LANES] - first, v[at + 18 * LANES] - first
     v[into * LANES + l] = x[0] * p + y[0] * q + z[0] * r
@@ -85,19 +92,19 @@ def _gradient_row(v, l, component, into, x, y, z):
 def _deform(v):
     """Write both deformation gradients."""
     for l in range(LANES):
-        at = _B * LANES + l
+        at = GRADIENTS * LANES + l
         x = (v[at], v[at + LANES], v[at + 2 * LANES])
         y = (v[at + 3 * LANES], v[at + 4 * LANES], v[at + 5 * LANES])
         z = (v[at + 6 * LANES], v[at + 7 * LANES], v[at + 8 * LANES])
         _gradient_row(v, l, 0, 0, x, y, z)
         _gradient_row(v, l, 1, 3, x, y, z)
         _gradient_row(v, l, 2, 6, x, y, z)
-        _gradient_row(v, l, 3, _MOVED, x, y, z)
-        _gradient_row(v, l, 4, _MOVED + 3, x, y, z)
-        _gradient_row(v, l, 5, _MOVED + 6, x, y, z)
+        _gradient_row(v, l, 3, MOVED, x, y, z)
+        _gradient_row(v, l, 4, MOVED + 3, x, y, z)
+        _gradient_row(v, l, 5, MOVED + 6, x, y, z)
         for k in (0, 4, 8):
             v[k * LANES + l] += 1.0
-            v[(_MOVED + k) * LANES + l] += 1.0
+            v[(MOVED + k) * LANES + l] += 1.0
 
 
 @njit(cache=True, inline="always")
@@ -119,15 +126,9 @@ def _block(v, at, l, x, y, z, p, q, r, wl, wm, sum_):
 def _resist(factor, v):
     """Write the forces on the corners and the blocks above the diagonal."""
     for l in range(LANES):
-        w, x, y, z = v[9 * LANES + l], v[10 * LANES + l], v[11 * LANES + l], v[12 * LANES + l]
-        r00, r01, r02 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-        r10, r11, r12 = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-        r20, r21, r22 = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-        m = _MOVED * LANES + l
-        f00, f01, f02 = v[m], v[m + LANES], v[m + 2 * LANES]
-        f10, f11, f12 = v[m + 3 * LANES], v[m + 4 * LANES], v[m + 5 * LANES]
-        f20, f21, f22 = v[m + 6 * LANES], v[m + 7 * LANES], v[m + 8 * LANES]
-        wl, wm = v[_MODULI * LANES + l], v[(_MODULI + 1) * LANES + l]
+        r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_at(v, TURNED, l)
+        f00, f01, f02, f10, f11, f12, f20, f21, f22 = matrix_at(v, MOVED, l)
+        wl, wm = v[MODULI * LANES + l], v[(MODULI + 1) * LANES + l]
         e00 = f00 * r00 + f01 * r01 + f02 * r02 - 1.0
         e11 = f10 * r10 + f11 * r11 + f12 * r12 - 1.0
         e22 = f20 * r20 + f21 * r21 + f22 * r22 - 1.0
@@ -140,7 +141,7 @@ def _resist(factor, v):
             2.0 * wm * e11 + pressure,
             2.0 * wm * e22 + pressure,
         )
-        at = _B * LANES + l
+        at = GRADIENTS * LANES + l
         p, q, r = v[at], v[at + LANES], v[at + 2 * LANES]
         b0, b1, b2 = (
             r00 * p + r01 * q + r02 * r,
@@ -160,7 +161,7 @@ def _resist(factor, v):
             r20 * p + r21 * q + r22 * r,
         )
         a0, a1, a2 = -b0 - c0 - d0, -b1 - c1 - d1, -b2 - c2 - d2
-        at = _FORCE * LANES + l
+        at = FORCE * LANES + l
         v[at] = s00 * a0 + s01 * a1 + s02 * a2
         v[at + LANES] = s01 * a0 + s11 * a1 + s12 * a2
         v[at + 2 * LANES] = s02 * a0 + s12 * a1 + s22 * a2
@@ -175,19 +176,19 @@ def _resist(factor, v):
         v[at + 11 * LANES] = s02 * d0 + s12 * d1 + s22 * d2
         wl, wm = factor * wl, factor * wm
         both = wl + wm
-        _block(v, _BLOCKS, l, a0, a1, a2, b0, b1, b2, wl, wm, both)
-        _block(v, _BLOCKS + 9, l, a0, a1, a2, c0, c1, c2, wl, wm, both)
-        _block(v, _BLOCKS + 18, l, a0, a1, a2, d0, d1, d2, wl, wm, both)
-        _block(v, _BLOCKS + 27, l, b0, b1, b2, c0, c1, c2, wl, wm, both)
-        _block(v, _BLOCKS + 36, l, b0, b1, b2, d0, d1, d2, wl, wm, both)
-        _block(v, _BLOCKS + 45, l, c0, c1, c2, d0, d1, d2, wl, wm, both)
+        _block(v, BLOCKS, l, a0, a1, a2, b0, b1, b2, wl, wm, both)
+        _block(v, BLOCKS + 9, l, a0, a1, a2, c0, c1, c2, wl, wm, both)
+        _block(v, BLOCKS + 18, l, a0, a1, a2, d0, d1, d2, wl, wm, both)
+        _block(v, BLOCKS + 27, l, b0, b1, b2, c0, c1, c2, wl, wm, both)
+        _block(v, BLOCKS + 36, l, b0, b1, b2, d0, d1, d2, wl, wm, both)
+        _block(v, BLOCKS + 45, l, c0, c1, c2, d0, d1, d2, wl, wm, both)
 
 
 @njit(cache=True)
 def linearise(
     v, corners, slots, constants, quaternions, ends, starts, diagonal, mirror, slot_of,
-    displacement, velocity, implicit, turning, whole, factor, motion, waiting, ninths,
-    nodes, force, blocks,
+    displacement, velocity, implicit, turning, whole, factor, spin, first, averaged, taken,
+    motion, waiting, ninths, nodes, force, blocks,
 ):  # fmt: skip
     """Write the force of a displacement to `force` and its stiffness to `blocks`.
 
@@ -220,8 +221,14 @@ def linearise(
         Without it rotations stay as they are.
     whole : bool
         Without it blocks below the diagonal are not written.
-    factor : float
-        Of the stiffness.
+    factor, spin : float
+        Of the stiffness with frozen rotations, and of what the exact one has beyond it.
+    first : (batches, 4 · LANES) float array
+        Rotations at the start of a step; read if averaged.
+    averaged : bool
+        Whether the force is that averaged over a step, whose start is what is moved.
+    taken : (batches · LANES,) bool array
+        Pieces that have taken the substitute for the averaged stress; updated.
     motion : (N, RECORD) float array
         Room for what is read of each node.
     waiting, ninths, nodes : float arrays
@@ -230,6 +237,11 @@ def linearise(
         Overwritten.
     blocks : (B, 3, 3) float array
         Overwritten.
+
+    Returns
+    -------
+    int
+        Pieces whose rotation is not differentiable, and is frozen in the exact stiffness.
     """
     _pack(displacement, velocity, implicit, motion)
     entries, moving, known, turned = (
@@ -238,32 +250,53 @@ def linearise(
     corners_at, slots_at = address(corners), address(slots)
     starts_at, diagonal_at, mirror_at = address(starts), address(diagonal), address(mirror)
     slot_at, waiting_at, ninths_at = address(slot_of), address(waiting), address(ninths)
-    nodes_at, f, K = address(nodes), address(force), address(blocks)
-    row, rows = 0, len(ends)
+    nodes_at, f, K, before = address(nodes), address(force), address(blocks), address(first)
+    row, rows, left_out = 0, len(ends), 0
     for batch in range(len(constants)):
         start = batch * LANES
         for entry in range(11):
-            store(entries, (_B + entry) * LANES, load(known, (11 * batch + entry) * LANES))
+            store(entries, (GRADIENTS + entry) * LANES, load(known, (11 * batch + entry) * LANES))
         _fetch_ahead(batch, len(constants), corners_at, slots_at, known, turned, moving, waiting_at)
         _gather(corners_at, start, moving, entries)
         _deform(v)
         for entry in range(4):
-            store(entries, (9 + entry) * LANES, load(turned, (4 * batch + entry) * LANES))
+            store(entries, (TURNED + entry) * LANES, load(turned, (4 * batch + entry) * LANES))
         if turning:
             if not turn_lanes(v):
                 for l in range(LANES):
                     mend_lane(v, l)
             for entry in range(4):
-                store(turned, (4 * batch + entry) * LANES, load(entries, (9 + entry) * LANES))
+                store(turned, (4 * batch + entry) * LANES, load(entries, (TURNED + entry) * LANES))
         _resist(factor, v)
-        add_forces(corners_at, start, entries, _FORCE, nodes_at)
-        add_blocks(slots_at, start, entries, _BLOCKS, waiting_at, ninths_at)
+        if spin != 0.0:
+            add_spin(spin, v)
+            for l in range(LANES):
+                left_out += v[IRREGULAR * LANES + l] > 0.0
+        if averaged:
+            for entry in range(4):
+                store(entries, (FIRST + entry) * LANES, load(before, (4 * batch + entry) * LANES))
+            _average(v, taken[start : start + LANES])
+        add_forces(corners_at, start, entries, FORCE, nodes_at)
+        add_blocks(slots_at, start, entries, BLOCKS, waiting_at, ninths_at)
         while row < rows and ends[row] <= start + LANES:
             finish_row(
                 row, starts_at, diagonal_at, mirror_at, whole, slot_at, waiting_at, ninths_at,
                 nodes_at, f, K,
             )  # fmt: skip
             row += 1
+    return left_out
+
+
+@njit(cache=True)
+def _average(v, taken):
+    """Write the averaged forces, of some pieces with the substitute."""
+    irregular = average(v)
+    for l in range(LANES):
+        irregular |= taken[l]
+    if irregular:
+        for l in range(LANES):
+            if taken[l] or v[IRREGULAR * LANES + l] > 0.0:
+                taken[l] = average_lane(v, l, taken[l])
 
 
 @njit(cache=True)

@@ -15,8 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.xfem.corotation.averaged_stress_kernels import is_moving
 from verify.xfem.corotation.polar_kernels import nearest_rotation
-from verify.xfem.dynamics.averaged_stress_kernels import is_moving
 
 __all__ = ["add_averaged_stiffness", "stress_slope"]
 

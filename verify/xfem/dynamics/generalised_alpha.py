@@ -87,7 +87,7 @@ class GeneralisedAlpha(NewtonIntegrator):
 
     def _prepare(self) -> None:
         start, body = self._start, self.body
-        internal, _ = body.force.evaluate(start.displacement)
+        internal = self._internal(start.displacement)
         external = self._load_at_start()
         self._before = StepForces(internal, external, body.viscous(start.velocity))
         if not self._goes_on(external):
@@ -145,7 +145,7 @@ class GeneralisedAlpha(NewtonIntegrator):
 
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
         body, before = self.body, self._before
-        internal, _ = body.force.evaluate(displacement)
+        internal = self._internal(displacement)
         new, old = 1.0 - self.alpha_f, self.alpha_f
         after = self._acceleration_after(displacement)
         middle = (1.0 - self.alpha_m) * after + self.alpha_m * self.acceleration

@@ -5,8 +5,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.corotation.averaged_stress_kernels import averaged_force
 from verify.xfem.corotation.internal_force import TangentKind
-from verify.xfem.dynamics.averaged_stress_kernels import averaged_force
 from verify.xfem.dynamics.averaged_stress_tangent import add_averaged_stiffness
 from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.dynamics.integrator import StepForces
@@ -33,7 +33,7 @@ class ImplicitEuler(NewtonIntegrator):
     share = 1.0
 
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
-        internal, _ = self.body.force.evaluate(displacement)
+        internal = self._internal(displacement)
         return StepForces(internal, self._load_at_end(time), self.body.viscous(velocity))
 
 
@@ -49,12 +49,12 @@ class Trapezoidal(NewtonIntegrator):
 
     def _prepare(self) -> None:
         start = self._start
-        internal, _ = self.body.force.evaluate(start.displacement)
+        internal = self._internal(start.displacement)
         viscous = self.body.viscous(start.velocity)
         self._before = StepForces(internal, self._load_at_start(), viscous)
 
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
-        internal, _ = self.body.force.evaluate(displacement)
+        internal = self._internal(displacement)
         return StepForces(
             0.5 * (self._before.internal + internal),
             0.5 * (self._before.external + self._load_at_end(time)),
@@ -66,7 +66,7 @@ class EnergyMomentum(NewtonIntegrator):
     """Conserves energy, linear and angular momentum of a free body at any amplitude and step.
 
     The internal force is a discrete gradient of the potential; see
-    `verify.xfem.dynamics.averaged_stress_kernels`. Its stiffness is not symmetric, and differs
+    `verify.xfem.corotation.averaged_stress_kernels`. Its stiffness is not symmetric, and differs
     from half of that at the end by the square of the turn in a step. Corrections take the latter,
     which is found in a tenth of the time, as long as each takes half of the residual off.
 
@@ -104,39 +104,53 @@ class EnergyMomentum(NewtonIntegrator):
 
     def _prepare(self) -> None:
         force = self.body.force
-        force.evaluate(self._start.displacement)
-        self._first[:] = force.rotations
+        if not force.is_swept:
+            force.evaluate(self._start.displacement)
+            self._first[:] = force.rotations
         self._evaluations = 0
         self._takes_all = self._asks_for_all
 
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
         body, start = self.body, self._start
-        force = body.force
-        force.evaluate(displacement)
-        v = force.virtual
-        internal = np.zeros(v.corners.node_points.shape)
-        self._evaluations += 1
-        if self._evaluations <= _FREE_EVALUATIONS:
-            self.substituted[:] = False
-        if force.turning:
-            averaged_force(
-                v.cells, *force.geometry, self._first, force.rotations,
-                v.extend(start.displacement), v.extend(displacement), self.substituted, internal,
-            )  # fmt: skip
-            internal = v.restrict(internal)
-            if isinstance(force, PenalisedForce):
-                force.add_penalty(0.5 * (start.displacement + displacement), 1.0, internal)
+        internal = np.zeros(body.shape)
+        if body.force.turning:
+            self._evaluations += 1
+            if self._evaluations <= _FREE_EVALUATIONS:
+                self.substituted[:] = False
+            self._average(displacement, internal)
         else:
-            internal = np.zeros(body.shape)
-            force.add_frozen_product(0.5 * (start.displacement + displacement), 1.0, internal)
+            middle = 0.5 * (start.displacement + displacement)
+            body.force.add_frozen_product(middle, 1.0, internal)
         middle = start.time + 0.5 * self.step_size
         viscous = body.viscous(0.5 * (start.velocity + velocity))
         return StepForces(internal, body.external(middle), viscous)
+
+    def _average(self, displacement: _Floats, internal: _Floats) -> None:
+        """Write the force of a step that ends like this; substituted pieces are updated."""
+        force, before = self.body.force, self._start.displacement
+        if force.is_swept:
+            force.linearise_average(
+                self.body.pattern, before, displacement, self.substituted, self._stiffness_share,
+                internal, self._blocks, self._reads_all, self.share,
+            )  # fmt: skip
+            self._is_linearised = True
+            return
+        force.evaluate(displacement)
+        v = force.virtual
+        found = np.zeros(v.corners.node_points.shape)
+        averaged_force(
+            v.cells, *force.geometry, self._first, force.rotations, v.extend(before),
+            v.extend(displacement), self.substituted, found,
+        )  # fmt: skip
+        internal[:] = v.restrict(found)
+        if isinstance(force, PenalisedForce):
+            force.add_penalty(0.5 * (before + displacement), 1.0, internal)
 
     def _solved(self, displacement: _Floats, residual: _Floats, kind: TangentKind) -> _Floats:
         self._takes_all |= self._is_slow and self.body.force.turning
         if not self._takes_all:
             return super()._solved(displacement, residual, kind)
+        self._is_linearised = False
         self._assemble(displacement, kind)
         self._general.factorize(self._blocks)
         return self._general.solve(residual)
@@ -147,6 +161,10 @@ class EnergyMomentum(NewtonIntegrator):
             super()._add_stiffness(displacement, kind)
             return
         v, pattern = force.virtual, self.body.pattern
+        if force.is_swept:
+            force.evaluate(self._start.displacement)
+            self._first[:] = force.rotations
+            force.evaluate(displacement)
         added = pattern.unfold(self._blocks)
         add_averaged_stiffness(
             v.cells, pattern.targets[: len(v.cells)], *force.geometry, self._first,

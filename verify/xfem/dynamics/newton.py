@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
+from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.corotation.internal_force import TangentKind
 from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
 from verify.xfem.dynamics.integrator import (
@@ -17,6 +18,7 @@ from verify.xfem.dynamics.integrator import (
 from verify.xfem.dynamics.linear_solver import LinearSolver, default_solver
 from verify.xfem.errors import XfemError
 from verify.xfem.sparse.cholesky import SingularStiffnessError
+from verify.xfem.sparse.solver_by_cost import SolverByCost
 
 __all__ = ["NewtonIntegrator"]
 
@@ -25,7 +27,9 @@ _Floats = NDArray[np.float64]
 _HALVINGS = 10
 _SLOW = 0.5  # of the residual: what a correction leaves that takes too little off
 _JUST = 1e-9  # of a step: more than the round-off of a time that some thousand steps have added up
-_INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
+_INEXACT = 1e-6  # residual that conjugate gradients leave of a correction of which nothing is known
+_COARSE, _FINE = 1e-2, 1e-10  # most and least of it
+_SPARE = 0.2  # of what is expected to be left anyhow: what conjugate gradients may leave
 _ROUND_OFF = 64.0 * np.finfo(float).eps
 
 
@@ -85,6 +89,9 @@ class NewtonIntegrator(ABC):
         self._noise = self._round_off()
         self._factorised: tuple[float, RayleighDamping] | None = None
         self._is_slow = False  # whether the last correction of this step took too little off
+        self._left: list[float] = []  # of the residual by each correction of the last step
+        self._is_linearised = False  # whether the stiffness of the last evaluation is in the blocks
+        self._at, self._found = np.empty(0), np.empty(0)  # last evaluation: where, and the force
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
     def _default_solver(self) -> LinearSolver:
@@ -104,6 +111,32 @@ class NewtonIntegrator(ABC):
     def _load_at_end(self, time: float) -> _Floats:
         """External force (N, d) of a step that ends at a time, before what jumps then."""
         return self.body.external(time - _JUST * self.step_size)
+
+    def _internal(self, displacement: _Floats) -> _Floats:
+        """Return the internal force (N, d); where it is swept, also find the stiffness."""
+        body = self.body
+        if not (body.force.is_swept and body.force.turning):
+            return body.force.evaluate(displacement)[0]
+        scale = self._stiffness_share
+        # damping wants rotations too, and others may have turned them since
+        if scale != self.share or not np.array_equal(self._at, displacement):
+            self._found = np.empty(body.shape)
+            body.force.linearise(
+                body.pattern, displacement, displacement, 0.0, scale, self._found, self._blocks,
+                self._reads_all, self.share,
+            )  # fmt: skip
+            self._at, self._is_linearised = displacement.copy(), True
+        return self._found
+
+    @property
+    def _stiffness_share(self) -> float:
+        """Of the stiffness with frozen rotations, in the matrix of a correction."""
+        return self.share * (1.0 + self.rate / self.step_size * self.body.damping.stiffness)
+
+    @property
+    def _reads_all(self) -> bool:
+        """Whether the solver reads what is below the diagonal."""
+        return not (isinstance(self._solver, SolverByCost) and self._solver.is_iterative)
 
     def _add_stiffness(self, displacement: _Floats, kind: TangentKind) -> None:
         """Add the derivative of the internal force of the step to the blocks."""
@@ -164,13 +197,15 @@ class NewtonIntegrator(ABC):
         prescribed, _ = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
         residual, norm, forces, scale = self._residual(displacement)
-        leaps, self._is_slow = 0, False
-        for _ in range(self.iterations):
+        leaps, self._is_slow, left = 0, False, []
+        for number in range(self.iterations):
             # round-off of positions, seen through the stiffness
             noise = np.abs(body.force.virtual.node_points + displacement).max() * self._noise
             if self._excess(residual, noise) <= self.tolerance * scale:
+                self._left = left
                 return displacement, self._velocity(displacement), forces
-            correction = self._correction(displacement, residual)
+            aim = self._aim(number, self.tolerance * scale / norm)
+            correction = self._correction(displacement, residual, aim)
             nearly = self._excess(residual, 100.0 * noise) <= 1e3 * self.tolerance * scale
             accepted = False
             for halving in range(_HALVINGS):
@@ -187,6 +222,7 @@ class NewtonIntegrator(ABC):
                 leaps += 1
                 trial = displacement + correction
                 residual, size, forces, scale = self._residual(trial)
+            left.append(size / norm)
             self._is_slow = not size < _SLOW * norm
             displacement, norm = trial, size
         raise StepFailedError(
@@ -195,6 +231,23 @@ class NewtonIntegrator(ABC):
             f"over masses of {scale:.3g} m/s²; expected {self.tolerance:g} of them. "
             f"{self._why(displacement, leaps)}"
         )
+
+    def _aim(self, number: int, enough: float) -> float:
+        """Residual that conjugate gradients may leave of a correction: little less than others do.
+
+        A correction leaves a residual because forces are not linear, about as much of it as the
+        same correction of the last step (inexact Newton: Eisenstat & Walker, SIAM J. Sci.
+        Comput. 17, 1996).
+
+        Parameters
+        ----------
+        number : int
+            Of the correction in the step.
+        enough : float
+            Share of the residual with which the step is solved.
+        """
+        expected = self._left[number] if number < len(self._left) else _INEXACT / _SPARE
+        return min(max(_FINE, _SPARE * max(expected, enough)), _COARSE)
 
     def _round_off(self) -> _Floats:
         """(N, 1) error of the acceleration of each node for positions of size one, rounded."""
@@ -216,7 +269,7 @@ class NewtonIntegrator(ABC):
         force = self.body.force
         found = [f"{leaps} of {self.iterations} corrections did not lower the residual"]
         if force.virtual.mesh.dim == force.virtual.mesh.space:
-            inverted = force.inverted(displacement)
+            inverted = inverted_pieces(force, displacement)
             if len(inverted) > 0:
                 found.append(
                     f"{len(inverted)} of {len(force.virtual.cells)} pieces are inside out, the "
@@ -224,8 +277,12 @@ class NewtonIntegrator(ABC):
                 )
         return f"{'; '.join(found)}. A shorter step may help"
 
-    def _correction(self, displacement: _Floats, residual: _Floats) -> _Floats:
+    def _correction(
+        self, displacement: _Floats, residual: _Floats, tolerance: float = _INEXACT
+    ) -> _Floats:
         self.solves += 1
+        if isinstance(self._solver, SolverByCost):
+            self._solver.tolerance = tolerance
         try:
             try:
                 return self._solved(displacement, residual, "exact")
@@ -251,13 +308,15 @@ class NewtonIntegrator(ABC):
 
     def _assemble(self, displacement: _Floats, kind: TangentKind) -> None:
         body, h = self.body, self.step_size
-        self._blocks[:] = 0.0
-        self._add_stiffness(displacement, kind)
         per_velocity = self.share * self.rate / h
-        if body.damping.stiffness > 0.0:
-            body.force.add_stiffness(
-                body.pattern, self._blocks, per_velocity * body.damping.stiffness
-            )
+        if not self._is_linearised or kind != "exact":
+            self._blocks[:] = 0.0
+            self._add_stiffness(displacement, kind)
+            if body.damping.stiffness > 0.0:
+                body.force.add_stiffness(
+                    body.pattern, self._blocks, per_velocity * body.damping.stiffness
+                )
+        self._is_linearised, self._at = False, np.empty(0)
         factor = self._weight / h**2 + per_velocity * body.damping.mass
         add_mass(self._blocks, self._mass_places, body.mass.entries[2], factor)
         constrain(body.pattern.starts, body.pattern.columns, body.fixed, self._blocks)

@@ -99,11 +99,29 @@ class PenalisedForce(InternalForce):
         force: _Floats,
         blocks: _Floats,
         whole: bool = True,
+        spin: float = 0.0,
     ) -> None:
-        """Overwrite force and stiffness of a semi-implicit step, the penalty's included."""
-        if self.virtual.mesh.dim < 3:  # the material calls `evaluate` and `add_stiffness` of here
-            super().linearise(pattern, displacement, velocity, implicit, scale, force, blocks)
-            return
-        super().linearise(pattern, displacement, velocity, implicit, scale, force, blocks, whole)
-        self.add_penalty(displacement + implicit * velocity, 1.0, force)
+        """Overwrite force and stiffness of an implicit step, the penalty's included."""
+        moved = displacement, velocity, implicit
+        super().linearise(pattern, *moved, scale, force, blocks, whole, spin)
+        if self.is_swept:  # else the material has called `evaluate` and `add_stiffness` of here
+            self.add_penalty(displacement + implicit * velocity, 1.0, force)
+            self.ghost.add_stiffness(pattern, blocks, scale)
+
+    def linearise_average(
+        self,
+        pattern: BlockPattern,
+        start: _Floats,
+        end: _Floats,
+        substituted: NDArray[np.bool_],
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+        spin: float = 0.0,
+    ) -> None:
+        """Overwrite averaged force and stiffness, the penalty's included."""
+        moved = start, end, substituted
+        super().linearise_average(pattern, *moved, scale, force, blocks, whole, spin)
+        self.add_penalty(0.5 * (start + end), 1.0, force)
         self.ghost.add_stiffness(pattern, blocks, scale)

@@ -46,8 +46,8 @@ class ConjugateGradients:
 
     Attributes
     ----------
-    limit : int
-        Most iterations of the next solve.
+    tolerance, limit : float, int
+        Of the next solve.
     iterations : int
         Of the last solve.
     """
@@ -57,7 +57,7 @@ class ConjugateGradients:
     ) -> None:
         if not 0.0 < tolerance < 1.0 or limit < 1:
             raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
-        self._pattern, self._tolerance, self.limit = pattern, tolerance, limit
+        self._pattern, self.tolerance, self.limit = pattern, tolerance, limit
         width = vector_width(block)
         self._inverse = np.zeros((pattern.node_count, block, width))
         self._work = np.zeros((8, pattern.node_count, width))
@@ -122,13 +122,13 @@ class ConjugateGradients:
             return
         iterations, residual = conjugate_gradients(
             pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._inverse,
-            load, x, start is None, self._work, self._tolerance, self.limit,
+            load, x, start is None, self._work, self.tolerance, self.limit,
         )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)
-        if residual > self._tolerance:
+        if residual > self.tolerance:
             raise NotConvergedError(
                 f"conjugate gradients: residual {residual:.3g} after {iterations} iterations; "
-                f"expected {self._tolerance:g}"
+                f"expected {self.tolerance:g}"
             )
         self.iterations = iterations

@@ -64,6 +64,15 @@ class SolverByCost:
         if self._is_analysed:
             self._analyse()
 
+    @property
+    def tolerance(self) -> float:
+        """Of the residual that iterations leave, relative to the right-hand side."""
+        return self._iterative.tolerance
+
+    @tolerance.setter
+    def tolerance(self, tolerance: float) -> None:
+        self._iterative.tolerance = tolerance
+
     def _analyse(self) -> None:
         """Allow as many iterations as a factorisation is worth."""
         self._is_analysed = True

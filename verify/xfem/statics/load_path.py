@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.corotation.internal_force import InternalForce
 from verify.xfem.statics.newton import Newton, NotInEquilibriumError
 from verify.xfem.statics.rigid_motion import RigidMotions
@@ -238,7 +239,5 @@ class LoadPath:
         if self._force.is_membrane:
             return False
         volumes = self._force.virtual.volumes
-        was, now = (
-            volumes[self._force.inverted(displacement)].sum() for displacement in (before, after)
-        )
+        was, now = (volumes[inverted_pieces(self._force, u)].sum() for u in (before, after))
         return bool(now - was > _INVERTED * volumes.sum())

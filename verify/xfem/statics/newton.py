@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
+from verify.xfem.corotation.crushed_pieces import collapsed_pieces
 from verify.xfem.corotation.internal_force import InternalForce
 from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
 from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
@@ -103,7 +104,7 @@ class Newton:
 
     def _why(self, place: Place) -> str:
         """Say what stood in the way, as far as it can be seen."""
-        collapsed = self._force.collapsed(place.displacement, _COLLAPSED)
+        collapsed = collapsed_pieces(self._force, place.displacement, _COLLAPSED)
         if len(collapsed) == 0:
             return "More load steps may help"
         return (

@@ -18,9 +18,9 @@ from numba import njit
 
 from verify.xfem.corotation.polar_kernels import nearest_rotation
 
-__all__ = ["averaged_force", "is_moving", "stress"]
+__all__ = ["REGULAR", "averaged_force", "is_moving", "stress"]
 
-_REGULAR = 1e-6  # smallest pivot of U₀ + U₁ over its trace
+REGULAR = 1e-6  # smallest pivot of U₀ + U₁ over its trace
 _STILL = 1e-26  # square of a relative change of C that is round-off
 
 
@@ -51,7 +51,7 @@ def _invert(A, out):
     """Write the inverse of the symmetric part of A (3, 3); False if not positive definite."""
     a, b, c = A[0, 0], A[1, 1], A[2, 2]
     d, e, f = 0.5 * (A[0, 1] + A[1, 0]), 0.5 * (A[0, 2] + A[2, 0]), 0.5 * (A[1, 2] + A[2, 1])
-    least = _REGULAR * (a + b + c)
+    least = REGULAR * (a + b + c)
     minor = a * b - d * d
     p, q, r = b * c - f * f, e * f - d * c, d * f - b * e
     determinant = a * p + d * q + e * r
