@@ -23,6 +23,7 @@ __all__ = ["MovingBody"]
 Array = NDArray[np.float64]
 _ROUND_OFF = 1e-14  # of the accelerations
 _MOST_ITERATIONS = 1000
+_SMALL = 5000  # unknowns of a solid that are factorised in a tenth of a second
 
 
 @dataclass(frozen=True)
@@ -188,6 +189,17 @@ class MovingBody:
             along = scale * left + size / before * along
         raise RuntimeError("the accelerations are not found: the mass has an element without any")
 
+    @property
+    def iterates(self) -> bool:
+        """Whether symmetric systems of a step begin by conjugate gradients.
+
+        Those of solids, unless they are small; with a pressure they are indefinite.
+        """
+        solid = self.space.mesh.cell_dimension == 3
+        return bool(
+            solid and self.law.unknowns is self.space and self.space.node_points.size > _SMALL
+        )
+
     def plan(self, lasting: NDArray[np.int64] | None) -> None:
         """Take ties (p, 2) of `lasting_ties` for all that will ever be tied; see `step_solver`."""
         self._lasting = lasting
@@ -195,14 +207,16 @@ class MovingBody:
     def step_solver(
         self, matrix: Any, kind: Literal["symmetric", "general"]
     ) -> NodalSolver | TiedSolver:
-        """Factorise a matrix of all unknowns, which is destroyed with the solver.
+        """Make the solver with a matrix of all unknowns, which is destroyed with it.
 
         What a solve misses the next iteration of a step corrects, if it is little. It is good
         until a tie goes; of linear laws with a plan also then.
         """
         if self._lasting is None:
             ties = self.ties
-            return NodalSolver(ties.projected(matrix), ties, self.held, kind, largest=1e-3)
+            iterates = self.iterates and kind == "symmetric"
+            few = ties.projected(matrix)
+            return NodalSolver(few, ties, self.held, kind, largest=1e-3, iterates=iterates)
         whole = NodalSolver(matrix, self.law.unknowns, self._own_held, kind, largest=1e-3)
         return TiedSolver(whole, self.ties, self._lasting, self._own_held)
 

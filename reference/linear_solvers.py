@@ -17,6 +17,7 @@ __all__ = [
     "iterate",
     "modes_not_positive",
     "near_null_space",
+    "preconditioned_gradients",
     "rigid_motions",
     "set_multigrid",
     "solve_by_multigrid",
@@ -97,6 +98,29 @@ def symmetric_solver(matrix: Any) -> Any:
 def general_solver(matrix: Any) -> Any:
     """Factorise a matrix that need not be symmetric by MUMPS; gives a PETSc KSP."""
     return _factorised(matrix, "lu")
+
+
+def preconditioned_gradients(matrix: Any, tolerance: float) -> Any:
+    """Prepare conjugate gradients with an incomplete Cholesky factor; gives a PETSc KSP.
+
+    Parameters
+    ----------
+    matrix : PETSc Mat
+        Symmetric; best not much worse conditioned than a mass.
+    tolerance : float
+        Of the residual relative to the right side.
+    """
+    from petsc4py import PETSc
+
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOperators(matrix)
+    solver.setType("cg")
+    solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+    solver.setTolerances(rtol=tolerance, atol=0.0)
+    # of the unknowns of each rank by themselves an incomplete LU, which is the same
+    solver.getPC().setType("icc" if matrix.comm.size == 1 else "bjacobi")
+    return solver
 
 
 def modes_not_positive(matrix: Any) -> int:

@@ -14,6 +14,7 @@ from reference.linear_solvers import (
     LARGEST_CORRECTION,
     direct_solver,
     general_solver,
+    preconditioned_gradients,
     solve_directly,
     symmetric_solver,
 )
@@ -22,6 +23,10 @@ from reference.space import ConformingSpace, SharedUnknowns
 __all__ = ["NodalMatrix", "NodalSolver", "assembled_matrix", "nodal_forces", "nodal_integral"]
 
 Array = NDArray[np.float64]
+_LEFT = 1e-12  # of a right side, by conjugate gradients: one solution for a linear step
+# in ns, for a solid of n unknowns whose matrix has e entries (docs/reference-in-space.md): an
+# iteration per entry, a factorisation per n² and a solution by it per n^(4/3)
+_ITERATION, _FACTORISATION, _SOLUTION = 2.0, 2.0, 40.0
 _SOLVERS = {"definite": direct_solver, "symmetric": symmetric_solver, "general": general_solver}
 
 
@@ -46,7 +51,11 @@ class NodalMatrix:
 
 
 class NodalSolver:
-    """A factorised matrix of which the rows and columns of held unknowns are taken out.
+    """Solver with a matrix of which the rows and columns of held unknowns are taken out.
+
+    It factorises, unless it is to iterate. Then it does so by conjugate gradients until they have
+    taken, beyond what solutions by a factor take, as many operations as a factorisation, or meet
+    a direction without positive curvature. No clock decides.
 
     Parameters
     ----------
@@ -59,6 +68,8 @@ class NodalSolver:
     kind : {"definite", "symmetric", "general"}
     largest : float
         Share of the first solution that may be lost in round-off.
+    iterates : bool
+        Whether to begin by conjugate gradients: for solids and symmetric matrices.
     """
 
     def __init__(
@@ -68,17 +79,30 @@ class NodalSolver:
         held: NDArray[np.int32],
         kind: Literal["definite", "symmetric", "general"] = "definite",
         largest: float = LARGEST_CORRECTION,
+        iterates: bool = False,
     ) -> None:
-        self._largest = largest
+        self._largest, self._kind = largest, kind
         self._unknowns, self._matrix, self._proven = unknowns, matrix, False
         matrix.zeroRowsColumns(unknowns.rows(held), mean_stiffness(matrix))
-        self._solver = _SOLVERS[kind](matrix)
+        self._solver: Any = None
+        self._iteration = preconditioned_gradients(matrix, _LEFT) if iterates else None
+        self._spent = 0.0  # ns by iterations, beyond those of solutions by a factor
+        if not iterates:
+            self._factorise()
         self._x, self._b = matrix.createVecs()
+
+    def _factorise(self) -> None:
+        self._solver = _SOLVERS[self._kind](self._matrix)
+
+    @property
+    def iterates(self) -> bool:
+        """Whether the next solution will be by conjugate gradients."""
+        return self._iteration is not None
 
     def solve(self, right: Array) -> Array:
         """Solve for an array (k,), zero where held if the right side is.
 
-        The first solve is refined, and shows whether the factorisation is any good.
+        The first solve by a factorisation is refined, and shows whether it is any good.
 
         Raises
         ------
@@ -88,18 +112,41 @@ class NodalSolver:
             If MUMPS failed.
         """
         self._b.array[:] = self._unknowns.own_part(right)
+        if not self._is_iterated():
+            self._solve_directly()
+        return self._unknowns.everywhere(self._x.array).ravel()
+
+    def _is_iterated(self) -> bool:
+        """Iterate if that is still worth it; say whether it has led to the solution."""
+        if self._iteration is None:
+            return False
+        size = float(self._matrix.getSize()[0])
+        iteration = _ITERATION * float(self._matrix.getInfo()["nz_used"])
+        solution, factorisation = _SOLUTION * size ** (4 / 3), _FACTORISATION * size**2
+        left = factorisation + solution - self._spent
+        self._iteration.setTolerances(max_it=max(1, int(left / iteration)))
+        self._iteration.solve(self._b, self._x)
+        self._spent += self._iteration.getIterationNumber() * iteration - solution
+        found = bool(self._iteration.getConvergedReason() > 0)
+        if not found or self._spent >= factorisation:
+            self._iteration.destroy()
+            self._iteration = None
+            self._factorise()
+        return found
+
+    def _solve_directly(self) -> None:
         if self._proven:
             self._solver.solve(self._b, self._x)
         else:
             self._x.set(0.0)
             solve_directly(self._solver, self._matrix, self._x, self._b, self._largest)
             self._proven = True
-        return self._unknowns.everywhere(self._x.array).ravel()
 
     def destroy(self) -> None:
         """Free what PETSc holds."""
-        for entry in (self._solver, self._matrix, self._x, self._b):
-            entry.destroy()
+        for entry in (self._solver, self._iteration, self._matrix, self._x, self._b):
+            if entry is not None:
+                entry.destroy()
 
 
 def assembled_matrix(form: Any) -> Any:

@@ -210,3 +210,53 @@ def test_a_prestressed_body_stays_where_statics_finds_it_until_its_cut_opens(kin
     volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
     means = found.displacement[:, cells, 2].mean(axis=2) @ volume / volume.sum()
     assert means[3] - means[2] == pytest.approx(-0.49 * 0.1**2, rel=1e-6)
+
+
+BLADE = {
+    "kind": "tool_path",
+    "name": "blade",
+    "points": [[-0.2, 0.5, 1.2], [1.2, 0.5, 1.2]],
+    "depth": 0.7,
+    "direction": [0, 0, -1],
+    "times": [0.015, 0.055],
+}
+
+
+@pytest.mark.parametrize("kinematics", ["linear", "corotational"])
+def test_steps_by_conjugate_gradients_are_those_of_factorisations_while_facets_open(
+    kinematics, monkeypatch
+):
+    """Also where one takes over at once, since it is said to cost nothing."""
+    from reference import dynamics_body, nodal_algebra
+
+    analysis = {"kind": "dynamic", "kinematics": kinematics, "duration": 0.08, "outputs": 3}
+    scene = moving(
+        [BLADE],
+        mesh={"cells": [[4, 4, 4]]},
+        supports=[{"where": "left", "displacement": [0, 0, 0]}],
+        loads=[{"kind": "gravity", "acceleration": [0.3, -0.5, -2.0]}],
+        analysis={**analysis, "time_step": 0.01},
+    )
+    wanted = solved(scene)
+    turned = []
+    factorise = nodal_algebra.NodalSolver._factorise
+    monkeypatch.setattr(
+        nodal_algebra.NodalSolver,
+        "_factorise",
+        lambda self: (turned.append(self.iterates), factorise(self)),
+    )
+    monkeypatch.setattr(dynamics_body, "_SMALL", 0)
+    monkeypatch.setattr(nodal_algebra, "_FACTORISATION", 1e9)
+    found = solved(scene)
+    assert int(found.notes["openings"]) >= 3
+    assert len(turned) == 0
+    size = np.abs(wanted.displacement).max()
+    # steps are solved to 1e-11 of their forces
+    assert found.displacement == pytest.approx(wanted.displacement, abs=1e-9 * size)
+    ledger = found.ledger
+    energy = max(np.ptp(ledger[name]) for name in ("kinetic", "strain", "gravity"))
+    assert np.ptp(ledger["total"]) < 1e-10 * energy
+    monkeypatch.setattr(nodal_algebra, "_FACTORISATION", 1e-9)
+    again = solved(scene)
+    assert len(turned) > 0
+    assert again.displacement == pytest.approx(wanted.displacement, abs=1e-9 * size)

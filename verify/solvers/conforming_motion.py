@@ -196,9 +196,10 @@ class _Mover:
     def _plan(self) -> bool:
         """Choose between one factorisation with all that is ever tied, and one per opening.
 
-        The first takes as many solves as there are ties, once.
+        The first takes as many solves as there are ties, once. Where nothing is factorised at
+        first neither is planned.
         """
-        if self.scene.analysis.kinematics != "linear":
+        if self.scene.analysis.kinematics != "linear" or self.body.iterates:
             return False
         lasting = lasting_ties(self.facing, self.opening)
         ties = lasting.size // 2 * self.space.dimension

@@ -119,8 +119,8 @@ class EnergyMomentum(NewtonIntegrator):
                 self.substituted[:] = False
             self._average(displacement, internal)
         else:
-            middle = 0.5 * (start.displacement + displacement)
-            body.force.add_frozen_product(middle, 1.0, internal)
+            mean = 0.5 * (start.displacement + displacement)
+            body.force.add_frozen_product(mean, 1.0, internal)
         middle = start.time + 0.5 * self.step_size
         viscous = body.viscous(0.5 * (start.velocity + velocity))
         return StepForces(internal, body.external(middle), viscous)

@@ -197,7 +197,8 @@ class NewtonIntegrator(ABC):
         prescribed, _ = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
         residual, norm, forces, scale = self._residual(displacement)
-        leaps, self._is_slow, left = 0, False, []
+        left: list[float] = []
+        leaps, self._is_slow = 0, False
         for number in range(self.iterations):
             # round-off of positions, seen through the stiffness
             noise = np.abs(body.force.virtual.node_points + displacement).max() * self._noise
