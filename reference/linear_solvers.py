@@ -116,7 +116,8 @@ def preconditioned_gradients(matrix: Any, tolerance: float) -> Any:
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
     solver.setType("cg")
-    solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+    norm: Any = PETSc.KSP.NormType.UNPRECONDITIONED
+    solver.setNormType(norm)
     solver.setTolerances(rtol=tolerance, atol=0.0)
     # of the unknowns of each rank by themselves an incomplete LU, which is the same
     solver.getPC().setType("icc" if matrix.comm.size == 1 else "bjacobi")

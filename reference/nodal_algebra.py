@@ -23,6 +23,7 @@ from reference.space import ConformingSpace, SharedUnknowns
 __all__ = ["NodalMatrix", "NodalSolver", "assembled_matrix", "nodal_forces", "nodal_integral"]
 
 Array = NDArray[np.float64]
+_MOST = 10_000  # iterations
 _LEFT = 1e-12  # of a right side, by conjugate gradients: one solution for a linear step
 # in ns, for a solid of n unknowns whose matrix has e entries (docs/reference-in-space.md): an
 # iteration per entry, a factorisation per n² and a solution by it per n^(4/3)
@@ -124,7 +125,7 @@ class NodalSolver:
         iteration = _ITERATION * float(self._matrix.getInfo()["nz_used"])
         solution, factorisation = _SOLUTION * size ** (4 / 3), _FACTORISATION * size**2
         left = factorisation + solution - self._spent
-        self._iteration.setTolerances(max_it=max(1, int(left / iteration)))
+        self._iteration.setTolerances(max_it=int(min(max(1.0, left / iteration), _MOST)))
         self._iteration.solve(self._b, self._x)
         self._spent += self._iteration.getIterationNumber() * iteration - solution
         found = bool(self._iteration.getConvergedReason() > 0)
