@@ -4,7 +4,6 @@ Each is written with ever more room until it fits, so that the disk is full at i
 somewhere in the middle.
 """
 
-import base64
 import io
 from pathlib import Path
 
@@ -17,7 +16,8 @@ from verify.anatomy.store import write_patch
 from verify.compare.locate import SolutionField
 from verify.replay import animation
 from verify.replay.stroke_file import write_stroke
-from verify.report.markdown import PICTURES, markdown
+from verify.report.blocks import Drawing
+from verify.report.template_sets import PICTURES, Beside
 from verify.result import CaseResult, write_result
 from verify.runner.error_field import write_error_field
 from verify.solution import Solution, write_solution
@@ -83,10 +83,15 @@ def test_a_file_that_does_not_fit_is_named_and_leaves_the_one_before(disk, monke
 def test_a_picture_of_the_markdown_report_that_does_not_fit_is_named(disk):
     made = io.BytesIO()
     Image.fromarray(NOISE[0]).save(made, "WEBP", quality=84)
-    address = f"data:image/webp;base64,{base64.b64encode(made.getvalue()).decode()}"
-    drawing = f'<svg aria-label="a" viewBox="0 0 1 1">{"<path/>" * 2000}</svg>'
-    page = f'<html><body><figure>{drawing}<img alt="b" src="{address}"></figure></body></html>'
-    write = in_this_process(lambda: markdown(page, disk.root))
+    drawing = Drawing("<path/>" * 2000, (1.0, 1.0), "a")
+
+    def written():
+        assets = Beside(disk.root / PICTURES)
+        assets.folder.mkdir(exist_ok=True)
+        assets.drawing(drawing)
+        assets.image(made.getvalue())
+
+    write = in_this_process(written)
     named = named_until_it_fits(disk, write)
     assert set(named) == {f"{PICTURES}/001.svg", f"{PICTURES}/002.png"}
 

@@ -2,17 +2,22 @@
 
 import math
 import re
+import warnings
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from synthetic_run import make_run
 
 from verify.report import load_run
-from verify.report.axes import Axis, Panel, log_range
-from verify.report.case_section import _floor_text
+from verify.report.case_view import case_view, floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
-from verify.report.figures_convergence import convergence_figure, error_range, required_slope
-from verify.report.marks import band, slope_triangle
+from verify.report.figures import convergence
+from verify.report.figures.convergence import convergence_panel, error_range, slope_triangle
+from verify.report.figures.style import Palette, drawing, log_range, log_ticks, panel, plain_axis
+from verify.report.pictures import CasePictures
+from verify.report.run_directory import CaseEntry
 from verify.result import Metric, SolveRecord, Status
 
 
@@ -22,10 +27,23 @@ def results(tmp_path_factory):
     return {result.case: result for result in run.results}
 
 
-def test_a_decade_is_as_long_anywhere_on_an_axis():
-    axis = Axis(1e-6, 1e3, 10.0, 190.0)
-    steps = [axis.at(10.0 ** (k + 1)) - axis.at(10.0**k) for k in range(-6, 3)]
-    assert steps == pytest.approx([20.0] * 9, abs=1e-9)
+@pytest.fixture
+def drawn(monkeypatch):
+    """Return the axes of a convergence figure before it is SVG, with its description."""
+
+    def of(result, metric, curves, y_range):
+        kept = []
+
+        def keep(figure, alt, kind="panel"):
+            kept.append((figure.axes[0], alt))
+            return drawing(figure, alt, kind)
+
+        monkeypatch.setattr(convergence, "drawing", keep)
+        slope = required_slope(result, metric)
+        assert convergence_panel("error", curves, y_range, Palette(), slope) is not None
+        return kept[0]
+
+    return of
 
 
 @pytest.mark.parametrize(
@@ -33,48 +51,56 @@ def test_a_decade_is_as_long_anywhere_on_an_axis():
 )
 def test_every_axis_has_at_least_two_and_at_most_nine_labels_inside(span):
     low, high = log_range(list(span))
-    labelled, _ = Axis(low, high, 0, 100).ticks()
+    labelled = log_ticks(low, high)
     assert 2 <= len(labelled) <= 9
     assert all(low * 0.999 <= value <= high * 1.001 for value in labelled)
 
 
-@pytest.mark.parametrize("ends", [(1e-3, 1e-1), (1e-1, 1e-3), (1e-2, 1e-2)])
-def test_the_name_of_the_band_stands_below_its_edge(ends):
-    panel = Panel((0.1, 10.0), (1e-4, 1.0), "h", "error")
-    markup = str(band(panel, list(zip((0.2, 5.0), ends, strict=True))))
-    x, y = (float(re.search(rf'<text[^>]* {k}="([0-9.]+)"', markup).group(1)) for k in "xy")
-    # letters of 11 pixels: about 27 of half their size, 8 above the line they stand on
-    reach = x - 27 * 5.0 if 'text-anchor="end"' in markup else x + 27 * 5.0
-
-    def edge(pixel):
-        share = (pixel - panel.x.at(0.2)) / (panel.x.at(5.0) - panel.x.at(0.2))
-        share = min(max(share, 0.0), 1.0)
-        return panel.y.at(ends[0] ** (1 - share) * ends[1] ** share)
-
-    assert y - 8 >= max(edge(x), edge(reach))
-    assert y <= panel.y.start
+def test_numbers_on_axes_and_names_of_curves_are_written_whole():
+    """Places in paths are shortened; digits of a label are not."""
+    name = "solver 0.123456789 <b>$x_1$</b>"
+    with panel("jump 0.000987654, m") as (figure, axes), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plain_axis(axes, "y", (0.0, 2.2e-4))
+        axes.plot([0, 1], [0, 2e-4], label=name)
+        axes.legend()
+        body = drawing(figure, "").body
+    words = re.findall(r"<text[^>]*>([^<]*)</text>", body)
+    assert "jump 0.000987654, m" in words
+    assert {"0", "5e−05", "0.0001", "0.00015", "0.0002"} <= set(words)
+    assert name.replace("<", "&lt;").replace(">", "&gt;") in words
 
 
 @pytest.mark.parametrize("slope", [0.5, 0.98, 1.95, 2.0])
 def test_the_slope_triangle_has_its_slope(slope):
-    panel = Panel((1e-3, 1.0), (1e-6, 1.0), "h", "e")
-    drawn = slope_triangle(panel, 1e-2, 1e-1, 1e-4, slope, "")
-    x0, y0, x1, y1 = map(float, re.search(r"M(\S+) (\S+)H(\S+)V(\S+)Z", drawn).groups())
-    decade_x = panel.x.at(0.1) - panel.x.at(0.01)
-    decade_y = panel.y.at(0.1) - panel.y.at(0.01)
-    # pixels are written to a tenth
-    assert ((y1 - y0) / decade_y) / ((x1 - x0) / decade_x) == pytest.approx(slope, abs=0.005)
+    axes = Figure().add_subplot()
+    slope_triangle(axes, 1e-2, 1e-1, 1e-4, slope, "")
+    (x0, y0), (x1, _), (x2, y2), _ = axes.lines[0].get_xydata()
+    assert x1 == x2
+    assert math.log10(y2 / y0) / math.log10(x2 / x0) == pytest.approx(slope, rel=1e-12)
 
 
-def test_a_failed_level_ends_the_curve_and_is_marked(results):
+def test_a_failed_level_ends_the_curve_and_is_marked(results, drawn):
     result = results["statics/griffith_inside"]
     curves = error_curves(result, "energy_norm")
     xfem = next(curve for curve in curves if curve.solver == "xfem")
     assert [len(stretch) for stretch in xfem.stretches] == [3]
     assert xfem.ends == [(3, "timeout")]
-    figure = convergence_figure(result, "energy_norm", curves, error_range(curves, True), "error")
-    assert figure.count('class="abandoned"') == 1
-    assert "XFEM ended at level 3: timeout" in figure
+    axes, said = drawn(result, "energy_norm", curves, error_range(curves, True))
+    crosses = [line.get_xydata() for line in axes.lines if line.get_marker() == "x"]
+    assert [len(cross) for cross in crosses] == [1]
+    assert crosses[0][0] == pytest.approx([0.125 / 8, xfem.points[-1].value])
+    assert "XFEM ended at level 3: timeout" in said
+
+
+def test_every_error_lies_where_its_number_says(results, drawn):
+    result = results["statics/f3_inclined"]
+    curves = error_curves(result, "energy_norm")
+    axes, _ = drawn(result, "energy_norm", curves, error_range(curves, True))
+    nodes = [line.get_xydata() for line in axes.lines if line.get_marker() in ("o", "s")]
+    for curve, found in zip(curves, nodes, strict=True):
+        expected = [(point.size, point.value) for point in curve.points]
+        assert np.ravel(found) == pytest.approx(np.ravel(expected), rel=1e-14)
 
 
 def test_a_gap_in_the_levels_is_not_bridged(results):
@@ -101,16 +127,14 @@ def test_the_required_slope_is_that_of_the_case_and_no_other(results):
     assert required_slope(results["statics/tissue_strip"], "energy_norm") is None
 
 
-def test_the_floor_of_the_reference_is_inside_the_figure_that_it_limits(results):
+def test_the_floor_of_the_reference_is_inside_the_figure_that_it_limits(results, drawn):
     result = results["statics/tissue_strip"]
     curves = error_curves(result, "energy_norm")
     low, high = error_range(curves, sloped=False)
     assert low < 0.03 / 2 < high
-    figure = convergence_figure(result, "energy_norm", curves, (low, high), "error")
-    assert figure.count('class="floor"') == 1
-    edge = re.search(r'd="M(\S+) (\S+)L[^"]*" class="floor-edge"', figure)
-    panel = Panel((1, 2), (low, high), "", "")
-    assert float(edge[2]) == pytest.approx(panel.y.at(0.03), abs=0.06)
+    axes, _ = drawn(result, "energy_norm", curves, (low, high))
+    (band,) = [c for c in axes.collections if "uncertainty" in str(c.get_label())]
+    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(0.03)
 
 
 def test_the_band_and_its_caption_say_the_same_where_uncertainties_differ(results):
@@ -126,14 +150,14 @@ def test_the_band_and_its_caption_say_the_same_where_uncertainties_differ(result
     curves = error_curves(replace(result, solves=solves, rates=[]), "energy_norm")
     assert not any(limits(point) for curve in curves for point in curve.points)
     assert {u for _, u in floor(curves, lambda point: point.size)} == {1e-6}
-    assert "below 1/30 of every error" in _floor_text(curves)
+    assert "below 1/30 of every error" in floor_text(curves)
 
 
-def test_an_exact_reference_draws_no_floor(results):
+def test_an_exact_reference_draws_no_floor(results, drawn):
     result = results["statics/f3_inclined"]
     curves = error_curves(result, "energy_norm")
-    figure = convergence_figure(result, "energy_norm", curves, error_range(curves, True), "error")
-    assert "floor" not in figure
+    axes, _ = drawn(result, "energy_norm", curves, error_range(curves, True))
+    assert not axes.collections
 
 
 def test_time_is_added_repetition_by_repetition():
@@ -151,3 +175,36 @@ def test_points_keep_clear_of_each_other_when_their_errors_do(results):
     assert low < min(values)
     assert max(values) < high
     assert math.log10(high / low) < 2 * math.log10(max(values) / min(values))
+
+
+def shown(result):
+    return case_view(0, CaseEntry(result.case, None, result), CasePictures(), Palette())
+
+
+def with_errors(result, errors, uncertainty=0.0):
+    """Return the result with these errors of XFEM, level by level, and no other solver."""
+    solves = [
+        SolveRecord("c", "xfem", level, Status.SOLVED, size=0.1 / 2**level,
+                    metrics=[Metric("energy_norm", error, "1", None, uncertainty)])
+        for level, error in enumerate(errors)
+    ]  # fmt: skip
+    return replace(result, solves=solves, rates=[], verdicts=[])
+
+
+def test_what_is_exact_to_round_off_is_a_line_of_text_with_its_number(results):
+    view = shown(with_errors(results["statics/f3_inclined"], [3e-15, 2e-14]))
+    assert view.convergence == []
+    (said,) = view.convergence_notes
+    assert "exact to round-off (at most 2.0×10⁻¹⁴) on every level: XFEM" in said
+
+
+def test_points_below_the_uncertainty_are_named_and_not_drawn(results):
+    view = shown(with_errors(results["statics/f3_inclined"], [0.3, 0.1, 0.01], 0.02))
+    assert "not drawn: XFEM, level 2" in view.convergence_notes[0]
+    assert "0.1 at h = 0.05 m" in view.convergence[0].panels[0].alt
+
+
+def test_one_level_is_no_convergence(results):
+    view = shown(with_errors(results["statics/f3_inclined"], [0.3]))
+    assert view.convergence == []
+    assert "One level" in view.convergence_notes[0]

@@ -11,7 +11,7 @@ from page_parser import parsed
 from synthetic_run import make_run
 
 from verify.cli.verdict_text import verdict_lines
-from verify.report import render
+from verify.report import render, render_markdown
 from verify.result import Notice, NoticeKind, read_result, write_result
 
 CLOSED = "its faces overlap by up to 18.5 mm at (0.05, 0.05) m"
@@ -52,10 +52,11 @@ def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge
     top, case = page.index("Warned of"), page.index('id="case-1"')
     assert top < case
     assert "statics/f3_inclined" in page[top : top + 200]  # which case; its banner says the rest
-    assert page.index("1 warning") < case
+    matrix = page.index('<table class="matrix">')
+    assert matrix < page.index("1 warning", matrix) < case
     inside = page[case:]
     banner = inside.index('class="banner"')
-    assert banner < inside.index("<svg")
+    assert banner < inside.index("<table")
     assert CLOSED in inside[banner : banner + 400]
     assert inside.index("1 warning") < banner
     parsed(page)
@@ -88,10 +89,8 @@ def test_notices_stand_in_every_export(warned):
 
 
 def test_a_warning_is_a_quotation_in_markdown(warned):
-    from verify.report.markdown import markdown
-
     root, _ = warned
-    text = markdown((root / "report.html").read_text(), root)
+    text = render_markdown(root).read_text(encoding="utf-8")
     assert any(
         line.startswith(">") and CLOSED.replace("[", "\\[") in line for line in text.splitlines()
     )

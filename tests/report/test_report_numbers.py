@@ -1,12 +1,10 @@
 """A number and the interval that it lies in are written so that the width can be seen."""
 
-import re
-
 import pytest
 
 from verify.report.notation import with_interval
 from verify.report.stability_map import graded
-from verify.report.summary import check_row
+from verify.report.tables import check_row
 from verify.result import Verdict, VerdictRecord
 
 
@@ -21,11 +19,7 @@ from verify.result import Verdict, VerdictRecord
     ],
 )
 def test_an_interval_is_written_with_the_digits_that_tell_its_ends_apart(value, half, written):
-    markup = str(with_interval(value, value - half, value + half))
-    raised = markup
-    for power, small in (("−4", "⁻⁴"), ("−11", "⁻¹¹")):
-        raised = raised.replace(f"<sup>{power}</sup>", small)
-    assert re.sub(r"<[^>]+>", "", raised) == written
+    assert with_interval(value, value - half, value + half) == written
 
 
 def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
@@ -34,7 +28,7 @@ def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
         "value", "reference", "strain_energy", Verdict.PASS, 8.0787592969, 8.0787592969,
         8.0787592969, "8.078757937 ± 1e-05 (relative)", "",
     )  # fmt: skip
-    assert "8.078759297<" in str(check_row(found))
+    assert check_row(found)[1].text == "8.078759297"
 
 
 @pytest.mark.parametrize(

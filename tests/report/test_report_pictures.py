@@ -73,9 +73,10 @@ def test_vtk_and_matplotlib_show_the_same_body(tmp_path):
     body = deformed_body(cut_square(12, opening=0.05), 2.0)
     view = common_view([body], "cividis")
     picture = pictures.Picture("", "", body, view)
-    assert drawn([picture]) == ""
+    by_vtk = tmp_path / "v.png"
+    assert pictures._by_vtk([picture], {id(picture): by_vtk}, tmp_path / "job.pickle") == ""
     draw_with_matplotlib.draw(body, view, tmp_path / "m.png")
-    one, two = ink(picture.image), ink((tmp_path / "m.png").read_bytes())
+    one, two = ink(by_vtk.read_bytes()), ink((tmp_path / "m.png").read_bytes())
     assert one.shape == two.shape == view.size[::-1]
     # lines are a little wider in one than in the other: below 1 % of the picture
     assert np.mean(one != two) < 0.01
@@ -100,15 +101,30 @@ def test_a_solid_can_be_drawn_without_opengl(tmp_path):
         (NOT_THERE, "could not be started"),
     ],
 )
-def test_a_machine_without_opengl_gets_pictures_by_matplotlib_and_a_note(
-    tmp_path, monkeypatch, command, reason
+def test_a_machine_without_opengl_gets_solids_by_matplotlib_and_a_reason(
+    monkeypatch, command, reason
 ):
     monkeypatch.setattr(pictures, "_VTK", command)
-    root = make_run(tmp_path / "run")
+    body = deformed_body(tetrahedra(), 1.0)
+    picture = pictures.Picture("", "", body, common_view([body], "cividis"))
+    assert reason in drawn([picture])
+    assert not picture.by_vtk
+    assert ink(picture.image).mean() > 0.1
+
+
+def test_plane_bodies_need_no_opengl(monkeypatch):
+    monkeypatch.setattr(pictures, "_VTK", NOT_THERE)
+    body = deformed_body(cut_square(4), 1.0)
+    picture = pictures.Picture("", "", body, common_view([body], "cividis"))
+    assert drawn([picture]) == ""
+    assert ink(picture.image).mean() > 0.1
+
+
+def test_the_page_says_why_solids_were_drawn_by_matplotlib(tmp_path, monkeypatch):
+    monkeypatch.setattr("verify.report.rendering.drawn", lambda pictures: "VTK ended by signal 11")
+    root = make_run(tmp_path / "run", pictures=False)
     page = parsed(render(root).read_text(encoding="utf-8"))
-    assert len(page.all("img")) == 12
-    assert "drawn by matplotlib" in page.text
-    assert reason in page.text
+    assert "drawn by matplotlib because VTK ended by signal 11" in page.text
 
 
 def test_missing_and_damaged_solutions_become_notes(tmp_path):

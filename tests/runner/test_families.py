@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from verify.report.family_section import family_section
+from verify.report.family_view import family_views
+from verify.report.figures.style import Palette
 from verify.report.run_directory import load_run
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
 from verify.runner.families import Families
@@ -40,10 +41,11 @@ def test_rows_are_run_judged_by_each_other_and_reported(verify):
     (compared,) = [v for v in cases["square[epsilon=0.5]"]["verdicts"] if v["check"] == "ratio"]
     assert compared["verdict"] == "PASS"
     assert compared["observed"] == pytest.approx(1.0)
-    shown = family_section(load_run(verify.folder / "out"))
-    assert shown is not None
-    assert "relative L² error of the displacement" in shown
-    assert shown.count("epsilon =") >= 2
+    (shown,) = family_views(load_run(verify.folder / "out"), Palette())
+    tables = [table for table, _ in shown.parts]
+    assert "relative L² error of the displacement" in [table.caption for table in tables]
+    assert all(table.head[0].text == "epsilon =" for table in tables)
+    assert [row[0].text for row in tables[0].rows] == ["0.5", "0"]
     again = verify(*run)
     assert json.loads(again.stdout)["cases"] == json.loads(done.stdout)["cases"]
     alone = verify(*[arg.replace("square.toml", "square.toml[epsilon=0.5]") for arg in run[:3]],

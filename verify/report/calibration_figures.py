@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from verify.report.axes import Panel, log_range, text
-from verify.report.markup import Markup, joined, tag
+from verify.report.markup import Markup, joined, table, tag
 from verify.report.notation import metric_title, number
-from verify.report.tables import table
 
 __all__ = ["calibration_section"]
 

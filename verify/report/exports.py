@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from verify.csv_files import csv_text
 from verify.report.curves import duration
-from verify.report.markup import printable
+from verify.report.notation import printable
 from verify.report.run_directory import CaseEntry, Run
 from verify.result import SolveRecord, Verdict, VerdictRecord
 

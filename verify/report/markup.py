@@ -5,27 +5,21 @@ plain string cannot get in unescaped, and no template engine is needed.
 """
 
 import html
-import re
+from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["Markup", "joined", "printable", "tag"]
+from verify.report.notation import printable
+from verify.result import Verdict
+
+__all__ = ["Markup", "badge", "joined", "table", "tag"]
 
 _VOID = {"br", "hr", "img", "meta", "link", "wbr", "col"}
-# Control characters (not allowed in XML, invisible in HTML), and marks that turn the
-# direction of the text around them
-_UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
 
 
 class Markup(str):
     """Text that is HTML already."""
 
     __slots__ = ()
-
-
-def printable(text: Any) -> str:
-    """Return `text` without what neither XML nor UTF-8 can hold (shown as U+FFFD)."""
-    whole = str(text).encode("utf-8", "replace").decode("utf-8")
-    return _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", whole)
 
 
 def joined(*children: Any) -> Markup:
@@ -57,3 +51,16 @@ def _content(child: Any) -> str:
     if isinstance(child, list | tuple):
         return joined(*child)
     return html.escape(printable(child), quote=False)
+
+
+def badge(verdict: Verdict) -> Markup:
+    """Return a verdict as a word in a frame."""
+    return tag("span", str(verdict), class_=f"verdict {verdict.lower()}")
+
+
+def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], caption: str) -> Markup:
+    """Return a table that scrolls sideways where the page is too narrow for it."""
+    titles = tag("thead", tag("tr", [tag("th", title, scope="col") for title in head]))
+    cells = tag("tbody", [tag("tr", [tag("td", cell) for cell in row]) for row in rows])
+    whole = tag("table", tag("caption", caption), titles, cells)
+    return tag("div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption)

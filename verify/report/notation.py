@@ -1,19 +1,18 @@
-"""How numbers, metrics and solvers are written in the report."""
+"""Written forms of numbers, metrics and solvers."""
 
 import math
+import re
 from typing import Any
-
-from verify.report.markup import Markup, joined, tag
 
 __all__ = [
     "SECONDARY",
     "bytes_text",
     "error_title",
-    "gap",
     "is_error",
     "metric_title",
     "number",
     "number_text",
+    "printable",
     "seconds_text",
     "solver_title",
     "with_interval",
@@ -53,6 +52,10 @@ _ERRORS = set(_METRICS) - {"strain_energy"}
 SECONDARY = _ERRORS - {"displacement_l2", "energy_norm", "jump_l2"}
 _SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference"}
 _MISSING = "–"
+# Control characters (not allowed in XML, invisible in HTML), and marks that turn the
+# direction of the text around them
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ufffe\uffff]")
+RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def metric_title(name: str) -> str:
@@ -90,18 +93,16 @@ def _decimal(value: float, digits: int) -> tuple[str, int | None]:
     return mantissa.replace("-", "−"), int(power)
 
 
-def number(value: Any, digits: int = 4) -> Markup:
+def number(value: Any, digits: int = 4) -> str:
     """Return `value` with `digits` significant digits, as ``1.234×10⁻³`` where that helps."""
     if value is None or isinstance(value, str | bool):
-        return joined(_MISSING if value is None else str(value))
+        return _MISSING if value is None else str(value)
     if isinstance(value, int):
-        return joined(f"{value:,}".replace(",", "\N{THIN SPACE}"))
+        return f"{value:,}".replace(",", "\N{THIN SPACE}")
     if not math.isfinite(value):
-        return joined("not finite")
+        return "not finite"
     mantissa, power = _decimal(value, digits)
-    if power is None:
-        return joined(mantissa)
-    return joined(mantissa, "×10", tag("sup", str(power).replace("-", "−")))
+    return mantissa if power is None else f"{mantissa}×10{str(power).translate(RAISED)}"
 
 
 def number_text(value: float | None, digits: int = 3) -> str:
@@ -109,27 +110,24 @@ def number_text(value: float | None, digits: int = 3) -> str:
     return _MISSING if value is None else f"{value:.{digits}g}"
 
 
-def with_interval(value: float | None, low: float | None, high: float | None) -> Markup:
+def with_interval(value: float | None, low: float | None, high: float | None) -> str:
     """Return an observed value and the interval in which the true one lies."""
     if value is None:
-        return joined(_MISSING)
+        return _MISSING
     if low is None or high is None or low == high or not all(map(math.isfinite, (low, high))):
         return number(value)
     digits = 4
     while digits < _MOST_DIGITS and _decimal(low, digits) == _decimal(high, digits):
         digits += 1
     if digits == _MOST_DIGITS:  # nobody compares more: the width says it
-        width = tag("span", "± ", number((high - low) / 2.0, 1), class_="interval")
-        return joined(number(value), gap(), width)
-    interval = tag(
-        "span", "[", number(low, digits), ", ", number(high, digits), "]", class_="interval"
-    )
-    return joined(number(value, digits), gap(), interval)
+        return f"{number(value)} ± {number((high - low) / 2.0, 1)}"
+    return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
 
 
-def gap() -> Markup:
-    """Return a space at which a cell that holds its line otherwise may be broken."""
-    return tag("span", " ", class_="gap")
+def printable(text: Any) -> str:
+    """Return `text` without what neither XML nor UTF-8 can hold (shown as U+FFFD)."""
+    whole = str(text).encode("utf-8", "replace").decode("utf-8")
+    return _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", whole)
 
 
 def seconds_text(value: float | None, beside: float | None = None) -> str:

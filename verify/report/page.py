@@ -1,23 +1,29 @@
-"""The page as a whole: one file, nothing fetched; a script only where bodies can be turned."""
+"""The report of a run as view data: the page and its Markdown are made of it by templates."""
 
-from importlib.resources import files
+from typing import Any
 
 from verify.printable import words_of
-from verify.report.case_section import case_section, failed_section
-from verify.report.family_section import family_section
-from verify.report.markup import Markup, joined, tag
-from verify.report.origin import origin_section, reading_guide
+from verify.report.blocks import Table
+from verify.report.case_view import case_view
+from verify.report.family_view import FamilyView, family_views
+from verify.report.figures.style import Palette
+from verify.report.overview import origin_facts, overview
 from verify.report.pictures import CasePictures
-from verify.report.ranking_section import ranking_section
-from verify.report.run_directory import CaseEntry, Run
-from verify.report.summary import summary, verdict_table
-from verify.report.turntable import turntable_script
+from verify.report.ranking_tables import (
+    compared,
+    conformance_table,
+    left_out_table,
+    stability_table,
+)
+from verify.report.run_directory import Run
 
-__all__ = ["page"]
+__all__ = ["page_view"]
+
+_QUESTIONS = (("accuracy", "Accuracy"), ("energy", "Energy"), ("cost", "Cost"))
 
 
-def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
-    """Return the report as HTML.
+def page_view(run: Run, pictures: list[CasePictures], notes: list[str]) -> dict[str, Any]:
+    """Return what ``report.j2`` shows.
 
     Parameters
     ----------
@@ -27,66 +33,47 @@ def page(run: Run, pictures: list[CasePictures], notes: list[str]) -> Markup:
     notes : list of str
         What has to be said about the pictures of all cases.
     """
-    style = Markup(files("verify.report").joinpath("style.css").read_text(encoding="utf-8"))
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", "Verification report"),
-        tag("style", style),
-    )
-    started = run.record.get("started")
-    when = f"Run of {started}" if started else "Run of unknown date"
-    try:
-        which = ranking_section(run.ranking)
-    except Exception as error:
-        which = tag("p", f"The ranking cannot be shown: {words_of(error)}.", class_="warning")
-    links = [("#reading", "how to read this"), ("#provenance", "provenance")]
-    if which is not None:
-        links.insert(0, ("#which", "which solver"))
-    top = tag(
-        "header",
-        tag("h1", "Verification report"),
-        tag(
-            "p",
-            when,
-            [joined(" · ", tag("a", words, href=to)) for to, words in links],
-            class_="quiet",
-        ),
-        class_="top",
-    )
-    sections = [
-        _section(index, entry, shown)
+    palette = Palette()
+    cases = [
+        case_view(index, entry, shown, palette)
         for index, (entry, shown) in enumerate(zip(run.entries, pictures, strict=True))
     ]
-    body = tag(
-        "main",
-        summary(run),
-        [tag("p", "Note: " + note, class_="warning") for note in notes],
-        verdict_table(run),
-        which,
-        _families(run),
-        sections,
-        reading_guide(),
-        origin_section(run),
-    )
-    turned = any(picture.turned for shown in pictures for picture in shown.all)
-    script = turntable_script() if turned else None
-    whole = tag("html", head, tag("body", top, body, script), lang="en")
-    return joined(Markup("<!DOCTYPE html>\n"), whole)
-
-
-def _families(run: Run) -> Markup | None:
+    families: list[FamilyView] = []
+    ranking: dict[str, Any] | None = None
     try:
-        return family_section(run)
+        families = family_views(run, palette)
     except Exception as error:
-        text = f"The families of scenes cannot be shown: {words_of(error)}."
-        return tag("p", text, class_="warning")
-
-
-def _section(index: int, entry: CaseEntry, pictures: CasePictures) -> Markup:
-    """Return the section of a case; if that fails, the others are shown all the same."""
+        notes = [*notes, f"the families of scenes cannot be shown: {words_of(error)}."]
     try:
-        return case_section(index, entry, pictures)
+        ranking = _ranking(run.ranking)
     except Exception as error:
-        return failed_section(index, entry, words_of(error))
+        notes = [*notes, f"the ranking cannot be shown: {words_of(error)}."]
+    started = run.record.get("started")
+    return {
+        "when": f"Run of {started}" if started else "Run of unknown date",
+        "command": run.record.get("command") or "",
+        "top": overview(run, cases),
+        "cases": cases,
+        "families": families,
+        "ranking": ranking,
+        "notes": notes,
+        "origin": origin_facts(run.record),
+    }
+
+
+def _ranking(ranking: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Return the tables of the ranking; None for a run of one solver or from before rankings."""
+    if not ranking or len(ranking.get("solvers", [])) < 2:
+        return None
+    tables: dict[str, list[Table]] = {
+        question: compared(ranking, question, title) for question, title in _QUESTIONS
+    }
+    return {
+        "solvers": len(ranking["solvers"]),
+        "cases": len(ranking["cases"]),
+        "conformance": conformance_table(ranking),
+        "stability": stability_table(ranking),
+        "contended": "; ".join(ranking.get("contended") or []),
+        "left_out": left_out_table(ranking),
+        "tables": tables,
+    }

@@ -1,13 +1,12 @@
 """Pictures of a run: the reference and the solvers with the cut open, and where each errs."""
 
-import base64
 import io
 import math
 import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -61,9 +60,9 @@ class Picture:
         return self.solid if self.turnable else {}
 
     @property
-    def address(self) -> str:
-        """The image as a data address."""
-        return "data:image/webp;base64," + base64.b64encode(self.image).decode("ascii")
+    def flat(self) -> bool:
+        """Whether the body is plane."""
+        return bool(np.ptp(self.body.points[:, 2]) == 0)
 
 
 @dataclass
@@ -111,33 +110,34 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
 
 
 def drawn(pictures: Sequence[Picture]) -> str:
-    """Draw every picture, by VTK in a process of its own, else by matplotlib.
+    """Draw every picture: plane bodies by matplotlib, solids by VTK in a process of its own.
+
+    VTK takes seconds to start, and for plane bodies shows nothing that matplotlib does not.
 
     Returns
     -------
     str
-        Why VTK did not draw some or all of them; empty if it did.
+        Why VTK did not draw some or all of the solids; empty if it did.
     """
-    if not pictures:
-        return ""
     with tempfile.TemporaryDirectory(prefix="verify-report-") as name:
         folder = Path(name)
-        job = folder / "job.pickle"
-        files = [f"{i}.png" for i in range(len(pictures))]
-        asked = [(p.body, p.view, file) for p, file in zip(pictures, files, strict=True)]
-        job.write_bytes(pickle.dumps(asked))
-        reason = _by_vtk(job, _SECONDS + _SECONDS_EACH * len(pictures))
-        for picture, file in zip(pictures, files, strict=True):
+        files = {id(picture): folder / f"{i}.png" for i, picture in enumerate(pictures)}
+        solids = [picture for picture in pictures if not picture.flat]
+        reason = _by_vtk(solids, files, folder / "job.pickle") if solids else ""
+        for picture in pictures:
             try:
-                picture.image = _as_webp(folder / file)
-            except OSError:  # not there, or cut off when the process ended
+                picture.image = _as_webp(files[id(picture)])
+            except OSError:  # not asked of VTK, not there, or cut off when the process ended
                 picture.by_vtk = False
-                draw_with_matplotlib.draw(picture.body, picture.view, folder / file)
-                picture.image = _as_webp(folder / file)
-    return "" if all(picture.by_vtk for picture in pictures) else reason or "VTK drew nothing"
+                draw_with_matplotlib.draw(picture.body, picture.view, files[id(picture)])
+                picture.image = _as_webp(files[id(picture)])
+    return "" if all(picture.by_vtk for picture in solids) else reason or "VTK drew nothing"
 
 
-def _by_vtk(job: Path, seconds: float) -> str:
+def _by_vtk(solids: Sequence[Picture], files: Mapping[int, Path], job: Path) -> str:
+    asked = [(picture.body, picture.view, files[id(picture)].name) for picture in solids]
+    job.write_bytes(pickle.dumps(asked))
+    seconds = _SECONDS + _SECONDS_EACH * len(solids)
     try:
         done = subprocess.run([*_VTK, str(job)], capture_output=True, text=True, timeout=seconds)
     except subprocess.TimeoutExpired:

@@ -1,12 +1,9 @@
 """Account of the energy that a blade released: one line per solver."""
 
-from collections.abc import Iterator, Sequence
-
-from verify.report.markup import Markup, tag
 from verify.report.notation import solver_title
 from verify.result import SolveRecord
 
-__all__ = ["released_line", "released_lines"]
+__all__ = ["released_line"]
 
 _PARTS = {
     "released_to_scheme": "dissipated by the scheme",
@@ -15,13 +12,6 @@ _PARTS = {
     "released_to_strain": "as strain energy beside it",
     "released_to_short_waves": "left as kinetic energy of waves shorter than four elements",
 }
-
-
-def released_lines(solves: Sequence[SolveRecord]) -> Iterator[Markup]:
-    """Return a paragraph for each solve that knows where its released energy went."""
-    for solve in solves:
-        if line := released_line(solve):
-            yield tag("p", line, class_="prose")
 
 
 def released_line(solve: SolveRecord) -> str:

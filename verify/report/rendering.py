@@ -1,14 +1,15 @@
 """Renders a run directory: ``report.html``, ``results.json``, ``results.csv``, ``junit.xml``."""
 
 from pathlib import Path
+from typing import Any
 
 from verify.printable import words_of
 from verify.report.exports import csv_rows, json_document, junit_document
-from verify.report.markdown import markdown
-from verify.report.page import page
+from verify.report.page import page_view
 from verify.report.pictures import CasePictures, case_pictures, drawn
 from verify.report.printing import print_page
-from verify.report.run_directory import CaseEntry, load_run
+from verify.report.run_directory import CaseEntry, Run, load_run
+from verify.report.template_sets import as_html, as_markdown
 from verify.whole_files import write_whole
 
 __all__ = ["render", "render_markdown", "render_pdf"]
@@ -34,21 +35,32 @@ def render(directory: Path) -> Path:
     OSError
         If the files cannot be written.
     """
-    run = load_run(directory)
+    return _written(load_run(directory), directory)[0]
+
+
+def _written(run: Run, directory: Path) -> tuple[Path, dict[str, Any]]:
+    """Write the page and the exports; return the page and what it shows."""
     pictures = [_pictures(run.root, entry) for entry in run.entries]
     notes = []
     if reason := drawn([picture for shown in pictures for picture in shown.all]):
         notes.append(f"pictures were drawn by matplotlib because {reason}.")
-    text = page(run, pictures, notes)
+    view = page_view(run, pictures, notes)
+    text = as_html("report.j2", **view, turnable=_turnable(pictures))
     excess = len(text.encode("utf-8")) - _PAGE_BYTES
     if excess > 0:
-        text = page(run, pictures, [*notes, _left_out(pictures, excess)])
+        notes.append(_left_out(pictures, excess))
+        view = page_view(run, pictures, notes)
+        text = as_html("report.j2", **view, turnable=_turnable(pictures))
     write_whole(directory / "results.json", json_document(run))
     write_whole(directory / "results.csv", csv_rows(run))
     write_whole(directory / "junit.xml", junit_document(run))
     target = directory / "report.html"
     write_whole(target, text)
-    return target
+    return target, view
+
+
+def _turnable(pictures: list[CasePictures]) -> bool:
+    return any(picture.turned for shown in pictures for picture in shown.all)
 
 
 def _pictures(root: Path, entry: CaseEntry) -> CasePictures:
@@ -67,9 +79,9 @@ def render_markdown(directory: Path) -> Path:
     InputError, OSError
         As `render`.
     """
-    text = render(directory).read_text(encoding="utf-8")
+    _, view = _written(load_run(directory), directory)
     target = directory / "report.md"
-    write_whole(target, markdown(text, directory))
+    write_whole(target, as_markdown("report.j2", directory, **view))
     return target
 
 
@@ -96,7 +108,7 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
     for shown in reversed(pictures):
         if excess <= 0:
             break
-        excess -= sum(len(picture.address) for picture in shown.all)
+        excess -= sum(4 * len(picture.image) // 3 for picture in shown.all)
         dropped += len(shown.all)
         shown.deformed, shown.error = [], []
         shown.notes.append("Its pictures are left out to keep the page small.")

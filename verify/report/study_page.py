@@ -11,11 +11,10 @@ from verify.printable import shown
 from verify.report.budget_figures import budget_section
 from verify.report.calibration_figures import calibration_section
 from verify.report.cost_study_figures import cost_section
-from verify.report.markup import Markup, joined, tag
+from verify.report.markup import Markup, badge, joined, tag
 from verify.report.notation import metric_title, number
 from verify.report.sliver_figures import sliver_curves, sliver_maps
 from verify.report.stability_map import MAP_STYLE, listed
-from verify.report.summary import badge
 from verify.report.thesis_figures import thesis_section
 from verify.result import Verdict
 from verify.whole_files import write_whole
@@ -55,7 +54,7 @@ def render_study(directory: Path, kind: str) -> Path:
 
 
 def _page(record: Mapping[str, Any], kind: str) -> Markup:
-    style = files("verify.report").joinpath("style.css").read_text(encoding="utf-8")
+    style = files("verify.report").joinpath("templates", "style.css").read_text(encoding="utf-8")
     head = tag(
         "head",
         tag("meta", charset="utf-8"),

@@ -1,79 +1,96 @@
-"""The tables of a case: orders, numbers, times, reference, regularisations, failures."""
+"""The tables of a case: checks, orders, numbers, times, reference, regularisations, failures."""
 
 from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
+from verify.report.blocks import Cell, Table, plain_table
 from verify.report.curves import duration, metric_names
-from verify.report.figures_reference import accuracy_figure
-from verify.report.markup import Markup, joined, tag
 from verify.report.notation import (
     bytes_text,
     error_title,
-    gap,
     metric_title,
     number,
     seconds_text,
     solver_title,
+    with_interval,
 )
-from verify.report.notices import unavailable_rows
-from verify.result import CaseResult, Metric, SolveRecord, Status
+from verify.result import CaseResult, Metric, NoticeKind, SolveRecord, Status, VerdictRecord
 
 __all__ = [
+    "check_row",
+    "check_text",
+    "checks_table",
     "failures_table",
     "numbers_table",
     "orders_table",
-    "reference_record",
+    "reference_facts",
+    "reference_tables",
     "regularisations_table",
-    "table",
     "times_table",
 ]
 
+_CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the"}
 
-def table(
-    head: Sequence[Any],
-    rows: Sequence[Sequence[Any]],
-    caption: str,
-    more: Sequence[Markup] = (),
-    **marks: str,
-) -> Markup:
-    """Return a table that scrolls sideways where the page is too narrow for it.
 
-    `more` are rows that are elements already, for the end of the table.
-    """
-    cells = [tag("tr", [tag("td", cell) for cell in row]) for row in rows]
-    whole = tag(
-        "table",
-        tag("caption", caption),
-        tag("thead", tag("tr", [tag("th", title, scope="col") for title in head])),
-        tag("tbody", cells, more),
+def check_text(record: VerdictRecord, named: bool = True) -> str:
+    """Return what a check looks at in words, after whom it judges if `named`."""
+    name = metric_title(record.metric) if record.check == "value" else error_title(record.metric)
+    what = f"{_CHECKS.get(record.check, record.check)} {name}".strip()
+    return (
+        f"{solver_title(record.solver) if record.solver else 'nobody'}: {what}" if named else what
     )
-    class_ = f"scroll {marks.get('class_', '')}".strip()
-    return tag("div", whole, class_=class_, tabindex="0", role="region", aria_label=caption)
 
 
-def numbers_table(result: CaseResult) -> Markup | None:
+def check_row(record: VerdictRecord) -> list[Cell]:
+    """Return the row of one check."""
+    observed = with_interval(record.observed, record.low, record.high)
+    if record.check == "value":  # as many digits as the limit has beside it
+        observed = number(record.observed, 10)
+    known = f"Known finding: {record.known} ({record.reason})" if record.known else record.reason
+    return [
+        Cell(check_text(record)),
+        Cell(observed),
+        Cell(record.limit),
+        Cell("", known, verdict=str(record.verdict)),
+    ]
+
+
+def checks_table(result: CaseResult) -> Table | None:
+    """Return the verdicts of a case."""
+    if not result.verdicts:
+        return None
+    head = ["check", "observed [interval]", "limit", "verdict"]
+    rows = [check_row(record) for record in result.verdicts]
+    return plain_table("Verdicts", head, rows, "verdicts")
+
+
+def numbers_table(result: CaseResult) -> Table | None:
     """Return every measured number of every solve with its uncertainty."""
     names = metric_names(result)
     if not result.solves:
         return None
-    titles = [joined(metric_title(name), _common_reference(result, name)) for name in names]
-    head = ["solver", "level", "h (m)", "unknowns", *titles]
-    rows = [
+    titles = [Cell(metric_title(name), _common_reference(result, name)) for name in names]
+    head = [*map(Cell, ("solver", "level", "h (m)", "unknowns")), *titles]
+    rows: list[list[Cell]] = [
         [
-            solver_title(solve.solver),
-            solve.level,
-            number(solve.size),
-            number(solve.unknowns),
+            Cell(solver_title(solve.solver)),
+            Cell(str(solve.level)),
+            Cell(number(solve.size)),
+            Cell(number(solve.unknowns)),
             *(_measured(solve, name, result) for name in names),
         ]
         for solve in _ordered(result)
     ]
-    more = unavailable_rows(result, len(head))
-    return table(head, rows, "Numbers: value ± uncertainty", more)
+    for notice in result.notices:
+        if notice.kind is NoticeKind.UNAVAILABLE:
+            whose = solver_title(notice.solver) if notice.solver else "every solver"
+            said = f"{metric_title(notice.about)} is not available: {notice.text}"
+            rows.append([Cell(whose), Cell("", said, span=len(head) - 1)])
+    return Table("Numbers: value ± uncertainty", head, rows)
 
 
-def times_table(result: CaseResult) -> Markup | None:
+def times_table(result: CaseResult) -> Table | None:
     """Return the wall time of every phase: median, and smallest to largest repetition."""
     phases = list(dict.fromkeys(name for solve in result.solves for name in solve.timings))
     if not phases:
@@ -90,7 +107,7 @@ def times_table(result: CaseResult) -> Markup | None:
         rows.append(
             [
                 solver_title(solve.solver),
-                solve.level,
+                str(solve.level),
                 *(_spread(solve.timings.get(phase, [])) for phase in phases),
                 seconds_text(whole.median) if whole else "–",
                 seconds_text(solve.wall),
@@ -98,14 +115,12 @@ def times_table(result: CaseResult) -> Markup | None:
                 *([iterations or "–"] if iterative else []),
             ]
         )
-    caption = "Wall times: median (smallest to largest repetition)"
-    return table(head, rows, caption)
+    return plain_table("Wall times: median (smallest to largest repetition)", head, rows)
 
 
-def orders_table(result: CaseResult) -> Markup | None:
-    """Return the observed orders, or why there is none."""
-    if not result.rates:
-        return None
+def orders_table(result: CaseResult) -> Table | None:
+    """Return the observed orders of the metrics that are shown, or why there is none."""
+    shown = metric_names(result)
     rows = [
         [
             solver_title(rate.solver),
@@ -115,37 +130,36 @@ def orders_table(result: CaseResult) -> Markup | None:
             rate.reason or "–",
         ]
         for rate in result.rates
+        if rate.metric in shown or not shown
     ]
     head = ["solver", "error", "order", "between successive levels", "reservation"]
-    return table(head, rows, "Observed orders of convergence")
+    return plain_table("Observed orders of convergence", head, rows, "prose") if rows else None
 
 
-def regularisations_table(result: CaseResult) -> Markup | None:
+def regularisations_table(result: CaseResult) -> Table | None:
     """Return all that the solvers dropped, snapped, clamped, scaled or floored."""
     groups: dict[tuple[str, str], list[tuple[int, dict[str, Any]]]] = {}
     for solve in _ordered(result):
         for entry in solve.regularisations:
             key = (solve.solver, str(entry.get("kind", "–")))
             groups.setdefault(key, []).append((solve.level, entry))
-    if not groups:
-        return None
     rows = []
     for (solver, kind), found in groups.items():
         sizes = [e["size"] for _, e in found if isinstance(e.get("size"), int | float)]
         unit = found[0][1].get("unit", "")
-        counts = _separated([joined(number(e.get("count")), f" (level {n})") for n, e in found])
-        largest = joined(number(float(max(sizes)), 2), " ", unit) if sizes else "–"
-        rows.append([solver_title(solver), kind, joined(*counts), largest])
+        counts = ", ".join(f"{number(e.get('count'))} (level {n})" for n, e in found)
+        largest = f"{number(float(max(sizes)), 2)} {unit}" if sizes else "–"
+        rows.append([solver_title(solver), kind, counts, largest])
     head = ["solver", "what was done", "how often", "largest contribution"]
-    return table(head, rows, "Regularisations", class_="prose")
+    return plain_table("Regularisations", head, rows, "prose") if rows else None
 
 
-def failures_table(solves: Sequence[SolveRecord]) -> Markup | None:
+def failures_table(solves: Sequence[SolveRecord]) -> Table | None:
     """Return the solves that did not end well, with their reasons."""
     rows = [
         [
             solver_title(solve.solver),
-            solve.level,
+            str(solve.level),
             str(solve.status),
             solve.reason or "no reason given",
             seconds_text(solve.wall),
@@ -153,42 +167,35 @@ def failures_table(solves: Sequence[SolveRecord]) -> Markup | None:
         for solve in solves
         if solve.status is not Status.SOLVED
     ]
-    if not rows:
-        return None
     head = ["solver", "level", "ended", "reason", "after"]
-    return table(head, rows, "Solves that did not end well", class_="prose")
+    return plain_table("Solves that did not end well", head, rows, "prose") if rows else None
 
 
-def reference_record(reference: dict[str, Any]) -> Markup | None:
-    """Return what the case was judged against, whatever the record holds."""
-    if not reference:
-        return None
-    said = {key: value for key, value in reference.items() if value not in ([], {}, None, "")}
-    plain = {key: value for key, value in said.items() if not isinstance(value, dict)}
-    nested = {key: value for key, value in said.items() if isinstance(value, dict)}
-    parts: list[Markup] = []
-    if plain:
-        entries = [
-            (tag("dt", _words(key)), tag("dd", _value(value))) for key, value in plain.items()
-        ]
-        parts.append(tag("dl", [joined(*entry) for entry in entries], class_="record"))
-    for key, value in nested.items():
-        if key == "time_to_accuracy":
-            parts.append(joined(accuracy_figure(value), _levels_table(value)))
-        else:
-            parts.append(_nested(key, value))
-    return joined(*parts)
+def reference_facts(reference: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return name and value of what the record of a reference says in single values."""
+    return [(_words(k), _value(v)) for k, v in _said(reference).items() if not isinstance(v, dict)]
 
 
-def _levels_table(levels: dict[str, dict[str, Any]]) -> Markup:
+def reference_tables(reference: dict[str, Any]) -> list[Table]:
+    """Return the nested parts of the record of a reference as tables."""
+    return [
+        _levels_table(record) if key == "time_to_accuracy" else _nested(key, record)
+        for key, record in _said(reference).items()
+        if isinstance(record, dict)
+    ]
+
+
+def _said(reference: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in reference.items() if value not in ([], {}, None, "")}
+
+
+def _levels_table(levels: dict[str, dict[str, Any]]) -> Table:
     """Return what each level of a reference cost and bounds of its errors, levels side by side."""
     costs = {"unknowns": number, "seconds": seconds_text}
     names = dict.fromkeys(name for entry in levels.values() for name in entry)
     rows = [
-        [
-            "wall time" if name == "seconds" else name,
-            *(costs[name](entry.get(name)) for entry in levels.values()),
-        ]
+        ["wall time" if name == "seconds" else name]
+        + [costs[name](entry.get(name)) for entry in levels.values()]
         for name in names
         if name in costs
     ]
@@ -198,10 +205,10 @@ def _levels_table(levels: dict[str, dict[str, Any]]) -> Markup:
         if name not in costs
     ]
     caption = "Reference: time to accuracy; of errors, bounds that the finest level gives"
-    return table(["", *(_words(level) for level in levels)], rows, caption)
+    return plain_table(caption, ["", *map(_words, levels)], rows)
 
 
-def _nested(key: str, record: dict[str, Any]) -> Markup:
+def _nested(key: str, record: dict[str, Any]) -> Table:
     """Return a table with one row per entry, if the entries are records; else name and value."""
     caption = f"Reference: {_words(key)}"
     if all(isinstance(entry, dict) for entry in record.values()):
@@ -210,33 +217,27 @@ def _nested(key: str, record: dict[str, Any]) -> Markup:
             [metric_title(name), *(_value(entry.get(column)) for column in columns)]
             for name, entry in record.items()
         ]
-        head = ["", *(_words(column) for column in columns)]
-        return table(head, rows, caption, class_="prose")
+        return plain_table(caption, ["", *map(_words, columns)], rows, "prose")
     rows = [[_words(name), _value(value)] for name, value in record.items()]
-    return table(["", "value"], rows, caption)
+    return plain_table(caption, ["", "value"], rows)
 
 
-def _value(value: Any) -> Markup:
+def _value(value: Any) -> str:
     if isinstance(value, bool):
-        return joined("yes" if value else "no")
+        return "yes" if value else "no"
     if isinstance(value, list | tuple):
-        return joined(*_separated([_value(entry) for entry in value])) if value else joined("–")
+        return ", ".join(map(_value, value)) if value else "–"
     if isinstance(value, dict):
-        said = [joined(_words(name), " ", _value(entry)) for name, entry in value.items()]
-        return joined(*_separated(said))
+        return ", ".join(f"{_words(name)} {_value(entry)}" for name, entry in value.items())
     if isinstance(value, float):
         return number(value, _digits(value))
-    return number(value) if value is None or isinstance(value, int) else joined(str(value))
+    return number(value) if value is None or isinstance(value, int) else str(value)
 
 
 def _digits(value: float, most: int = 7) -> int:
     """Return how many significant digits `value` needs, up to `most`."""
     whole = float(f"{value:.{most}g}")
     return next((n for n in range(2, most) if float(f"{value:.{n}g}") == whole), most)
-
-
-def _separated(parts: list[Markup]) -> list[Any]:
-    return [piece for part in parts for piece in (", ", part)][1:]
 
 
 def _words(key: str) -> str:
@@ -254,33 +255,31 @@ def _references(result: CaseResult, name: str) -> set[tuple[float, str]]:
     return {(m.reference, m.unit) for m in found if m.reference is not None}
 
 
-def _common_reference(result: CaseResult, name: str) -> Markup | None:
+def _common_reference(result: CaseResult, name: str) -> str:
     """Return the reference value of a quantity, if all solves are held against the same one."""
     if len(references := _references(result, name)) != 1:
-        return None
+        return ""
     ((value, unit),) = references
-    words = ["reference ", number(value, 8), "" if unit == "1" else f" {unit}"]
-    return tag("div", words, class_="quiet")
+    return f"reference {number(value, 8)}{'' if unit == '1' else f' {unit}'}"
 
 
-def _measured(solve: SolveRecord, name: str, result: CaseResult) -> Any:
+def _measured(solve: SolveRecord, name: str, result: CaseResult) -> Cell:
     metric: Metric | None = solve.metric(name)
     if metric is None:
-        return "–" if solve.status is Status.SOLVED else str(solve.status)
+        return Cell("–" if solve.status is Status.SOLVED else str(solve.status))
     value = number(metric.value, 5 if metric.reference is None else 8)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
-    plus = joined(gap(), "± ", number(metric.uncertainty, 2)) if metric.uncertainty > 0 else None
-    own = None
+    plus = f" ± {number(metric.uncertainty, 2)}" if metric.uncertainty > 0 else ""
+    own = ""
     if metric.reference is not None and len(_references(result, name)) > 1:
-        own = tag("div", "reference ", number(metric.reference, 8), unit, class_="quiet")
-    return joined(value, plus, unit, own)
+        own = f"reference {number(metric.reference, 8)}{unit}"
+    return Cell(f"{value}{plus}{unit}", own)
 
 
-def _spread(values: Sequence[float]) -> Markup:
+def _spread(values: Sequence[float]) -> str:
     if not values:
-        return joined("–")
+        return "–"
     middle, low, high = median(values), min(values), max(values)
     if len(values) == 1:
-        return joined(seconds_text(middle), gap(), "(once)")
-    between = f"({seconds_text(low, middle)}–{seconds_text(high, middle)})"
-    return joined(seconds_text(middle), gap(), between)
+        return f"{seconds_text(middle)} (once)"
+    return f"{seconds_text(middle)} ({seconds_text(low, middle)}–{seconds_text(high, middle)})"

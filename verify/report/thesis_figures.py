@@ -71,7 +71,7 @@ def _added(name: str, row: Mapping[str, Any]) -> int:
     return added
 
 
-def _step(name: str, row: Mapping[str, Any]) -> Markup:
+def _step(name: str, row: Mapping[str, Any]) -> str:
     return number(row["step"][name], 2)
 
 

@@ -2,7 +2,6 @@
 
 import base64
 import json
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,9 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 
 from verify.report.bodies import Body
-from verify.report.markup import Markup, tag
 from verify.report.view import View
 
-__all__ = ["is_solid", "packed", "turntable_script"]
+__all__ = ["is_solid", "packed"]
 
 _TRIANGLES = 120_000  # of a surface beyond which only the still is shown
 _STEPS = 65535
@@ -75,12 +73,6 @@ def packed(body: Body, view: View) -> dict[str, str]:
         "data-edges": _text(index[cut:].astype("<u4")),
         "data-colours": _text(np.round(255 * colours).astype(np.uint8)),
     }
-
-
-def turntable_script() -> Markup:
-    """Return the program that turns them."""
-    text = files("verify.report").joinpath("turntable.js").read_text(encoding="utf-8")
-    return tag("script", Markup(text))
 
 
 def _cut_faces(body: Body) -> NDArray[np.bool_]:

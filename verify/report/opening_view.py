@@ -3,33 +3,25 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from verify.report.markup import Markup, joined, tag
+from verify.report.blocks import Drawing, Figure
+from verify.report.figures.profiles import profile_panel
+from verify.report.figures.style import Palette
 from verify.report.notation import solver_title
-from verify.report.time_panel import time_panel
 from verify.result import CaseResult, OpeningCurve, OpeningProfile
 
-__all__ = ["opening_section"]
+__all__ = ["opening_figures"]
 
 _REFERENCE = "reference"
-_PER_PANEL = 4  # solvers beside the reference; colours and dashes are five
 _FAR = 20.0  # times the reference's largest jump, and longer than the cut: it would hide the others
 _NOTHING = 1e-12  # of the length of the line: jumps below are round-off
 
 
-def opening_section(result: CaseResult) -> Markup | None:
-    """Return the profiles along every cut, or None if the result has none."""
-    figures = [figure for profile in result.openings for figure in _figures(profile, result)]
-    if not figures:
-        return None
-    said = (
-        "Displacement jump along the cuts, positive side less negative side, of every solver's "
-        "finest level. Below zero the faces of a cut overlap, as far as displacements are small: "
-        "the depth in the deformed body stands in the numbers."
-    )
-    return tag("div", tag("h3", "Opening of the cuts"), tag("p", said, class_="quiet"), *figures)
+def opening_figures(result: CaseResult, palette: Palette) -> list[Figure]:
+    """Return the profiles along every cut; a figure without panels is a sentence."""
+    return [f for profile in result.openings for f in _figures(profile, result, palette)]
 
 
-def _figures(profile: OpeningProfile, result: CaseResult) -> Iterator[Markup]:
+def _figures(profile: OpeningProfile, result: CaseResult, palette: Palette) -> Iterator[Figure]:
     curves = [c for c in profile.curves if len(c.normal) == len(profile.arc) > 1]
     if not curves:
         return
@@ -39,29 +31,19 @@ def _figures(profile: OpeningProfile, result: CaseResult) -> Iterator[Markup]:
     reference = next((c for c in curves if c.solver == _REFERENCE), None)
     largest = max(map(_largest, curves))
     if largest <= _NOTHING * length:
-        yield tag("p", f"{place}: the jump is zero along the whole cut, to round-off.")
+        yield Figure([], f"{place}: the jump is zero along the whole cut, to round-off.")
         return
     scale = _largest(reference) if reference else min(map(_largest, curves))
     far = [c for c in curves if c is not reference and _largest(c) > max(_FAR * scale, length)]
     others = [c for c in curves if c is not reference and c not in far]
-    left_out = [f"{_name(c)} (up to {_largest(c):.2g} m)" for c in far]
-    groups = [others[i : i + _PER_PANEL] for i in range(0, len(others), _PER_PANEL)] or [[]]
+    left_out = ", ".join(f"{_name(c)} (up to {_largest(c):.2g} m)" for c in far)
     panels = [
         panel
-        for group in groups
         for part in ("normal", "tangential")
-        if (panel := _panel(profile, part, reference, group, _NOTHING * length)) is not None
+        if (panel := _panel(profile, part, reference, others, _NOTHING * length, palette))
     ]
-    yield tag(
-        "figure",
-        tag("div", panels, class_="panels"),
-        tag(
-            "figcaption",
-            f"{place}: {profile.where}. ",
-            _band_text(reference, result),
-            f" Off the scale, and left out: {', '.join(left_out)}." if left_out else None,
-        ),
-    )
+    said = f"{place}: {profile.where}. {_band_text(reference, result)}"
+    yield Figure(panels, said + (f" Off the scale, and left out: {left_out}." if far else ""))
 
 
 def _largest(curve: OpeningCurve) -> float:
@@ -71,12 +53,9 @@ def _largest(curve: OpeningCurve) -> float:
 
 
 def _panel(
-    profile: OpeningProfile,
-    part: str,
-    reference: OpeningCurve | None,
-    others: Sequence[OpeningCurve],
-    nothing: float,
-) -> Markup | None:
+    profile: OpeningProfile, part: str, reference: OpeningCurve | None,
+    others: Sequence[OpeningCurve], nothing: float, palette: Palette,
+) -> Drawing | None:  # fmt: skip
     shown = [*([reference] if reference else []), *others]
     curves = [(_name(c), getattr(c, part)) for c in shown]
     if all(abs(v) <= nothing for _, values in curves for v in values if math.isfinite(v)):
@@ -89,7 +68,7 @@ def _panel(
             [v + w for v, w in zip(middle, half, strict=True)],
         )
     title = f"{profile.cut}: {part} jump, m"
-    return time_panel(title, profile.arc, curves, x_title="arc length, m", band=band)
+    return profile_panel(title, profile.arc, curves, palette, x_title="arc length, m", band=band)
 
 
 def _name(curve: OpeningCurve) -> str:
@@ -98,16 +77,16 @@ def _name(curve: OpeningCurve) -> str:
     return solver_title(curve.solver)
 
 
-def _band_text(reference: OpeningCurve | None, result: CaseResult) -> Markup:
+def _band_text(reference: OpeningCurve | None, result: CaseResult) -> str:
     if reference is None:
-        return joined("There is no reference to draw.")
+        return "There is no reference to draw."
     source = result.reference.get("source") or "unnamed"
     if reference.level is None:
-        return joined(f"The reference ({source}) has no uncertainty.")
+        return f"The reference ({source}) has no uncertainty."
     if not reference.normal_band:
-        return joined(f"The reference ({source}) has too few levels for a band of uncertainty.")
+        return f"The reference ({source}) has too few levels for a band of uncertainty."
     widest = max(reference.normal_band)
-    return joined(
+    return (
         f"Grey band: uncertainty of the reference ({source}) from the differences of its levels, "
         f"at most {widest:.2g} m of the normal jump."
     )

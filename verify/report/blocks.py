@@ -1,0 +1,93 @@
+"""View data: cells, tables, drawings.
+
+Their text is without markup; templates write it as HTML or Markdown and escape it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+__all__ = ["Cell", "Drawing", "Figure", "Table", "plain_table"]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table.
+
+    Parameters
+    ----------
+    text : str
+    note : str
+        A second, quiet line.
+    verdict : str
+        A word that stands in a frame before the text: PASS, FAIL, UNDECIDED, ERROR.
+    strong : bool
+    mark : str
+        A sign behind the text, explained by `tip`.
+    tip : str
+    grade : str
+        Of a stability map: good, fair, poor, bad or none.
+    link : str
+        Identifier on the page that the text leads to.
+    span : int
+        Columns.
+    """
+
+    text: str = ""
+    note: str = ""
+    verdict: str = ""
+    strong: bool = False
+    mark: str = ""
+    tip: str = ""
+    grade: str = ""
+    link: str = ""
+    span: int = 1
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; `kind` is ``prose`` if its cells hold sentences, ``map`` if they are tinted.
+
+    The first cell of a row is its head if `named`.
+    """
+
+    caption: str
+    head: list[Cell]
+    rows: list[list[Cell]]
+    kind: str = ""
+    named: bool = False
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure as the inside of an SVG element of `size` = (width, height) in points.
+
+    `alt` says in words what it shows.
+    """
+
+    body: str
+    size: tuple[float, float]
+    alt: str
+    kind: str = "panel"
+
+
+@dataclass
+class Figure:
+    """Panels that belong together, and what has to be said about them."""
+
+    panels: list[Drawing] = field(default_factory=list)
+    caption: str = ""
+
+
+def plain_table(
+    caption: str,
+    head: Sequence[str | Cell],
+    rows: Sequence[Sequence[str | Cell]],
+    kind: str = "",
+    named: bool = False,
+) -> Table:
+    """Return a table of which cells may be given as their text alone."""
+    return Table(caption, _cells(head), [_cells(row) for row in rows], kind, named)
+
+
+def _cells(row: Sequence[str | Cell]) -> list[Cell]:
+    return [cell if isinstance(cell, Cell) else Cell(str(cell)) for cell in row]

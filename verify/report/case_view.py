@@ -1,0 +1,284 @@
+"""What a page shows of one case, without markup."""
+
+from dataclasses import dataclass, field, replace
+
+from verify.printable import words_of
+from verify.report.blocks import Drawing, Figure, Table
+from verify.report.curves import Curve, error_curves, limits, metric_names
+from verify.report.figures.accuracy import accuracy_figure
+from verify.report.figures.colour_bar import colour_bar
+from verify.report.figures.convergence import convergence_panel, cost_panel, error_range
+from verify.report.figures.sketch import sketch
+from verify.report.figures.style import Palette
+from verify.report.motion_view import MotionView, motion_view
+from verify.report.notation import error_title, number, number_text, solver_title
+from verify.report.opening_view import opening_figures
+from verify.report.pictures import CasePictures, Picture
+from verify.report.problem import problem_facts
+from verify.report.run_directory import CaseEntry
+from verify.report.tables import (
+    checks_table,
+    failures_table,
+    numbers_table,
+    orders_table,
+    reference_facts,
+    reference_tables,
+    regularisations_table,
+    times_table,
+)
+from verify.result import CaseResult, NoticeKind, Verdict
+
+__all__ = ["CaseView", "PictureRow", "case_view", "floor_text", "required_slope", "verdict_of"]
+
+ROUND_OFF = 1e-11  # relative errors below are round-off, as the rates of a result have it
+
+
+@dataclass(frozen=True)
+class PictureRow:
+    """Pictures in one view and one scale of colours."""
+
+    kind: str
+    pictures: list[Picture]
+    bar: Drawing
+
+
+@dataclass
+class CaseView:
+    """A case on the page.
+
+    Parameters
+    ----------
+    anchor, name, title, requirement : str
+    verdict : Verdict
+    failing : list of str
+        Titles of the solvers that fail.
+    by_solver : dict of str to str
+        Worst verdict of each solver, by its title.
+    defect : str
+        Why it cannot be shown; empty if it can.
+    unfinished : int or None
+        Solves that had finished where it was not judged.
+    """
+
+    anchor: str
+    name: str
+    title: str
+    verdict: Verdict
+    requirement: str = ""
+    failing: list[str] = field(default_factory=list)
+    by_solver: dict[str, str] = field(default_factory=dict)
+    defect: str = ""
+    unfinished: int | None = None
+    warnings: list[tuple[str, str]] = field(default_factory=list)
+    adequacy: list[str] = field(default_factory=list)
+    facts: list[tuple[str, list[str]]] = field(default_factory=list)
+    sketch: Drawing | None = None
+    checks: Table | None = None
+    failures: Table | None = None
+    rows: list[PictureRow] = field(default_factory=list)
+    scale: str = ""
+    turnable: bool = False
+    picture_notes: list[str] = field(default_factory=list)
+    convergence: list[Figure] = field(default_factory=list)
+    convergence_notes: list[str] = field(default_factory=list)
+    cost: Figure | None = None
+    cost_notes: list[str] = field(default_factory=list)
+    openings: list[Figure] = field(default_factory=list)
+    motion: MotionView | None = None
+    orders: Table | None = None
+    numbers: Table | None = None
+    times: Table | None = None
+    regularisations: Table | None = None
+    reference: list[tuple[str, str]] = field(default_factory=list)
+    reference_tables: list[Table] = field(default_factory=list)
+    accuracy: Figure | None = None
+    lead: tuple[str, Drawing] | None = None
+
+
+def verdict_of(entry: CaseEntry) -> Verdict:
+    """Return the verdict of a case; one without a result could not be judged."""
+    return entry.result.verdict if entry.result else Verdict.ERROR
+
+
+def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Palette) -> CaseView:
+    """Return what is shown of case number `index`; what cannot be shown is said."""
+    view = CaseView(f"case-{index + 1}", entry.name, entry.name, verdict_of(entry))
+    try:
+        if entry.result is None:
+            view.defect = f"Not judged: {entry.defect}."
+            if entry.unjudged:
+                view.unfinished = sum(solve.status == "solved" for solve in entry.unjudged)
+            view.failures = failures_table(entry.unjudged)
+        else:
+            _fill(view, entry.result, palette)
+            _show(view, pictures)
+    except Exception as error:
+        said = f"This case cannot be shown: {words_of(error)}. Its numbers are in results.json."
+        return CaseView(view.anchor, view.name, view.title, view.verdict, defect=said)
+    return view
+
+
+def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
+    view.title, view.requirement = result.title, result.requirement
+    view.failing = [solver_title(name) for name in result.failing]
+    worst: dict[str, list[Verdict]] = {}
+    for record in result.verdicts:
+        worst.setdefault(solver_title(record.solver or "nobody"), []).append(record.verdict)
+    order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
+    view.by_solver = {name: str(max(own, key=order.index)) for name, own in worst.items()}
+    for notice in result.notices:
+        whose = f"{solver_title(notice.solver)}, " if notice.solver else ""
+        if notice.kind is NoticeKind.WARNING:
+            view.warnings.append((f"{whose}{notice.about}", notice.text))
+        elif notice.kind is NoticeKind.ADEQUACY:
+            view.adequacy.append(notice.text)
+    try:
+        view.facts, view.sketch = problem_facts(result.scene), sketch(result.scene)
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        view.facts.append(("Sketch", [f"cannot be drawn ({words_of(error)})"]))
+    view.checks, view.failures = checks_table(result), failures_table(result.solves)
+    _convergence(view, result, palette)
+    view.openings = opening_figures(result, palette)
+    view.motion = motion_view(result, palette)
+    view.orders, view.numbers = orders_table(result), numbers_table(result)
+    view.times, view.regularisations = times_table(result), regularisations_table(result)
+    view.reference = reference_facts(result.reference)
+    view.reference_tables = reference_tables(result.reference)
+    levels = result.reference.get("time_to_accuracy")
+    view.accuracy = accuracy_figure(levels) if isinstance(levels, dict) else None
+
+
+def _show(view: CaseView, pictures: CasePictures) -> None:
+    view.scale = "" if pictures.scale == 1 else f"× {number(pictures.scale, 1)}"
+    view.picture_notes = pictures.notes
+    for kind, group, bar in (("deformed", pictures.deformed, "displacement |u|"),
+                             ("error", pictures.error, "error")):  # fmt: skip
+        if group and group[0].image:
+            view.rows.append(PictureRow(kind, group, colour_bar(group[0].view, bar)))
+            view.turnable |= any(picture.turned for picture in group)
+
+
+def _convergence(view: CaseView, result: CaseResult, palette: Palette) -> None:
+    """Draw each metric over the element size, and what the first of them costs."""
+    lead = _lead_metric(result)
+    drawn: list[Curve] = []
+    for metric in metric_names(result):
+        curves, said = _above_round_off(error_curves(result, metric), metric)
+        view.convergence_notes += said
+        slope = required_slope(result, metric)
+        y_range = error_range(curves, sloped=slope is not None)
+        if y_range is None:
+            continue
+        drawn += curves
+        title = error_title(metric)
+        if max(len([p for p in curve.points if p.value > 0]) for curve in curves) > 1:
+            source = next(m.source for s in result.solves if (m := s.metric(metric)) is not None)
+            panel = convergence_panel(title, curves, y_range, palette, slope)
+            said = [
+                f"{title[:1].upper()}{title[1:]}, against {source or 'an unnamed reference'}.",
+                floor_text(curves),
+                f"The triangle has the required order, {slope[1]}." if slope else "",
+            ]
+            if panel is not None:
+                view.convergence.append(Figure([panel], " ".join(filter(None, said))))
+            if view.cost is None or metric == lead:
+                costs = [cost_panel(title, curves, y_range, palette, of)
+                         for of in ("unknowns", "time")]  # fmt: skip
+                view.cost = Figure([p for p in costs if p is not None]) if any(costs) else view.cost
+                if panel is not None:
+                    view.lead = (f"{view.title}: {title}", panel)
+    if drawn and not view.convergence:
+        view.convergence_notes.append(
+            "One level was solved: there is no convergence to draw; its errors are in the numbers."
+        )
+    _reservations(view, drawn, result)
+
+
+def _lead_metric(result: CaseResult) -> str:
+    """Return the metric of the worst check."""
+    order = [Verdict.FAIL, Verdict.UNDECIDED, Verdict.ERROR, Verdict.PASS]
+    judged = sorted(result.verdicts, key=lambda record: order.index(record.verdict))
+    return judged[0].metric if judged else ""
+
+
+def _above_round_off(curves: list[Curve], metric: str) -> tuple[list[Curve], list[str]]:
+    """Leave out solvers that are exact to round-off and points that the comparison hides."""
+    title = error_title(metric)
+    title = f"{title[:1].upper()}{title[1:]}"
+    exact = {c.label: max(p.value for p in c.points) for c in curves
+             if all(p.value <= ROUND_OFF for p in c.points)}  # fmt: skip
+    said = []
+    if exact:
+        most = max(exact.values())
+        amount = f"exact to round-off (at most {number(most, 2)})" if most else "exactly zero"
+        said.append(f"{title}: {amount} on every level: {', '.join(exact)}.")
+    shown = []
+    for curve in curves:
+        if curve.label in exact:
+            continue
+        hidden = [p.level for p in curve.points if p.value <= p.uncertainty]
+        if hidden:
+            levels = ", ".join(map(str, hidden))
+            said.append(f"{title}: below the uncertainty of the comparison, and not drawn: "
+                        f"{curve.label}, level {levels}.")  # fmt: skip
+            kept = [[p for p in s if p.value > p.uncertainty] for s in curve.stretches]
+            curve = replace(curve, stretches=[s for s in kept if s])
+        if curve.points:
+            shown.append(curve)
+    return shown, said
+
+
+def required_slope(result: CaseResult, metric: str) -> tuple[float, str] | None:
+    """Return the order of convergence that the case demands of `metric`, and how it says so."""
+    for check in result.scene.get("acceptance") or []:
+        if (
+            isinstance(check, dict)
+            and check.get("check") == "rate"
+            and check.get("metric") == metric
+        ):
+            if isinstance(order := check.get("at_least"), int | float):
+                return float(order), f"≥\N{NARROW NO-BREAK SPACE}{order:g}"
+            if isinstance(order := check.get("equals"), int | float):
+                return float(order), f"{order:g}"
+    return None
+
+
+def floor_text(curves: list[Curve]) -> str:
+    """Say how large the uncertainty of the comparison is beside the errors that are drawn."""
+    finest = max(point.level for curve in curves for point in curve.points)
+    points = [point for curve in curves for point in curve.points]
+    floor = max(point.uncertainty for point in points if point.level == finest)
+    if floor <= 0:
+        return "No uncertainty of the comparison is recorded."
+    where = f"at most {number_text(floor, 2)} on the finest level"
+    if any(limits(point) for point in points):
+        return (
+            "Bars: uncertainty of reference and integration; grey band: the least of a level; "
+            f"{where}."
+        )
+    return f"Uncertainty of reference and integration: {where}, below 1/30 of every error."
+
+
+def _reservations(view: CaseView, curves: list[Curve], result: CaseResult) -> None:
+    """Add what a reader has to know before trusting the panels."""
+    if any(curve.ends for curve in curves):
+        view.convergence_notes.append("× marks a level that did not finish: the curve ends there.")
+    timed = [p.duration for c in curves for p in c.points if p.duration]
+    if timed and view.cost:
+        phases: dict[str, dict[str, None]] = {}
+        for curve in curves:
+            for point in curve.points:
+                names = point.duration.phases if point.duration else ()
+                phases.setdefault(curve.label, {}).update(dict.fromkeys(names))
+        listed = "; ".join(
+            f"{label}: {', '.join(names)}" for label, names in phases.items() if names
+        )
+        counts = sorted({time.repetitions for time in timed})
+        repeated = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+        view.cost_notes.append(
+            f"Timed: {listed}. Median of {repeated} repetition{'s' if counts != [1] else ''} "
+            "after a first call that is not counted"
+            + ("; dotted, the time with meshing." if any(t.meshing > 0 for t in timed) else ".")
+        )
+    notes = dict.fromkeys(s.notes["timing"] for s in result.solves if "timing" in s.notes)
+    view.cost_notes += [f"Timing note: {note}." for note in notes]

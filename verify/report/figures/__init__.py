@@ -1,0 +1,1 @@
+"""Figures by matplotlib, as drawings for the page."""

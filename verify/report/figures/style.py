@@ -1,0 +1,174 @@
+"""The look of all figures: markers and colours of solvers, axes, and SVG that a page can hold."""
+
+import io
+import math
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from textwrap import wrap
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+
+from verify.report.blocks import Drawing
+from verify.report.notation import RAISED, printable
+
+__all__ = ["Palette", "Style", "drawing", "legend", "log_axis", "log_range", "panel", "plain_axis"]
+
+_MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
+_GRID = "#e4e4e4"
+_RC = {
+    "svg.fonttype": "none", "svg.hashsalt": "report", "text.parse_math": False, "font.size": 9,
+    "axes.linewidth": 0.7, "axes.spines.top": False, "axes.spines.right": False,
+    "axes.axisbelow": True, "lines.linewidth": 1.3, "lines.markersize": 5.5,
+    "lines.markeredgewidth": 1.1, "axes.unicode_minus": True, "path.simplify_threshold": 0.2,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Style:
+    """Colour, marker and dashes of a solver; a hollow marker shows what lies below it."""
+
+    colour: str
+    marker: str
+    hollow: bool = False
+    dashes: str | tuple[int, tuple[float, ...]] = "-"
+
+
+_KNOWN = {
+    "XFEM": Style("#c04a00", "o"),
+    "conforming P1": Style("#0067a5", "s", True, (0, (5, 2))),
+    "reference": Style("#4d4d4d", "D", True, (0, (1, 1.5))),
+    "exact": Style("#4d4d4d", "D", True, (0, (1, 1.5))),
+}
+_OTHERS = (
+    Style("#00785a", "^", False, (0, (7, 2, 1.5, 2))),
+    Style("#a3487b", "P", False, (0, (3, 1.5))),
+    Style("#8a6a00", "v", True, (0, (2, 2))),
+    Style("#5b4db5", "X", False, (0, (9, 3))),
+    Style("#1b8fb8", ">", True, (0, (4, 1.5, 1, 1.5, 1, 1.5))),
+    Style("#b0003a", "p", False, (0, (6, 1.5))),
+    Style("#4a7c00", "<", True, (0, (1, 3))),
+    Style("#7a3b00", "h", False, (0, (8, 2, 2, 2))),
+    Style("#d0378f", "d", True, (0, (3, 3))),
+    Style("#1f2f6f", "*", False, (0, (5, 1, 1, 1))),
+)
+
+
+class Palette(dict[str, Style]):
+    """Styles by label: the same in every figure of a page, distinct for the first ten others."""
+
+    def __missing__(self, label: str) -> Style:
+        known = _KNOWN.get(label)
+        taken = sum(name not in _KNOWN for name in self)
+        self[label] = known or _OTHERS[taken % len(_OTHERS)]
+        return self[label]
+
+
+@contextmanager
+def panel(title: str, width: float = 4.5, height: float = 2.75) -> Iterator[tuple[Figure, Axes]]:
+    """Give a figure of one panel in the style of the report, sizes in inches; its title on top.
+
+    The axes leave room on the right for a legend.
+    """
+    across = width - 2.0
+    with rc_context(_RC):  # type: ignore[arg-type]
+        figure = Figure(figsize=(width, height))
+        FigureCanvasSVG(figure)
+        axes = figure.add_axes((0.52 / width, 0.48 / height, across / width,
+                                (height - 0.78) / height))  # fmt: skip
+        axes.set_title(printable(title), loc="left", x=-0.42 / across, fontsize=9, pad=9)
+        axes.grid(True, axis="y", color=_GRID, linewidth=0.7)
+        yield figure, axes
+
+
+def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
+    """Return a figure as SVG, without what only a file of its own needs."""
+    buffer = io.StringIO()
+    with rc_context(_RC):  # type: ignore[arg-type]
+        figure.savefig(
+            buffer,
+            format="svg",
+            transparent=True,
+            metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
+        )
+    text = buffer.getvalue()  # fmt: skip
+    body = text[text.index(">", text.index("<svg")) + 1 : text.rindex("</svg>")]
+    body = re.sub(
+        r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", "", body, flags=re.DOTALL
+    )
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
+    body = re.sub(r' id="([^"]*)"', lambda m: m[0] if m[1] in used else "", body)
+    body = re.sub(r"font: [^;\"]*?([\d.]+)px [^;\"]*", r"font-size: \1px", body)
+    # places to a hundredth of a point; only in paths, never in text
+    body = re.sub(r' d="[^"]*"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), body)
+    body = re.sub(r">\s+<", "><", re.sub(r"\s*\n\s*", " ", body)).strip()
+    inches = figure.get_size_inches()
+    return Drawing(body, (72.0 * inches[0], 72.0 * inches[1]), alt, kind)
+
+
+def legend(axes: Axes, title: str = "") -> None:
+    """Name the curves right of the axes, long names in several lines."""
+    handles, found = axes.get_legend_handles_labels()
+    labels = ["\n".join(s for line in printable(label).split("\n") for s in wrap(line, 19) or [""])
+              for label in found]  # fmt: skip
+    if handles:
+        axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.04), frameon=False,
+                    fontsize=8, handlelength=2.1, borderaxespad=0.4, labelspacing=0.45,
+                    handletextpad=0.5, title=title or None)  # fmt: skip
+
+
+def log_range(values: Sequence[float], room: float = 0.08) -> tuple[float, float]:
+    """Return a range around positive `values`, at least a factor of two wide."""
+    low, high = math.log10(min(values)), math.log10(max(values))
+    widen = max(room * (high - low), (math.log10(2) - (high - low)) / 2, 0.04)
+    return 10 ** max(low - widen, -_MOST), 10 ** min(high + widen, _MOST)
+
+
+def log_axis(axes: Axes, which: str, ends: tuple[float, float]) -> None:
+    """Make an axis logarithmic over `ends`, with two to nine labelled ticks."""
+    axis = getattr(axes, f"{which}axis")
+    getattr(axes, f"set_{which}scale")("log")
+    getattr(axes, f"set_{which}lim")(*ends)
+    labelled = log_ticks(*ends)
+    axis.set_major_locator(FixedLocator(labelled))
+    axis.set_minor_locator(NullLocator())
+    as_power = any(not 0.009 < value < 9999 for value in labelled)
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value, as_power)))
+
+
+def plain_axis(axes: Axes, which: str, ends: tuple[float, float]) -> None:
+    """Make an axis linear over `ends`, with a few round ticks."""
+    getattr(axes, f"set_{which}lim")(*ends)
+    axis = getattr(axes, f"{which}axis")
+    axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−")))
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return the values of labelled ticks: decades, or more where there are less than two."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    start, end = low * (1 - 1e-9), high * (1 + 1e-9)
+    decades = [d for d in range(first, last + 1) if start <= 10.0**d <= end]
+    if len(decades) >= 2:
+        step = -(-len(decades) // 6)
+        found = [10.0**d for d in decades if d % step == 0]
+        return found if len(found) >= 2 else [10.0 ** decades[0], 10.0 ** decades[-1]]
+    tried = [m * 10.0**d for d in range(first, last + 1) for m in (1, 2, 5)]
+    for ticks in (tried, MaxNLocator(3).tick_values(low, high)):
+        inside = [float(v) for v in ticks if start <= v <= end]
+        if len(inside) >= 2:
+            return inside
+    return [low * 1.02, high * 0.98]
+
+
+def _tick(value: float, as_power: bool) -> str:
+    if not as_power:
+        return f"{value:.4g}"
+    exponent = math.floor(math.log10(value) + 1e-9)
+    mantissa, power = f"{value / 10.0**exponent:.3g}", str(exponent).translate(RAISED)
+    return f"10{power}" if mantissa == "1" else f"{mantissa}·10{power}"

@@ -1,0 +1,193 @@
+"""The first screen of a report: what was asked, what came out of every case and solver."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from verify.report.blocks import Cell, Drawing, Table
+from verify.report.case_view import CaseView, PictureRow
+from verify.report.notation import bytes_text, solver_title
+from verify.report.pictures import Picture
+from verify.report.run_directory import CaseEntry, Run
+from verify.report.tables import check_text
+from verify.result import NoticeKind, Status, Verdict, VerdictRecord
+
+__all__ = ["Overview", "origin_facts", "overview"]
+
+_NAMED = 6  # entries of a list in the paragraph
+_ORDER = ["FAIL", "ERROR", "UNDECIDED", "PASS"]
+
+
+@dataclass
+class Overview:
+    """Counts, lists in words, the matrix of verdicts, and the picture and plot that say most."""
+
+    counts: dict[str, int]
+    cases: int
+    checks: int
+    solvers: int
+    solves: int
+    findings: list[tuple[str, str]] = field(default_factory=list)
+    unchecked: str = ""
+    ended: str = ""
+    notes: list[str] = field(default_factory=list)
+    matrix: Table | None = None
+    names: list[str] = field(default_factory=list)
+    picture: tuple[Picture, str] | None = None
+    plot: tuple[str, str, Drawing] | None = None
+
+
+def overview(run: Run, cases: Sequence[CaseView]) -> Overview:
+    """Return the first screen of `run`."""
+    judged = [(e, v) for e in run.entries if e.result for v in e.result.verdicts]
+    solves = [s for r in run.results for s in r.solves]
+    solves += [s for e in run.entries for s in e.unjudged]
+    counts = Counter(str(v.verdict) for _, v in judged)
+    view = Overview(
+        {str(verdict): counts[str(verdict)] for verdict in Verdict}, len(run.entries), len(judged),
+        len({v.solver for _, v in judged if v.solver}), len(solves),
+    )  # fmt: skip
+    view.findings = _findings(run, judged)
+    without = [e.name for e in run.entries if e.result and not e.result.verdicts]
+    view.unchecked = _listed(without)
+    ended = Counter(str(s.status) for s in solves if s.status is not Status.SOLVED)
+    view.ended = ", ".join(f"{count} {name}" for name, count in sorted(ended.items()))
+    view.notes = [f"{defect}." for defect in run.defects]
+    if (run.record.get("provenance") or {}).get("dirty"):
+        view.notes.append(
+            "the code differed from its commit when this ran: it cannot be reproduced from it."
+        )
+    asked = [s.solver for s in solves if s.solver != "reference"]
+    asked += [v.solver or "nobody" for _, v in judged]
+    view.names = [solver_title(name) for name in dict.fromkeys(asked)]
+    view.matrix = _matrix(run, cases, view.names)
+    _show_most(view, cases)
+    return view
+
+
+def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return name and value of where the numbers of a run come from."""
+    origin = record.get("provenance")
+    origin = dict(origin) if isinstance(origin, dict) else {}
+    versions = origin.pop("versions", None)
+    commit, dirty = origin.pop("commit", None), origin.pop("dirty", None)
+    state = {True: ", with changes that are not committed", False: ", unchanged"}.get(dirty, "")
+    said = [
+        ("command", str(record.get("command") or "unknown")),
+        ("started", str(record.get("started") or "unknown")),
+        ("finished", str(record.get("finished") or "not finished")),
+        ("commit", f"{commit}{state}" if commit else "unknown"),
+    ]
+    if isinstance(memory := origin.pop("memory", None), int | float):
+        said.append(("memory", bytes_text(memory)))
+    said += [(key, str(value)) for key, value in origin.items()]
+    if isinstance(versions, dict):
+        said.append(("versions", ", ".join(f"{name} {v}" for name, v in versions.items())))
+    if isinstance(options := record.get("options"), dict):
+        written = ", ".join(f"{key} {value}" for key, value in options.items() if value is not None)
+        said.append(("options", written))
+    return said
+
+
+def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[tuple[str, str]]:
+    """Return what is not a plain pass, in lists of at most six entries, failures first."""
+    failed = [(e, v) for e, v in judged if v.verdict is Verdict.FAIL]
+    errors = [f"{e.name}: {_clause(v.reason)}" for e, v in judged if v.verdict is Verdict.ERROR]
+    errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
+    warned: dict[str, list[str]] = {}
+    for entry in run.entries:
+        for w in entry.result.warnings if entry.result else []:
+            whose = solver_title(w.solver) if w.solver else "every solver"
+            warned.setdefault(f"{w.about} in {entry.name}", []).append(whose)
+    adequacy = [
+        f"{entry.name}: {notice.text}"
+        for entry in run.entries
+        for notice in (entry.result.notices if entry.result else [])
+        if notice.kind is NoticeKind.ADEQUACY
+    ]
+    lists = {
+        "Failed": _by_solver([(e, v) for e, v in failed if not v.known], judged),
+        "Failed, known findings": _by_solver([(e, v) for e, v in failed if v.known], judged),
+        "Undecided": [
+            f"{e.name} ({check_text(v)}): {_clause(v.reason)}"
+            for e, v in judged
+            if v.verdict is Verdict.UNDECIDED
+        ],
+        "Not judged": list(dict.fromkeys(errors)),
+        # the text of each stands on top of its case
+        "Warned of": [f"{about} ({', '.join(whose)})" for about, whose in warned.items()],
+        "Adequacy of the model": adequacy,
+    }
+    return [(title, _listed(entries)) for title, entries in lists.items() if entries]
+
+
+def _by_solver(
+    failed: list[tuple[CaseEntry, VerdictRecord]], judged: list[tuple[CaseEntry, VerdictRecord]]
+) -> list[str]:
+    """Say of each solver what it fails, the one that fails most first."""
+    said = []
+    for solver, count in Counter(v.solver for _, v in failed).most_common():
+        made = sum(v.solver == solver for _, v in judged)
+        where: dict[str, list[str]] = {}
+        for entry, record in failed:
+            if record.solver == solver:
+                where.setdefault(entry.name, []).append(check_text(record, named=False))
+        places = "; ".join(f"{name} ({', '.join(whats)})" for name, whats in where.items())
+        checks = "1 check" if made == 1 else f"{made} checks"
+        said.append(f"{solver_title(solver)}, {count} of its {checks}: {places}")
+    return said
+
+
+def _matrix(run: Run, cases: Sequence[CaseView], names: Sequence[str]) -> Table:
+    """Return the verdict of each solver in each case, with its failed share."""
+    rows = []
+    for entry, case in zip(run.entries, cases, strict=True):
+        marks = [Cell(case.title, case.name, link=case.anchor), Cell("", verdict=str(case.verdict))]
+        if case.warnings:
+            n = len(case.warnings)
+            marks[1] = Cell("", f"⚠ {n} warning{'s' * (n > 1)}", verdict=str(case.verdict))
+        marks += [_mark(entry, name, case.by_solver.get(name, "")) for name in names]
+        rows.append(marks)
+    return Table("Verdicts", [Cell("case"), Cell("whole"), *map(Cell, names)], rows, "matrix", True)
+
+
+def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:
+    own = [v for v in entry.result.verdicts if solver_title(v.solver or "nobody") == name] \
+        if entry.result else []  # fmt: skip
+    if verdict:
+        bad = [v for v in own if str(v.verdict) == verdict]
+        known = verdict == "FAIL" and all(v.known for v in bad)
+        share = f"{len(bad)} of {len(own)}" if verdict != "PASS" and len(own) > 1 else ""
+        return Cell("", "known finding" if known else share, verdict=verdict)
+    solves = entry.result.solves if entry.result else entry.unjudged
+    ends = Counter(str(s.status) for s in solves if solver_title(s.solver) == name)
+    return Cell(", ".join(ends) if ends else "–")
+
+
+def _show_most(view: Overview, cases: Sequence[CaseView]) -> None:
+    """Choose the worst case that has a picture, and the worst that has a plot."""
+    # of equal verdicts the case that shows most: it has the most figures
+    ranked = sorted(cases, key=lambda c: (_ORDER.index(str(c.verdict)), -len(c.convergence)))
+    for case in ranked:
+        if view.picture is None and case.rows:
+            row = case.rows[-1] if case.verdict is Verdict.FAIL else case.rows[0]
+            view.picture = (_telling(row, case.failing), case.anchor)
+        if view.plot is None and case.lead is not None:
+            view.plot = (case.lead[0], case.anchor, case.lead[1])
+
+
+def _telling(row: PictureRow, failing: Sequence[str]) -> Picture:
+    """Return the picture of who fails, else the last: the solver after its reference."""
+    marked = [p for p in row.pictures if any(name in p.title for name in failing)]
+    return (marked or row.pictures[-1:])[0]
+
+
+def _listed(parts: list[str]) -> str:
+    rest = len(parts) - _NAMED
+    shown = "; ".join(parts[:_NAMED])
+    return shown if rest <= 0 else f"{shown}; and {rest} more in the table"
+
+
+def _clause(sentence: str) -> str:
+    return sentence.rstrip(". ") or "no reason given"

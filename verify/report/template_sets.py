@@ -1,0 +1,133 @@
+"""The two sets of templates: HTML, escaped by Jinja2, and Markdown, escaped by `in_markdown`.
+
+Both read the same view data and the same page; only the macros of ``blocks`` differ.
+"""
+
+import base64
+import io
+import re
+import shutil
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from PIL import Image
+
+from verify.report.blocks import Drawing
+from verify.report.notation import printable
+from verify.whole_files import write_whole
+
+__all__ = ["PICTURES", "Beside", "as_html", "as_markdown", "in_markdown"]
+
+PICTURES = "report-pictures"
+_SPECIAL = re.compile(r"([\\`*\[\]|])")
+_START = re.compile(r"^(\s*)([#>+=-]|\d+[.)](?=\s))")
+_LOOK = (
+    "<style>text { font-family: sans-serif; } "
+    "* { stroke-linejoin: round; stroke-linecap: butt; }</style>"
+)
+
+
+def as_html(template: str, **view: Any) -> str:
+    """Return the page that `template` makes of `view`; text of the view cannot become markup."""
+    return _environment("html").get_template(template).render(
+        assets=_Inline(), style=_file("style.css"), script=_file("page.js"),
+        turntable=_file("turntable.js"), **view
+    )  # fmt: skip
+
+
+def as_markdown(template: str, folder: Path, **view: Any) -> str:
+    """Return the same as Markdown; its pictures are written below `folder`.
+
+    Raises
+    ------
+    OSError
+        If they cannot be written.
+    """
+    target = folder / PICTURES
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    text = _environment("markdown").get_template(template).render(assets=Beside(target), **view)
+    return re.sub(r"[ \t]+\n", "\n", re.sub(r"\n\s*\n", "\n\n", text)).strip() + "\n"
+
+
+def in_markdown(text: str) -> str:
+    """Return text that Markdown shows as it is: no marks, no elements, no line breaks."""
+    plain = _SPECIAL.sub(r"\\\1", " ".join(text.split()))
+    plain = _START.sub(lambda m: f"{m[1]}{m[2][:-1]}\\{m[2][-1]}", plain)
+    return plain.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+@cache
+def _environment(kind: str) -> Environment:
+    made = Environment(
+        loader=ChoiceLoader([PackageLoader("verify.report", f"templates/{kind}"),
+                             PackageLoader("verify.report", "templates")]),
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        finalize=_final if kind == "html" else _final_markdown,
+    )  # fmt: skip
+    made.tests["text"] = lambda value: isinstance(value, str)
+    return made
+
+
+def _final(value: Any) -> Any:
+    if isinstance(value, Markup):
+        return value
+    return "" if value is None else printable(value)
+
+
+def _final_markdown(value: Any) -> Markup:
+    """Escape for Markdown what Jinja2 would escape for HTML."""
+    return value if isinstance(value, Markup) else Markup(in_markdown(_final(value)))
+
+
+def _file(name: str) -> Markup:
+    return Markup(files("verify.report").joinpath("templates", name).read_text(encoding="utf-8"))
+
+
+class _Inline:
+    """Drawings and images inside the page."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def drawing(self, drawing: Drawing) -> Markup:
+        """Return the inside of an SVG element, its identifiers made those of this page alone."""
+        self.count += 1
+        return Markup(re.sub(r'( id="|href="#|url\(#)', rf"\g<1>f{self.count}-", drawing.body))
+
+    def image(self, webp: bytes) -> str:
+        """Return the image as a data address."""
+        return "data:image/webp;base64," + base64.b64encode(webp).decode("ascii")
+
+
+class Beside:
+    """Drawings and images as files: SVG and PNG."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.count = folder, 0
+
+    def drawing(self, drawing: Drawing) -> Markup:
+        """Write an SVG file; return its path from the Markdown."""
+        width, height = drawing.size
+        head = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
+            f'xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 {width:g} {height:g}">'
+        )
+        return self._written("svg", f"{head}{_LOOK}{drawing.body}</svg>")
+
+    def image(self, webp: bytes) -> Markup:
+        """Write a PNG file; return its path from the Markdown."""
+        made = io.BytesIO()
+        with Image.open(io.BytesIO(webp)) as image:
+            image.save(made, "PNG", optimize=True)
+        return self._written("png", made.getvalue())
+
+    def _written(self, ending: str, content: str | bytes) -> Markup:
+        self.count += 1
+        name = f"{self.count:03d}.{ending}"
+        write_whole(self.folder / name, content)
+        return Markup(f"{PICTURES}/{name}")

@@ -1,0 +1,45 @@
+// Folding and filtering; without a script everything is there, unfiltered.
+(() => {
+  'use strict';
+  const cases = [...document.querySelectorAll('details.case')];
+  const form = document.querySelector('.filters');
+  const all = [...document.querySelectorAll('details')];
+  let before = [];
+  addEventListener('beforeprint', () => { before = all.map(d => d.open); all.forEach(d => { d.open = true; }); });
+  addEventListener('afterprint', () => all.forEach((d, i) => { d.open = before[i]; }));
+  const follow = () => {
+    const target = location.hash.length > 1 && document.getElementById(location.hash.slice(1));
+    if (!target) return;
+    for (let d = target.closest('details'); d; d = d.parentElement.closest('details')) d.open = true;
+    target.scrollIntoView();
+  };
+  addEventListener('hashchange', follow);
+  document.addEventListener('click', e => {  // the same link twice changes no hash
+    const link = e.target.closest('a[href^="#"]');
+    if (link && link.hash === location.hash) follow();
+  });
+  follow();
+  if (!form) return;
+  form.hidden = false;
+  const rows = new Map([...document.querySelectorAll('table.matrix tbody tr')].map(
+    row => [row.querySelector('a').hash.slice(1), row]));
+  const filter = () => {
+    const words = form.words.value.toLowerCase(), solver = form.solver.value, verdict = form.verdict.value;
+    let shown = 0;
+    for (const one of cases) {
+      const own = JSON.parse(one.dataset.solvers);
+      const found = solver ? own[solver] : one.dataset.verdict;
+      const keep = one.dataset.name.toLowerCase().includes(words) && (!solver || found)
+        && (!verdict || found === verdict || (!solver && Object.values(own).includes(verdict)));
+      one.hidden = !keep;
+      if (rows.has(one.id)) rows.get(one.id).hidden = !keep;
+      shown += keep;
+    }
+    form.querySelector('output').textContent = shown < cases.length ? `${shown} of ${cases.length} cases` : '';
+  };
+  form.addEventListener('input', filter);
+  form.addEventListener('submit', e => e.preventDefault());
+  form.addEventListener('click', e => {
+    if ('fold' in e.target.dataset) cases.forEach(one => { one.open = !!e.target.dataset.fold; });
+  });
+})();
