@@ -103,7 +103,8 @@ def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
     )
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
     body = re.sub(r' id="([^"]*)"', lambda m: m[0] if m[1] in used else "", body)
-    body = re.sub(r"font: [^;\"]*?([\d.]+)px [^;\"]*", r"font-size: \1px", body)
+    # the page's own typeface
+    body = re.sub(r'(<text style="[^"]*?)font-family: [^;"]*(?:; )?', r"\1", body)
     # places to a hundredth of a point; only in paths, never in text
     body = re.sub(r' d="[^"]*"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), body)
     body = re.sub(r">\s+<", "><", re.sub(r"\s*\n\s*", " ", body)).strip()
