@@ -18,7 +18,8 @@ from verify.xfem.cuts.crossing import TipRule
 from verify.xfem.cuts.flat import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.joining import PatchSlots, join_slots
-from verify.xfem.splitting.split import Partition, split_cells
+from verify.xfem.splitting.partition import Partition
+from verify.xfem.splitting.split import split_cells
 from verify.xfem.splitting.unknown_nodes import node_sides, number_groups, piece_sides
 from verify.xfem.splitting.zero_points import ZeroPoints
 

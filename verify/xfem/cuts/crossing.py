@@ -61,11 +61,14 @@ def level_and_depth(cut: Cut, points: _Floats) -> tuple[_Floats, _Floats]:
 
 def crossed_through(
     cut: Cut, positions: _Floats, crossing: Crossing, tip: TipRule
-) -> NDArray[np.bool_]:
-    """Which pieces (p,) a cut goes through; `positions` are those of all numbered points."""
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which pieces (p,) a cut goes through, and in which it ends by the rule `inside`.
+
+    `positions` are those of all numbered points.
+    """
     zero, piece, size, pieces = crossing
     if tip == "nearest":
-        return _mostly_crossed(cut, positions, crossing)
+        return _mostly_crossed(cut, positions, crossing), np.zeros(pieces, dtype=bool)
     mark = np.zeros(len(positions), dtype=bool)
     mark[zero] = True
     wanted = np.flatnonzero(mark)
@@ -74,13 +77,13 @@ def crossed_through(
     at = place[zero]
     margin = 1.0 if tip == "through" else -1.0
     inside = (np.abs(level[at]) <= REACH * size) & (depth[at] >= margin * AT_END * size)
-    found = np.zeros(pieces, dtype=bool)
+    some, every = np.zeros(pieces, dtype=bool), np.zeros(pieces, dtype=bool)
+    some[piece[inside]] = True
     if tip == "through":
-        found[piece[inside]] = True
-    else:
-        found[piece] = True
-        found[piece[~inside]] = False
-    return found
+        return some, every
+    every[piece] = True
+    every[piece[~inside]] = False
+    return every, some & ~every
 
 
 def _mostly_crossed(cut: Cut, positions: _Floats, crossing: Crossing) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.arrays.distinct import distinct
 from verify.xfem.cutting.patch import MeshPatch
-from verify.xfem.splitting.split import Partition
+from verify.xfem.splitting.partition import Partition
 
 __all__ = ["Division"]
 

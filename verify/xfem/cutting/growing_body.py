@@ -31,7 +31,8 @@ from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.joining import join_slots
-from verify.xfem.splitting.split import ROUND_OFF, Held, Partition, split_cells
+from verify.xfem.splitting.partition import Partition
+from verify.xfem.splitting.split import ROUND_OFF, Held, split_cells
 
 __all__ = ["CutsNear", "GrowingBody", "Increment"]
 

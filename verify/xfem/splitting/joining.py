@@ -15,8 +15,13 @@ from numpy.typing import NDArray
 
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.clipping import staircase
-from verify.xfem.splitting.joining_kernels import join_across_faces, number_groups, patch_around
-from verify.xfem.splitting.split import Partition
+from verify.xfem.splitting.joining_kernels import (
+    join_across_faces,
+    join_tied,
+    number_groups,
+    patch_around,
+)
+from verify.xfem.splitting.partition import Partition
 
 __all__ = ["PatchSlots", "join_slots"]
 
@@ -44,7 +49,7 @@ class PatchSlots:
 
 
 def join_slots(mesh: SimplexMesh, partition: Partition, solid: NDArray[np.bool_]) -> PatchSlots:
-    """Join the slots of all pieces that touch, around the nodes of split cells.
+    """Join the slots of tied pieces, and of all that touch, around the nodes of split cells.
 
     Parameters
     ----------
@@ -58,6 +63,7 @@ def join_slots(mesh: SimplexMesh, partition: Partition, solid: NDArray[np.bool_]
     )
     # the slots of a group are a tree: each slot knows a smaller one, the first itself
     towards = np.arange(len(piece_cell) * (mesh.dim + 1))
+    join_tied(partition.tied, mesh.dim + 1, towards)
     begin = 0
     while begin < len(patch):
         points = partition.points

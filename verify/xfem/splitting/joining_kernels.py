@@ -5,7 +5,7 @@ from numba import njit
 
 from verify.xfem.arrays.row_numbers import point_on_edge
 
-__all__ = ["join_across_faces", "number_groups", "patch_around"]
+__all__ = ["join_across_faces", "join_tied", "number_groups", "patch_around"]
 
 
 @njit(cache=True)
@@ -157,6 +157,23 @@ def _next_region(top, stack, level, sides, relevant, values, stairs, edges, aske
 
 
 @njit(cache=True)
+def _join(one, other, towards):
+    first, second = _root(one, towards), _root(other, towards)
+    if first < second:
+        towards[second] = first
+    else:
+        towards[first] = second
+
+
+@njit(cache=True)
+def join_tied(pairs, corners, towards):
+    """Join the slots of pairs (t, 2) of pieces of one cell, at all its corners."""
+    for k in range(len(pairs)):
+        for a in range(corners):
+            _join(pairs[k, 0] * corners + a, pairs[k, 1] * corners + a, towards)
+
+
+@njit(cache=True)
 def _join_face(cell, other, skip, p, q, cells, towards):
     """Join the slots of two pieces at the nodes of a face, given by the corner opposite to it."""
     corners = cells.shape[1]
@@ -165,11 +182,7 @@ def _join_face(cell, other, skip, p, q, cells, towards):
             continue
         for b in range(corners):
             if cells[other, b] == cells[cell, a]:
-                first, second = _root(p * corners + a, towards), _root(q * corners + b, towards)
-                if first < second:
-                    towards[second] = first
-                else:
-                    towards[first] = second
+                _join(p * corners + a, q * corners + b, towards)
 
 
 @njit(cache=True)

@@ -9,8 +9,8 @@ across it, and are left out afterwards.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import get_args
+from dataclasses import replace
+from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ from verify.xfem.given_arrays import real_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.bisection import Simplices, bisect_at
 from verify.xfem.splitting.clipping import staircase
+from verify.xfem.splitting.junctions import joint_cuts, meeting_cells, tied_pieces, without_specks
+from verify.xfem.splitting.partition import Partition
 from verify.xfem.splitting.split_kernels import (
     crossed_cells,
     crossed_edges,
@@ -39,7 +41,7 @@ from verify.xfem.splitting.split_kernels import (
 )
 from verify.xfem.splitting.zero_points import ZeroPoints
 
-__all__ = ["ROUND_OFF", "Held", "Partition", "split_cells"]
+__all__ = ["ROUND_OFF", "Held", "split_cells"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -49,85 +51,17 @@ Held = Callable[[_Ints, NDArray[np.int8], int], NDArray[np.bool_]]
 ROUND_OFF = 8.0 * np.finfo(float).eps
 
 
-@dataclass(frozen=True)
-class Partition:
-    """Pieces of some cells and their sub-simplices.
-
-    Attributes
-    ----------
-    parent : (p,) int array
-        Cell of each piece.
-    label : (p, cuts) int8 array
-        Side of each cut that split the piece off; 0 if the cut does not split its cell.
-    sub_piece : (k,) int array
-        Piece of each sub-simplex.
-    sub_points : (k, d + 1) int array
-        Its vertices, as numbers in `points`.
-    sub_barycentric : (k, d + 1, d + 1) float array
-        Barycentric coordinates of its vertices (second axis) in its cell.
-    sub_fraction : (k,) float array
-        Its share of the volume of its cell.
-    sub_sign : (k,) int8 array
-        Its orientation in its cell, +1 or -1: from how it came about, hence right for any sliver.
-    points : ZeroPoints
-        Mesh nodes and zero points.
-    snapped : int
-        Nodal level-set values that were taken as exactly zero.
-    """
-
-    parent: _Ints
-    label: NDArray[np.int8]
-    sub_piece: _Ints
-    sub_points: _Ints
-    sub_barycentric: _Floats
-    sub_fraction: _Floats
-    sub_sign: NDArray[np.int8]
-    points: ZeroPoints
-    snapped: int
-
-    @property
-    def fraction(self) -> _Floats:
-        """(p,) share of each piece in the volume of its cell."""
-        return np.bincount(self.sub_piece, self.sub_fraction, minlength=len(self.parent))
-
-    @property
-    def simplices(self) -> tuple[_Ints, _Ints, _Floats, _Floats, NDArray[np.int8]]:
-        """Piece, points, barycentric corners, share and sign of the sub-simplices."""
-        return (
-            self.sub_piece,
-            self.sub_points,
-            self.sub_barycentric,
-            self.sub_fraction,
-            self.sub_sign,
-        )
-
-    def with_simplices(
-        self,
-        piece: _Ints,
-        points: _Ints,
-        barycentric: _Floats,
-        fraction: _Floats,
-        sign: NDArray[np.int8],
-    ) -> "Partition":
-        """Return the same with other sub-simplices."""
-        return replace(
-            self,
-            sub_piece=piece,
-            sub_points=points,
-            sub_barycentric=barycentric,
-            sub_fraction=fraction,
-            sub_sign=sign,
-        )
-
-
 def split_cells(
     mesh: SimplexMesh,
     cuts: Sequence[Cut],
     tip: TipRule = "inside",
     held: Held | None = None,
     opened: NDArray[np.bool_] | None = None,
+    joint: NDArray[np.bool_] | None = None,
 ) -> Partition:
-    """Split every cell that a cut goes through; the others do not appear in the result.
+    """Split every cell that a cut goes through, or that several part together.
+
+    The others do not appear in the result.
 
     Parameters
     ----------
@@ -144,6 +78,8 @@ def split_cells(
         go through, and its number, tells which it shall split: those that it split before.
     opened : (m, cuts) bool array, optional
         Cells in which each cut may split anything; without it all.
+    joint : (m,) bool array, optional
+        Cells that several cuts have parted together before.
 
     Raises
     ------
@@ -166,30 +102,73 @@ def split_cells(
             mesh, cuts[0], ZeroPoints(mesh.points, values, snap), snapped, tip, held, opened
         )
     plus = values[mesh.cells] >= 0.0
-    candidates = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
-    corners = mesh.dim + 1
-    whole = np.arange(len(candidates))
-    partition = Partition(
-        parent=candidates,
-        label=np.zeros((len(candidates), len(cuts)), dtype=np.int8),
-        sub_piece=whole,
-        sub_points=mesh.cells[candidates],
-        sub_barycentric=np.tile(np.eye(corners), (len(candidates), 1, 1)),
-        sub_fraction=np.ones(len(candidates)),
-        sub_sign=np.ones(len(candidates), dtype=np.int8),
-        points=ZeroPoints(mesh.points, values, snap),
+    crossed = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
+    sizes = np.zeros(len(mesh.cells))
+    sizes[crossed] = mesh.longest_edges(crossed)
+
+    def divided(cells: _Ints, rules: _Rules) -> tuple[Partition, list[_Ints]]:
+        points = ZeroPoints(mesh.points, values, snap)
+        return _divided(_whole(mesh.cells, cells, len(cuts), points, snapped), rules)
+
+    rules = _Rules(cuts, sizes, tip, held, opened)
+    partition, ends = divided(crossed, rules)
+    if tip != "inside":
+        return _only_split(partition)
+    # what all cuts part together they part when some of them are not open yet, too
+    free = rules._replace(held=None, opened=None)
+    alone, ends = (partition, ends) if opened is None else divided(crossed, free)
+    meets = meeting_cells(alone, ends, len(mesh.cells))
+    suspects = np.flatnonzero(meets.any(axis=1))
+    if len(suspects) == 0:
+        return _only_split(partition)
+    trial = divided(suspects, free._replace(through=meets))[0]
+    through = joint_cuts(without_specks(trial, meets.any(axis=1)), alone, cuts, sizes, joint)
+    if not through.any():
+        return _only_split(partition)
+    cells = through.any(axis=1)
+    partition = divided(crossed, rules._replace(through=through))[0]
+    partition = _only_split(without_specks(partition, cells))
+    return replace(partition, tied=tied_pieces(partition, cuts, sizes, cells))
+
+
+class _Rules(NamedTuple):
+    """How cuts divide: what `split_cells` was given, and sizes of the cells."""
+
+    cuts: Sequence[Cut]
+    sizes: _Floats
+    tip: TipRule
+    held: Held | None
+    opened: NDArray[np.bool_] | None
+    through: NDArray[np.bool_] | None = None  # (m, cuts) cells in which a cut has no end
+
+
+def _whole(cells: _Ints, chosen: _Ints, cuts: int, points: ZeroPoints, snapped: int) -> Partition:
+    """Make one piece of each chosen cell."""
+    count, corners = len(chosen), cells.shape[1]
+    return Partition(
+        parent=chosen,
+        label=np.zeros((count, cuts), dtype=np.int8),
+        sub_piece=np.arange(count),
+        sub_points=cells[chosen],
+        sub_barycentric=np.tile(np.eye(corners), (count, 1, 1)),
+        sub_fraction=np.ones(count),
+        sub_sign=np.ones(count, dtype=np.int8),
+        points=points,
         snapped=snapped,
     )
-    sizes = np.zeros(len(mesh.cells))
-    sizes[candidates] = mesh.longest_edges(candidates)
+
+
+def _divided(partition: Partition, rules: _Rules) -> tuple[Partition, list[_Ints]]:
+    """Divide pieces by all cuts; also the cells in pieces of which each cut ends."""
+    ends = [np.empty(0, dtype=np.int64)] * len(rules.cuts)
     # a branch given before its stem can split only once the stem has: hence more than one sweep
-    for _ in range(max(1, len(cuts))):
+    for _ in range(max(1, len(rules.cuts))):
         before = len(partition.parent)
-        for index, cut in enumerate(cuts):
-            partition = _split_by(partition, index, cut, sizes, tip, held, opened)
+        for index in range(len(rules.cuts)):
+            partition, ends[index] = _split_by(partition, index, rules)
         if len(partition.parent) == before:
             break
-    return _only_split(partition)
+    return partition, ends
 
 
 def _split_by_one(
@@ -245,37 +224,33 @@ def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]
     return values, int(tiny.sum())
 
 
-def _split_by(
-    partition: Partition,
-    index: int,
-    cut: Cut,
-    sizes: _Floats,
-    tip: TipRule,
-    held: Held | None,
-    opened: NDArray[np.bool_] | None,
-) -> Partition:
-    points = partition.points
+def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partition, _Ints]:
+    """Divide pieces by one cut; also the cells in pieces of which it ends."""
+    points, parent = partition.points, partition.parent
     edges, piece = crossed_edges(
         partition.sub_points, partition.sub_piece, partition.label, points.values, index
     )
     if len(edges) == 0:
-        return partition
+        return partition, np.empty(0, dtype=np.int64)
     crossing = Crossing(
         zero=points.find(index, edges[:, 0], edges[:, 1]),
         piece=piece,
-        size=sizes[partition.parent[piece]],
-        pieces=len(partition.parent),
+        size=rules.sizes[parent[piece]],
+        pieces=len(parent),
     )
-    active = crossed_through(cut, points.positions, crossing, tip)
-    if held is not None:
-        doubtful = np.flatnonzero((np.bincount(piece, minlength=len(active)) > 0) & ~active)
-        active[doubtful] = held(partition.parent[doubtful], partition.label[doubtful], index)
-    if opened is not None:
-        active &= opened[partition.parent, index]
+    active, ending = crossed_through(rules.cuts[index], points.positions, crossing, rules.tip)
+    meets = np.bincount(piece, minlength=len(active)) > 0
+    if rules.through is not None:
+        active |= meets & rules.through[parent, index]
+    if rules.held is not None:
+        doubtful = np.flatnonzero(meets & ~active)
+        active[doubtful] = rules.held(parent[doubtful], partition.label[doubtful], index)
+    if rules.opened is not None:
+        active &= rules.opened[parent, index]
+    ends = parent[ending]
     if not active.any():
-        return partition
-    divided = _divide(partition, index, active)
-    return _bisect_beside(divided, index)
+        return partition, ends
+    return _bisect_beside(_divide(partition, index, active), index), ends
 
 
 def _divide(partition: Partition, index: int, active: NDArray[np.bool_]) -> Partition:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.joining import PatchSlots
-from verify.xfem.splitting.split import Partition
+from verify.xfem.splitting.partition import Partition
 
 __all__ = ["PieceSides", "node_sides", "number_groups", "piece_sides"]
 
