@@ -157,6 +157,9 @@ def joined(mesh, partition):
         if all(alive[slots[0] // corners] for slots in pair):  # others join nothing
             first.append(pair[0])
             second.append(pair[1])
+    for tie in partition.tied:
+        first.append(tie[0] * corners + np.arange(corners))
+        second.append(tie[1] * corners + np.arange(corners))
     size = len(piece_cell) * corners
     a, b = np.concatenate(first), np.concatenate(second)
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(size, size))

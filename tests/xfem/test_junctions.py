@@ -4,10 +4,13 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from cut_comparison import assert_same_cut
 from test_sliver_policies import shaken
+from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
-from verify.xfem.cuts import PolygonPatch, Polyline
+from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
+from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh
@@ -62,3 +65,117 @@ def test_cuts_that_end_in_one_point_of_an_element_leave_a_part_for_each_sector(c
         assert following > 1e-9
         # straight cuts are realised exactly; the border is sampled in steps of 1/4000
         np.testing.assert_allclose(areas(virtual), sector_areas(point, angles), atol=5e-4)
+
+
+def half_planes(rng, count):
+    """Half planes that leave one line, in any position and sense of turning."""
+    frame, point = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.uniform(0.35, 0.65, 3)
+    cuts = []
+    for k, angle in enumerate(sectors(rng, count)):
+        out = 3.0 * (np.cos(angle) * frame[0] + np.sin(angle) * frame[1])
+        low, high = point - 3.0 * frame[2], point + 3.0 * frame[2]
+        rim = [low, low + out, high + out, high]
+        cuts.append(PolygonPatch(rim if k % 2 else rim[::-1]))
+    return cuts
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("seed", range(3))
+def test_half_planes_that_end_on_one_line_in_tetrahedra_leave_a_part_for_each_sector(count, seed):
+    rng = np.random.default_rng([3, count, seed])
+    mesh = shaken(box_mesh((2, 2, 2)), seed)
+    cuts = half_planes(rng, count)
+    virtual = cut_mesh(mesh, cuts)
+    assert virtual.bodies.max() + 1 == count
+    modes, following = zero_modes(virtual)
+    assert modes == 6 * count
+    assert following > 1e-9
+    divided = subdivide(virtual)
+    torn = facet_measures(divided.cut_facets).sum()
+    # facets as thin as round-off measure up to its root, 1e-8 of their length
+    assert exterior(divided) == pytest.approx(6.0 + 2.0 * torn, abs=1e-6)
+    assert divided.cell_piece.max() + 1 == len(virtual.cells)
+
+
+def forked_slit(point, angles, reach):
+    """Three slits that leave a point and end inside the body."""
+    ends = point + reach * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return [Polyline([point, end]) for end in ends]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_fork_that_ends_inside_is_one_slit_that_opens_to_its_ends(seed):
+    """The faces of the cut are as long as the slits, but for the elements in which they end."""
+    rng = np.random.default_rng([7, seed])
+    cells, reach = 12, 0.3
+    mesh = shaken(rectangle_mesh((cells, cells)), seed)
+    point, angles = rng.uniform(0.4, 0.6, 2), sectors(rng, 3)
+    virtual = cut_mesh(mesh, forked_slit(point, angles, reach))
+    assert virtual.bodies.max() == 0
+    divided = subdivide(virtual)
+    torn = facet_measures(divided.cut_facets).sum()
+    # each loses less than the way through an element at its tip, at most its longest edge
+    assert 3.0 * (reach - np.sqrt(2.0) / cells * 1.3) < torn <= 3.0 * reach + 1e-12
+    assert exterior(divided) == pytest.approx(4.0 + 2.0 * torn, abs=1e-9)
+    # nothing is torn where no cut is
+    middle = divided.cut_facets.mean(axis=1) - point
+    off = np.abs(middle @ np.stack([-np.sin(angles), np.cos(angles)]))
+    ahead = middle @ np.stack([np.cos(angles), np.sin(angles)]) > -1e-12
+    assert np.where(ahead, off, 1.0).min(axis=1).max() < 1e-12
+
+
+@pytest.mark.parametrize("bend", [15.0, 40.0])
+@pytest.mark.parametrize("seed", range(10))
+def test_a_branch_from_the_kink_of_a_polyline_comes_off(bend, seed):
+    """It leaves the stem steeper than that bends: on the convex side it would miss it else."""
+    rng = np.random.default_rng([int(bend), seed])
+    mesh = shaken(rectangle_mesh((5, 5)), seed)
+    point, way = rng.uniform(0.35, 0.65, 2), rng.uniform(0.0, 2.0 * np.pi)
+    turn, least = np.radians(bend), np.radians(bend + 10.0)
+    side = rng.choice([1.0, -1.0])
+    away = side * rng.uniform(least, np.pi - side * turn - least)
+
+    def off(angle):
+        return point + 3.0 * np.array([np.cos(way + angle), np.sin(way + angle)])
+
+    stem = Polyline([2.0 * point - off(0.0), point, off(turn)])
+    branch = Polyline([point, off(turn + away)])
+    for cuts in ([stem, branch], [branch, stem]):
+        virtual = cut_mesh(mesh, cuts)
+        assert virtual.bodies.max() + 1 == 3
+        assert zero_modes(virtual)[0] == 9
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("through", [True, False])
+def test_strokes_that_end_in_one_point_part_the_body_as_the_cuts_at_once_do(seed, through):
+    """Two come to the point, a third leaves it; at each frame pieces and joins are the same."""
+    rng = np.random.default_rng([9, seed])
+    mesh = shaken(rectangle_mesh((5, 5)), seed)
+    point, angles = rng.uniform(0.4, 0.6, 2), sectors(rng, 3)
+    ends = point + (2.0 if through else 0.3) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    cutter = SemiProgressiveCutter(mesh)
+    nodes = 0
+    for k, end in enumerate(ends):
+        tips = [point, end] if k == 2 else [end, point]
+        cutter.begin(ToolPath.of_tip(tips, [k, k + 1.0]))
+        for time in np.linspace(k, k + 1.0, 6)[1:]:
+            cutter.advance(time)
+            virtual = cutter.virtual_mesh()
+            assert_same_cut(virtual, cut_mesh(mesh, cutter.cuts))
+            assert virtual.node_count >= nodes
+            nodes = virtual.node_count
+    assert virtual.bodies.max() + 1 == (3 if through else 1)
+
+
+def test_a_stroke_that_goes_on_past_a_junction_parts_what_was_one():
+    """Two strokes meet in an element; the second goes on through it when the first has been."""
+    mesh = shaken(rectangle_mesh((5, 5)), 1)
+    point = np.array([0.47, 0.52])
+    cutter = SemiProgressiveCutter(mesh)
+    cutter.begin(ToolPath.of_tip([[-1.0, 0.6], point], [0.0, 1.0]))
+    cutter.advance(1.0)
+    cutter.begin(ToolPath.of_tip([[0.6, -1.0], point, 2.0 * point - [0.6, -1.0]], [1.0, 2.0, 3.0]))
+    for time, parts in ((2.0, 2), (3.0, 3)):
+        cutter.advance(time)
+        assert cutter.virtual_mesh().bodies.max() + 1 == parts

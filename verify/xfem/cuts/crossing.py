@@ -1,5 +1,6 @@
 """Whether a cut goes through a piece: from where it crosses the piece's edges."""
 
+from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -8,12 +9,22 @@ from numpy.typing import NDArray
 from verify.xfem.cuts.flat import Cut
 from verify.xfem.errors import XfemError
 
-__all__ = ["AT_END", "REACH", "Crossing", "TipRule", "crossed_through", "level_and_depth"]
+__all__ = [
+    "AT_END",
+    "REACH",
+    "Crossing",
+    "Reached",
+    "TipRule",
+    "crossed_through",
+    "level_and_depth",
+]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 TipRule = Literal["inside", "through", "nearest"]
+
+Reached = Callable[[_Ints, _Floats], NDArray[np.bool_]]
 
 AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
 REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
@@ -60,11 +71,24 @@ def level_and_depth(cut: Cut, points: _Floats) -> tuple[_Floats, _Floats]:
 
 
 def crossed_through(
-    cut: Cut, positions: _Floats, crossing: Crossing, tip: TipRule
+    cut: Cut,
+    positions: _Floats,
+    crossing: Crossing,
+    tip: TipRule,
+    reached: Reached | None = None,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which pieces (p,) a cut goes through, and in which it ends by the rule `inside`.
 
-    `positions` are those of all numbered points.
+    Parameters
+    ----------
+    cut : Cut
+    positions : (n, d) float array
+        All numbered points, in metres.
+    crossing : Crossing
+    tip : {"inside", "through", "nearest"}
+    reached : callable, optional
+        Given numbers of points past the end and sizes of their elements, tells which belong to the
+        cut all the same.
     """
     zero, piece, size, pieces = crossing
     if tip == "nearest":
@@ -77,6 +101,11 @@ def crossed_through(
     at = place[zero]
     margin = 1.0 if tip == "through" else -1.0
     inside = (np.abs(level[at]) <= REACH * size) & (depth[at] >= margin * AT_END * size)
+    if reached is not None:
+        near = (np.abs(level[at]) <= REACH * size) & (depth[at] > -size)
+        past = np.flatnonzero(near & ~inside)
+        if len(past):
+            inside[past] = reached(zero[past], size[past])
     some, every = np.zeros(pieces, dtype=bool), np.zeros(pieces, dtype=bool)
     some[piece[inside]] = True
     if tip == "through":

@@ -6,7 +6,7 @@ keep theirs, new ones follow.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from verify.xfem.cutting.renumber_kernels import (
     slots_before,
     write_pieces,
 )
+from verify.xfem.cutting.tied_parts import TiedParts
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh
@@ -142,6 +143,7 @@ class GrowingBody:
         self.cut_count = 0
         self.split_cells = np.zeros(cells, dtype=bool)
         self._dropped = np.zeros(cells, dtype=np.int64)
+        self._tied = TiedParts(cells)
         self.held = 0
         self.vanished = 0
 
@@ -194,7 +196,8 @@ class GrowingBody:
         while len(wanted):
             patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
             numbers, cuts = cuts_near(patch)
-            partition = split_cells(patch, cuts, held=self._held_in(patch, numbers))
+            held, joint = self._held_in(patch, numbers), self._tied.joint[patch.whole_cells]
+            partition = split_cells(patch, cuts, held=held, joint=joint)
             yield
             division = self._compare(patch, partition, numbers)
             all_wanted = distinct(np.concatenate([wanted, division.changed_cells]))
@@ -215,6 +218,7 @@ class GrowingBody:
         cells = division.changed_cells
         before = self.node_count
         place = self._renumber(division)
+        self._tied.store(division.partition.tied, division.cell, place, len(self.piece_parent))
         self._store_simplices(division, cells, place)
         self.split_cells[cells] = True
         self._dropped[cells] = 0
@@ -266,6 +270,10 @@ class GrowingBody:
             left = np.flatnonzero(orphans & solid)
             if len(left):
                 raise XfemError(f"a cut would join parts of cell {cell[left[0]]} that are separate")
+        if len(partition.tied) or self._tied.joint[cell].any():
+            of = np.where(solid, old, -1)
+            partition = replace(partition, tied=self._tied.still(partition.tied, of))
+            changed |= self._tied.parted(partition.tied, of)
         return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
 
     def _renumber(self, state: Division) -> _Ints:

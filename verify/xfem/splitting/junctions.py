@@ -18,13 +18,15 @@ from scipy.sparse.csgraph import connected_components
 from verify.xfem.cuts.crossing import AT_END, REACH, level_and_depth
 from verify.xfem.cuts.flat import Cut
 from verify.xfem.splitting.partition import Partition
+from verify.xfem.splitting.zero_points import ZeroPoints
 
-__all__ = ["joint_cuts", "meeting_cells", "tied_pieces", "without_specks"]
+__all__ = ["joint_cuts", "meeting_cells", "reached", "tied_pieces", "without_specks"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]
 
+_ASIDE = 1e-4  # element sizes: steps in which a cut is felt for
 _SPECK = 1e-24  # of a cell: what rounding leaves between three planes with a common line
 
 
@@ -36,7 +38,9 @@ class _Facets(NamedTuple):
     second: _Ints
 
 
-def meeting_cells(partition: Partition, ends: Sequence[_Ints], cells: int) -> _Bools:
+def meeting_cells(
+    partition: Partition, ends: Sequence[_Ints], cells: int, joint: _Bools | None
+) -> _Bools:
     """Which cuts (m, cuts) meet cells, of those where several do and one at least ends.
 
     Parameters
@@ -47,11 +51,13 @@ def meeting_cells(partition: Partition, ends: Sequence[_Ints], cells: int) -> _B
         Cells in pieces of which each cut ends.
     cells : int
         Number of cells of the mesh.
+    joint : (m,) bool array, optional
+        Further cells, in which several meet.
     """
     meets = np.zeros((cells, len(ends)), dtype=bool)
     for cut, some in enumerate(ends):
         meets[some, cut] = True
-    ending = meets.any(axis=1)
+    ending = meets.any(axis=1) if joint is None else meets.any(axis=1) | joint
     piece, cut = np.nonzero((partition.label != 0) & ending[partition.parent, None])
     meets[partition.parent[piece], cut] = True
     meets[meets.sum(axis=1) < 2] = False
@@ -151,60 +157,64 @@ def _borne(partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: _F
             x.reshape(points.shape) for x in level_and_depth(cut, positions[points.ravel()])
         )
         inside = depth >= -AT_END * size
-        doubtful = np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1))
-        if len(doubtful):
-            of = label[facets.first[rows[doubtful]]] != 0
-            inside[doubtful] |= _reaching(
-                partition, cuts, index, points[doubtful], depth[doubtful], size[doubtful], of
-            )
+        if not inside.all():
+            past = (depth < -AT_END * size) & (depth > depth.max(axis=1, keepdims=True) - size)
+            past &= (depth > AT_END * size).any(axis=1, keepdims=True)
+            row, corner = np.nonzero(past)
+            if len(row):
+                inside[row, corner] = reached(
+                    cuts, index, partition.points, points[row, corner], size[row, 0]
+                )
         borne[rows, index] = (inside & (np.abs(level) <= REACH * size)).all(axis=1)
     return borne
 
 
-def _reaching(
-    partition: Partition,
-    cuts: Sequence[Cut],
-    index: int,
-    points: _Ints,
-    depth: _Floats,
-    size: _Floats,
-    dividing: _Bools,
+def reached(
+    cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: _Ints, size: _Floats
 ) -> _Bools:
-    """Which corners of facets a cut reaches: past its end, which is on the cut in which they lie.
+    """Which points past the end of a cut it reaches all the same: it ends on another cut there.
 
-    A cut that is bent inside an element is realised beside itself, and what ends on it must go on
-    to where it is.
+    A cut that is bent inside an element is realised beside itself, and what ends on it goes on to
+    where it is: over points that lie past the other cut as given and not past it as realised.
 
     Parameters
     ----------
-    partition : Partition
     cuts : sequence of Cut
     index : int
-        Of the cut on which the facets lie.
-    points, depth, size : (q, d), (q, d), (q, 1) arrays
-        Corners of the facets, depth of the cut there, and size of their cells, in metres.
-    dividing : (q, cuts) bool array
-        Cuts that divide their cells.
+        Of the cut that ends.
+    zero : ZeroPoints
+    points : (q,) int array
+        Numbers of points of its plane past its end.
+    size : (q,) float array
+        Of the cells in which they lie, in metres.
     """
-    positions, values = partition.points.positions, partition.points.values
-    reached = np.zeros(points.shape, dtype=bool)
-    row = np.arange(len(points))
-    deepest = depth.argmax(axis=1)
-    start, inner = positions[points[row, deepest]], depth[row, deepest]
-    for corner in range(points.shape[1]):
-        past = depth[:, corner] < -AT_END * size[:, 0]
-        share = np.where(past, inner / np.where(past, inner - depth[:, corner], 1.0), 0.0)
-        end = start + share[:, None] * (positions[points[:, corner]] - start)
-        level, left = level_and_depth(cuts[index], end)
-        off = AT_END * size[:, 0] + np.abs(level) + np.abs(left)
-        for other, cut in enumerate(cuts):
-            rows = np.flatnonzero(
-                past & dividing[:, other] & (values[points[:, corner], other] == 0.0)
-            )
-            if other == index or len(rows) == 0:
-                continue
-            there, inside = level_and_depth(cut, end[rows])
-            before = level_and_depth(cut, start[rows])[0]
-            on = (np.abs(there) <= off[rows]) | (before * there < 0.0)
-            reached[rows, corner] |= on & (inside >= -off[rows])
-    return reached
+    found = np.zeros(len(points), dtype=bool)
+    at, realised = zero.positions[points], zero.values[points]
+    near = np.abs(realised) <= size[:, None]
+    near[:, index] = False
+    for other in np.flatnonzero(near.any(axis=0)):
+        cut = cuts[other]
+        given = level_and_depth(cut, at)[0]
+        between = near[:, other] & (given * realised[:, other] <= 0.0)
+        between &= np.abs(given - realised[:, other]) > AT_END * size
+        rows = np.flatnonzero(between & ~found)
+        if len(rows) == 0:
+            continue
+        end, inwards = _end(cuts[index], at[rows], size[rows])
+        off = AT_END * size[rows] + np.abs(level_and_depth(cuts[index], end)[0])
+        level, depth = level_and_depth(cut, end)
+        before = level_and_depth(cut, end + _ASIDE * size[rows, None] * inwards)[0]
+        found[rows] = (np.abs(level) <= off) & (depth >= -off) & (before * given[rows] < 0.0)
+    return found
+
+
+def _end(cut: Cut, points: _Floats, size: _Floats) -> tuple[_Floats, _Floats]:
+    """Nearest end (q, space) of a cut to points past it, and the direction from there to it."""
+    step = _ASIDE * size
+    slope = np.empty_like(points)
+    for axis, unit in enumerate(np.eye(points.shape[1])):
+        ahead, behind = (cut.depth(points + way * step[:, None] * unit) for way in (0.5, -0.5))
+        slope[:, axis] = (ahead - behind) / step
+    length = np.linalg.norm(slope, axis=1)
+    slope /= np.where(length > 0.0, length, 1.0)[:, None]
+    return points - cut.depth(points)[:, None] * slope, slope

@@ -29,7 +29,13 @@ from verify.xfem.given_arrays import real_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.splitting.bisection import Simplices, bisect_at
 from verify.xfem.splitting.clipping import staircase
-from verify.xfem.splitting.junctions import joint_cuts, meeting_cells, tied_pieces, without_specks
+from verify.xfem.splitting.junctions import (
+    joint_cuts,
+    meeting_cells,
+    reached,
+    tied_pieces,
+    without_specks,
+)
 from verify.xfem.splitting.partition import Partition
 from verify.xfem.splitting.split_kernels import (
     crossed_cells,
@@ -117,7 +123,7 @@ def split_cells(
     # what all cuts part together they part when some of them are not open yet, too
     free = rules._replace(held=None, opened=None)
     alone, ends = (partition, ends) if opened is None else divided(crossed, free)
-    meets = meeting_cells(alone, ends, len(mesh.cells))
+    meets = meeting_cells(alone, ends, len(mesh.cells), joint)
     suspects = np.flatnonzero(meets.any(axis=1))
     if len(suspects) == 0:
         return _only_split(partition)
@@ -238,7 +244,15 @@ def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partitio
         size=rules.sizes[parent[piece]],
         pieces=len(parent),
     )
-    active, ending = crossed_through(rules.cuts[index], points.positions, crossing, rules.tip)
+    further = None
+    if rules.tip == "inside" and len(rules.cuts) > 1:
+
+        def further(past: _Ints, size: _Floats) -> NDArray[np.bool_]:
+            return reached(rules.cuts, index, points, past, size)
+
+    active, ending = crossed_through(
+        rules.cuts[index], points.positions, crossing, rules.tip, further
+    )
     meets = np.bincount(piece, minlength=len(active)) > 0
     if rules.through is not None:
         active |= meets & rules.through[parent, index]

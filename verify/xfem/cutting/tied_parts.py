@@ -1,0 +1,74 @@
+"""Pieces of a growing body that no cut keeps apart, though planes of cuts divide them."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from verify.xfem.arrays.growing_array import GrowingArray
+
+__all__ = ["TiedParts"]
+
+_Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+
+
+class TiedParts:
+    """Which stored pieces are tied: see `verify.xfem.splitting.junctions`.
+
+    Parameters
+    ----------
+    cells : int
+        Number of cells, of which each is a piece.
+
+    Attributes
+    ----------
+    joint : (m,) bool array
+        Cells that several cuts have parted together.
+    """
+
+    def __init__(self, cells: int) -> None:
+        self.joint = np.zeros(cells, dtype=bool)
+        self._part = GrowingArray(np.arange(cells))
+
+    def still(self, tied: _Ints, old: _Ints) -> _Ints:
+        """Those of the pairs (t, 2) of new pieces that have not been apart before.
+
+        `old` (p,) is the stored piece of each new one, -1 if it has none.
+        """
+        first, second = old[tied].T
+        same = self._part.rows[first] == self._part.rows[second]
+        return tied[same & (first >= 0) & (second >= 0)]
+
+    def parted(self, tied: _Ints, old: _Ints) -> _Bools:
+        """Which new pieces (p,) come from a part that is several by now."""
+        now = _components(len(old), tied)
+        known = np.flatnonzero(old >= 0)
+        before = np.unique(self._part.rows[old[known]], return_inverse=True)[1]
+        pairs = np.unique(np.stack([before, now[known]]), axis=1)
+        found = np.zeros(len(old), dtype=bool)
+        found[known] = (np.bincount(pairs[0]) > 1)[before]
+        return found
+
+    def store(self, tied: _Ints, cell: _Ints, place: _Ints, count: int) -> None:
+        """Take over new pieces, stored at `place` (p,), -1 if not at all.
+
+        Parameters
+        ----------
+        tied : (t, 2) int array
+        cell, place : (p,) int array
+        count : int
+            Number of stored pieces.
+        """
+        self._part.append(np.arange(len(self._part), count))
+        now = _components(len(place), tied)
+        stored = np.flatnonzero(place >= 0)
+        leader = np.full(len(place), count)
+        np.minimum.at(leader, now[stored], place[stored])
+        self._part.rows[place[stored]] = leader[now[stored]]
+        self.joint[cell[tied[:, 0]]] = True
+
+
+def _components(count: int, pairs: _Ints) -> _Ints:
+    graph = coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
