@@ -9,8 +9,10 @@ from test_sliver_policies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
+from verify.methods.virtual_nodes import virtual_node
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
 from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh
@@ -179,3 +181,28 @@ def test_a_stroke_that_goes_on_past_a_junction_parts_what_was_one():
     for time, parts in ((2.0, 2), (3.0, 3)):
         cutter.advance(time)
         assert cutter.virtual_mesh().bodies.max() + 1 == parts
+
+
+@pytest.mark.parametrize("policy", ["merge", "drop"])
+def test_pieces_that_no_cut_keeps_apart_are_slivers_together_or_not_at_all(policy):
+    """A fork just inside an edge: planes past the point cut thin pieces off thick parts."""
+    mesh = rectangle_mesh((4, 4))
+    point = np.array([0.375, 0.5 + 1e-4])
+    cuts = fork(point, np.array([0.3, 2.2, 4.5]))
+    virtual = cut_mesh(mesh, cuts)
+    assert virtual.fraction.min() < 1e-3
+    cell = virtual.parent[virtual.fraction.argmin()]
+    assert len(np.unique(virtual.part[virtual.parent == cell])) == 3
+    treated, report = treat_slivers(virtual, policy)
+    assert treated.bodies.max() + 1 == 3
+    # only what is dropped goes to another part
+    moved = report.volume_share if policy == "drop" else 0.0
+    np.testing.assert_allclose(areas(treated.corners), areas(virtual), atol=moved + 1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_cells_copied_for_parts_with_a_node_keep_the_sectors_of_a_fork_apart(seed):
+    rng = np.random.default_rng([11, seed])
+    mesh = shaken(rectangle_mesh((5, 5)), seed)
+    body = virtual_node(mesh, fork(rng.uniform(0.35, 0.65, 2), sectors(rng, 3)))
+    assert body.virtual.bodies.max() + 1 == 3

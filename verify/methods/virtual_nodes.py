@@ -102,19 +102,22 @@ def _parts_with_nodes(cut: VirtualMesh) -> NDArray[np.int64]:
     """
     sign = np.where(cut.level_sets[cut.mesh.cells[cut.parent]] >= 0.0, 1, -1)
     label = cut.label[:, None, :]
+    part = cut.part
     has_node = ((label == 0) | (label == sign)).all(axis=2).any(axis=1)
+    has_node = (np.bincount(part, has_node, minlength=len(part)) > 0)[part]
     into = np.arange(len(cut.cells))
     if has_node.all():
         return into
     without = np.flatnonzero(~has_node)
     host = np.full(len(cut.mesh.cells), -1)
-    order = np.lexsort([cut.fraction, has_node])
+    order = np.lexsort([cut.part_fraction, has_node])
     host[cut.parent[order]] = order
     into[without] = host[cut.parent[without]]
     first, second, area = sibling_contacts(cut, cut.parent[without])
     fits = ~has_node[first] & has_node[second]
-    pairs, back = np.unique(np.stack([first, second])[:, fits], axis=1, return_inverse=True)
+    pairs, back = np.unique(np.stack([part[first], second])[:, fits], axis=1, return_inverse=True)
     total = np.bincount(back.ravel(), area[fits], minlength=pairs.shape[1])
     best = np.lexsort([total, pairs[0]])
     into[pairs[0][best]] = pairs[1][best]
+    into[without] = into[part[without]]
     return into

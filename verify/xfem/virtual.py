@@ -182,6 +182,25 @@ class VirtualMesh:
         return np.bincount(self.sub_cells.piece, minlength=len(self.cells)) > 0
 
     @cached_property
+    def part(self) -> _Ints:
+        """(p,) first of the pieces of a cell that have all unknowns in common: together one part.
+
+        Where cuts end on one another they leave pieces that none keeps apart.
+        """
+        part = np.arange(len(self.cells))
+        rows = np.flatnonzero(self.split)
+        keys = np.concatenate([self.parent[rows, None], self.cells[rows]], axis=1)
+        _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        part[rows] = rows[first[number.ravel()]]
+        return part
+
+    @cached_property
+    def part_fraction(self) -> _Floats:
+        """(p,) share of the part of each piece in the volume of its cell."""
+        total = np.bincount(self.part, self.fraction, minlength=len(self.part))
+        return np.asarray(total[self.part])
+
+    @cached_property
     def piece_side(self) -> NDArray[np.int8]:
         """(p, cuts) side of each cut on which a piece lies, whether split by it or not."""
         corners, sub = self.mesh.cells[self.parent], self.sub_cells

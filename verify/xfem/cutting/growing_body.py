@@ -261,7 +261,7 @@ class GrowingBody:
         if orphan >= 0:
             # a piece on one side of a cut that does not split it is part of what is on that side
             side = label.copy()
-            side[:, numbers] = _sides(partition)
+            side[:, numbers] = partition.sides
             orphan = match_pieces(cell, label, side, solid, *store, old, changed)
         if orphan >= 0:
             # what had no volume was left out, and rounded otherwise it must not come back
@@ -388,15 +388,3 @@ def _among(values: _Ints, ascending: _Ints) -> NDArray[np.bool_]:
     """Whether each value is one of some ascending ones, of which there is at least one."""
     place = np.searchsorted(ascending, values)
     return ascending[np.minimum(place, len(ascending) - 1)] == values
-
-
-def _sides(partition: Partition) -> NDArray[np.int8]:
-    """(p, cuts) side of each cut on which a piece lies, 0 if it lies on both."""
-    side = partition.label.copy()
-    plus = partition.points.values[partition.sub_points] >= 0.0
-    for cut in range(side.shape[1]):
-        above = np.bincount(partition.sub_piece, plus[:, :, cut].any(axis=1), len(side)) > 0
-        below = np.bincount(partition.sub_piece, ~plus[:, :, cut].all(axis=1), len(side)) > 0
-        whole = partition.label[:, cut] == 0
-        side[whole, cut] = above[whole].astype(np.int8) - below[whole].astype(np.int8)
-    return side

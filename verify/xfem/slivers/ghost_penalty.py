@@ -68,7 +68,10 @@ class GhostPenalty:
         lam, mu = material.of_cells(len(virtual.mesh.cells))
         self.virtual, self.factor = virtual, factor
         pieces = np.stack(face_contacts(virtual, near=True))
-        pieces = pieces[:, virtual.split[pieces].any(axis=0)]
+        counts_once = virtual.split[pieces].any(axis=0) & (virtual.part[pieces] == pieces).all(
+            axis=0
+        )
+        pieces = pieces[:, counts_once]
         mesh, cells = virtual.mesh, virtual.parent[pieces]
         local = (mesh.neighbours[cells[0]] == cells[1][:, None]).argmax(axis=1)
         there = (mesh.neighbours[cells[1]] == cells[0][:, None]).argmax(axis=1)

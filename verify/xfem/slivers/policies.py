@@ -117,9 +117,10 @@ def treat_slivers(
             f"held nodes: {kept_nodes.dtype} array of shape {kept_nodes.shape}; expected bool and "
             f"({virtual.node_count},)"
         )
-    small = virtual.fraction < threshold
+    small = virtual.part_fraction < threshold
     # a cell of many pieces keeps its largest one whatever its size
-    small[_largest_siblings(virtual)] = False
+    largest = np.isin(virtual.part, virtual.part[_largest_siblings(virtual)])
+    small[largest] = False
     nothing = np.zeros_like(small)
     treated, dropped, following, rootless = virtual, nothing, nothing, nothing
     extension, node = csr_array(identity(virtual.node_count)), np.arange(virtual.node_count)
@@ -156,7 +157,7 @@ def _bridges(virtual: VirtualMesh, contacts: tuple[_Ints, _Ints], small: _Bools)
 
 def _largest_siblings(virtual: VirtualMesh) -> _Ints:
     """Return the largest piece of each cell."""
-    parent, fraction = virtual.parent, virtual.fraction
+    parent, fraction = virtual.parent, virtual.part_fraction
     most = np.maximum.reduceat(fraction, np.flatnonzero(np.diff(parent, prepend=-1)))
     candidates = np.flatnonzero(fraction == most[parent])
     largest: _Ints = candidates[np.diff(parent[candidates], append=-1) != 0]
@@ -171,13 +172,15 @@ def _siblings(virtual: VirtualMesh, small: _Bools) -> _Ints:
     into = np.arange(len(small))
     into[small] = largest[virtual.parent[small]]
     first, second, area = sibling_contacts(virtual, virtual.parent[small])
-    upward = small[first] & (virtual.fraction[second] > virtual.fraction[first])
-    first, second, area = first[upward], second[upward], area[upward]
+    share = virtual.part_fraction
+    upward = small[first] & (share[second] > share[first])
+    first, second, area = virtual.part[first[upward]], second[upward], area[upward]
     pairs, back = np.unique(np.stack([first, second]), axis=1, return_inverse=True)
     total = np.bincount(back.ravel(), area, minlength=pairs.shape[1])
     order = np.lexsort([total, pairs[0]])
     last = np.diff(pairs[0][order], append=-1) != 0
     into[pairs[0][order[last]]] = pairs[1][order[last]]
+    into[small] = into[virtual.part[small]]
     return _followed_to_the_end(into)
 
 

@@ -58,6 +58,18 @@ class Partition:
         return np.bincount(self.sub_piece, self.sub_fraction, minlength=len(self.parent))
 
     @property
+    def sides(self) -> NDArray[np.int8]:
+        """(p, cuts) side of each cut on which a piece lies, 0 if it lies on both."""
+        side = self.label.copy()
+        plus = self.points.values[self.sub_points] >= 0.0
+        for cut in range(side.shape[1]):
+            above = np.bincount(self.sub_piece, plus[:, :, cut].any(axis=1), len(side)) > 0
+            below = np.bincount(self.sub_piece, ~plus[:, :, cut].all(axis=1), len(side)) > 0
+            whole = self.label[:, cut] == 0
+            side[whole, cut] = above[whole].astype(np.int8) - below[whole].astype(np.int8)
+        return side
+
+    @property
     def simplices(self) -> tuple[_Ints, _Ints, _Floats, _Floats, NDArray[np.int8]]:
         """Piece, points, barycentric corners, share and sign of the sub-simplices."""
         return (
