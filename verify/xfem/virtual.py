@@ -306,7 +306,7 @@ def cut_mesh(
     Notes
     -----
     A branch ends on the *realised* cut from which it leaves, which for a curved cut is off the
-    given one by O(h²): let the branch start a little behind its stem.
+    given one by O(h²). It goes on to there over elements in which the given stem lies in between.
     """
     partition = split_cells(mesh, cuts, tip, opened=opened)
     fraction = partition.fraction

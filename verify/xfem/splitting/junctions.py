@@ -192,7 +192,7 @@ def reached(
     at, realised = zero.positions[points], zero.values[points]
     near = np.abs(realised) <= size[:, None]
     near[:, index] = False
-    for other in np.flatnonzero(near.any(axis=0)):
+    for other in np.flatnonzero(near.any(axis=0)).tolist():
         cut = cuts[other]
         given = level_and_depth(cut, at)[0]
         between = near[:, other] & (given * realised[:, other] <= 0.0)
