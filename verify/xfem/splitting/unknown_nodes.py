@@ -165,6 +165,8 @@ def _write_sides(level_sets, node_parent, cells, label, rows, side_of_row, share
         for cut in range(cuts):
             if side[node, cut] == 0 or side[node, cut] == disagreed:
                 says = vote[node, cut]
-                if node < len(level_sets) or says == 0.0:
-                    says = level_sets[node_parent[node], cut]
+                level = level_sets[node_parent[node], cut]
+                # a node exactly on the cut has its material where its pieces are
+                if says == 0.0 or (node < len(level_sets) and level != 0.0):
+                    says = level
                 side[node, cut] = 1 if says >= 0.0 else -1
