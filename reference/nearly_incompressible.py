@@ -23,7 +23,7 @@ from verify.scene import Material, Scene
 
 __all__ = ["LEAST_POISSON", "saddle_form", "solve_mixed", "wants_pressure"]
 
-# Poisson's ratio from which the pressure pays, measured: docs/reference-in-space.md
+# Poisson's ratio from which the pressure pays, measured: docs/theory/reference.md
 LEAST_POISSON = 0.45
 # unknowns in space up to which the saddle point is factorised
 _MOST_DIRECT = 60_000

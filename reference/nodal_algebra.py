@@ -25,7 +25,7 @@ __all__ = ["NodalMatrix", "NodalSolver", "assembled_matrix", "nodal_forces", "no
 Array = NDArray[np.float64]
 _MOST = 10_000  # iterations
 _LEFT = 1e-12  # of a right side, by conjugate gradients: one solution for a linear step
-# in ns, for a solid of n unknowns whose matrix has e entries (docs/reference-in-space.md): an
+# in ns, for a solid of n unknowns whose matrix has e entries (docs/theory/reference.md): an
 # iteration per entry, a factorisation per n² and a solution by it per n^(4/3)
 _ITERATION, _FACTORISATION, _SOLUTION = 2.0, 2.0, 40.0
 _SOLVERS = {"definite": direct_solver, "symmetric": symmetric_solver, "general": general_solver}

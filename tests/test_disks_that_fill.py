@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 from small_disk import by_command, in_this_process, named_until_it_fits, small_disk
 
-from verify.anatomy.store import write_patch
+from verify.simulator.anatomy.store import write_patch
 from verify.compare.locate import SolutionField
-from verify.replay import animation
-from verify.replay.stroke_file import write_stroke
+from verify.simulator import animation
+from verify.simulator.stroke_file import write_stroke
 from verify.report.blocks import Drawing
 from verify.report.template_sets import PICTURES, Beside
 from verify.result import CaseResult, write_result

@@ -45,12 +45,12 @@ def examples(tmp_path):
     """A folder with the example files and the case of the page."""
     for file in (DOCS / "examples").glob("*.py"):
         (tmp_path / file.name).write_text(file.read_text())
-    (tmp_path / "square.toml").write_text(blocks("extending.md", "toml")[0])
+    (tmp_path / "square.toml").write_text(blocks("guide/your-solver.md", "toml")[0])
     return tmp_path
 
 
 def test_the_page_shows_the_example_files_as_they_are():
-    shown = set(blocks("extending.md", "python"))
+    shown = set(blocks("guide/your-solver.md", "python"))
     files = {file.name: file.read_text() for file in (DOCS / "examples").glob("*.py")}
     assert set(files.values()) == shown
 
@@ -63,7 +63,7 @@ def test_the_solver_of_the_page_has_less_than_forty_lines():
 @needs_skfem
 def test_every_command_on_extending_succeeds_in_order(examples):
     said = {}
-    for line in commands("extending.md"):
+    for line in commands("guide/your-solver.md"):
         done = run(line, examples)
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
         said[line.split()[1]] = done.stdout
@@ -120,7 +120,7 @@ def test_the_entry_point_of_the_page_makes_an_exact_solution_a_case_can_name(exa
     unknown = run("verify check bending.toml", examples)
     assert unknown.returncode == 2
     assert "no exact solution 'stretched_plate'" in unknown.stderr
-    register(examples, blocks("extending.md", "toml")[-1])
+    register(examples, blocks("guide/your-solver.md", "toml")[-1])
     assert "stretched_plate" in run("verify list --exact", examples).stdout
     # quadratic in x and y: P1 errs with order 1 in the energy norm
     done = run("verify run bending.toml --solver xfem --out run --repetitions 1", examples)
@@ -133,14 +133,14 @@ def test_the_entry_point_of_the_page_makes_an_exact_solution_a_case_can_name(exa
 
 @needs_skfem
 def test_the_entry_point_of_the_page_gives_the_solver_a_short_name(examples):
-    register(examples, blocks("extending.md", "toml")[1])
+    register(examples, blocks("guide/your-solver.md", "toml")[1])
     done = run("verify conform skfem --check cut-patch", examples)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("cut-patch  kept")
 
 
 def test_every_command_on_regression_succeeds_in_order(tmp_path):
-    for line in commands("regression.md"):
+    for line in commands("guide/regression.md"):
         done = run(line, tmp_path)
         # what is undecided about speed depends on the machine: the page says so
         allowed = (0, 5) if "--strict" in line else (0, 1) if " check " in line else (0,)
@@ -155,7 +155,7 @@ def test_the_marked_test_of_the_page_passes(pytester):
 
     installed = {point.value for point in entry_points(group="pytest11")}
     plugin = [] if "verify.pytest_plugin" in installed else ["-p", "verify.pytest_plugin"]
-    pytester.makepyfile(blocks("regression.md", "python")[0])
+    pytester.makepyfile(blocks("guide/regression.md", "python")[0])
     result = pytester.runpytest_inprocess(*plugin, "-p", "no:cacheprovider", "-p", "no:xdist")
     checks = result.parseoutcomes()
     assert set(checks) <= {"passed", "skipped", "warnings"}

@@ -27,8 +27,8 @@ from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, f
 from verify.compare.overlap import OverlapSearch
 from verify.compare.simplices import simplices
 from verify.compile_times import compile_times
-from verify.replay.session import Session
-from verify.replay.stage import Stage
+from verify.simulator.session import Session
+from verify.simulator.stage import Stage
 from verify.solution import Solution
 from verify.threads import ONE_THREAD
 from verify.xfem.corotation import InternalForce
@@ -42,7 +42,7 @@ from verify.xfem.dynamics import (
 )
 from verify.xfem.elasticity import State, isotropic
 from verify.xfem.loads import body_force
-from verify.xfem.mapping.pull_back import pull_back
+from verify.simulator.mapping.pull_back import pull_back
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import treat_slivers

@@ -120,7 +120,7 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark)
     Nodes, places, gradients, moduli and vectors read once, rotations read and written, the matrix
     written once (`Linearisation.least_traffic`): 400 bytes for each tetrahedron. A fifth is the
     aim; seen are 0.17, 0.18, 0.19 and 0.23 on a quiet machine, and 0.14 to 0.19 when others use
-    the memory too (docs/xfem-linear-solvers.md).
+    the memory too (docs/theory/linear-solvers.md).
     """
     virtual, pattern, force, blocks, _ = system()
     displacement = np.zeros_like(virtual.node_points)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGES = ["writing-a-case.md", "cli.md"]
+PAGES = ["guide/write-a-case.md", "guide/cli.md"]
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -36,7 +36,7 @@ def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
-    (tmp_path / "my_case.toml").write_text(blocks("writing-a-case.md", "toml")[0], encoding="utf-8")
+    (tmp_path / "my_case.toml").write_text(blocks("guide/write-a-case.md", "toml")[0], encoding="utf-8")
     lines = [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
     assert len(lines) >= 3
     for line in lines:

@@ -9,8 +9,8 @@ from verify.compare.motion import ExactMotion
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.study.blade_intensity import blade_front, blade_intensity
-from verify.study.stress_intensity import intensity_defect
+from verify.assess.blade_intensity import blade_front, blade_intensity
+from verify.assess.stress_intensity import intensity_defect
 
 
 def _strip(speed, angle, upwards=True):

@@ -66,7 +66,7 @@ def test_lock_holds_no_address_option_or_path(lock):
 
 
 def test_every_direct_dependency_says_its_licence_in_the_guide():
-    guide = (ROOT / "docs/install.md").read_text()
+    guide = (ROOT / "docs/guide/install.md").read_text()
     table = guide.split("\n## Licences\n")[1].split("\n## ")[0]
     first_column = " ".join(row.split("|")[1] for row in table.splitlines() if row.startswith("|"))
     words = {normal(word) for word in re.findall(r"[\w.-]+", first_column)}

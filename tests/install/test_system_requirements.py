@@ -92,5 +92,5 @@ def test_dolfinx_wheel_needs_glibc_2_34(requirements, libc, fits):
 
 def test_the_guide_gives_the_same_apt_line(requirements):
     packages = {package for package, _ in requirements.LIBRARIES.values()} | {"gcc", "libc6-dev"}
-    guide = (ROOT / "docs/install.md").read_text()
+    guide = (ROOT / "docs/guide/install.md").read_text()
     assert f"\n{requirements.apt_line(packages)}\n" in guide

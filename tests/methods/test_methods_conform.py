@@ -5,7 +5,7 @@ import pytest
 from verify.conformance import State, conform
 
 # A cut that loses material, a body without its cut and springs are wrong by construction; the
-# reasons are in docs/methods.md.
+# reasons are in docs/theory/methods.md.
 LOSES_MATERIAL = {
     "rigid-translation-2d", "rigid-rotation-2d", "rigid-translation-3d", "rigid-rotation-3d",
     "finite-rotation-2d", "finite-rotation-3d", "parted-3d",

@@ -9,7 +9,7 @@ from pathlib import Path
 from verify.methods import METHODS
 from verify.solvers import find_solver
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "methods.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "theory" / "methods.md"
 
 
 def blocks(language):

@@ -7,7 +7,7 @@ from reference_scenes import areas, exterior_facets, needs_fenicsx, polyline, sq
 from reference.exact import exact_solution
 from verify.errors import InputError
 from verify.scene import load_scene
-from verify.study.richardson import extrapolate
+from verify.assess.richardson import extrapolate
 
 pytestmark = needs_fenicsx
 

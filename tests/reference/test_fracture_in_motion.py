@@ -179,8 +179,8 @@ class TestOnTheReference:
     def test_the_stated_uncertainty_of_a_suddenly_opened_crack_covers_the_exact_factor(self, angle):
         from verify.compare.body import body_of
         from verify.compare.hooke import law_of
-        from verify.study.quantities import Measured
-        from verify.study.reference import known_quantity, size_of
+        from verify.assess.quantities import Measured
+        from verify.assess.reference import known_quantity, size_of
 
         scene = opened_suddenly(angle)
         body, law = body_of(scene), law_of(scene)

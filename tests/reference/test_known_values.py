@@ -138,7 +138,7 @@ def factors(name, level=None):
 def test_intensities_energies_and_openings_are_the_known_ones(name):
     from verify.compare.body import body_of
     from verify.compare.hooke import hooke
-    from verify.study.quantities import Measured
+    from verify.assess.quantities import Measured
 
     known = VALUES[name]
     pairs = factors(name)

@@ -12,7 +12,7 @@ from verify.compare.kinetic import kinetic
 from verify.result import SolveRecord, Status
 from verify.scene import Material, load_scene
 from verify.solvers import find_solver
-from verify.study.accuracy import assess_accuracy
+from verify.assess.accuracy import assess_accuracy
 from verify.xfem.structured_meshes import rectangle_mesh
 
 pytestmark = needs_fenicsx
@@ -111,7 +111,7 @@ def test_the_lips_of_a_tear_fly_apart_with_the_elastic_wave(name, off):
     """Without lateral contraction the motion is linear along the band at any stretch."""
     from verify.compare.body import body_of
     from verify.compare.hooke import law_of
-    from verify.study.quantities import Measured
+    from verify.assess.quantities import Measured
 
     scene = load_scene("dynamics/membrane_torn")
     level = 1 if name == "reference" else 0

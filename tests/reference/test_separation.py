@@ -5,7 +5,7 @@ import pytest
 from reference_scenes import areas, energy_of, needs_fenicsx, polyline, square
 
 from verify.errors import InputError
-from verify.study.richardson import extrapolate
+from verify.assess.richardson import extrapolate
 
 pytestmark = needs_fenicsx
 

@@ -13,8 +13,8 @@ from verify.report import render
 from verify.report.figures.style import Palette
 from verify.scene import Material
 from verify.solution import Solution
-from verify.study.motion_account import motion_account
-from verify.study.motion_history import motion_history
+from verify.assess.motion_account import motion_account
+from verify.assess.motion_history import motion_history
 
 TIMES = [0.0, 0.25, 0.5, 0.75, 1.0]
 

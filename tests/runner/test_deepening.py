@@ -15,7 +15,7 @@ from verify.runner.deepening import further_level
 from verify.runner.job import Job
 from verify.runner.plan import CasePlan
 from verify.scene import Scene, load_scene
-from verify.study.sufficiency import sufficiency
+from verify.assess.sufficiency import sufficiency
 
 MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
 

@@ -9,7 +9,7 @@ import pytest
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
 
-GUIDE = Path(__file__).resolve().parents[2] / "docs" / "writing-a-case.md"
+GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "write-a-case.md"
 BLOCKS = re.findall(r"^```toml\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.M | re.S)
 TITLES = [re.search(r'^title = "(.*)"', text, re.M) for text in BLOCKS]
 # a block without a title is a part of a case

@@ -15,7 +15,7 @@ from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
 from verify.solvers.xfem_scene import background_mesh
 from verify.study.budget import CutEnd, cut_ends
-from verify.study.quantities import Measured
+from verify.assess.quantities import Measured
 
 __all__ = ["Crack", "Off", "crack_scene"]
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from verify.errors import InputError
 from verify.result import SolveRecord, Status
-from verify.study.accuracy import assess_accuracy
+from verify.assess.accuracy import assess_accuracy
 from verify.verdict import with_verdicts
 
 

@@ -7,7 +7,7 @@ from judged_fields import Cubic, judged
 
 from verify.errors import InputError
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
-from verify.study.accuracy import assess_accuracy
+from verify.assess.accuracy import assess_accuracy
 from verify.verdict import with_verdicts
 
 
@@ -240,7 +240,7 @@ def test_a_solution_beside_the_body_is_not_measured_but_named():
 
 
 def test_a_solution_that_cannot_be_compared_costs_nobody_else_a_verdict(monkeypatch):
-    import verify.study.accuracy as accuracy
+    import verify.assess.accuracy as accuracy
 
     real = accuracy.Measured
 

@@ -15,7 +15,7 @@ from verify.report.bodies import deformed_body, error_body
 from verify.result import Verdict
 from verify.runner.error_field import nodal_error, write_error_field
 from verify.scene import load_scene
-from verify.study.budget.scenes import with_kinematics
+from verify.assess.changed_scenes import with_kinematics
 
 CASE = """
 title = "a sheet"

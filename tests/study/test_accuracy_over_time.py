@@ -8,7 +8,7 @@ from cut_meshes import STRAIGHT, layered, scene
 
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
 from verify.solution import Solution
-from verify.study.accuracy import assess_accuracy
+from verify.assess.accuracy import assess_accuracy
 from verify.verdict import with_verdicts
 
 DURATION = 2.0

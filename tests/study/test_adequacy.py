@@ -11,8 +11,8 @@ from verify.result import NoticeKind
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, scene_hash
 from verify.solvers import find_solver
-from verify.study.accuracy import assess_accuracy
-from verify.study.adequacy import adequacy_notice, other_scene
+from verify.assess.accuracy import assess_accuracy
+from verify.assess.adequacy import adequacy_notice, other_scene
 
 CASE = {
     "title": "t",

@@ -10,7 +10,7 @@ from verify.result import Verdict
 from verify.scene import load_scene
 from verify.study.budget import Candidate, cheapest_adequate, error_budget, on_realised_cut
 from verify.study.budget.budget import Answer
-from verify.study.budget.realised_cut import polylines_of, triangles_of
+from verify.assess.realised_cut import polylines_of, triangles_of
 
 
 class Affine:

@@ -10,7 +10,7 @@ from verify.errors import InputError
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.study.closing import with_openings
+from verify.assess.closing import with_openings
 
 SHARED = """
 title = "A square, cut through"

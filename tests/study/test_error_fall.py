@@ -8,7 +8,7 @@ import pytest
 
 from verify.compare.body import body_of
 from verify.scene import Scene, load_scene
-from verify.study.error_fall import error_fall
+from verify.assess.error_fall import error_fall
 
 
 def on_an_arc(facets):

@@ -17,7 +17,7 @@ from verify.study.measured_scenes import Measurement, measured_scenes
 from verify.study.slivers.findings import findings
 from verify.study.variants import variant_of
 
-GUIDE = Path(__file__).parents[2] / "docs" / "studies.md"
+GUIDE = Path(__file__).parents[2] / "docs" / "guide" / "studies.md"
 COMMANDS = re.findall(r"^\$ verify (study (?:slivers|energy) .*)$", GUIDE.read_text(), re.MULTILINE)
 
 

@@ -10,11 +10,11 @@ from verify.compare.hooke import law_of
 from verify.compare.separated import boundary_nodes, separated_parts
 from verify.scene import PartQuantity, Scene
 from verify.solution import Solution
-from verify.study import energy_account
-from verify.study.energy_account import account_metrics
-from verify.study.motion_account import motion_account
-from verify.study.part_account import part_metrics, part_records
-from verify.study.quantities import Measured, unit_of
+from verify.assess import energy_account
+from verify.assess.energy_account import account_metrics
+from verify.assess.motion_account import motion_account
+from verify.assess.part_account import part_metrics, part_records
+from verify.assess.quantities import Measured, unit_of
 
 # what a blade releases is measured elsewhere
 ACCOUNT = [name for name in energy_account.ACCOUNT if not name.startswith("released")]

@@ -1,6 +1,6 @@
 import pytest
 
-from verify.study.rates import observed_rate
+from verify.assess.rates import observed_rate
 
 H = [0.4, 0.2, 0.1, 0.05]
 

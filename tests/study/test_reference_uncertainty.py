@@ -13,8 +13,8 @@ from verify.compare.jump_error import jump_error
 from verify.compare.slabs import area_rule
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
-from verify.study.quantities import Measured
-from verify.study.reference import conforming_reference, exact_reference
+from verify.assess.quantities import Measured
+from verify.assess.reference import conforming_reference, exact_reference
 
 pytestmark = pytest.mark.fenicsx
 

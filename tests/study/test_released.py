@@ -10,8 +10,8 @@ from verify.report.released_line import released_line
 from verify.result import Metric, SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.study.motion_account import motion_account
-from verify.study.released import advance, released_metrics
+from verify.assess.motion_account import motion_account
+from verify.assess.released import advance, released_metrics
 
 POINTS = np.array([[0, 0], [2, 0], [2, 1], [0, 1]], dtype=float)
 CELLS = np.array([[0, 1, 2], [0, 2, 3]])

@@ -12,9 +12,9 @@ from verify.result import Metric, SolveRecord, Status
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
-from verify.study.quantities import Measured, unit_of
-from verify.study.reference import conforming_reference, exact_reference
-from verify.study.unavailable import unavailable_quantities
+from verify.assess.quantities import Measured, unit_of
+from verify.assess.reference import conforming_reference, exact_reference
+from verify.assess.unavailable import unavailable_quantities
 
 ASKED = [
     {"kind": "stress_intensity", "name": f"K_{mode} at the {end}", "end": end, "mode": mode}

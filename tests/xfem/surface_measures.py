@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.mapping.moving_surface import MovingSurface
+from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["enclosed_by_body", "loose_edges", "pinched_edges", "volume_by_body"]

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verify.xfem.collision.bounding_tree import BoundingTree
-from verify.xfem.collision.simplex_kernels import nearest_on_facet
-from verify.xfem.collision.surface_collider import SurfaceCollider
+from verify.simulator.collision.bounding_tree import BoundingTree
+from verify.xfem.cuts.simplex_kernels import nearest_on_facet
+from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.xfem.cuts import ToolPath
-from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
-from verify.xfem.mapping.body_surface import BodySurface
+from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 

@@ -15,8 +15,8 @@ from random_strokes import meshes, strokes
 from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 
 from verify.xfem.cuts import ToolPath
-from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.mapping.body_surface import BodySurface
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 

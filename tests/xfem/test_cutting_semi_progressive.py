@@ -5,7 +5,7 @@ import pytest
 from cut_comparison import assert_same_cut
 
 from verify.xfem.cuts import ToolPath
-from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

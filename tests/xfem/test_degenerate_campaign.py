@@ -10,8 +10,8 @@ from cut_comparison import assert_same_cut
 from degenerate_strokes import body, strokes
 from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 
-from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.mapping.body_surface import BodySurface
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.virtual import cut_mesh
 
 STROKES = 4  # a body; each one meets what those before have left

@@ -13,7 +13,7 @@ from verify.xfem.cuts import (
     ToolPath,
     TriangulatedSurface,
 )
-from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import in_one_go

@@ -11,7 +11,7 @@ from xfem_bodies import zero_modes
 
 from verify.methods.virtual_nodes import virtual_node
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
-from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide

@@ -7,12 +7,12 @@ import pytest
 from surface_measures import loose_edges
 
 from verify.xfem.cuts import ToolPath
-from verify.xfem.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.errors import XfemError
-from verify.xfem.mapping.alternative_mesh import virtual_elements
-from verify.xfem.mapping.body_surface import BodySurface
-from verify.xfem.mapping.embedded_surface import EmbeddedSurface
-from verify.xfem.mapping.pull_back import pull_back
+from verify.simulator.mapping.alternative_mesh import virtual_elements
+from verify.simulator.mapping.body_surface import BodySurface
+from verify.simulator.mapping.embedded_surface import EmbeddedSurface
+from verify.simulator.mapping.pull_back import pull_back
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 PATHS = [

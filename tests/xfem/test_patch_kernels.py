@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from verify.xfem.cutting.renumber_kernels import simplices_of
-from verify.xfem.mapping.near_facet_kernels import concerned_facets, levels_at
+from verify.simulator.cutting.renumber_kernels import simplices_of
+from verify.simulator.mapping.near_facet_kernels import concerned_facets, levels_at
 from verify.xfem.splitting.joining_kernels import patch_around
 from verify.xfem.structured_meshes import box_mesh
 

@@ -19,7 +19,7 @@ def printed_by(page, capsys):
 
 
 def test_dynamics_cuts_a_moving_body_penalises_slivers_and_keeps_pace(capsys):
-    account, penalty, pace = printed_by("xfem-dynamics.md", capsys)
+    account, penalty, pace = printed_by("theory/dynamics.md", capsys)
     off, size = re.findall(r"by (\S+) J of (\S+) J", account)[0]
     assert float(off) < 1e-10 * float(size)
     assert "faces penalised with factor 0.01" in penalty
@@ -28,7 +28,7 @@ def test_dynamics_cuts_a_moving_body_penalises_slivers_and_keeps_pace(capsys):
 
 
 def test_slivers_are_aggregated_and_a_penalty_does_not_change_the_answer_much(capsys):
-    aggregated, energies = printed_by("xfem-slivers.md", capsys)
+    aggregated, energies = printed_by("theory/slivers.md", capsys)
     assert aggregated.startswith("16 slivers aggregated")
     kept, penalised = map(float, re.findall(r"(\S+) J", energies))
     assert kept > 0.0
@@ -37,7 +37,7 @@ def test_slivers_are_aggregated_and_a_penalty_does_not_change_the_answer_much(ca
 
 def test_cutting_finds_the_tool_on_the_cut_body_and_on_the_cut_skin(capsys):
     solid, skin = (
-        np.array(line.split(), dtype=float) for line in printed_by("xfem-cutting.md", capsys)
+        np.array(line.split(), dtype=float) for line in printed_by("guide/simulator.md", capsys)
     )
     assert solid[0] > 0.0  # crossing an element takes time
     assert 0.15 < solid[1] <= 0.2 + 1e-12  # the lifted top is 0.2 below the query
@@ -46,7 +46,7 @@ def test_cutting_finds_the_tool_on_the_cut_body_and_on_the_cut_skin(capsys):
     assert skin[1] == pytest.approx(skin[2], rel=1e-9)
 
 
-@pytest.mark.parametrize("page", ["xfem-dynamics.md", "xfem-slivers.md", "xfem-cutting.md"])
+@pytest.mark.parametrize("page", ["theory/dynamics.md", "theory/slivers.md", "guide/simulator.md"])
 def test_every_page_has_examples_and_links_that_lead_somewhere(page):
     text = (DOCS / page).read_text(encoding="utf-8")
     assert "```python" in text

@@ -8,7 +8,7 @@ from typing import Any
 from verify.baseline.record import Independent, Own, Quantity, Speed
 from verify.calibration import KERNEL, seconds_of_note
 from verify.result import CaseResult, Metric, SolveRecord, Status
-from verify.study.intervals import ERROR_METRICS
+from verify.assess.intervals import ERROR_METRICS
 
 __all__ = ["MeasuredSpeed", "finest", "metric_of", "quantities_of", "speed_entry", "speed_of"]
 

@@ -3,8 +3,8 @@
 import argparse
 import json
 
-from verify.anatomy.fetching import fetch_anatomy
-from verify.anatomy.store import store_folder
+from verify.simulator.anatomy.fetching import fetch_anatomy
+from verify.simulator.anatomy.store import store_folder
 
 __all__ = ["execute"]
 

@@ -45,7 +45,7 @@ def execute(arguments: argparse.Namespace) -> int:
             print(f"verify: {stop}; the same command resumes it", file=sys.stderr)
             return 128 + stop.signum
     from verify.report import render
-    from verify.runner.ranking import rank_run
+    from verify.cli.run_ranking import rank_run
 
     rank_run(arguments.out, [result], {}, False, arguments.timeout, print)
     report, code = render(arguments.out), exit_code([result], arguments.strict)

@@ -13,7 +13,7 @@ from verify.scene import load_scene
 from verify.whole_files import asked_place, write_whole
 
 if TYPE_CHECKING:
-    from verify.replay import Stage, StepRecord
+    from verify.simulator import Stage, StepRecord
 
 __all__ = ["execute"]
 
@@ -34,14 +34,14 @@ def execute(arguments: argparse.Namespace) -> int:
     if out is None and not has_display and arguments.records is None:
         raise InputError("there is no display to show it on; use --out FILE.gif")
     scene = load_scene(arguments.case)
-    from verify.replay import stage_of
+    from verify.simulator import stage_of
 
     try:
         stage = stage_of(scene)
     except UnsupportedSceneError as reason:
         raise InputError(f"cannot be played: {reason}", str(scene.file or scene.name)) from None
     if arguments.window or (out is None and has_display):
-        from verify.replay.window import play_in_window
+        from verify.simulator.window import play_in_window
 
         play_in_window(stage, scene.title, arguments.stroke, arguments.spread)
         return 0
@@ -49,9 +49,9 @@ def execute(arguments: argparse.Namespace) -> int:
 
 
 def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
-    from verify.replay import Session, quality_of
-    from verify.replay.animation import Frame, view_of, write_animation, write_picture
-    from verify.replay.timings import timings_of
+    from verify.simulator import Session, quality_of
+    from verify.simulator.animation import Frame, view_of, write_animation, write_picture
+    from verify.simulator.timings import timings_of
 
     session = Session(stage, spread=arguments.spread)
     every = max(1, round(stage.steps / (arguments.frames - 1)))
@@ -103,7 +103,7 @@ def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
 
 def _table(records: "list[StepRecord]") -> str:
     """Return what every step cost and did as CSV."""
-    from verify.replay import PHASES
+    from verify.simulator import PHASES
 
     text = io.StringIO()
     table = csv.writer(text)

@@ -10,7 +10,7 @@
     DIR/level-0/conforming.json   held nodes and loads on it
     DIR/level-0/solution.json     the answer of a program goes here, with its VTU
 
-Every field of the JSON files is described in ``docs/extending.md``.
+Every field of the JSON files is described in ``docs/guide/your-solver.md``.
 """
 
 import re

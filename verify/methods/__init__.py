@@ -19,7 +19,7 @@ springs instead of elements
 what they cost
     `counting`
 
-Sources and limits of each: ``docs/methods.md``.
+Sources and limits of each: ``docs/theory/methods.md``.
 
 Example
 -------

@@ -37,9 +37,9 @@ from verify.runner.job import check_files, load_record
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in
-from verify.study.accuracy import assess_accuracy
-from verify.study.adequacy import adequacy_notice
-from verify.study.closing import with_openings
+from verify.assess.accuracy import assess_accuracy
+from verify.assess.adequacy import adequacy_notice
+from verify.assess.closing import with_openings
 from verify.verdict import with_verdicts
 from verify.whole_files import write_whole
 

@@ -38,7 +38,7 @@ def check_scene(scene: Scene) -> None:
 
 def _missing(scene: Scene, asked: StressIntensityQuantity) -> str | None:
     """Why a stress-intensity factor cannot be had from any solution, or None."""
-    from verify.study.stress_intensity import intensity_defect
+    from verify.assess.stress_intensity import intensity_defect
 
     return intensity_defect(scene, asked)
 

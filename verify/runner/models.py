@@ -7,7 +7,7 @@ from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.job import Job
 from verify.runner.reference_cache import REFERENCE
 from verify.scene import Scene
-from verify.study.adequacy import other_scene
+from verify.assess.adequacy import other_scene
 
 __all__ = ["model_jobs"]
 

@@ -79,7 +79,7 @@ def largest_step(
 
     An explicit scheme takes `factor` times its critical step, or the step asked for if that is
     smaller. Where pieces turn, the critical step is that of strains up to 1, and `RESONANCE_FREE`
-    of it, so that the time grid makes no modes resonate (docs/xfem-dynamics.md). An implicit one
+    of it, so that the time grid makes no modes resonate (docs/theory/dynamics.md). An implicit one
     takes the step asked for, or else `factor` times the critical step of the uncut elements: what
     an explicit scheme could follow.
 

@@ -13,10 +13,10 @@ from verify.scene import Scene, ValueCheck, restore_scene
 from verify.solution import handed_over
 from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
-from verify.study.accuracy import assess_accuracy
+from verify.assess.accuracy import assess_accuracy
 from verify.study.finding import Finding
 from verify.study.in_processes import in_processes
-from verify.study.intervals import NotMeasuredError, error_interval
+from verify.assess.intervals import NotMeasuredError, error_interval
 from verify.study.variants import Variant
 
 __all__ = ["Measurement", "measured_families", "measured_scenes", "missing_solutions"]

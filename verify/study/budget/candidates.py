@@ -17,10 +17,10 @@ from verify.solution import Solution
 from verify.study.budget.cheapest import Candidate
 from verify.study.budget.distances import Times, distances, norm_names
 from verify.study.budget.links import Chain
-from verify.study.budget.scenes import at_rest, with_kinematics
+from verify.assess.changed_scenes import at_rest, with_kinematics
 from verify.study.budget.solved import JUDGED, Solve, Solved
-from verify.study.quantities import Measured
-from verify.study.reference import Reference, size_of
+from verify.assess.quantities import Measured
+from verify.assess.reference import Reference, size_of
 
 __all__ = ["find_candidates"]
 

@@ -17,14 +17,14 @@ from verify.solution import Solution
 from verify.study.budget.crossing_delay import mean_wait
 from verify.study.budget.links import Chain, Missing, is_realised_as_asked, link
 from verify.study.budget.references import OUTSIDE, References
-from verify.study.budget.scenes import (
+from verify.assess.changed_scenes import (
     on_one_level,
     on_realised_cut,
     with_kinematics,
     with_time_step,
 )
 from verify.study.budget.solved import CONFORMING, JUDGED, Solve
-from verify.study.reference import (
+from verify.assess.reference import (
     ExactField,
     Reference,
     exact_reference,

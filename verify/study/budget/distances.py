@@ -13,7 +13,7 @@ from verify.compare.error_norm import ErrorNorm
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.motion import Motion
-from verify.study.error_history import mean_over
+from verify.assess.error_history import mean_over
 
 __all__ = ["Distances", "Times", "distances", "norm_names"]
 

@@ -12,8 +12,8 @@ from verify.scene import Scene
 from verify.solution import Solution
 from verify.study.budget.budget import Answer
 from verify.study.budget.solved import Solved
-from verify.study.quantities import Measured
-from verify.study.reference import Reference
+from verify.assess.quantities import Measured
+from verify.assess.reference import Reference
 
 __all__ = ["Chain", "Missing", "is_realised_as_asked", "link"]
 

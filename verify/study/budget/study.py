@@ -17,11 +17,11 @@ from verify.study.budget.cheapest import Candidate, cheapest_adequate
 from verify.study.budget.cut_ends import CutEnd, cut_ends
 from verify.study.budget.distances import Times, norm_names
 from verify.study.budget.links import Chain, Missing
-from verify.study.budget.scenes import coarsest
+from verify.assess.changed_scenes import coarsest
 from verify.study.budget.solved import JUDGED, Solve
 from verify.study.finding import Finding
-from verify.study.quantities import unit_of
-from verify.study.reference import ExactField
+from verify.assess.quantities import unit_of
+from verify.assess.reference import ExactField
 
 __all__ = ["BudgetStudy", "budget_study"]
 

@@ -10,8 +10,8 @@ from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import find_solver
 from verify.study.calibration.families import Family
-from verify.study.quantities import Measured
-from verify.study.reference import (
+from verify.assess.quantities import Measured
+from verify.assess.reference import (
     ExactField,
     conforming_reference,
     exact_reference,

@@ -7,7 +7,7 @@ from itertools import pairwise
 from statistics import median
 
 from verify.result import SolveRecord, Status
-from verify.study.intervals import error_interval
+from verify.assess.intervals import error_interval
 
 __all__ = ["ONCE", "WorkPoint", "pareto_front", "time_at", "work_points"]
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import isfinite
 
 from verify.result import CaseResult, SolveRecord, Status
-from verify.study.intervals import Interval, NotMeasuredError, error_interval
+from verify.assess.intervals import Interval, NotMeasuredError, error_interval
 from verify.study.ranking.standing import Item
 
 __all__ = ["interval_of", "item_on_finest"]

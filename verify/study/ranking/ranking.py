@@ -6,8 +6,8 @@ from typing import Any
 
 from verify.ranking import LeftOut, Ranking
 from verify.result import CaseResult, Status, Verdict
-from verify.study.energy_account import ACCOUNT
-from verify.study.intervals import ERROR_METRICS
+from verify.assess.energy_account import ACCOUNT
+from verify.assess.intervals import ERROR_METRICS
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
 from verify.study.ranking.energy import energy_comparisons

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from verify.ranking import Comparison, LeftOut, Standing
-from verify.study.intervals import Interval
-from verify.study.rates import ROUND_OFF
+from verify.assess.intervals import Interval
+from verify.assess.rates import ROUND_OFF
 
 __all__ = ["Item", "compared_by_mean", "compared_by_worst", "is_exact"]
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.calibration import kernel_seconds
-from verify.replay import PHASES, Session, Stage, quality_of
+from verify.simulator import PHASES, Session, Stage, quality_of
 from verify.study.thesis.strokes import hand, stroke_along
 
 __all__ = ["LIMITS", "RealTime", "real_time"]
@@ -43,7 +43,7 @@ class RealTime:
     kernel : float
         Processor time of the calibration kernel beside it, s.
     volume_error, loose_edges, inverted : float, int, int
-        Worst over every tenth step: see `verify.replay.quality.Quality`.
+        Worst over every tenth step: see `verify.simulator.quality.Quality`.
     energy_gain : float
         Largest excess of the mechanical energy over the work done, relative to that work.
     """

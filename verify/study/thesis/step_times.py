@@ -6,7 +6,7 @@ from time import thread_time
 
 import numpy as np
 
-from verify.replay import Session, Stage
+from verify.simulator import Session, Stage
 from verify.study.thesis.published import published_rows
 from verify.study.thesis.strokes import CutHand, cut_hand, hand
 

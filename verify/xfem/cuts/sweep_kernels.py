@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from verify.xfem.collision.simplex_kernels import (
+from verify.xfem.cuts.simplex_kernels import (
     foot_on_facet,
     nearest_on_facet,
     squared_distance,

@@ -15,7 +15,7 @@ policies do:
     place, every part of the body stays one of its own. A sliver that reaches no root is kept.
 
 Ghost penalties are another remedy, see `verify.xfem.slivers.ghost_penalty`; measurements in
-``docs/xfem-slivers.md``.
+``docs/theory/slivers.md``.
 """
 
 from dataclasses import dataclass

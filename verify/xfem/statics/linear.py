@@ -23,7 +23,7 @@ __all__ = ["ITERATE_FROM", "StaticSolution", "solve_static"]
 
 _Floats = NDArray[np.float64]
 
-ITERATE_FROM = 2000  # nodes in space: docs/xfem-linear-solvers.md has the measurement
+ITERATE_FROM = 2000  # nodes in space: docs/theory/linear-solvers.md has the measurement
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
 _MOST = 2000  # iterations before a factorisation is the quicker way
 

@@ -1,0 +1,44 @@
+"""A path that is played opens the same elements at the same steps as one that is judged."""
+
+import numpy as np
+import pytest
+from thesis_stages import CASES, stage
+
+from verify.scene import load_scene
+from verify.solvers.xfem_cuts import cuts_of
+from verify.solvers.xfem_openings import opening_times
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.virtual import cut_mesh
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["block_cut_once", "block_cut_twice", "tetrahedron_four_edges", "tetrahedron_three_edges",
+     "square_dissected", "triangle"],
+)  # fmt: skip
+def test_played_and_judged_open_the_same_elements_at_the_same_steps(name) -> None:
+    """But where strokes meet: what one has left of an element is played piece by piece.
+
+    A judged element opens as a whole, so for at most its crossing it is behind what is played.
+    """
+    scene, played = load_scene(CASES / f"{name}.toml"), stage(name)
+    cuts = cuts_of(scene, 0.1)
+    virtual = cut_mesh(played.mesh, cuts)
+    opening = opening_times(scene.cuts, virtual, [0.0] * len(cuts))
+    alone = (~np.isnan(opening)).sum(axis=1) == 1
+    cutter = SemiProgressiveCutter(played.mesh)
+    for path in played.strokes:
+        cutter.begin(path)
+    behind = 0
+    steps = np.arange(0, max(cut.ends_at for cut in scene.cuts) / played.time_step + 2)
+    for time in played.time_step * steps:
+        cutter.advance(float(time))
+        for k in range(len(cuts)):
+            cells = np.arange(len(played.mesh.cells))
+            there, here = cutter.body.split_by(cells, k), opening[:, k] <= time
+            np.testing.assert_array_equal(there[alone], here[alone])
+            assert (there | ~here).all()
+            behind = max(behind, (there & ~here).sum())
+    parts = [np.column_stack([one.parent, one.label]) for one in (virtual, cutter.virtual_mesh())]
+    np.testing.assert_array_equal(*(np.unique(rows, axis=0) for rows in parts))
+    assert (behind > 0) == (name in ("block_cut_twice", "square_dissected"))

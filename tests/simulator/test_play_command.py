@@ -1,0 +1,118 @@
+"""``verify play`` draws without a display, says what a step took, and refuses in one line."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+from thesis_stages import CASES
+
+from verify.cli import main
+from verify.simulator import Session, stage_of
+from verify.simulator.live_scalpel import LiveScalpel
+from verify.simulator.stroke_file import stroke_text, write_stroke
+from verify.runner.selection import select_cases
+from verify.scene import load_scene
+
+graphics = pytest.mark.graphics
+
+
+@graphics
+def test_an_animation_is_drawn_without_a_display(tmp_path, monkeypatch, capfd) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    out, table = tmp_path / "square.gif", tmp_path / "steps.csv"
+    command = ["play", str(CASES / "square_dissected.toml"), "--out", str(out), "--frames", "6",
+               "--records", str(table), "--json"]  # fmt: skip
+    assert main(command) == 0
+    said = capfd.readouterr()
+    assert "WARN" not in said.err  # VTK's own, of the X server that is not there
+    summary = json.loads(said.out)
+    assert summary["loose_edges"] == summary["inverted_elements"] == 0
+    with Image.open(out) as animation:
+        assert animation.n_frames >= 6
+        pictures = []
+        for k in (0, animation.n_frames - 1):
+            animation.seek(k)
+            pictures.append(np.asarray(animation.convert("RGB"), dtype=int))
+    drawn = [(p.sum(axis=2) < 3 * 250).mean() for p in pictures]
+    assert min(drawn) > 0.01  # there is a body in each
+    assert np.abs(pictures[0] - pictures[1]).max() > 50  # and it has moved
+    rows = list(csv.DictReader(table.open(encoding="utf-8")))
+    assert len(rows) == summary["steps"]
+    assert int(rows[-1]["split"]) == summary["split"] > 50
+
+
+def test_a_scene_is_cut_alike_with_its_work_spread(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    found = []
+    for spread in ([], ["--spread"]):
+        command = ["play", str(CASES / "tetrahedron_four_edges.toml"), "--json",
+                   "--records", str(tmp_path / "steps.csv"), *spread]  # fmt: skip
+        assert main(command) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    at_once, spread_out = found
+    assert not at_once["spread"]
+    assert spread_out["spread"]
+    for key in ("steps", "split", "unknowns", "loose_edges"):
+        assert at_once[key] == spread_out[key]
+    assert at_once["split"] > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["triangle"], "there is no display"),
+        (["triangle", "--window"], "there is no display"),
+        (["triangle", "--out", "a.mp4"], ".gif or .png"),
+        (["triangle", "--out", "nowhere/a.gif"], "no directory"),
+        (["triangle", "--out", "a.gif", "--frames", "1"], "at least 2"),
+    ],
+)
+def test_what_cannot_be_played_is_one_line(arguments, message, monkeypatch, capsys) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    name, *rest = arguments
+    assert main(["play", str(CASES / f"{name}.toml"), *rest]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+
+
+def test_a_static_case_is_not_played(tmp_path, capsys) -> None:
+    assert main(["play", "statics/f1_patch", "--out", str(tmp_path / "a.gif")]) == 2
+    assert "in time" in capsys.readouterr().err
+
+
+def test_played_scenes_are_run_only_if_named() -> None:
+    assert not [scene for scene in select_cases(weight="heavy") if scene.played_only]
+    assert select_cases(["thesis/triangle"])
+
+
+def test_a_live_scalpel_cuts_what_it_is_led_through_and_its_stroke_can_be_played_again(
+    tmp_path,
+) -> None:
+    """The hand moves 5 mm a step across the block; the file gives the same pieces again."""
+    path = CASES / "block_cut_once.toml"
+    text = path.read_text(encoding="utf-8")
+    stage = stage_of(load_scene(path))
+    session = Session(type(stage)(**{**vars(stage), "strokes": [], "hooks": [], "visual": None}))
+    scalpel = LiveScalpel(session, 0.06)
+    for y in np.arange(-0.02, 0.125, 0.01):
+        scalpel.touch(np.array([0.052, y, 0.1]), np.array([0.01, 0.0, -1.0]))
+        session.step()
+    scalpel.lift()
+    session.step()
+    cut = session.cutter.body.split_cells
+    assert cut.sum() > 50
+    assert len(scalpel.finished) == 1
+    write_stroke(scalpel.finished[0], tmp_path / "stroke.toml", "first")
+    stroke = (tmp_path / "stroke.toml").read_text(encoding="utf-8")
+    assert stroke == stroke_text(scalpel.finished[0], "first")
+    begin, end = text.index("[[cuts]]"), text.index("[analysis]")
+    again = tmp_path / "again.toml"
+    again.write_text(text[:begin] + stroke + "\n" + text[end:], encoding="utf-8")
+    replayed = Session(stage_of(load_scene(again)))
+    while replayed.time < session.time:
+        replayed.step()
+    np.testing.assert_array_equal(replayed.cutter.body.split_cells, cut)

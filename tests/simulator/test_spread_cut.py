@@ -1,0 +1,197 @@
+"""A cut whose work is spread over steps is the same cut, a few steps later, and sound all along."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from verify.simulator import Session, quality_of
+from verify.xfem.cuts import ToolPath
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.in_pieces import in_one_go
+
+ROUND_OFF = 1e-12
+
+
+def incised(hand, **changes):
+    """The hand scene, cut twice as fast: several elements at every step."""
+    begin, end = hand.strokes[0].blades[[0, -1]]
+    path = ToolPath(np.stack([begin, end]), [0.0, 0.4])
+    hooks = [replace(hook, begin=0.2) for hook in hand.hooks]
+    return replace(hand, **({"strokes": [path], "hooks": hooks, "duration": 0.6} | changes))
+
+
+def assert_cut_alike(mine, other) -> None:
+    """The same elements are split, into as many pieces and unknowns."""
+    np.testing.assert_array_equal(np.sort(mine.virtual.parent), np.sort(other.virtual.parent))
+    assert mine.virtual.node_count == other.virtual.node_count
+    cells = [np.sort(session.cutter.crossings.cell) for session in (mine, other)]
+    np.testing.assert_array_equal(*cells)
+
+
+@pytest.fixture(scope="module")
+def played(hand):
+    """The scene with its work spread; what was measured after every step."""
+    session = Session(incised(hand), spread=True)
+    found = []
+    while not session.finished:
+        session.step()
+        found.append(quality_of(session))
+    session.settle()
+    return session, found
+
+
+def test_volume_and_surfaces_are_sound_at_every_step_of_a_spread_cut(played) -> None:
+    _, found = played
+    for quality in found:
+        assert quality.volume_error < ROUND_OFF
+        assert quality.enclosed_error < ROUND_OFF
+        assert quality.loose_edges == 0
+        assert quality.inverted_facets == 0
+        assert quality.stray_facets == 0
+
+
+def test_the_account_of_a_spread_cut_closes_though_a_hook_begins_within(played) -> None:
+    session, _ = played
+    largest = max(record.work for record in session.records)
+    assert largest > 1e-4
+    for record in session.records:
+        balance = record.mechanical - record.work + record.dissipated
+        assert abs(balance) < 1e-9 * largest
+
+
+def test_spread_or_not_the_same_elements_are_split_into_the_same_pieces(hand, played) -> None:
+    at_once = Session(incised(hand), account=False)
+    at_once.run()
+    spread, _ = played
+    assert_cut_alike(spread, at_once)
+
+
+def test_an_element_is_split_within_ten_steps_of_being_crossed(hand) -> None:
+    """Eight pieces, at times a ninth; the cut is made in the second of the next eight."""
+    session = Session(incised(hand, hooks=[]), account=False, spread=True)
+    session.run()
+    crossings, h = session.cutter.crossings, session.stage.time_step
+    late = (crossings.seen - crossings.leave) / h
+    assert 0.0 <= late.min() <= late.max() <= 10.0 * (1.0 + 1e-9)
+    # and a step that splits is followed by six that follow the cut, in which none is split
+    split = np.array([record.newly_split > 0 for record in session.records])
+    assert split.sum() > 3
+    for k in np.flatnonzero(split[:-6]):
+        assert not split[k + 1 : k + 7].any()
+        assert all(record.busy for record in session.records[k - 1 : k + 7])
+
+
+def test_nothing_is_left_of_a_cut_when_a_hook_begins_so_its_step_is_no_long_one(hand) -> None:
+    """The stroke goes on: that step splits what was crossed in the three before, no more."""
+    scene = incised(hand)
+    session = Session(scene, account=False, spread=True)
+    begins = scene.hooks[0].begin
+    while session.time + scene.time_step <= begins:
+        session.step()
+    assert session._work is None
+    assert len(session.displacement) == len(session.state.displacement)
+    before = session.records[-1].split
+    session.step()
+    crossed = session.cutter.crossings
+    assert session.records[-1].split > before
+    late = (begins - crossed.leave[before:]) / scene.time_step
+    assert late.max() <= 4.0 * (
+        1.0 + 1e-9
+    )  # the step of the last look, and three in which none began
+
+
+def test_elements_beyond_the_most_of_a_cut_wait_and_are_split_like_the_others(
+    hand, played, monkeypatch
+) -> None:
+    monkeypatch.setattr("verify.simulator.session.MOST", 4)
+    # a hook would finish what waits as it begins
+    session = Session(incised(hand, hooks=[]), spread=True)
+    waited = 0
+    while not session.finished:
+        session.step()
+        waited += session.cutter.waits
+        quality = quality_of(session)
+        assert quality.volume_error < ROUND_OFF
+        assert quality.loose_edges == 0
+    session.settle()
+    assert waited > 10
+    assert not session.cutter.waits
+    # where a blade crosses two elements through at the same moment, one more
+    assert max(record.newly_split for record in session.records) <= 5
+    unhurried, _ = played
+    assert_cut_alike(session, unhurried)
+    assert session.virtual.node_count == len(session.state.displacement)
+
+
+def test_a_spread_replay_is_the_same_to_the_last_bit(hand, played) -> None:
+    again = Session(incised(hand), account=False, spread=True)
+    again.run()
+    mine, other = again.state, played[0].state
+    assert len(mine.displacement) == len(other.displacement)
+    np.testing.assert_array_equal(mine.displacement, other.displacement)
+
+
+def test_a_path_led_elsewhere_after_a_look_does_not_change_what_was_found(hand) -> None:
+    """Between pieces of a look, and before the cut, a live blade may move on, and turn."""
+    begin, end = hand.strokes[0].blades[[0, -1]]
+    halfway = 0.5 * (begin + end)
+    live = ToolPath(np.stack([begin, halfway]), [0.0, 0.2])
+    straight = SemiProgressiveCutter(hand.mesh)
+    bent = SemiProgressiveCutter(hand.mesh)
+    for cutter in (straight, bent):
+        cutter.begin(live)
+    before = bent.body.node_count
+    looking = bent.looking(0.2)
+    next(looking)
+    turned = 0.5 * (halfway + end) + np.array([0.01, 0.0, 0.0])
+    bent.extend(turned[None], [0.3])
+    assert bent.strokes[0].path is live  # not while it is looked at
+    division = in_one_go(looking)
+    assert bent.strokes[0].path.times[-1] == bent.strokes[0].led.times[-1] == 0.3
+    assert bent.body.node_count == before
+    assert not bent.body.split_cells.any()
+    bent.extend((end + np.array([0.02, 0.0, 0.0]))[None], [0.4])
+    bent.divide(division, 0.2)
+    straight.advance(0.2)
+    mine, other = bent.virtual_mesh(), straight.virtual_mesh()
+    np.testing.assert_array_equal(mine.cells, other.cells)
+    split = np.flatnonzero(bent.body.split_cells)
+    nodes = np.unique(hand.mesh.cells[split])
+    np.testing.assert_array_equal(bent.level_sets[nodes], straight.level_sets[nodes])
+    bent.advance(0.4)
+    assert bent.body.split_cells.sum() > len(split)
+    np.testing.assert_allclose(bent.virtual_mesh().volumes.sum(), hand.mesh.measures.sum())
+
+
+def test_what_is_new_moves_as_that_from_which_it_comes_until_mechanics_follow(hand) -> None:
+    """Moving body: at the step at which the unknowns are known nothing jumps, nor is gained."""
+    wild = incised(hand, hooks=[])
+    session = Session(wild, spread=True)
+    rng = np.random.default_rng(3)
+    session.state.velocity[:] = 0.2 * rng.standard_normal(session.state.velocity.shape)
+    waited = 0
+    while not session.finished:
+        session.step()
+        ahead = session.displacement
+        known = len(session.state.displacement)
+        waited += len(ahead) > known
+        shown = session.surfaces.touchable_positions
+        assert np.isfinite(shown).all()
+        np.testing.assert_array_equal(ahead[:known], session.state.displacement)
+        assert len(ahead) == session.cutter.body.node_count
+    assert waited > 10
+
+
+def test_the_force_of_a_blade_on_what_is_new_pulls_at_what_it_moves_with(hand) -> None:
+    """The force that a blade passes on is all there, whatever unknowns the mechanics know."""
+    session = Session(incised(hand, hooks=[], tool_force=0.5, tool_radius=0.002), spread=True)
+    checked = 0
+    while not session.finished:
+        session.step()
+        load = session._tool_load
+        if session.records[-1].contacts and load is not None:
+            assert load.shape == session.state.displacement.shape
+            assert np.linalg.norm(load.sum(axis=0)) == pytest.approx(0.5, rel=1e-9)
+            checked += len(session.displacement) > len(load)
+    assert checked > 5

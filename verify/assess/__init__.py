@@ -1,0 +1,1 @@
+"""Measurements of solutions and their intervals: errors, rates, references, energy balances."""

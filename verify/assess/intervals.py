@@ -1,0 +1,54 @@
+"""Intervals of measured errors: a value and the bounds of its true value."""
+
+from dataclasses import dataclass
+
+from verify.result import Metric
+from verify.assess.energy_account import ACCOUNT
+from verify.assess.error_history import ERROR_NAMES
+
+__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval"]
+
+# metrics that are relative errors themselves; all others are quantities with a reference
+ERROR_METRICS = (*ERROR_NAMES, *ACCOUNT)
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A measured number and the bounds of its true value."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def half_width(self) -> float:
+        """Largest distance of the bounds from the value."""
+        return max(self.value - self.low, self.high - self.value)
+
+
+class NotMeasuredError(Exception):
+    """A solve, a metric or its reference that the check needs is not there."""
+
+
+def error_interval(metric: Metric) -> Interval:
+    """Relative error that a metric stands for, with the bounds of its true value.
+
+    For an error metric that is its value; for a quantity its distance from the reference.
+
+    Raises
+    ------
+    NotMeasuredError
+        If the metric is a quantity without a reference, or with one that is 0.
+    """
+    if metric.name in ERROR_METRICS:
+        return _interval(metric.value, metric.uncertainty)
+    if metric.reference is None:  # never take the quantity itself for an error
+        raise NotMeasuredError(f"{metric.name} has no reference to be compared with")
+    if metric.reference == 0.0:
+        raise NotMeasuredError(f"the reference of {metric.name} is 0: it has no relative error")
+    scale = abs(metric.reference)
+    return _interval(abs(metric.value - metric.reference) / scale, metric.uncertainty / scale)
+
+
+def _interval(error: float, width: float) -> Interval:
+    return Interval(error, max(0.0, error - width), error + width)

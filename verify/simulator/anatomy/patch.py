@@ -1,0 +1,47 @@
+"""A patch of skin over a plane: its outline, openings in it, and its height."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.simulator.anatomy.plane_mesh import mesh_of_about
+
+__all__ = ["Patch"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Skin as a height over a plane.
+
+    Attributes
+    ----------
+    outline : (k, 2) float array
+        Outer border, m.
+    height : callable
+        z (n,) at points (n, 2), m.
+    holes : list of (k, 2) float arrays
+        Borders of openings, m.
+    """
+
+    outline: _Floats
+    height: Callable[[_Floats], _Floats]
+    holes: list[_Floats] = field(default_factory=list)
+
+    def triangulate(self, triangles: int) -> tuple[_Floats, _Ints, int]:
+        """Mesh the patch with about so many triangles.
+
+        Returns
+        -------
+        points : (n, 3) float array
+        triangles : (m, 3) int array
+            Anticlockwise seen from outside the body.
+        rim : int
+            Number of points on the outer border, which are the first.
+        """
+        plane, cells, rim = mesh_of_about(self.outline, self.holes, triangles)
+        return np.column_stack([plane, self.height(plane)]), cells, rim

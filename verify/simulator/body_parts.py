@@ -1,0 +1,75 @@
+"""What a body under the knife is made of, as its cutter has it at a moment."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.simulator.grips import Grips
+from verify.simulator.stage import Stage
+from verify.xfem.corotation import InternalForce
+from verify.xfem.dynamics import DynamicBody
+from verify.xfem.mass import Mass, side_wise_mass
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["BodyParts", "held_nodes"]
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BodyParts:
+    """Forces, mass, and what holds the body; the sparsity is found with `body`.
+
+    Attributes
+    ----------
+    stage : Stage
+    force : InternalForce
+    mass : Mass
+    grips : Grips
+    """
+
+    stage: Stage
+    force: InternalForce
+    mass: Mass
+    grips: Grips
+
+    @classmethod
+    def of(
+        cls,
+        stage: Stage,
+        virtual: VirtualMesh,
+        start: dict[int, _Floats],
+        facets: Sequence[NDArray[np.bool_]],
+    ) -> "BodyParts":
+        """Make the parts of a cut body.
+
+        Parameters
+        ----------
+        stage : Stage
+        virtual : VirtualMesh
+        start : dict
+            Displacement (N, s) at which each hook (by its number) has gripped.
+        facets : sequence of (m, d + 1) bool arrays
+            `verify.simulator.grips.held_facets` of each hold.
+        """
+        mass = side_wise_mass(virtual, stage.density)
+        grips = Grips(virtual, stage.holds, stage.hooks, mass.weights, start, facets)
+        return cls(stage, InternalForce(virtual, stage.material), mass, grips)
+
+    def body(self, load: Callable[[float], _Floats]) -> DynamicBody:
+        """Make the body and its sparsity; `load` gives nodal forces (N, s) at a time, N."""
+        return DynamicBody(
+            self.force,
+            self.mass,
+            weight=self.mass.weight(self.stage.gravity),
+            load=load,
+            supports=self.grips.supports,
+            damping=self.stage.damping,
+        )
+
+
+def held_nodes(body: DynamicBody) -> NDArray[np.bool_]:
+    """(N,) unknown nodes that are held altogether, which need not be solved for."""
+    return body.fixed.all(axis=1)

@@ -1,0 +1,51 @@
+"""How a cut is going to divide cells: found first, done later."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.arrays.distinct import distinct
+from verify.simulator.cutting.patch import MeshPatch
+from verify.xfem.splitting.partition import Partition
+
+__all__ = ["Division"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Division:
+    """Pieces of a patch of them against those of the body.
+
+    Attributes
+    ----------
+    patch : MeshPatch
+    partition : Partition
+        The patch, divided by the cuts near it.
+    numbers : int array
+        Of these cuts.
+    cell, label, fraction, solid : (q,), (q, cuts), (q,), (q,) arrays
+        Of each piece: cell, sides of all cuts, share of the cell, whether it has any.
+    old : (q,) int array
+        Piece of the body from which it comes.
+    changed : (q,) bool array
+        Whether it is not the same.
+    """
+
+    patch: MeshPatch
+    partition: Partition
+    numbers: _Ints
+    cell: _Ints
+    label: NDArray[np.int8]
+    fraction: _Floats
+    solid: NDArray[np.bool_]
+    old: _Ints
+    changed: NDArray[np.bool_]
+
+    @cached_property
+    def changed_cells(self) -> _Ints:
+        """Cells of the pieces whose labels are new, ascending."""
+        return distinct(self.cell[self.changed & self.solid])

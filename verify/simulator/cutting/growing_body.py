@@ -1,0 +1,390 @@
+"""A body that is cut again and again: every cut costs what it touches.
+
+The same pieces and the same joins as `verify.xfem.virtual.cut_mesh` gives for all cuts at once,
+kept up to date cell by cell. Numbers of pieces and unknown nodes never change: cells and nodes
+keep theirs, new ones follow.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.arrays.distinct import distinct
+from verify.xfem.arrays.growing_array import GrowingArray
+from verify.xfem.cuts.flat import Cut
+from verify.simulator.cutting.division import Division
+from verify.simulator.cutting.patch import MeshPatch, PatchCutter
+from verify.simulator.cutting.point_numbers import PointNumbers
+from verify.simulator.cutting.renumber_kernels import (
+    labelled,
+    match_pieces,
+    number_unknowns,
+    retire,
+    separated,
+    simplices_of,
+    slots_before,
+    write_pieces,
+)
+from verify.simulator.cutting.tied_parts import TiedParts
+from verify.xfem.errors import XfemError
+from verify.xfem.in_pieces import InPieces, in_one_go
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.splitting.joining import join_slots
+from verify.xfem.splitting.partition import Partition
+from verify.xfem.splitting.split import ROUND_OFF, Held, split_cells
+
+__all__ = ["CutsNear", "GrowingBody", "Increment"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+_NOTHING = ROUND_OFF**2  # share of a cell that a piece without volume may have when divided further
+
+# the cuts near a patch: the number of each, and the cut as that patch sees it
+CutsNear = Callable[[MeshPatch], tuple[_Ints, Sequence[Cut]]]
+
+
+@dataclass(frozen=True)
+class Increment:
+    """What one cut did to a body.
+
+    Attributes
+    ----------
+    cells : int array
+        Cells that were split, or whose pieces were.
+    touched : int array
+        Cells around the nodes of these.
+    moved : int array
+        Those of them that have new unknowns, or are split anew.
+    nodes_before : int
+        Number of unknown nodes before.
+    source : (new,) int array
+        Unknown node from which each new one inherits displacement and velocity.
+    """
+
+    cells: _Ints
+    touched: _Ints
+    moved: _Ints
+    nodes_before: int
+    source: _Ints
+
+    def inherit(self, values: _Floats) -> _Floats:
+        """Nodal values (N_before, ...) after the cut: new nodes move as their source does.
+
+        The displacement field does not change, and the lumped masses of the parts of a piece sum
+        to its own: energy and momentum are continuous.
+
+        Raises
+        ------
+        XfemError
+            If the number of values is not that of the unknown nodes before the cut.
+        """
+        if len(values) != self.nodes_before:
+            raise XfemError(f"{len(values)} nodal values; expected {self.nodes_before}")
+        return np.concatenate([values, values[self.source]])
+
+
+class GrowingBody:
+    """Pieces and unknowns of a mesh under repeated cuts.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+
+    Attributes
+    ----------
+    piece_cells : GrowingArray
+        (p, d + 1) unknown nodes of each piece.
+    piece_parent, piece_fraction, piece_label : GrowingArray
+        (p,), (p,), (p, cuts): as in `VirtualMesh`, in the order in which pieces came.
+    first_piece, next_piece
+        Pieces of a cell: the first, and after each the next or -1.
+    node_parent : GrowingArray
+        (N,) mesh node of each unknown node.
+    points : PointNumbers
+        Points where cuts meet the mesh.
+    sub_piece, sub_points, sub_barycentric, sub_fraction : GrowingArray
+        Sub-simplices as in `SubCells`; piece -1 if no longer in use.
+    sub_sign : GrowingArray
+        (k,) orientation of the sub-simplices in their cells, +1 or -1.
+    sub_range : (m, 2) int array
+        First sub-simplex of each cell, and one past the last.
+    split_cells : (m,) bool array
+        Whether a cell is split.
+    held : int
+        How often a cut separated a piece only because it had done so before a later cut came:
+        where that is not 0, the cuts at once would have left some element less divided.
+    vanished : int
+        How often a part of a piece without volume, left out when that was made, was left out though
+        rounding gives it some, less than 1e-29 of its cell: where that is not 0, the cuts at once
+        would have made more pieces.
+    """
+
+    def __init__(self, mesh: SimplexMesh) -> None:
+        cells, corners = mesh.cells.shape
+        self.mesh = mesh
+        self.patches = PatchCutter(mesh)
+        self.piece_cells = GrowingArray(mesh.cells)
+        self.piece_parent = GrowingArray(np.arange(cells))
+        self.piece_fraction = GrowingArray(np.ones(cells))
+        self.piece_label = GrowingArray(np.zeros((cells, 0), dtype=np.int8))
+        self.first_piece = np.arange(cells)
+        self.next_piece = GrowingArray(np.full(cells, -1))
+        self.node_parent = GrowingArray(np.arange(len(mesh.points)))
+        self.points = PointNumbers(len(mesh.points), mesh.space)
+        self.sub_piece = GrowingArray(np.empty(0, dtype=np.int64))
+        self.sub_points = GrowingArray(np.empty((0, corners), dtype=np.int64))
+        self.sub_barycentric = GrowingArray(np.empty((0, corners, corners)))
+        self.sub_fraction = GrowingArray(np.empty(0))
+        self.sub_sign = GrowingArray(np.empty(0, dtype=np.int8))
+        self.sub_range = np.zeros((cells, 2), dtype=np.int64)
+        self.cut_count = 0
+        self.split_cells = np.zeros(cells, dtype=bool)
+        self._dropped = np.zeros(cells, dtype=np.int64)
+        self._tied = TiedParts(cells)
+        self.held = 0
+        self.vanished = 0
+
+    @property
+    def node_count(self) -> int:
+        """Number of unknown nodes."""
+        return len(self.node_parent)
+
+    @property
+    def dropped(self) -> int:
+        """Pieces left out because their volume is exactly zero, or was when they were made."""
+        return int(self._dropped.sum())
+
+    def split_by(self, cells: _Ints, cut: int) -> NDArray[np.bool_]:
+        """Whether a cut has split cells, or pieces of them."""
+        return labelled(cells, cut, self.piece_label.rows, self.first_piece, self.next_piece.rows)
+
+    def add_cut(self) -> int:
+        """Make room for one more cut; its number."""
+        label = np.zeros((len(self.piece_label), self.cut_count + 1), dtype=np.int8)
+        label[:, :-1] = self.piece_label.rows
+        self.piece_label = GrowingArray(label)
+        self.cut_count += 1
+        return self.cut_count - 1
+
+    def split(self, candidates: _Ints, cuts_near: CutsNear) -> Increment | None:
+        """Bring some cells up to date with the cuts; None if nothing changes: see `looking`."""
+        division = in_one_go(self.looking(candidates, cuts_near))
+        return None if division is None else self.divide(division)
+
+    def looking(self, candidates: _Ints, cuts_near: CutsNear) -> InPieces[Division | None]:
+        """Find how some cells are to be divided, None if they are not; the body stays as it is.
+
+        Done in pieces, between which neither the body nor the cuts may change.
+
+        Parameters
+        ----------
+        candidates : int array
+            Cells that may have to be split.
+        cuts_near : callable
+            Gives the cuts near a patch as (number of each, cut as that patch sees it); it must
+            contain every cut that splits a cell of the patch.
+
+        Raises
+        ------
+        XfemError
+            If a cut would join what is already separate.
+        """
+        wanted = distinct(candidates)
+        while len(wanted):
+            patch = self.patches.patch(self.patches.cells_around(self.patches.nodes_of(wanted)))
+            numbers, cuts = cuts_near(patch)
+            held, joint = self._held_in(patch, numbers), self._tied.joint[patch.whole_cells]
+            partition = split_cells(patch, cuts, held=held, joint=joint)
+            yield
+            division = self._compare(patch, partition, numbers)
+            all_wanted = distinct(np.concatenate([wanted, division.changed_cells]))
+            if len(all_wanted) == len(wanted):
+                return division if len(division.changed_cells) else None
+            # a cell at the edge of the patch changes too: its own surroundings are needed
+            wanted = all_wanted
+        return None
+
+    def divide(self, division: Division) -> Increment:
+        """Divide cells as has been found, by the body as it still is.
+
+        Raises
+        ------
+        XfemError
+            If a cut would join what is already separate.
+        """
+        cells = division.changed_cells
+        before = self.node_count
+        place = self._renumber(division)
+        self._tied.store(division.partition.tied, division.cell, place, len(self.piece_parent))
+        self._store_simplices(division, cells, place)
+        self.split_cells[cells] = True
+        self._dropped[cells] = 0
+        empty = division.cell[~division.solid]
+        np.add.at(self._dropped, empty[_among(empty, cells)], 1)
+        self.vanished += int(np.count_nonzero(division.fraction[~division.solid]))
+        touched = self.patches.cells_around(self.patches.nodes_of(cells))
+        moved = distinct(np.concatenate([cells, self._moved]))
+        return Increment(cells, touched, moved, before, self._source)
+
+    def _held_in(self, patch: MeshPatch, numbers: _Ints) -> Held:
+        """Make the rule that what a cut has separated it separates, whatever came later."""
+
+        def held(parent: _Ints, label: NDArray[np.int8], index: int) -> NDArray[np.bool_]:
+            before = separated(
+                patch.whole_cells[parent],
+                label,
+                numbers,
+                numbers[index],
+                self.piece_label.rows,
+                self.first_piece,
+                self.next_piece.rows,
+            )
+            self.held += int(before.sum())
+            return before
+
+        return held
+
+    def _compare(self, patch: MeshPatch, partition: Partition, numbers: _Ints) -> Division:
+        """Match the pieces of a patch with the stored ones."""
+        fraction = partition.fraction
+        solid = fraction > 0.0
+        label = np.zeros((len(solid), self.cut_count), dtype=np.int8)
+        label[:, numbers] = partition.label
+        cell = patch.whole_cells[partition.parent]
+        old = np.empty(len(solid), dtype=np.int64)
+        changed = np.zeros(len(solid), dtype=bool)
+        store = (self.piece_label.rows, self.first_piece, self.next_piece.rows)
+        orphan = match_pieces(cell, label, label, solid, *store, old, changed)
+        if orphan >= 0:
+            # a piece on one side of a cut that does not split it is part of what is on that side
+            side = label.copy()
+            side[:, numbers] = partition.sides
+            orphan = match_pieces(cell, label, side, solid, *store, old, changed)
+        if orphan >= 0:
+            # what had no volume was left out, and rounded otherwise it must not come back
+            orphans = solid & (old < 0)
+            solid &= ~(orphans & (self._dropped[cell] > 0) & (fraction <= _NOTHING))
+            left = np.flatnonzero(orphans & solid)
+            if len(left):
+                raise XfemError(f"a cut would join parts of cell {cell[left[0]]} that are separate")
+        if len(partition.tied) or self._tied.joint[cell].any():
+            of = np.where(solid, old, -1)
+            partition = replace(partition, tied=self._tied.still(partition.tied, of))
+            changed |= self._tied.parted(partition.tied, of)
+        return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
+
+    def _renumber(self, state: Division) -> _Ints:
+        """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
+        patch, partition = state.patch, state.partition
+        slots = join_slots(patch, partition, state.solid)
+        cell, touched, home, solid, old = slots_before(
+            slots.cells[slots.piece_cell],
+            np.searchsorted(patch.whole_cells, state.changed_cells),
+            patch.cells,
+            len(patch.whole_nodes),
+            patch.whole_cells,
+            partition.parent,
+            partition.label,
+            partition.points.values,
+            state.solid,
+            state.old,
+            self.first_piece,
+        )
+        number = np.empty(int(slots.group.max(initial=-1)) + 1, dtype=np.int64)
+        source = np.empty(len(number), dtype=np.int64)
+        before = self.node_count
+        after = number_unknowns(
+            slots.group,
+            solid,
+            home,
+            touched,
+            old,
+            self.piece_cells.rows,
+            len(self.mesh.points),
+            before,
+            number,
+            source,
+        )
+        if after < 0:
+            raise XfemError(f"a cut would join parts of cell {cell[-1 - after]} that are separate")
+        self._source = source[: after - before]
+        self.node_parent.append(self.node_parent.rows[self._source])
+        return self._write(cell, slots.group, touched, number, solid, old, state)
+
+    def _write(
+        self,
+        cell: _Ints,
+        group: _Ints,
+        touched: NDArray[np.bool_],
+        number: _Ints,
+        solid: NDArray[np.bool_],
+        old: _Ints,
+        state: Division,
+    ) -> _Ints:
+        place = np.empty(len(old), dtype=np.int64)
+        moved = np.zeros(len(old), dtype=bool)
+        changed = np.zeros(len(old), dtype=bool)
+        changed[: len(state.changed)] = state.changed
+        stores = (
+            self.next_piece,
+            self.piece_cells,
+            self.piece_parent,
+            self.piece_fraction,
+            self.piece_label,
+        )
+        count = len(self.piece_cells)
+        for store in stores:
+            store.extend(len(state.old))
+        after = write_pieces(
+            cell,
+            group,
+            touched,
+            number,
+            solid,
+            changed,
+            old,
+            state.fraction,
+            state.label,
+            self.next_piece.rows,
+            self.piece_cells.rows,
+            self.piece_parent.rows,
+            self.piece_fraction.rows,
+            self.piece_label.rows,
+            count,
+            place,
+            moved,
+        )
+        self._moved = cell[moved]
+        for store in stores:
+            store.rows = store.rows[:after]
+        return place
+
+    def _store_simplices(self, division: Division, cells: _Ints, place: _Ints) -> None:
+        """Replace the sub-simplices of the changed cells."""
+        patch, partition = division.patch, division.partition
+        ids = self.points.number(partition.points, patch.whole_nodes, division.numbers)
+        rows, bounds = simplices_of(
+            cells,
+            patch.whole_cells,
+            partition.parent,
+            partition.sub_piece,
+            place,
+            partition.sub_fraction,
+        )
+        retire(self.sub_piece.rows, self.sub_range, cells)
+        begin = len(self.sub_piece)
+        self.sub_piece.append(place[partition.sub_piece[rows]])
+        self.sub_points.append(ids[partition.sub_points[rows]])
+        self.sub_barycentric.append(partition.sub_barycentric[rows])
+        self.sub_fraction.append(partition.sub_fraction[rows])
+        self.sub_sign.append(partition.sub_sign[rows])
+        self.sub_range[cells] = begin + bounds
+
+
+def _among(values: _Ints, ascending: _Ints) -> NDArray[np.bool_]:
+    """Whether each value is one of some ascending ones, of which there is at least one."""
+    place = np.searchsorted(ascending, values)
+    return ascending[np.minimum(place, len(ascending) - 1)] == values

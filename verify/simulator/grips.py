@@ -1,0 +1,138 @@
+"""What holds a played body and pulls at it: supports of the scene, hooks at the edges of a cut."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.simulator.stage import Hold, Hook
+from verify.xfem.dynamics import MovingSupports
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Grips", "gripped", "held_facets", "held_unknowns"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+def gripped(virtual: VirtualMesh, hook: Hook) -> _Ints:
+    """Unknown nodes that a hook grips: those on its side within its radius, at least the nearest.
+
+    The unknowns at nodes across the cut are among them: they carry the material up to the cut.
+    """
+    on_side = np.flatnonzero(virtual.node_side[:, hook.stroke] == hook.side)
+    if len(on_side) == 0:
+        return on_side
+    away = np.linalg.norm(virtual.node_points[on_side] - hook.at, axis=1)
+    return on_side[away <= max(hook.radius, float(away.min()))]
+
+
+def held_unknowns(
+    virtual: VirtualMesh, nodes: NDArray[np.bool_], on_held: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
+    """Unknown nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
+
+    The unknown of the material at a node is held. Another one there, of material beyond a cut, is
+    held only if that material reaches a held facet: else a part that is cut free would hang on a
+    node that is no part of it. `on_held` is what `held_facets` gives, if it is known.
+    """
+    held = np.zeros(virtual.node_count, dtype=bool)
+    held[: len(nodes)] = nodes
+    sub = virtual.sub_cells
+    facets = held_facets(virtual.mesh, nodes) if on_held is None else on_held
+    _hold_parts(facets, virtual.cells, virtual.parent, sub.piece, sub.barycentric, held)
+    return held
+
+
+def held_facets(mesh: SimplexMesh, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(m, d + 1) whether the facet opposite to a corner is on the boundary, its nodes all held."""
+    cell, local = mesh.boundary_facets.T
+    facet = nodes[mesh.cells[cell]]
+    facet[np.arange(len(cell)), local] = True
+    on_held = np.zeros(mesh.cells.shape, dtype=bool)
+    on_held[cell, local] = facet.all(axis=1)
+    return on_held
+
+
+@njit(cache=True)
+def _hold_parts(on_held, cells, parent, piece, barycentric, held):
+    """Hold the unknowns of sub-simplices on held facets: all corners but one lie on these."""
+    corners = cells.shape[1]
+    for k in range(len(piece)):
+        for opposite in range(corners):
+            if not on_held[parent[piece[k]], opposite]:
+                continue
+            away = 0
+            for corner in range(corners):
+                away += barycentric[k, corner, opposite] != 0.0
+            if away != 1:
+                continue
+            for corner in range(corners):
+                if corner != opposite:
+                    held[cells[piece[k], corner]] = True
+
+
+class Grips:
+    """Supports and loads of a body as it is now, from the time at which it was last cut.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+    holds : sequence of Hold
+    hooks : sequence of Hook
+    weights : (N,) float array
+        Lumped masses: a force is shared in proportion, so that slivers get next to nothing.
+    start : dict
+        Displacement (N, s) at which each hook (by its number) has gripped.
+    facets : sequence of (m, d + 1) bool arrays, optional
+        `held_facets` of each hold; they do not change as the body is cut.
+    """
+
+    def __init__(
+        self,
+        virtual: VirtualMesh,
+        holds: Sequence[Hold],
+        hooks: Sequence[Hook],
+        weights: _Floats,
+        start: dict[int, _Floats],
+        facets: Sequence[NDArray[np.bool_]] | None = None,
+    ) -> None:
+        shape = (virtual.node_count, virtual.mesh.space)
+        self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
+        for k, hold in enumerate(holds):
+            at = held_unknowns(virtual, hold.nodes, None if facets is None else facets[k])
+            for axis, value in zip(hold.components, hold.values, strict=True):
+                self._fixed[at, axis], self._values[at, axis] = True, value
+        self._moved: list[tuple[Hook, _Ints, _Floats]] = []
+        self._pulled: list[tuple[Hook, _Ints, _Floats]] = []
+        for number, begun in start.items():
+            hook, nodes = hooks[number], gripped(virtual, hooks[number])
+            if len(nodes) == 0:
+                continue
+            if hook.is_force:
+                share = weights[nodes] / weights[nodes].sum()
+                self._pulled.append((hook, nodes, share[:, None] * hook.vector))
+            else:
+                self._fixed[nodes] = True
+                self._moved.append((hook, nodes, begun[nodes]))
+
+    @property
+    def supports(self) -> MovingSupports:
+        """Holds, and hooks that move."""
+        return MovingSupports(self._fixed, self._at)
+
+    def force(self, time: float) -> _Floats:
+        """Nodal forces (N, s) of the hooks that pull, N."""
+        force = np.zeros(self._values.shape)
+        for hook, nodes, full in self._pulled:
+            force[nodes] += hook.share(time) * full
+        return force
+
+    def _at(self, time: float) -> tuple[_Floats, _Floats]:
+        displacement, velocity = self._values.copy(), np.zeros(self._values.shape)
+        for hook, nodes, begun in self._moved:
+            displacement[nodes] = begun + hook.share(time) * hook.vector
+            velocity[nodes] = hook.rate(time) * hook.vector
+        return displacement, velocity

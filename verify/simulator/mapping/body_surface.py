@@ -1,0 +1,109 @@
+"""The surface of the material itself: the mesh's own boundary, split, and the faces of the cuts.
+
+Each piece's share of it closes around the material: facets on the boundary of the mesh, and inner
+facets from the polygons in which cuts cross elements (thesis 3.2.4), oriented outwards, with
+vertices doubled where, and only where, the material is separate. A membrane is its own surface,
+with two new rims along a cut instead of inner facets.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.arrays.distinct import ranges
+from verify.simulator.cutting.growing_body import GrowingBody, Increment
+from verify.xfem.in_pieces import InPieces, in_one_go
+from verify.simulator.mapping.corner_kernels import place_corners
+from verify.simulator.mapping.edge_points import EdgePoints
+from verify.simulator.mapping.exposed_kernels import exposed_facets
+from verify.simulator.mapping.membrane_facets import membrane_facets, rim_edges
+from verify.simulator.mapping.moving_surface import MovingSurface
+
+__all__ = ["BodySurface"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class BodySurface:
+    """Outer and inner surface of a growing body; every update costs what the cut touched.
+
+    Parameters
+    ----------
+    body : GrowingBody
+        Of triangles in the plane, tetrahedra, or triangles in space (a membrane).
+
+    Attributes
+    ----------
+    surface : MovingSurface
+    """
+
+    def __init__(self, body: GrowingBody) -> None:
+        mesh = body.mesh
+        self._body, self._membrane = body, mesh.dim < mesh.space
+        self.surface = MovingSurface(mesh.dim + 1, mesh.space, mesh.space)
+        self._edges = EdgePoints(mesh.points, body.points)
+        self._facet_range = np.zeros((len(mesh.cells), 2), dtype=np.int64)
+        split = np.flatnonzero(body.split_cells)
+        if self._membrane:
+            in_one_go(self._covering(np.arange(len(mesh.cells)), split))
+            return
+        self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
+        boundary = np.unique(mesh.boundary_facets[:, 0])
+        in_one_go(self._covering(np.union1d(boundary, split), split))
+
+    def update(self, increment: Increment | None) -> None:
+        """Follow a cut."""
+        if increment is not None:
+            in_one_go(self.following(increment))
+
+    def following(self, increment: Increment) -> InPieces[None]:
+        """Follow a cut in pieces; the body must not be cut again in between."""
+        return self._covering(increment.touched, increment.cells)
+
+    @property
+    def rims(self) -> _Ints:
+        """(k, 2) edges of the surface that cuts have made; of a solid there are none.
+
+        They run along the direction of their facets, the material on their left seen from above.
+        """
+        if not self._membrane:
+            return np.empty((0, 2), dtype=np.int64)
+        return rim_edges(self._body, self.surface)
+
+    def _covering(self, cells: _Ints, split: _Ints) -> InPieces[None]:
+        """Make the facets of some cells anew; `split` are those with new sub-simplices."""
+        body, mesh = self._body, self._body.mesh
+        self._edges.add(body.sub_points.rows[ranges(body.sub_range[split])].ravel())
+        ids, at, piece, cell, inner = self._facets_of(cells)
+        yield
+        ids, at, source = self._edges.bisect(ids, at)
+        material, counts, pieces, cell, inner = place_corners(
+            ids, at, source, piece, cell, inner, mesh.cells, mesh.points, body.points.supports
+        )
+        self.surface.retire(ranges(self._facet_range[cells]))
+        self._facet_range[cells] = 0
+        self.surface.add(
+            ids, material, at, counts, pieces, inner, body.piece_cells.rows, cell,
+            self._facet_range,
+        )  # fmt: skip
+
+    def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:
+        """Point numbers, barycentric corners, piece, cell, whether on a cut, of their facets."""
+        body, mesh = self._body, self._body.mesh
+        if self._membrane:
+            return membrane_facets(body, cells)
+        return exposed_facets(
+            cells,
+            body.split_cells,
+            mesh.cells,
+            mesh.neighbours,
+            body.piece_cells.rows,
+            body.first_piece,
+            body.next_piece.rows,
+            body.sub_range,
+            body.sub_piece.rows,
+            body.sub_points.rows,
+            body.sub_barycentric.rows,
+            body.sub_sign.rows,
+            self._orientation,
+        )

@@ -1,0 +1,267 @@
+"""Facets of elements and of their sub-simplices that lie on the surface of the material."""
+
+import numpy as np
+from numba import njit
+
+from verify.simulator.mapping.partner_kernels import partner
+
+__all__ = ["exposed_facets"]
+
+
+@njit(cache=True)
+def _same_facet(s, skip, t, other, sub_points):
+    """Whether the facets of two simplices opposite to these corners have the same points."""
+    corners, same = sub_points.shape[1], True
+    for i in range(corners):
+        found = i == skip
+        for j in range(corners):
+            found = found or (j != other and sub_points[s, i] == sub_points[t, j])
+        same = same and found
+    return same
+
+
+@njit(cache=True)
+def _find_facet(s, skip, begin, end, sub_points):
+    """Give another simplex from `begin` to `end` with the facet of s opposite to `skip`, or -1."""
+    corners, total = sub_points.shape[1], -sub_points[s, skip]
+    for k in range(corners):
+        total += sub_points[s, k]
+    for t in range(begin, end):
+        if t == s:
+            continue
+        rest = -total
+        for k in range(corners):
+            rest += sub_points[t, k]
+        for other in range(corners):
+            # the sums tell most facets apart
+            if sub_points[t, other] == rest and _same_facet(s, skip, t, other, sub_points):
+                return t
+    return -1
+
+
+@njit(cache=True)
+def _mark_shared(begin, end, sub_piece, sub_points, sums, shared):
+    """Mark the facets (k, d + 1) that two simplices of one piece share; `sums` (k,) is room."""
+    corners = sub_points.shape[1]
+    for s in range(begin, end):
+        sums[s - begin] = 0
+        for k in range(corners):
+            sums[s - begin] += sub_points[s, k]
+            shared[s - begin, k] = False
+    for s in range(begin, end):
+        for t in range(s + 1, end):
+            if sub_piece[t] != sub_piece[s]:
+                continue
+            more = sums[t - begin] - sums[s - begin]
+            for skip in range(corners):
+                for other in range(corners):
+                    # the sums tell most facets apart
+                    apart = sub_points[t, other] - sub_points[s, skip] != more
+                    if not apart and _same_facet(s, skip, t, other, sub_points):
+                        shared[s - begin, skip] = shared[t - begin, other] = True
+
+
+@njit(cache=True)
+def _face_of(barycentric, skip):
+    """Corner opposite to the face of the element in which a facet lies, or -1."""
+    for a in range(barycentric.shape[1]):
+        flat = True
+        for k in range(barycentric.shape[0]):
+            flat = flat and (k == skip or barycentric[k, a] == 0.0)
+        if flat:
+            return a
+    return -1
+
+
+@njit(cache=True)
+def _meets(piece, other, cell, across, opposite, cells, piece_cells):
+    """Whether pieces of two cells move together at the nodes of the face between these."""
+    same = True
+    for a in range(cells.shape[1]):
+        for b in range(cells.shape[1]):
+            if a != opposite and cells[across, b] == cells[cell, a]:
+                same = same and piece_cells[other, b] == piece_cells[piece, a]
+    return same
+
+
+@njit(cache=True)
+def _is_whole(points, skip, nodes):
+    """Whether a facet is a whole face of the element: all its points are nodes."""
+    whole = True
+    for k in range(len(points)):
+        node = k == skip
+        for a in range(len(nodes)):
+            node = node or points[k] == nodes[a]
+        whole = whole and node
+    return whole
+
+
+@njit(cache=True)
+def _beyond(
+    piece, cell, opposite, neighbours, cells, piece_cells, sub_range, sub_piece,
+    sub_points, sub_barycentric, sub_sign, orientation, out, count,
+):  # fmt: skip
+    """Expose parts of a whole face beyond which there is a piece that moves otherwise.
+
+    They are the facets of the cell across, turned about. Gives the count of facets.
+    """
+    ids, at, piece_of, cell_of, inner = out
+    across, corners = neighbours[cell, opposite], cells.shape[1]
+    for s in range(sub_range[across, 0], sub_range[across, 1]):
+        if _meets(piece, sub_piece[s], cell, across, opposite, cells, piece_cells):
+            continue
+        for skip in range(corners):
+            face = _face_of(sub_barycentric[s], skip)
+            if face < 0 or neighbours[across, face] != cell:
+                continue
+            k = 0
+            for v in range(corners):
+                if v == skip:
+                    continue
+                ids[count, k] = sub_points[s, v]
+                for b in range(corners):
+                    at[count, k, b] = 0.0
+                    for j in range(corners):
+                        if cells[across, j] == cells[cell, b]:
+                            at[count, k, b] = sub_barycentric[s, v, j]
+                k += 1
+            piece_of[count], cell_of[count], inner[count] = piece, cell, True
+            _turn(ids[count], at[count], -orientation[across] * sub_sign[s], skip)
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _rows(room, corners):
+    """Point numbers, barycentric corners, piece, cell and whether on a cut, not yet written."""
+    return (
+        np.empty((room, corners - 1), dtype=np.int64),
+        np.empty((room, corners - 1, corners)),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.int64),
+        np.empty(room, dtype=np.bool_),
+    )
+
+
+@njit(cache=True)
+def _with_room(out, count, more):
+    """Give the same rows with room for more, and as many again."""
+    new = _rows(2 * (count + more), out[1].shape[2])
+    for row in range(count):
+        for k in range(out[0].shape[1]):
+            new[0][row, k] = out[0][row, k]
+            for a in range(out[1].shape[2]):
+                new[1][row, k, a] = out[1][row, k, a]
+        new[2][row], new[3][row], new[4][row] = out[2][row], out[3][row], out[4][row]
+    return new
+
+
+@njit(cache=True)
+def exposed_facets(
+    wanted, split, cells, neighbours, piece_cells, first_piece, next_piece,
+    sub_range, sub_piece, sub_points, sub_barycentric, sub_sign, orientation,
+):  # fmt: skip
+    """Facets of these cells on the surface of the material.
+
+    Returns for each: point numbers (q, d), barycentric corners (q, d, d + 1), piece, cell,
+    and whether it lies on a cut. Facets are oriented outwards.
+    """
+    corners = cells.shape[1]
+    room = 256
+    for cell in wanted:
+        room += corners + 2 * (sub_range[cell, 1] - sub_range[cell, 0])
+    out, count = _rows(room, corners), np.int64(0)
+    sums, shared = np.empty(32, dtype=np.int64), np.empty((32, corners), dtype=np.bool_)
+    for cell in wanted:
+        begin, end = sub_range[cell, 0], sub_range[cell, 1]
+        most = corners * max(1, end - begin)
+        for a in range(corners):
+            across = neighbours[cell, a]
+            if across >= 0:
+                most += corners * (sub_range[across, 1] - sub_range[across, 0])
+        if count + most > len(out[0]):
+            out = _with_room(out, count, most)
+        ids, at, piece_of, cell_of, inner = out
+        if not split[cell]:
+            piece = first_piece[cell]
+            for a in range(corners):
+                across = neighbours[cell, a]
+                other = partner(
+                    piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
+                )
+                if other < 0:
+                    k = 0
+                    for b in range(corners):
+                        if b != a:
+                            ids[count, k] = cells[cell, b]
+                            for c in range(corners):
+                                at[count, k, c] = 1.0 if c == b else 0.0
+                            k += 1
+                    piece_of[count], cell_of[count] = piece, cell
+                    inner[count] = across >= 0
+                    _turn(ids[count], at[count], orientation[cell], a)
+                    count += 1
+                    continue
+                if not split[across]:
+                    continue
+                count = _beyond(
+                    piece, cell, a, neighbours, cells, piece_cells, sub_range, sub_piece,
+                    sub_points, sub_barycentric, sub_sign, orientation, out, count,
+                )  # fmt: skip
+            continue
+        if end - begin > len(sums):
+            sums = np.empty(2 * (end - begin), dtype=np.int64)
+            shared = np.empty((2 * (end - begin), corners), dtype=np.bool_)
+        _mark_shared(begin, end, sub_piece, sub_points, sums, shared)
+        for s in range(begin, end):
+            for skip in range(corners):
+                if shared[s - begin, skip]:
+                    continue
+                face = _face_of(sub_barycentric[s], skip)
+                if face >= 0:
+                    other = partner(
+                        sub_piece[s], cell, face, cells, neighbours, piece_cells, first_piece,
+                        next_piece,
+                    )  # fmt: skip
+                    across = neighbours[cell, face]
+                    first, last = (np.int64(0), np.int64(0))
+                    if across >= 0:
+                        first, last = sub_range[across, 0], sub_range[across, 1]
+                    # the same facet of the cell across may be that of a piece that moves otherwise
+                    same = _find_facet(s, skip, first, last, sub_points)
+                    if other >= 0 and (
+                        same < 0
+                        or _meets(
+                            sub_piece[s], sub_piece[same], cell, across, face, cells, piece_cells
+                        )
+                    ):
+                        if _is_whole(sub_points[s], skip, cells[cell]):
+                            count = _beyond(
+                                sub_piece[s], cell, face, neighbours, cells, piece_cells,
+                                sub_range, sub_piece, sub_points, sub_barycentric, sub_sign,
+                                orientation, out, count,
+                            )  # fmt: skip
+                        continue
+                k = 0
+                for b in range(corners):
+                    if b != skip:
+                        ids[count, k] = sub_points[s, b]
+                        for a in range(corners):
+                            at[count, k, a] = sub_barycentric[s, b, a]
+                        k += 1
+                piece_of[count], cell_of[count] = sub_piece[s], cell
+                inner[count] = face < 0 or neighbours[cell, face] >= 0
+                _turn(ids[count], at[count], orientation[cell] * sub_sign[s], skip)
+                count += 1
+    ids, at, piece_of, cell_of, inner = out
+    return ids[:count], at[:count], piece_of[:count], cell_of[:count], inner[:count]
+
+
+@njit(cache=True)
+def _turn(ids, at, sign, skipped):
+    """Orient the facet opposite to a corner of a simplex of that orientation outwards."""
+    if (sign > 0) == (skipped % 2 == 0):
+        return
+    ids[0], ids[1] = ids[1], ids[0]
+    for a in range(at.shape[1]):
+        at[0, a], at[1, a] = at[1, a], at[0, a]

@@ -1,0 +1,129 @@
+"""Surfaces of a played body: that of the material itself, one to see, one to touch.
+
+Those of a solid can be separate meshes. A plane body and a membrane are their own surface.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.simulator.stage import Stage
+from verify.simulator.surface_part import SurfacePart, embed_together
+from verify.simulator.cutting.growing_body import Increment
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.in_pieces import InPieces
+from verify.simulator.mapping.body_surface import BodySurface
+from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["Picture", "Surfaces"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+
+class Picture:
+    """Triangles to be drawn.
+
+    Attributes
+    ----------
+    points, material : (q, 3) float array
+        Corners as they are now, and in the uncut body, m.
+    triangles : (f, 3) int array
+    inner : (f,) bool array
+        Whether a triangle lies on a cut.
+    """
+
+    def __init__(
+        self, points: _Floats, material: _Floats, triangles: _Ints, inner: NDArray[np.bool_]
+    ) -> None:
+        beyond = ((0, 0), (0, 3 - points.shape[1]))
+        self.points, self.material = np.pad(points, beyond), np.pad(material, beyond)
+        self.triangles, self.inner = triangles, inner
+
+
+class Surfaces:
+    """All surfaces of a body under the knife.
+
+    Parameters
+    ----------
+    stage : Stage
+    cutter : SemiProgressiveCutter
+
+    Attributes
+    ----------
+    material : BodySurface
+        Closed around the material; of a membrane, its triangles.
+    visual, collision : SurfacePart or None
+        Where the stage has separate ones.
+    """
+
+    def __init__(self, stage: Stage, cutter: SemiProgressiveCutter) -> None:
+        self._cutter = cutter
+        self.material = BodySurface(cutter.body)
+        self._embedded, (self.visual, self.collision) = embed_together(
+            cutter, [stage.visual, stage.collision]
+        )
+        followers = (self.material, self._embedded)
+        self._followers = [surface for surface in followers if surface is not None]
+        self._positions = [np.empty((0, stage.mesh.space)) for _ in self._followers]
+
+    def following(self, increment: Increment) -> InPieces[None]:
+        """Let them follow a cut, in pieces; each is sound all along."""
+        if self._embedded is not None:
+            yield from self._embedded.following(increment)
+        yield from self.material.following(increment)
+
+    def move(self, displacement: _Floats) -> None:
+        """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""
+        for k, follower in enumerate(self._followers):
+            surface = follower.surface
+            if len(self._positions[k]) != len(surface.material.rows):
+                self._positions[k] = np.empty_like(surface.material.rows)
+            surface.positions(displacement, self._positions[k])
+
+    @property
+    def shown(self) -> MovingSurface | SurfacePart:
+        """The surface that is seen, the faces of cuts apart."""
+        return self.visual or self.material.surface
+
+    @property
+    def touchable(self) -> MovingSurface | SurfacePart:
+        """The surface that tools collide with."""
+        return self.collision or self.material.surface
+
+    @property
+    def touchable_positions(self) -> _Floats:
+        """(v, s) vertices of that surface after the last `move`, m."""
+        return self._positions[-1 if self.collision else 0]
+
+    def picture(self, virtual: VirtualMesh, displacement: _Floats) -> Picture:
+        """Draw the body as it is now: the visual surface with the faces of the cuts."""
+        if virtual.mesh.space == 2:
+            return _pieces(virtual, displacement)
+        inside = self.material.surface
+        parts: list[tuple[MovingSurface | SurfacePart, _Ints]] = [(inside, inside.used)]
+        if self.visual is not None:
+            shown = inside.used[inside.inner.rows[inside.used]]
+            parts = [(inside, shown), (self.visual, self.visual.used)]
+        points, material, triangles, inner, begin = [], [], [], [], 0
+        for number, (surface, used) in enumerate(parts):
+            points.append(surface.positions(displacement))
+            material.append(surface.material.rows)
+            triangles.append(surface.facets.rows[used] + begin)
+            inner.append(surface.inner.rows[used] & (number == 0))
+            begin += len(points[-1])
+        return Picture(*(np.concatenate(rows) for rows in (points, material, triangles, inner)))
+
+
+def _pieces(virtual: VirtualMesh, displacement: _Floats) -> Picture:
+    """Draw a plane body: its whole triangles and the parts of the split ones."""
+    piece, at, _ = virtual.solid_simplices
+    corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
+    turned = np.linalg.det(at) < 0.0  # sub-simplices come in the order of their numbers
+    at = np.where(turned[:, None, None], at[:, ::-1], at)
+    moved = corners + displacement[virtual.cells[piece]]
+    now, before = (
+        np.einsum("qki,qis->qks", at, x).reshape(-1, corners.shape[2]) for x in (moved, corners)
+    )
+    triangles = np.arange(len(now)).reshape(-1, 3)
+    return Picture(now, before, triangles, np.zeros(len(triangles), dtype=bool))
