@@ -12,14 +12,14 @@ import pytest
 from PIL import Image
 from small_disk import by_command, in_this_process, named_until_it_fits, small_disk
 
-from verify.simulator.anatomy.store import write_patch
 from verify.compare.locate import SolutionField
-from verify.simulator import animation
-from verify.simulator.stroke_file import write_stroke
 from verify.report.blocks import Drawing
 from verify.report.template_sets import PICTURES, Beside
 from verify.result import CaseResult, write_result
 from verify.runner.error_field import write_error_field
+from verify.simulator import animation
+from verify.simulator.anatomy.store import write_patch
+from verify.simulator.stroke_file import write_stroke
 from verify.solution import Solution, write_solution
 from verify.xfem.cuts import ToolPath
 

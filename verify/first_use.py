@@ -27,6 +27,7 @@ from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, f
 from verify.compare.overlap import OverlapSearch
 from verify.compare.simplices import simplices
 from verify.compile_times import compile_times
+from verify.simulator.mapping.pull_back import pull_back
 from verify.simulator.session import Session
 from verify.simulator.stage import Stage
 from verify.solution import Solution
@@ -42,7 +43,6 @@ from verify.xfem.dynamics import (
 )
 from verify.xfem.elasticity import State, isotropic
 from verify.xfem.loads import body_force
-from verify.simulator.mapping.pull_back import pull_back
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import treat_slivers

@@ -10,10 +10,10 @@ from dataclasses import replace
 from math import isfinite
 
 from verify.applied_checks import applied_checks, limit_text, unjudged
-from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
-from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 from verify.assess.intervals import Interval, NotMeasuredError, error_interval
 from verify.assess.rates import ROUND_OFF
+from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
+from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 
 __all__ = ["judge", "judged_against_rows", "with_verdicts"]
 

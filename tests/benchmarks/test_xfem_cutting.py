@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from verify.simulator.collision.surface_collider import SurfaceCollider
-from verify.xfem.cuts import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
+from verify.xfem.cuts import ToolPath
 from verify.xfem.structured_meshes import box_mesh
 
 pytestmark = pytest.mark.timing

@@ -36,7 +36,9 @@ def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
-    (tmp_path / "my_case.toml").write_text(blocks("guide/write-a-case.md", "toml")[0], encoding="utf-8")
+    (tmp_path / "my_case.toml").write_text(
+        blocks("guide/write-a-case.md", "toml")[0], encoding="utf-8"
+    )
     lines = [line for block in blocks(page, "sh") for line in block.splitlines() if line.strip()]
     assert len(lines) >= 3
     for line in lines:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from reference.exact import exact_solution
+from verify.assess.blade_intensity import blade_front, blade_intensity
+from verify.assess.stress_intensity import intensity_defect
 from verify.compare.body import body_of
 from verify.compare.motion import ExactMotion
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.acceptance import StressIntensityQuantity
-from verify.assess.blade_intensity import blade_front, blade_intensity
-from verify.assess.stress_intensity import intensity_defect
 
 
 def _strip(speed, angle, upwards=True):

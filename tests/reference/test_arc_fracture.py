@@ -6,9 +6,9 @@ from reference_scenes import needs_fenicsx, square
 
 from reference.exact import exact_solution
 from reference.fracture import no_tip, stress_intensity, tips
+from verify.assess.stress_intensity import exact_intensity
 from verify.scene import Scene
 from verify.solvers import find_solver
-from verify.assess.stress_intensity import exact_intensity
 
 
 def plate_with_an_arc(start=-20.0, sweep=100.0):

@@ -5,9 +5,9 @@ import pytest
 from reference_scenes import areas, exterior_facets, needs_fenicsx, polyline, square
 
 from reference.exact import exact_solution
+from verify.assess.richardson import extrapolate
 from verify.errors import InputError
 from verify.scene import load_scene
-from verify.assess.richardson import extrapolate
 
 pytestmark = needs_fenicsx
 

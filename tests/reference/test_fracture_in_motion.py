@@ -177,10 +177,10 @@ class TestOnTheReference:
     @pytest.mark.heavy
     @pytest.mark.parametrize("angle", [0.0, 20.0])
     def test_the_stated_uncertainty_of_a_suddenly_opened_crack_covers_the_exact_factor(self, angle):
-        from verify.compare.body import body_of
-        from verify.compare.hooke import law_of
         from verify.assess.quantities import Measured
         from verify.assess.reference import known_quantity, size_of
+        from verify.compare.body import body_of
+        from verify.compare.hooke import law_of
 
         scene = opened_suddenly(angle)
         body, law = body_of(scene), law_of(scene)

@@ -43,11 +43,11 @@ def other_meshes(monkeypatch):
 
 def known(scene):
     """Every quantity with its half-width, and the numbers of cells, by three levels."""
+    from verify.assess.quantities import Measured
+    from verify.assess.reference import known_quantity, size_of
     from verify.compare.body import body_of
     from verify.compare.hooke import law_of
     from verify.solvers import find_solver
-    from verify.assess.quantities import Measured
-    from verify.assess.reference import known_quantity, size_of
 
     body, law, solver = body_of(scene), law_of(scene), find_solver("reference")
     levels = [solver.solve(scene, level, repetitions=0) for level in range(scene.reference.levels)]

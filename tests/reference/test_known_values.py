@@ -136,9 +136,9 @@ def factors(name, level=None):
 
 @pytest.mark.parametrize("name", ROWS)
 def test_intensities_energies_and_openings_are_the_known_ones(name):
+    from verify.assess.quantities import Measured
     from verify.compare.body import body_of
     from verify.compare.hooke import hooke
-    from verify.assess.quantities import Measured
 
     known = VALUES[name]
     pairs = factors(name)

@@ -8,11 +8,11 @@ from ranks_of_tests import on_ranks
 from reference_scenes import needs_fenicsx
 
 from reference.meshing import open_cut
+from verify.assess.accuracy import assess_accuracy
 from verify.compare.kinetic import kinetic
 from verify.result import SolveRecord, Status
 from verify.scene import Material, load_scene
 from verify.solvers import find_solver
-from verify.assess.accuracy import assess_accuracy
 from verify.xfem.structured_meshes import rectangle_mesh
 
 pytestmark = needs_fenicsx
@@ -109,9 +109,9 @@ def test_a_bowl_that_is_let_go_moves_as_that_of_the_compact_solver(tmp_path):
 @pytest.mark.parametrize("name, off", [("reference", 0.002), ("xfem", 0.03)])
 def test_the_lips_of_a_tear_fly_apart_with_the_elastic_wave(name, off):
     """Without lateral contraction the motion is linear along the band at any stretch."""
+    from verify.assess.quantities import Measured
     from verify.compare.body import body_of
     from verify.compare.hooke import law_of
-    from verify.assess.quantities import Measured
 
     scene = load_scene("dynamics/membrane_torn")
     level = 1 if name == "reference" else 0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from reference_scenes import areas, energy_of, needs_fenicsx, polyline, square
 
-from verify.errors import InputError
 from verify.assess.richardson import extrapolate
+from verify.errors import InputError
 
 pytestmark = needs_fenicsx
 

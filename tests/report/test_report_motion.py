@@ -8,13 +8,13 @@ import pytest
 from page_parser import parsed
 from synthetic_run import cut_square, make_run
 
+from verify.assess.motion_account import motion_account
+from verify.assess.motion_history import motion_history
 from verify.compare.hooke import Hooke
 from verify.report import render
 from verify.report.figures.style import Palette
 from verify.scene import Material
 from verify.solution import Solution
-from verify.assess.motion_account import motion_account
-from verify.assess.motion_history import motion_history
 
 TIMES = [0.0, 0.25, 0.5, 0.75, 1.0]
 

@@ -8,11 +8,11 @@ import pytest
 from page_parser import parsed
 from synthetic_run import HOSTILE, make_run
 
+from verify.cli import run_ranking as runner_ranking
+from verify.cli.run_ranking import rank_run
 from verify.conformance import CheckResult, State
 from verify.report import load_run, render
 from verify.result import Status
-from verify.cli import run_ranking as runner_ranking
-from verify.cli.run_ranking import rank_run
 
 
 def ranked(root, conformance=False):

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
+from verify.assess.sufficiency import sufficiency
 from verify.errors import InputError
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.runner.deepening import further_level
 from verify.runner.job import Job
 from verify.runner.plan import CasePlan
 from verify.scene import Scene, load_scene
-from verify.assess.sufficiency import sufficiency
 
 MISSING = [name for name in ("gmsh", "dolfinx") if find_spec(name) is None]
 

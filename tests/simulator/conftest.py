@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from thesis_stages import stage
 
-from verify.simulator.anatomy.procedural import procedural_face
 from verify.simulator import Stage
+from verify.simulator.anatomy.procedural import procedural_face
 
 
 @pytest.fixture(scope="session")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from thesis_stages import CASES
 
-from verify.simulator.anatomy.store import patch_file
-from verify.simulator import Session, quality_of, stage_of
 from verify.scene import load_scene
+from verify.simulator import Session, quality_of, stage_of
+from verify.simulator.anatomy.store import patch_file
 from verify.xfem.cuts import ToolPath
 
 ROUND_OFF = 1e-12

@@ -6,14 +6,14 @@ import zipfile
 import numpy as np
 import pytest
 
+from verify.cli import main
+from verify.errors import InputError
+from verify.scene import Skin
 from verify.simulator.anatomy import fetching
 from verify.simulator.anatomy.fetching import fetch_anatomy
 from verify.simulator.anatomy.skin_mesh import skin_mesh
 from verify.simulator.anatomy.store import stored_patch, write_patch
 from verify.simulator.anatomy.surface_file import border_loops
-from verify.cli import main
-from verify.errors import InputError
-from verify.scene import Skin
 
 
 def wheel(path, files: dict[str, str]) -> str:

@@ -5,9 +5,9 @@ import pytest
 from thesis_stages import CASES, stage
 
 from verify.scene import load_scene
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_openings import opening_times
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.virtual import cut_mesh
 
 

@@ -9,11 +9,11 @@ from PIL import Image
 from thesis_stages import CASES
 
 from verify.cli import main
+from verify.runner.selection import select_cases
+from verify.scene import load_scene
 from verify.simulator import Session, stage_of
 from verify.simulator.live_scalpel import LiveScalpel
 from verify.simulator.stroke_file import stroke_text, write_stroke
-from verify.runner.selection import select_cases
-from verify.scene import load_scene
 
 graphics = pytest.mark.graphics
 

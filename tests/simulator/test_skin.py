@@ -4,13 +4,13 @@ import meshio
 import numpy as np
 import pytest
 
+from verify.errors import InputError
+from verify.scene import Skin
 from verify.simulator.anatomy.plane_mesh import mesh_of_about, plane_mesh
 from verify.simulator.anatomy.procedural import procedural_face, procedural_hand
 from verify.simulator.anatomy.skin_mesh import skin_mesh, skin_surface
 from verify.simulator.anatomy.surface_file import border_loops, outer_border, read_surface
 from verify.simulator.anatomy.thicken import closed_shell, thicken, vertex_normals
-from verify.errors import InputError
-from verify.scene import Skin
 from verify.xfem.mesh import SimplexMesh
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from verify.simulator import Session, quality_of
-from verify.xfem.cuts import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.cuts import ToolPath
 from verify.xfem.in_pieces import in_one_go
 
 ROUND_OFF = 1e-12

@@ -7,8 +7,8 @@ import pytest
 from thesis_stages import CASES, stage
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.simulator import Session, quality_of, stage_of
 from verify.scene import load_scene
+from verify.simulator import Session, quality_of, stage_of
 
 G, H = 9.8, 0.005
 

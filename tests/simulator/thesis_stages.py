@@ -3,8 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from verify.simulator import Stage, stage_of
 from verify.scene import load_scene
+from verify.simulator import Stage, stage_of
 
 __all__ = ["CASES", "stage"]
 

@@ -7,6 +7,7 @@ import numpy as np
 from tip_advance import tip_advances
 
 from reference.exact import exact_solution
+from verify.assess.quantities import Measured
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.compare.integration import rules
@@ -15,7 +16,6 @@ from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
 from verify.solvers.xfem_scene import background_mesh
 from verify.study.budget import CutEnd, cut_ends
-from verify.assess.quantities import Measured
 
 __all__ = ["Crack", "Off", "crack_scene"]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from verify.assess.accuracy import assess_accuracy
 from verify.errors import InputError
 from verify.result import SolveRecord, Status
-from verify.assess.accuracy import assess_accuracy
 from verify.verdict import with_verdicts
 
 

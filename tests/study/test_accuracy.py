@@ -5,9 +5,9 @@ import pytest
 from cut_meshes import STRAIGHT, grid, layered, quadratic, scene, solution
 from judged_fields import Cubic, judged
 
+from verify.assess.accuracy import assess_accuracy
 from verify.errors import InputError
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
-from verify.assess.accuracy import assess_accuracy
 from verify.verdict import with_verdicts
 
 

@@ -9,13 +9,13 @@ from cut_meshes import grid
 from judged_fields import Quadratic, judged
 from membrane_meshes import bowl, layers, line, membrane, roof
 
+from verify.assess.changed_scenes import with_kinematics
 from verify.compare.hooke import law_of
 from verify.errors import UnsupportedSceneError
 from verify.report.bodies import deformed_body, error_body
 from verify.result import Verdict
 from verify.runner.error_field import nodal_error, write_error_field
 from verify.scene import load_scene
-from verify.assess.changed_scenes import with_kinematics
 
 CASE = """
 title = "a sheet"

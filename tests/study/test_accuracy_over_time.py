@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from cut_meshes import STRAIGHT, layered, scene
 
+from verify.assess.accuracy import assess_accuracy
 from verify.result import SolveRecord, Status, Verdict, read_result, write_result
 from verify.solution import Solution
-from verify.assess.accuracy import assess_accuracy
 from verify.verdict import with_verdicts
 
 DURATION = 2.0

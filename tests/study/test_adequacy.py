@@ -5,14 +5,14 @@ import re
 import pytest
 from pydantic import ValidationError
 
+from verify.assess.accuracy import assess_accuracy
+from verify.assess.adequacy import adequacy_notice, other_scene
 from verify.compare.hooke import law_of
 from verify.compare.strain_energy import strain_energy
 from verify.result import NoticeKind
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, scene_hash
 from verify.solvers import find_solver
-from verify.assess.accuracy import assess_accuracy
-from verify.assess.adequacy import adequacy_notice, other_scene
 
 CASE = {
     "title": "t",

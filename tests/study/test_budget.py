@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from verify.assess.realised_cut import polylines_of, triangles_of
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.compare.motion import ExactMotion
@@ -10,7 +11,6 @@ from verify.result import Verdict
 from verify.scene import load_scene
 from verify.study.budget import Candidate, cheapest_adequate, error_budget, on_realised_cut
 from verify.study.budget.budget import Answer
-from verify.assess.realised_cut import polylines_of, triangles_of
 
 
 class Affine:

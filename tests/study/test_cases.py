@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from reference.exact import exact_solution
+from verify.assess.reference import exact_reference
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError
 from verify.scene import Scene, list_cases, load_scene
-from verify.assess.reference import exact_reference
 
 CASES = [name for name in list_cases() if name.startswith("statics/")]
 EXACT = [name for name in CASES if load_scene(name).exact is not None]

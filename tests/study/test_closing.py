@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from pressed_halves import common, normal, pressed
 
+from verify.assess.closing import with_openings
 from verify.errors import InputError
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.assess.closing import with_openings
 
 SHARED = """
 title = "A square, cut through"

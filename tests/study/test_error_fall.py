@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from verify.assess.error_fall import error_fall
 from verify.compare.body import body_of
 from verify.scene import Scene, load_scene
-from verify.assess.error_fall import error_fall
 
 
 def on_an_arc(facets):

@@ -7,12 +7,12 @@ import pytest
 from pydantic import ValidationError
 
 from reference.exact import exact_solution
+from verify.assess.stress_intensity import exact_intensity, solution_intensity
 from verify.errors import InputError, UnsupportedSceneError
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
 from verify.solution import Solution
 from verify.solvers import find_solver
-from verify.assess.stress_intensity import exact_intensity, solution_intensity
 
 
 def penny(*asked, **changes):

@@ -7,13 +7,13 @@ import pytest
 
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
+from verify.assess.local_difference import local_difference
+from verify.assess.quantities import Measured
+from verify.assess.richardson import place_uncertainty
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.assess.local_difference import local_difference
-from verify.assess.quantities import Measured
-from verify.assess.richardson import place_uncertainty
 
 SIZES = [0.4, 0.2, 0.1]
 POINT = {"kind": "displacement", "name": "u", "point": [0.31, 0.83], "component": "x"}

@@ -5,16 +5,16 @@ import pytest
 from cut_meshes import layered, quadratic, scene
 from solid_meshes import height, inclined, solid_scene, stacked
 
-from verify.compare.body import body_of
-from verify.compare.hooke import law_of
-from verify.compare.separated import boundary_nodes, separated_parts
-from verify.scene import PartQuantity, Scene
-from verify.solution import Solution
 from verify.assess import energy_account
 from verify.assess.energy_account import account_metrics
 from verify.assess.motion_account import motion_account
 from verify.assess.part_account import part_metrics, part_records
 from verify.assess.quantities import Measured, unit_of
+from verify.compare.body import body_of
+from verify.compare.hooke import law_of
+from verify.compare.separated import boundary_nodes, separated_parts
+from verify.scene import PartQuantity, Scene
+from verify.solution import Solution
 
 # what a blade releases is measured elsewhere
 ACCOUNT = [name for name in energy_account.ACCOUNT if not name.startswith("released")]

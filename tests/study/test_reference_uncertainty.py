@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from reference.exact import exact_solution
+from verify.assess.quantities import Measured
+from verify.assess.reference import conforming_reference, exact_reference
 from verify.compare.body import body_of
 from verify.compare.cut_line import cut_rule
 from verify.compare.displacement_error import displacement_error
@@ -13,8 +15,6 @@ from verify.compare.jump_error import jump_error
 from verify.compare.slabs import area_rule
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
-from verify.assess.quantities import Measured
-from verify.assess.reference import conforming_reference, exact_reference
 
 pytestmark = pytest.mark.fenicsx
 

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from verify.assess.motion_account import motion_account
+from verify.assess.released import advance, released_metrics
 from verify.compare.difference_energy import difference_energy, short_wave_energy
 from verify.compare.hooke import Hooke, law_of
 from verify.errors import InputError
@@ -10,8 +12,6 @@ from verify.report.released_line import released_line
 from verify.result import Metric, SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.assess.motion_account import motion_account
-from verify.assess.released import advance, released_metrics
 
 POINTS = np.array([[0, 0], [2, 0], [2, 1], [0, 1]], dtype=float)
 CELLS = np.array([[0, 1, 2], [0, 2, 3]])

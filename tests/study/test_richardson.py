@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from verify.errors import InputError
 from verify.assess.richardson import extrapolate, field_uncertainty, observed_order
+from verify.errors import InputError
 
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 2.0, 4.0])

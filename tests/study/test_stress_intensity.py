@@ -5,6 +5,9 @@ from dataclasses import replace
 import pytest
 
 from reference.exact import exact_solution
+from verify.assess.quantities import Measured, unit_of
+from verify.assess.reference import conforming_reference, exact_reference
+from verify.assess.unavailable import unavailable_quantities
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
@@ -12,9 +15,6 @@ from verify.result import Metric, SolveRecord, Status
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
-from verify.assess.quantities import Measured, unit_of
-from verify.assess.reference import conforming_reference, exact_reference
-from verify.assess.unavailable import unavailable_quantities
 
 ASKED = [
     {"kind": "stress_intensity", "name": f"K_{mode} at the {end}", "end": end, "mode": mode}

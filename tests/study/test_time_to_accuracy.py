@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from verify.assess.time_to_accuracy import time_to_accuracy
 from verify.report.tables import reference_tables
 from verify.solution import Solution
-from verify.assess.time_to_accuracy import time_to_accuracy
 
 TRIANGLE = Solution(np.eye(3)[:, :2], np.array([[0, 1, 2]]), np.zeros((1, 3, 2)))
 LEVELS = {

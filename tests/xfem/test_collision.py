@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from verify.simulator.collision.bounding_tree import BoundingTree
-from verify.xfem.cuts.simplex_kernels import nearest_on_facet
 from verify.simulator.collision.surface_collider import SurfaceCollider
-from verify.xfem.cuts import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
 from verify.simulator.mapping.body_surface import BodySurface
+from verify.xfem.cuts import ToolPath
+from verify.xfem.cuts.simplex_kernels import nearest_on_facet
+from verify.xfem.errors import XfemError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 

@@ -6,10 +6,10 @@ from cut_comparison import assert_same_cut
 from scipy.spatial import Delaunay
 from xfem_bodies import zero_modes
 
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts.flat import Cut, Plane, PolygonPatch
 from verify.xfem.cuts.polyline import Polyline
 from verify.xfem.cuts.tool_path import ToolPath
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from random_strokes import meshes, strokes
 from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 
-from verify.xfem.cuts import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
+from verify.xfem.cuts import ToolPath
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 

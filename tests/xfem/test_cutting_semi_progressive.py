@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from cut_comparison import assert_same_cut
 
-from verify.xfem.cuts import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

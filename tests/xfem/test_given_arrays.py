@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.bases import from_sidewise, sidewise_from
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import (
@@ -13,7 +14,6 @@ from verify.xfem.cuts import (
     ToolPath,
     TriangulatedSurface,
 )
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import in_one_go

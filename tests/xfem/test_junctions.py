@@ -10,8 +10,8 @@ from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
 from verify.methods.virtual_nodes import virtual_node
-from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide

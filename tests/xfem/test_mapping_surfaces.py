@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from surface_measures import loose_edges
 
-from verify.xfem.cuts import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
 from verify.simulator.mapping.alternative_mesh import virtual_elements
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
 from verify.simulator.mapping.pull_back import pull_back
+from verify.xfem.cuts import ToolPath
+from verify.xfem.errors import XfemError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 PATHS = [

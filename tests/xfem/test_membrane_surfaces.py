@@ -5,11 +5,11 @@ import pytest
 from cut_bodies import rotation
 
 from verify.simulator.collision.surface_collider import SurfaceCollider
-from verify.xfem.cuts import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.pull_back import pull_back
+from verify.xfem.cuts import ToolPath
+from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 

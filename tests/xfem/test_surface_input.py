@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from verify.xfem.cuts.simplex_kernels import nearest_on_facet
 from verify.simulator.collision.surface_collider import SurfaceCollider
-from verify.xfem.cuts.tool_path import ToolPath
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.pull_back import pull_back
+from verify.xfem.cuts.simplex_kernels import nearest_on_facet
+from verify.xfem.cuts.tool_path import ToolPath
+from verify.xfem.errors import XfemError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 

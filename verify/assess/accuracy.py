@@ -9,16 +9,6 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from verify.compare.body import AnyBody, body_of
-from verify.compare.errors import Rules
-from verify.compare.hooke import Law, law_of
-from verify.compare.integration import spread_of
-from verify.compare.locate import ROUND_OFF
-from verify.errors import InputError, UnsupportedSceneError
-from verify.printable import one_line
-from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
-from verify.scene import Scene, scene_hash
-from verify.solution import Solution
 from verify.assess.energy_account import ACCOUNT, account_metrics
 from verify.assess.error_history import ERROR_NAMES, History, compared_times, error_history
 from verify.assess.intervals import error_interval
@@ -38,6 +28,16 @@ from verify.assess.reference import (
 from verify.assess.released import released_metrics
 from verify.assess.sufficiency import sufficiency
 from verify.assess.unavailable import unavailable_quantities
+from verify.compare.body import AnyBody, body_of
+from verify.compare.errors import Rules
+from verify.compare.hooke import Law, law_of
+from verify.compare.integration import spread_of
+from verify.compare.locate import ROUND_OFF
+from verify.errors import InputError, UnsupportedSceneError
+from verify.printable import one_line
+from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
+from verify.scene import Scene, scene_hash
+from verify.solution import Solution
 
 __all__ = ["assess_accuracy"]
 

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from verify.assess.changed_scenes import at_rest, with_kinematics
+from verify.assess.reference import compared_size, conforming_reference
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import CaseResult, Notice, NoticeKind
 from verify.scene import Box, Polygon, Rectangle, Scene
 from verify.solution import Solution
-from verify.assess.changed_scenes import at_rest, with_kinematics
-from verify.assess.reference import compared_size, conforming_reference
 
 __all__ = ["adequacy_notice", "other_scene"]
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from verify.assess.realised_cut import polylines_of, triangles_of
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene, ToolPathCut
-from verify.assess.realised_cut import polylines_of, triangles_of
 
 __all__ = [
     "at_rest",

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from verify.assess.openings import Contestant, largest_opening_time, opening_profiles
+from verify.assess.reference import size_of
 from verify.compare.body import AnyBody, body_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.compare.overlap import Overlap, OverlapSearch
@@ -30,8 +32,6 @@ from verify.result import (
 )
 from verify.scene import Scene
 from verify.solution import Solution
-from verify.assess.openings import Contestant, largest_opening_time, opening_profiles
-from verify.assess.reference import size_of
 
 __all__ = ["with_openings"]
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from verify.assess.motion_account import NO_VELOCITIES, MotionAccount
+from verify.assess.part_account import PART_METRICS
 from verify.compare.ledger import balance, energy_scale, total_energy
 from verify.result import Metric
 from verify.scene import Scene
-from verify.assess.motion_account import NO_VELOCITIES, MotionAccount
-from verify.assess.part_account import PART_METRICS
 
 __all__ = ["ACCOUNT", "account_metrics"]
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from verify.result import Metric
 from verify.assess.energy_account import ACCOUNT
 from verify.assess.error_history import ERROR_NAMES
+from verify.result import Metric
 
 __all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval"]
 

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.assess.quantities import Measured
 from verify.compare.opening import cut_place
 from verify.compare.simplex_rule import points_in
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity
-from verify.assess.quantities import Measured
 
 __all__ = ["local_difference"]
 

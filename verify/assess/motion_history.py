@@ -1,8 +1,8 @@
 """Energies and momenta of a moving solution over its output times, as a report shows them."""
 
-from verify.compare.ledger import total_energy
 from verify.assess.motion_account import MotionAccount
 from verify.assess.part_account import momentum_components
+from verify.compare.ledger import total_energy
 
 __all__ = ["motion_history"]
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.assess.richardson import place_uncertainty
 from verify.compare.body import AnyBody
 from verify.compare.cut_profile import ProfileLine, profile_lines
 from verify.compare.jump_error import displacement_jump
 from verify.compare.motion import Motion
 from verify.errors import InputError
 from verify.result import OpeningCurve, OpeningProfile
-from verify.assess.richardson import place_uncertainty
 
 __all__ = ["Contestant", "largest_opening_time", "opening_profiles"]
 

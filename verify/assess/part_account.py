@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.assess.motion_account import NO_VELOCITIES, MotionAccount, uniform_force
 from verify.compare.kinetic import Kinetic
 from verify.compare.separated import boundary_nodes
 from verify.result import Metric, PartRecord
 from verify.scene import BodyForce, Gravity, Scene, Traction
 from verify.scene.parts import lie_on_part
 from verify.solution import Solution
-from verify.assess.motion_account import NO_VELOCITIES, MotionAccount, uniform_force
 
 __all__ = ["PART_METRICS", "momentum_components", "part_metrics", "part_records"]
 

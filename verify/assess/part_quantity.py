@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.assess.motion_account import NO_VELOCITIES
 from verify.compare.hooke import Law
 from verify.compare.kinetic import density_of, kinetic
 from verify.compare.locate import SolutionField
@@ -14,7 +15,6 @@ from verify.compare.strain_energy import cell_strain_energies
 from verify.errors import UnsupportedSceneError
 from verify.scene import PartQuantity, Scene
 from verify.solution import Solution
-from verify.assess.motion_account import NO_VELOCITIES
 
 __all__ = ["part_quantity", "part_unit"]
 

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from verify.assess.blade_intensity import blade_intensity
+from verify.assess.part_quantity import part_quantity, part_unit
+from verify.assess.stress_intensity import solution_intensity
 from verify.compare.body import AnyBody
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
@@ -22,9 +25,6 @@ from verify.scene.acceptance import (
     StressIntensityQuantity,
 )
 from verify.solution import Solution
-from verify.assess.blade_intensity import blade_intensity
-from verify.assess.part_quantity import part_quantity, part_unit
-from verify.assess.stress_intensity import solution_intensity
 
 __all__ = ["Measured", "field_quantity", "unit_of"]
 

@@ -8,6 +8,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from verify.assess.error_fall import counted_order, error_fall
+from verify.assess.error_history import ERROR_NAMES, base_of, compared_times, error_history
+from verify.assess.local_difference import local_difference
+from verify.assess.quantities import Measured, field_quantity
+from verify.assess.rates import ROUND_OFF
+from verify.assess.richardson import (
+    Extrapolation,
+    extrapolate,
+    field_uncertainty,
+    place_uncertainty,
+)
+from verify.assess.stress_intensity import exact_intensity
+from verify.assess.time_to_accuracy import time_to_accuracy
 from verify.compare.body import AnyBody, Body
 from verify.compare.body_rule import body_rule
 from verify.compare.errors import ERRORS, Rules
@@ -29,19 +42,6 @@ from verify.scene.acceptance import (
     StressIntensityQuantity,
 )
 from verify.solution import Solution
-from verify.assess.error_fall import counted_order, error_fall
-from verify.assess.error_history import ERROR_NAMES, base_of, compared_times, error_history
-from verify.assess.local_difference import local_difference
-from verify.assess.quantities import Measured, field_quantity
-from verify.assess.rates import ROUND_OFF
-from verify.assess.richardson import (
-    Extrapolation,
-    extrapolate,
-    field_uncertainty,
-    place_uncertainty,
-)
-from verify.assess.stress_intensity import exact_intensity
-from verify.assess.time_to_accuracy import time_to_accuracy
 
 __all__ = [
     "ExactField",

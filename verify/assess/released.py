@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from verify.assess.motion_account import MotionAccount
 from verify.compare.body import body_of
 from verify.compare.difference_energy import difference_energy, short_wave_energy
 from verify.compare.hooke import Law
@@ -20,7 +21,6 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Metric
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
-from verify.assess.motion_account import MotionAccount
 
 __all__ = ["RELEASED", "advance", "released_metrics"]
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.assess.front_factors import front_defect, front_factors
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import (
     ArcCut,
@@ -23,7 +24,6 @@ from verify.scene import (
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.history import factor_at, jumps
 from verify.solution import Solution
-from verify.assess.front_factors import front_defect, front_factors
 
 __all__ = ["exact_intensity", "intensity_defect", "solution_intensity"]
 

@@ -5,10 +5,10 @@ from math import isfinite
 from statistics import median
 from typing import Any
 
+from verify.assess.intervals import ERROR_METRICS
 from verify.baseline.record import Independent, Own, Quantity, Speed
 from verify.calibration import KERNEL, seconds_of_note
 from verify.result import CaseResult, Metric, SolveRecord, Status
-from verify.assess.intervals import ERROR_METRICS
 
 __all__ = ["MeasuredSpeed", "finest", "metric_of", "quantities_of", "speed_entry", "speed_of"]
 

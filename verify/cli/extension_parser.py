@@ -31,7 +31,8 @@ def _add_export(add: Add) -> None:
         "write a case as files for another program: meshes, cuts, supports, loads",
         "examples:\n  verify export statics/f3_inclined --out f3\n"
         "  verify export my_case.toml --out mine --level 0 --conforming\n\n"
-        "The program answers in f3/level-<k>/solution.json and .vtu; see docs/guide/your-solver.md.",
+        "The program answers in f3/level-<k>/solution.json and .vtu;\n"
+        "see docs/guide/your-solver.md.",
     )
     add_case(command)
     add_out(command)

@@ -44,8 +44,8 @@ def execute(arguments: argparse.Namespace) -> int:
             progress.close()
             print(f"verify: {stop}; the same command resumes it", file=sys.stderr)
             return 128 + stop.signum
-    from verify.report import render
     from verify.cli.run_ranking import rank_run
+    from verify.report import render
 
     rank_run(arguments.out, [result], {}, False, arguments.timeout, print)
     report, code = render(arguments.out), exit_code([result], arguments.strict)

@@ -11,12 +11,12 @@ from importlib import import_module
 from pathlib import Path
 
 from verify.cli.progress import progress_on
+from verify.cli.run_ranking import rank_run
 from verify.cli.solver_parameters import of_solvers
 from verify.cli.verdict_text import verdict_lines
 from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
 from verify.runner.checking import check_solver_name
 from verify.runner.ending import NOTHING_RAN
-from verify.cli.run_ranking import rank_run
 from verify.runner.reference_cache import cache_folder
 
 __all__ = ["execute"]

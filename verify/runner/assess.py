@@ -14,6 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from verify.assess.accuracy import assess_accuracy
+from verify.assess.adequacy import adequacy_notice
+from verify.assess.closing import with_openings
 from verify.compare.body import body_of
 from verify.compare.locate import Field
 from verify.compare.motion import ExactMotion
@@ -37,9 +40,6 @@ from verify.runner.job import check_files, load_record
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in
-from verify.assess.accuracy import assess_accuracy
-from verify.assess.adequacy import adequacy_notice
-from verify.assess.closing import with_openings
 from verify.verdict import with_verdicts
 from verify.whole_files import write_whole
 

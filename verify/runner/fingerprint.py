@@ -32,7 +32,7 @@ _METHODS = ("xfem", "methods")
 # the layers forbid them to import our methods, so that these do not make them solve again
 _INDEPENDENT = ("conforming", "reference")
 # what can change a verdict, given the solutions
-_COMPARING = ("result.py", "compare", "study", "verdict.py", "runner/assess.py")
+_COMPARING = ("result.py", "compare", "assess", "verdict.py", "runner/assess.py")
 
 
 def digest_of(content: Any) -> str:

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from verify.assess.adequacy import other_scene
 from verify.errors import UnsupportedSceneError
 from verify.runner.fingerprint import code_of_solver, digest_of, physics_digest
 from verify.runner.job import Job
 from verify.runner.reference_cache import REFERENCE
 from verify.scene import Scene
-from verify.assess.adequacy import other_scene
 
 __all__ = ["model_jobs"]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.session import Session
 from verify.simulator.surface_part import SurfacePart
-from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["Quality", "deformation_gradients", "quality_of"]

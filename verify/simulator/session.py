@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.simulator.body_parts import BodyParts, held_nodes
+from verify.simulator.collision.surface_collider import Contacts, SurfaceCollider
+from verify.simulator.cutting.growing_body import Increment
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.grips import Grips, held_facets
 from verify.simulator.stage import Stage
 from verify.simulator.staged_cut import MOST, Followed, Pieces, StagedCut
 from verify.simulator.step_record import PHASES, StepRecord
 from verify.simulator.surfaces import Picture, Surfaces
 from verify.simulator.touched_memory import touch_memory
-from verify.simulator.collision.surface_collider import Contacts, SurfaceCollider
 from verify.xfem.cuts import ToolPath
-from verify.simulator.cutting.growing_body import Increment
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.sparse.cholesky import Cholesky

@@ -5,19 +5,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.simulator.anatomy.skin_mesh import quartered, skin_mesh, skin_surface
 from verify.errors import InputError, UnsupportedSceneError
-from verify.simulator.stage import Hold, Hook, Stage
 from verify.scene import Gravity, Scene, Skin, ToolPathCut, is_uniform
 from verify.scene.parts import on_part
 from verify.scene.replay import Pull
+from verify.simulator.anatomy.skin_mesh import quartered, skin_mesh, skin_surface
+from verify.simulator.cutting.growing_body import GrowingBody
+from verify.simulator.mapping.body_surface import BodySurface
+from verify.simulator.stage import Hold, Hook, Stage
 from verify.solvers.xfem_scene import background_mesh
 from verify.xfem.cuts import ToolPath
-from verify.simulator.cutting.growing_body import GrowingBody
 from verify.xfem.dynamics import RayleighDamping
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
-from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["stage_of"]

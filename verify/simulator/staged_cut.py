@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from verify.simulator.body_parts import BodyParts, held_nodes
-from verify.simulator.grips import Grips
-from verify.simulator.surfaces import Surfaces
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.grips import Grips
+from verify.simulator.surfaces import Surfaces
 from verify.xfem.dynamics import DynamicBody
 from verify.xfem.in_pieces import MANY, InPieces
 from verify.xfem.sparse.cholesky import Cholesky

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from verify.assess.accuracy import assess_accuracy
+from verify.assess.intervals import NotMeasuredError, error_interval
 from verify.errors import UnsupportedSceneError
 from verify.printable import one_line
 from verify.result import SolveRecord, Status, Verdict
@@ -13,10 +15,8 @@ from verify.scene import Scene, ValueCheck, restore_scene
 from verify.solution import handed_over
 from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
-from verify.assess.accuracy import assess_accuracy
 from verify.study.finding import Finding
 from verify.study.in_processes import in_processes
-from verify.assess.intervals import NotMeasuredError, error_interval
 from verify.study.variants import Variant
 
 __all__ = ["Measurement", "measured_families", "measured_scenes", "missing_solutions"]

@@ -8,9 +8,9 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from verify.errors import InputError
 from verify.simulator.anatomy.base_mesh import BaseMesh
 from verify.simulator.anatomy.surface_file import border_loops
-from verify.errors import InputError
 
 __all__ = ["Crop", "crop_face", "crop_hand"]
 

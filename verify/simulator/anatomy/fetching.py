@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from verify.errors import InputError
 from verify.simulator.anatomy.base_mesh import parse_base_mesh
 from verify.simulator.anatomy.cropping import Crop, crop_face, crop_hand
 from verify.simulator.anatomy.patch import Patch
 from verify.simulator.anatomy.store import patch_file, stored_patch, write_patch
 from verify.simulator.anatomy.thicken import thicken
-from verify.errors import InputError
 from verify.whole_files import asked_place, whole_file, write_whole
 
 __all__ = ["PACKAGE", "VERSION", "WHEEL_SHA256", "fetch_anatomy"]

@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.scene import Skin
 from verify.simulator.anatomy.patch import Patch
 from verify.simulator.anatomy.procedural import procedural_face, procedural_hand
 from verify.simulator.anatomy.store import stored_patch
 from verify.simulator.anatomy.surface_file import outer_border, read_surface
 from verify.simulator.anatomy.thicken import closed_shell, thicken
-from verify.scene import Skin
 
 __all__ = ["SkinMesh", "patch_of", "quartered", "skin_mesh", "skin_surface"]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from verify.simulator.anatomy.patch import Patch
 from verify.errors import InputError
+from verify.simulator.anatomy.patch import Patch
 from verify.whole_files import write_whole
 
 __all__ = ["patch_file", "store_folder", "stored_patch", "write_patch"]

@@ -23,7 +23,7 @@ class _Rows(Protocol):
 
 
 class DeformingFacets(Protocol):
-    """What is asked of a surface: `verify.simulator.mapping.moving_surface.MovingSurface` has it."""
+    """Deformed facets of a surface, as `mapping.moving_surface.MovingSurface` has them."""
 
     @property
     def material(self) -> _Rows:

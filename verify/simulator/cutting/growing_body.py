@@ -11,9 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.distinct import distinct
-from verify.xfem.arrays.growing_array import GrowingArray
-from verify.xfem.cuts.flat import Cut
 from verify.simulator.cutting.division import Division
 from verify.simulator.cutting.patch import MeshPatch, PatchCutter
 from verify.simulator.cutting.point_numbers import PointNumbers
@@ -28,6 +25,9 @@ from verify.simulator.cutting.renumber_kernels import (
     write_pieces,
 )
 from verify.simulator.cutting.tied_parts import TiedParts
+from verify.xfem.arrays.distinct import distinct
+from verify.xfem.arrays.growing_array import GrowingArray
+from verify.xfem.cuts.flat import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.simulator.collision.bounding_tree import BoundingTree
-from verify.xfem.cuts.flat import Cut
-from verify.xfem.cuts.tool_path import ToolPath
 from verify.simulator.cutting.division import Division
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.stroke import Stroke
 from verify.simulator.cutting.whole_mesh import whole_mesh
+from verify.xfem.cuts.flat import Cut
+from verify.xfem.cuts.tool_path import ToolPath
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.simulator.collision.bounding_tree import BoundingTree
+from verify.simulator.cutting.patch import MeshPatch
+from verify.simulator.cutting.walk_kernels import cells_hit, walk
 from verify.xfem.cuts.crossing import REACH
 from verify.xfem.cuts.flat import Cut
 from verify.xfem.cuts.tool_path import Sweep, ToolPath
-from verify.simulator.cutting.patch import MeshPatch
-from verify.simulator.cutting.walk_kernels import cells_hit, walk
 from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["SeenCut", "Stroke"]

@@ -9,14 +9,14 @@ with two new rims along a cut instead of inner facets.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
-from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.simulator.mapping.corner_kernels import place_corners
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.exposed_kernels import exposed_facets
 from verify.simulator.mapping.membrane_facets import membrane_facets, rim_edges
 from verify.simulator.mapping.moving_surface import MovingSurface
+from verify.xfem.arrays.distinct import ranges
+from verify.xfem.in_pieces import InPieces, in_one_go
 
 __all__ = ["BodySurface"]
 

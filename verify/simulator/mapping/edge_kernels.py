@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.row_numbers import find_row, number_of_row
 from verify.simulator.cutting.point_numbers import runs_through
+from verify.xfem.arrays.row_numbers import find_row, number_of_row
 
 __all__ = ["CUTS", "LINE", "EdgeRecord", "bisect_facets", "record_points", "unrecorded"]
 

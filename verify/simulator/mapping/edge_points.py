@@ -9,10 +9,7 @@ record is by these.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.growing_array import GrowingArray
-from verify.xfem.arrays.row_numbers import RowNumbers
 from verify.simulator.cutting.point_numbers import PointNumbers
-from verify.xfem.errors import XfemError
 from verify.simulator.mapping.edge_kernels import (
     CUTS,
     LINE,
@@ -21,6 +18,9 @@ from verify.simulator.mapping.edge_kernels import (
     record_points,
     unrecorded,
 )
+from verify.xfem.arrays.growing_array import GrowingArray
+from verify.xfem.arrays.row_numbers import RowNumbers
+from verify.xfem.errors import XfemError
 
 __all__ = ["EdgePoints"]
 

@@ -11,18 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.arrays.distinct import (
-    distinct,
-    distinct_in_lists,
-    distinct_in_rows,
-    ranges,
-)
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.point_numbers import FoundPoints, PointNumbers
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
-from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.simulator.mapping.cut_facet_kernels import divide_facets
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.locate_kernels import (
@@ -34,6 +26,14 @@ from verify.simulator.mapping.locate_kernels import (
 )
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.mapping.near_facet_kernels import concerned_facets, levels_at
+from verify.xfem.arrays.distinct import (
+    distinct,
+    distinct_in_lists,
+    distinct_in_rows,
+    ranges,
+)
+from verify.xfem.errors import XfemError
+from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.splitting.split import ROUND_OFF, split_cells
 
 __all__ = ["EmbeddedSurface"]

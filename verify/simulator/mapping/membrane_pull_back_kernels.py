@@ -3,13 +3,13 @@
 import numpy as np
 from numba import njit
 
+from verify.simulator.mapping.material_share_kernels import is_material
+from verify.simulator.mapping.partner_kernels import partner
 from verify.xfem.cuts.simplex_kernels import (
     foot_on_facet,
     nearest_on_facet,
     squared_distance,
 )
-from verify.simulator.mapping.material_share_kernels import is_material
-from verify.simulator.mapping.partner_kernels import partner
 
 __all__ = ["pull_back_to_membrane"]
 

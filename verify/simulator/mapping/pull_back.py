@@ -8,12 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.cuts.simplex_kernels import signed_volume
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.errors import XfemError
 from verify.simulator.mapping.material_share_kernels import is_material
 from verify.simulator.mapping.membrane_pull_back_kernels import pull_back_to_membrane
 from verify.simulator.mapping.partner_kernels import partner
+from verify.xfem.cuts.simplex_kernels import signed_volume
+from verify.xfem.errors import XfemError
 
 __all__ = ["pull_back"]
 

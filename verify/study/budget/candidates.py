@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
+from verify.assess.changed_scenes import at_rest, with_kinematics
+from verify.assess.quantities import Measured
+from verify.assess.reference import Reference, size_of
 from verify.compare.body import AnyBody
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.hooke import Law, hooke, law_of
@@ -17,10 +20,7 @@ from verify.solution import Solution
 from verify.study.budget.cheapest import Candidate
 from verify.study.budget.distances import Times, distances, norm_names
 from verify.study.budget.links import Chain
-from verify.assess.changed_scenes import at_rest, with_kinematics
 from verify.study.budget.solved import JUDGED, Solve, Solved
-from verify.assess.quantities import Measured
-from verify.assess.reference import Reference, size_of
 
 __all__ = ["find_candidates"]
 

@@ -9,6 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from verify.assess.changed_scenes import (
+    on_one_level,
+    on_realised_cut,
+    with_kinematics,
+    with_time_step,
+)
+from verify.assess.reference import (
+    ExactField,
+    Reference,
+    exact_reference,
+    size_of,
+)
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
@@ -17,19 +29,7 @@ from verify.solution import Solution
 from verify.study.budget.crossing_delay import mean_wait
 from verify.study.budget.links import Chain, Missing, is_realised_as_asked, link
 from verify.study.budget.references import OUTSIDE, References
-from verify.assess.changed_scenes import (
-    on_one_level,
-    on_realised_cut,
-    with_kinematics,
-    with_time_step,
-)
 from verify.study.budget.solved import CONFORMING, JUDGED, Solve
-from verify.assess.reference import (
-    ExactField,
-    Reference,
-    exact_reference,
-    size_of,
-)
 
 __all__ = ["make_chain"]
 

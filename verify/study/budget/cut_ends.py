@@ -4,8 +4,8 @@ Linear elements without tip functions are too stiff at the end of a cut. Away fr
 is, to first order, what the displacement changes by when the end is moved (the derivative by its
 place, the only field that can come from there), so that an answer is that of a cut with other ends.
 How far these are off is a number of elements that depends on where the end falls among the nodes
-alone. Measured on a Griffith crack (docs/guide/studies.md), for an end that is realised on an edge of
-which the hindmost node lies `behind` it: two thirds of `behind`, and a third of an element more.
+alone. Measured on a Griffith crack (docs/guide/studies.md), for an end that is realised on an edge
+of which the hindmost node lies `behind` it: two thirds of `behind`, and a third of an element more.
 """
 
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.body import Body
 from verify.assess.realised_cut import polylines_of
+from verify.compare.body import Body
 
 __all__ = ["CutEnd", "cut_ends"]
 

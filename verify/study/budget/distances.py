@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.assess.error_history import mean_over
 from verify.compare.displacement_error import displacement_error
 from verify.compare.energy_error import energy_error
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.motion import Motion
-from verify.assess.error_history import mean_over
 
 __all__ = ["Distances", "Times", "distances", "norm_names"]
 

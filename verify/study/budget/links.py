@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from verify.assess.quantities import Measured
+from verify.assess.reference import Reference
 from verify.compare.body import AnyBody, Body, body_of
 from verify.compare.hooke import law_of
 from verify.compare.realised import cut_deviation
@@ -12,8 +14,6 @@ from verify.scene import Scene
 from verify.solution import Solution
 from verify.study.budget.budget import Answer
 from verify.study.budget.solved import Solved
-from verify.assess.quantities import Measured
-from verify.assess.reference import Reference
 
 __all__ = ["Chain", "Missing", "is_realised_as_asked", "link"]
 

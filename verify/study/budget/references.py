@@ -2,14 +2,14 @@
 
 from typing import Any
 
+from verify.assess.changed_scenes import with_kinematics
+from verify.assess.reference import Reference, conforming_reference
 from verify.compare.body import AnyBody
 from verify.compare.hooke import law_of
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.study.budget.links import Missing
-from verify.assess.changed_scenes import with_kinematics
 from verify.study.budget.solved import REFERENCE, Solve, Solved
-from verify.assess.reference import Reference, conforming_reference
 
 __all__ = ["OUTSIDE", "References"]
 

@@ -4,6 +4,9 @@ from dataclasses import asdict, dataclass, field
 from time import perf_counter
 from typing import Any
 
+from verify.assess.changed_scenes import coarsest
+from verify.assess.quantities import unit_of
+from verify.assess.reference import ExactField
 from verify.compare.body import Body
 from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
@@ -17,11 +20,8 @@ from verify.study.budget.cheapest import Candidate, cheapest_adequate
 from verify.study.budget.cut_ends import CutEnd, cut_ends
 from verify.study.budget.distances import Times, norm_names
 from verify.study.budget.links import Chain, Missing
-from verify.assess.changed_scenes import coarsest
 from verify.study.budget.solved import JUDGED, Solve
 from verify.study.finding import Finding
-from verify.assess.quantities import unit_of
-from verify.assess.reference import ExactField
 
 __all__ = ["BudgetStudy", "budget_study"]
 

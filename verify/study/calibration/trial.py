@@ -3,13 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from verify.compare.body import AnyBody, body_of
-from verify.compare.errors import Rules
-from verify.compare.hooke import Law, law_of
-from verify.scene import Scene
-from verify.solution import Solution
-from verify.solvers import find_solver
-from verify.study.calibration.families import Family
 from verify.assess.quantities import Measured
 from verify.assess.reference import (
     ExactField,
@@ -17,6 +10,13 @@ from verify.assess.reference import (
     exact_reference,
     size_of,
 )
+from verify.compare.body import AnyBody, body_of
+from verify.compare.errors import Rules
+from verify.compare.hooke import Law, law_of
+from verify.scene import Scene
+from verify.solution import Solution
+from verify.solvers import find_solver
+from verify.study.calibration.families import Family
 
 __all__ = ["NORMS", "Trial", "trials"]
 

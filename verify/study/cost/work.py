@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
-from verify.result import SolveRecord, Status
 from verify.assess.intervals import error_interval
+from verify.result import SolveRecord, Status
 
 __all__ = ["ONCE", "WorkPoint", "pareto_front", "time_at", "work_points"]
 

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from verify.assess.intervals import Interval
+from verify.assess.rates import ROUND_OFF
 from verify.ranking import Comparison, LeftOut, Standing
 from verify.result import CaseResult
 from verify.study.cost.work import WorkPoint, time_at, work_points
-from verify.assess.intervals import Interval
 from verify.study.ranking.standing import Item, compared_by_mean
-from verify.assess.rates import ROUND_OFF
 
 __all__ = ["common_error", "cost_comparisons", "why_times_are_no_sample"]
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
+from verify.assess.energy_account import ACCOUNT
 from verify.ranking import Comparison
 from verify.result import CaseResult
-from verify.assess.energy_account import ACCOUNT
 from verify.study.ranking.finest import item_on_finest
 from verify.study.ranking.standing import compared_by_worst
 

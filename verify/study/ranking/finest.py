@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from math import isfinite
 
-from verify.result import CaseResult, SolveRecord, Status
 from verify.assess.intervals import Interval, NotMeasuredError, error_interval
+from verify.result import CaseResult, SolveRecord, Status
 from verify.study.ranking.standing import Item
 
 __all__ = ["interval_of", "item_on_finest"]

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from verify.ranking import LeftOut, Ranking
-from verify.result import CaseResult, Status, Verdict
 from verify.assess.energy_account import ACCOUNT
 from verify.assess.intervals import ERROR_METRICS
+from verify.ranking import LeftOut, Ranking
+from verify.result import CaseResult, Status, Verdict
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
 from verify.study.ranking.energy import energy_comparisons

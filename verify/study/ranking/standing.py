@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from verify.ranking import Comparison, LeftOut, Standing
 from verify.assess.intervals import Interval
 from verify.assess.rates import ROUND_OFF
+from verify.ranking import Comparison, LeftOut, Standing
 
 __all__ = ["Item", "compared_by_mean", "compared_by_worst", "is_exact"]
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verify.simulator import Stage, stage_of
 from verify.scene import Scene, Skin, load_scene
-from verify.xfem.cuts import ToolPath
+from verify.simulator import Stage, stage_of
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.cuts import ToolPath
 
 __all__ = ["CutHand", "cut_hand", "hand", "stroke_along"]
 

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.methods.catalogue import cut_by
-from verify.simulator import Stage, stage_of
 from verify.scene import load_scene
+from verify.simulator import Stage, stage_of
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.study.thesis.published import published_rows
 from verify.study.thesis.sliver_steps import step_of_body
 from verify.xfem.cuts import Polyline, ToolPath
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
