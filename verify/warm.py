@@ -121,7 +121,8 @@ def warm_parent() -> Iterator[None]:
     if not sys.platform.startswith("linux") or getattr(_own, "parent", None) is not None:
         yield
         return
-    _own.parent = _Parent()
+    with contextlib.suppress(OSError):  # no process to fork from: each job starts one of its own
+        _own.parent = _Parent()
     try:
         yield
     finally:

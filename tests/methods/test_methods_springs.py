@@ -31,6 +31,22 @@ def sheet_of_equilateral_triangles(rows=6, columns=6, edge=0.2):
     return SimplexMesh(points, cells)
 
 
+def test_a_motion_in_space_is_pulled_by_springs_and_by_no_sweep_of_tetrahedra():
+    """What a scheme asks for, force and stiffness at once, is what the springs give one by one."""
+    cut = cut_mesh(box_mesh((2, 2, 2)), [Plane([0.5, 0.45, 0.4], [0.2, 0.3, 1.0])])
+    force = SpringForce(cut, isotropic(7.0, 0.25, "solid"))
+    u = 0.1 * np.random.default_rng(3).standard_normal((cut.node_count, 3))
+    alone, _ = force.evaluate(u)
+    pattern = block_pattern(cut.cells, cut.node_count)
+    swept, blocks = np.empty_like(u), np.empty((len(pattern.columns), 3, 3))
+    force.linearise(pattern, u, np.zeros_like(u), 0.0, 1.0, swept, blocks)
+    assert swept == pytest.approx(alone, rel=1e-14)
+    summed = np.zeros_like(blocks)
+    force.evaluate(u)
+    force.add_stiffness(pattern, summed)
+    assert blocks == pytest.approx(summed, rel=1e-14)
+
+
 @pytest.mark.parametrize("fit", ["fitted", "van_gelder"])
 def test_equilateral_triangles_have_the_springs_of_lloyd_and_of_van_gelder(fit):
     mesh = SimplexMesh([[0, 0], [3, 0], [1.5, 3 * np.sqrt(0.75)]], [[0, 1, 2]])

@@ -26,11 +26,6 @@ def test_every_command_of_the_guide_succeeds(tmp_path, monkeypatch) -> None:
         assert main(shlex.split(line)[1:]) == 0, line
 
 
-def test_the_python_of_the_guide_runs() -> None:
-    (code,) = blocks("python")
-    exec(code, {})
-
-
 def test_the_guide_names_every_scene() -> None:
     text = PAGE.read_text(encoding="utf-8").replace("`…_four_edges`", "`tetrahedron_four_edges`")
     for name in list_cases():

@@ -51,4 +51,4 @@ def test_every_page_has_examples_and_links_that_lead_somewhere(page):
     text = (DOCS / page).read_text(encoding="utf-8")
     assert "```python" in text
     for target in re.findall(r"\]\(([^)#]+\.md)", text):
-        assert (DOCS / target).exists(), target
+        assert ((DOCS / page).parent / target).exists(), target

@@ -70,6 +70,11 @@ class SpringForce(InternalForce):
         """Springs have no stress to average: always an error."""
         raise XfemError("springs have no stress field; expected an integrator that needs none")
 
+    @property
+    def is_swept(self) -> bool:
+        """Springs are no elements: the sweep of tetrahedra is not theirs."""
+        return False
+
     def evaluate(
         self,
         displacement: _Floats,

@@ -47,9 +47,9 @@ def _deformation(force: InternalForce, displacement: _Floats) -> _Floats:
     """Deformation gradients (p, d, d) of the pieces; of a membrane zero across its plane."""
     v = force.virtual
     check_floats("displacement", displacement, (v.node_count, v.mesh.space))
-    gradients, parent, _, normals, _, _ = force.geometry
-    F = np.einsum("pik,pil->pkl", v.extend(displacement)[v.cells], gradients[parent])
+    F = np.einsum("pik,pil->pkl", v.extend(displacement)[v.cells], v.mesh.gradients[v.parent])
     F += np.eye(v.mesh.space)
     if force.is_membrane:
-        F -= np.einsum("pk,pl->pkl", normals[parent], normals[parent])
+        normals = force.geometry[3][v.parent]
+        F -= np.einsum("pk,pl->pkl", normals, normals)
     return F
