@@ -1,4 +1,4 @@
-"""What differs between versions of DOLFINx and of the petsc4py below it, in one place."""
+"""Differences between versions of DOLFINx and of the petsc4py below it, in one place."""
 
 from importlib import import_module
 from types import ModuleType

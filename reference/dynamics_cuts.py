@@ -1,4 +1,4 @@
-"""When each facet of a mesh opens that conforms to all cuts of a scene."""
+"""Opening times of the facets of a mesh that conforms to all cuts of a scene."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Where the energy of a motion goes, step by step, for every scheme.
+"""Energy balance of a motion, step by step, for every scheme.
 
 A step balances M a_α + f_visc + f_int − f_ext = r with the reactions r. Multiplied by Δu this is
 an identity, whatever scheme chose the forces:

@@ -1,4 +1,4 @@
-"""What of FEniCSx and gmsh is here, and whether it works: ``python -m reference.probe NAME``.
+"""Probe of FEniCSx and gmsh: what is here, and does it work: ``python -m reference.probe NAME``.
 
 Prints one line of JSON. Each probe runs in a process of its own, because what is half installed
 may crash or hang instead of failing.

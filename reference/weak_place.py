@@ -1,4 +1,4 @@
-"""Where a body is held so weakly that its displacement is lost in round-off."""
+"""Places where a body is held so weakly that its displacement is lost in round-off."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""What numba's compilation of kernels takes, kernel by kernel.
+"""Time of numba's compilation, kernel by kernel.
 
 Seconds are processor time and exclusive: a kernel compiled while another is being compiled counts
 for itself only.

@@ -1,4 +1,4 @@
-"""What the solvers stand on: is it here, does it work, and if not, what brings it.
+"""Check of what the solvers stand on: is it here, does it work, and if not, what brings it.
 
 Nothing is believed because a package is listed as installed: each thing is tried, in a process
 of its own, so that a library that crashes or hangs is a finding and not the end.

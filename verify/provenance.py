@@ -1,4 +1,4 @@
-"""Where a number comes from: the commit, the versions, the machine, the threads, the day.
+"""Provenance of numbers: the commit, the versions, the machine, the threads, the day.
 
 Nothing is imported to find a version (DOLFINx would start MPI); the installed metadata says it.
 """

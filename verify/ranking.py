@@ -1,4 +1,4 @@
-"""What a ranking of solvers says: the form of ``ranking.json``, for who writes and who reads it."""
+"""Form of ``ranking.json``, for who writes and who reads it."""
 
 from dataclasses import dataclass
 from typing import Any, Literal

@@ -1,4 +1,4 @@
-"""What every exact solution offers: its field, and the energy that it stores in a body."""
+"""Base of every exact solution: its field, and the energy that it stores in a body."""
 
 from reference.exact.energy import boundary_work, elastic_energy, outline_of
 from reference.exact.field import Array, ExactField, Plane

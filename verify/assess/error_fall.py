@@ -1,4 +1,4 @@
-"""How errors fall from level to level: those of the elements, and what is not theirs."""
+"""Fall of errors from level to level: that of the elements, and that of other sources."""
 
 from collections.abc import Sequence
 from math import inf

@@ -1,4 +1,4 @@
-"""How far two levels differ around the place of a point value, not at the place alone.
+"""Difference of two levels around the place of a point value, not at the place alone.
 
 At one point the difference of two levels is a number of either sign that may be small by
 accident: it depends on where in its cell the point lies. Around the point the same error takes

@@ -1,4 +1,4 @@
-"""Whether the reference is good enough for the errors that it has to judge."""
+"""Sufficiency of a reference for the errors that it has to judge."""
 
 from collections.abc import Sequence
 from math import isfinite

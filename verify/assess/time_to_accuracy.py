@@ -1,4 +1,4 @@
-"""What each level of a reference cost, and how exact it turned out to be."""
+"""Cost of each level of a reference, and how exact it turned out to be."""
 
 from collections.abc import Mapping, Sequence
 from statistics import median

@@ -1,4 +1,4 @@
-"""What a run measured, in the terms of a baseline: quantities and speeds by their names."""
+"""Quantities and speeds of a run, by their names in a baseline."""
 
 from dataclasses import dataclass
 from math import isfinite

@@ -1,4 +1,4 @@
-"""What ``verify run`` does: select, run, render, and say what came out."""
+"""The command ``verify run``: select, run, render, and say what came out."""
 
 import argparse
 import contextlib

@@ -1,4 +1,4 @@
-"""Where plane cuts cross the triangles of a surface: lines on the surface, with two sides each."""
+"""Lines in which plane cuts cross the triangles of a surface, with two sides each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

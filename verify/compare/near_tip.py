@@ -1,4 +1,4 @@
-"""What is near to a tip and what is far: where the two are measured separately."""
+"""Regions near tips and far from them, in which errors are measured separately."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""What solids and membranes have in common: simplices in space, with cuts that end somewhere."""
+"""Simplices in space with cuts that end somewhere: the base of solids and membranes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What the checks measure on solutions. Independent of every solver and of the reference."""
+"""Measures of the checks on solutions, independent of every solver and of the reference."""
 
 import numpy as np
 from numpy.typing import NDArray

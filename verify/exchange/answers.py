@@ -1,4 +1,4 @@
-"""What another program answered: one stored solution per mesh level, or why there is none."""
+"""Answers of another program: a stored solution per mesh level, or why there is none."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a growing incision costs: unknowns and elements that each method adds.
+"""Cost of a growing incision: unknowns and elements that each method adds.
 
 In the plane a cut through n triangles in a row crosses n + 1 edges. XFEM (and virtual nodes)
 enrich the n + 2 nodes of the strip, two fewer for each end inside the body, whose edge stays

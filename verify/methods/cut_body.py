@@ -1,4 +1,4 @@
-"""What every method gives: a body to solve on, one to show, and an account of the cut."""
+"""Result of every method: a body to solve on, one to show, and an account of the cut."""
 
 from dataclasses import dataclass, field
 

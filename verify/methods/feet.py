@@ -1,4 +1,4 @@
-"""Where nodes may go to lie on a cut: feet, inside the body or along its boundary."""
+"""Feet of nodes on a cut: places to which they may move, inside the body or along its boundary."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""What is drawn of a stored field: triangles, outline and values, ready for any renderer."""
+"""Triangles, outline and values of a stored field, ready for any renderer."""
 
 from dataclasses import dataclass
 from pathlib import Path

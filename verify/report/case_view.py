@@ -1,4 +1,4 @@
-"""What a page shows of one case, without markup."""
+"""View of one case, without markup."""
 
 from dataclasses import dataclass, field, replace
 

@@ -1,4 +1,4 @@
-"""What is drawn into a panel: curves with error bars, their names, bands and slope triangles."""
+"""Marks in a panel: curves with error bars, their names, bands and slope triangles."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What moves: errors, energies and momenta over time, with the instants of the cuts."""
+"""View of a motion: errors, energies and momenta over time, with the instants of the cuts."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""How a body is looked at: window, colours and lines, the same for every renderer."""
+"""Window, colours and lines of a picture, the same for every renderer."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

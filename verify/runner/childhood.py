@@ -1,4 +1,4 @@
-"""What every process that the runner starts does first and last."""
+"""First and last acts of every process that the runner starts."""
 
 import ctypes
 import os

@@ -1,4 +1,4 @@
-"""Where solves run: in child processes here, or on the workers of a cluster."""
+"""Engines that run solves: child processes here, or the workers of a cluster."""
 
 from pathlib import Path
 from typing import Any, Protocol

@@ -1,4 +1,4 @@
-"""What a run was asked for, apart from the cases."""
+"""Options of a run, apart from the cases."""
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How a process ended, in words: by the outcome that it left, or by its death."""
+"""Outcome of a process in words: as it left it, or by its death."""
 
 from pathlib import Path
 from typing import Any

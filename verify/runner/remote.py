@@ -1,4 +1,4 @@
-"""What a worker of a cluster does: one solve in a child process, its files handed back as bytes.
+"""Solve on a worker of a cluster, in a child process, its files handed back as bytes.
 
 No file system is shared: the worker solves in a folder of its own. The child has the same limits
 as on the machine of the run, and dies if the run no longer wants its answer.

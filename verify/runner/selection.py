@@ -1,4 +1,4 @@
-"""Which cases a run takes: by name, by file, by pattern, by ``-k`` expression, by weight."""
+"""Selection of cases: by name, by file, by pattern, by ``-k`` expression, by weight."""
 
 import re
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""What a solver says about scenes before it solves: ``python -m verify.runner.survey FILE``.
+"""Statements of a solver about scenes before it solves: ``python -m verify.runner.survey FILE``.
 
 In a process of its own, because to ask a solver means to import it, and some start MPI.
 """

@@ -1,4 +1,4 @@
-"""What a scene measures and what it accepts."""
+"""Quantities and acceptance checks of a scene."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""What a case expects of the faces of its cuts where the deformation presses them together."""
+"""Expected contact of the faces of cuts that the deformation presses together."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Where the cuts of a scene lie: in the body, as expected, not on each other; what lies on them."""
+"""Placement of cuts: in the body, as expected, not on each other; and of what lies on them."""
 
 from itertools import combinations
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is wrong with a case file, in one line: the key, the fault, what is valid there."""
+"""Messages about a case file, in one line: the key, the fault, what is valid there."""
 
 from collections.abc import Iterable
 from typing import Any

@@ -1,4 +1,4 @@
-"""How a cutting scene is played: what pulls the incision open, the tool, surfaces beside the mesh.
+"""Table of a simulated scene: what pulls the incision open, the tool, surfaces beside the mesh.
 
 Nothing here changes what a solver of the scene is asked for, but the pulls: they are loads.
 """

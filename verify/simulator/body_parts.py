@@ -1,4 +1,4 @@
-"""What a body under the knife is made of, as its cutter has it at a moment."""
+"""Parts of a body under the knife, as its cutter has it at a moment."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

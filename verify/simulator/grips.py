@@ -1,4 +1,4 @@
-"""What holds a played body and pulls at it: supports of the scene, hooks at the edges of a cut."""
+"""Grips on a simulated body: supports of the scene, hooks at the edges of a cut."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Whether a played body is still sound: volumes, closed surfaces, nothing inside out or astray.
+"""Soundness of a simulated body: volumes, closed surfaces, nothing inside out or astray.
 
 Measured from outside, between steps: no part of what a step costs.
 """

@@ -1,4 +1,4 @@
-"""What a line of sight meets first on a body that is played."""
+"""First point of a simulated body on a line of sight."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""What is played, as arrays: body, supports, strokes, hooks, surfaces."""
+"""A simulated scene as arrays: body, supports, strokes, hooks, surfaces."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""What a step of a played scene cost and did."""
+"""Record of a step of a simulated scene: its cost and its events."""
 
 from dataclasses import dataclass
 

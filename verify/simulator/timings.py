@@ -1,4 +1,4 @@
-"""What the steps of a played scene cost, phase by phase: how long, and how many meet a limit.
+"""Times of the steps of a simulated scene, phase by phase, and how many meet a limit.
 
 Only the phases count: cutting, assembly, motion, mapping and collision, all that a simulator does
 in a step. What is kept beside it is not timed: the record of the step, the account of energies,

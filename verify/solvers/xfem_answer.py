@@ -1,4 +1,4 @@
-"""What the compact XFEM solver found, as a neutral solution with everything that it changed."""
+"""Answer of the compact XFEM solver as a neutral solution, with everything that it changed."""
 
 from dataclasses import dataclass, field
 

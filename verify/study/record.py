@@ -1,4 +1,4 @@
-"""What a study leaves on disk: a versioned JSON record and the same numbers as CSV."""
+"""Files of a study: a versioned JSON record and the same numbers as CSV."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

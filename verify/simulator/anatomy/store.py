@@ -1,4 +1,4 @@
-"""Where real anatomy is kept between runs: patches in the user's data directory."""
+"""Store of real anatomy between runs: patches in the user's data directory."""
 
 import io
 import os

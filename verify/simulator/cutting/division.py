@@ -1,4 +1,4 @@
-"""How a cut is going to divide cells: found first, done later."""
+"""Plan of a division of cells by a cut: found first, done later."""
 
 from dataclasses import dataclass
 from functools import cached_property

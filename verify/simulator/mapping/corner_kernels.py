@@ -1,4 +1,4 @@
-"""Where corners of facets lie in their elements, and with which nodes of these they move."""
+"""Places of corners of facets in their elements, and the nodes with which they move."""
 
 import numpy as np
 from numba import njit

@@ -1,4 +1,4 @@
-"""Whether a point of a virtual element lies in its piece's share of the material."""
+"""Test of a point of a virtual element: is it in its piece's share of the material."""
 
 from numba import njit
 

@@ -1,4 +1,4 @@
-"""Where on a membrane the material is that is nearest to a tool: a walk down in distance."""
+"""Nearest material of a membrane to a tool: a walk down in distance."""
 
 import numpy as np
 from numba import njit

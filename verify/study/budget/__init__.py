@@ -1,4 +1,4 @@
-"""Where the error of an XFEM answer comes from, and the cheapest model that is good enough."""
+"""Parts of the error of an XFEM answer, and the cheapest model that is good enough."""
 
 from verify.assess.changed_scenes import on_realised_cut, with_kinematics
 from verify.study.budget.budget import Answer, Budget, Part, error_budget

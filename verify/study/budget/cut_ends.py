@@ -1,4 +1,4 @@
-"""Where the ends of a cut are realised, and how far off a cut they make an answer be.
+"""Realised ends of a cut, and by how many elements an answer is that of another cut.
 
 Linear elements without tip functions are too stiff at the end of a cut. Away from it their error
 is, to first order, what the displacement changes by when the end is moved (the derivative by its

@@ -1,4 +1,4 @@
-"""How far fields are apart, in norms over the body and over time."""
+"""Distances of fields, in norms over the body and over time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a budget's links are made of, and when the cut needs none of its own."""
+"""Links of a budget, and when the cut needs none of its own."""
 
 from dataclasses import dataclass, field
 

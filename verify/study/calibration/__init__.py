@@ -1,4 +1,4 @@
-"""How far the error bars of the reference can be trusted, on cases whose truth is known."""
+"""Coverage of the reference's error bars, on cases whose truth is known."""
 
 from verify.study.calibration.study import CalibrationStudy, calibration_study
 

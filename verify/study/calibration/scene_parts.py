@@ -1,4 +1,4 @@
-"""What the random scenes of the study have in common."""
+"""Common parts of the random scenes of the study."""
 
 from typing import Any
 

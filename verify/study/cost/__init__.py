@@ -1,4 +1,4 @@
-"""What accuracy costs, once and over a cut that grows."""
+"""Cost of accuracy, once and over a cut that grows."""
 
 from verify.study.cost.sequence import growing_scenes
 from verify.study.cost.study import CostStudy, cost_study

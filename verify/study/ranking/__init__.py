@@ -1,4 +1,4 @@
-"""Which solver: rankings of the solvers of a run by accuracy, stability, energy and cost."""
+"""Rankings of the solvers of a run by accuracy, robustness, energy and cost."""
 
 from verify.study.ranking.ranking import rank_solvers, ranked_solvers
 

@@ -1,4 +1,4 @@
-"""Who is nearest to the truth, at equal element size and on each one's finest level."""
+"""Accuracy: nearness to the truth at equal element size and on each one's finest level."""
 
 from collections.abc import Iterable, Sequence
 

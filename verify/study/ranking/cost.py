@@ -1,4 +1,4 @@
-"""Who is cheapest at equal error."""
+"""Cost at equal error."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

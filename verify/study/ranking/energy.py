@@ -1,4 +1,4 @@
-"""Who keeps energy and momentum, in cases that move."""
+"""Conservation of energy and momentum, in cases that move."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What solvers have on the finest level that they were asked for, or why they have nothing."""
+"""Results of solvers on the finest level that they were asked for, or why there are none."""
 
 from collections.abc import Sequence
 from math import isfinite

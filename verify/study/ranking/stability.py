@@ -1,4 +1,4 @@
-"""Who gets there at all: solves that failed or blew up, refusals, regularisations."""
+"""Robustness: solves that failed or blew up, refusals, regularisations."""
 
 from collections.abc import Sequence
 from math import isfinite

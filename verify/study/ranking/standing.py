@@ -1,4 +1,4 @@
-"""Where solvers stand in one comparison: ranks from intervals, ties where they overlap."""
+"""Standing of solvers in one comparison: ranks from intervals, ties where they overlap."""
 
 import math
 from collections.abc import Mapping, Sequence

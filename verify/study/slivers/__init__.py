@@ -1,4 +1,4 @@
-"""What cuts near to nodes do to a solver: errors, conditioning, explicit steps."""
+"""Effect of cuts near to nodes on a solver: errors, conditioning, explicit steps."""
 
 from verify.study.slivers.study import SliverStudy, sliver_study
 

@@ -1,4 +1,4 @@
-"""What goes wrong with small pieces: the condition, and how far a force on one moves it."""
+"""Small pieces: the condition, and how far a force on one moves it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

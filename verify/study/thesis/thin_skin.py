@@ -1,4 +1,4 @@
-"""What goes wrong in thin skin: layers of linear tetrahedra are far too stiff in bending."""
+"""Thin skin: layers of linear tetrahedra are far too stiff in bending."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

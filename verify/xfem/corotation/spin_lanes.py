@@ -1,4 +1,4 @@
-"""What the exact stiffness of tetrahedra has beyond that with frozen rotations, eight at a time.
+"""Rotational part of the exact tangent of tetrahedra, eight at a time.
 
 As in `spin_stiffness_kernels`, [g_i]ₓᵀ H [g_j]ₓ times the volume. Σ_j g_j = 0, so that the six
 blocks above the diagonal of a piece are enough here too.

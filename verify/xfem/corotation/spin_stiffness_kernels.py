@@ -1,4 +1,4 @@
-"""What the exact stiffness of corotational elasticity has beyond that with frozen rotations.
+"""Rotational part of the exact tangent of corotational elasticity.
 
 With b_i the material gradient of shape function i, R the rotation of a piece and g_i = R b_i, it is
 [g_i]ₓᵀ H [g_j]ₓ times the volume, H = μI + (λ tr E − 2μ)(tr(V) I − V)⁻¹, V = R Uᵀ Rᵀ.

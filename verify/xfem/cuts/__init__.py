@@ -1,4 +1,4 @@
-"""What a cut is: flat, along a polyline or a triangulated surface, or swept by a tool."""
+"""Cuts: flat, along a polyline or a triangulated surface, or swept by a tool."""
 
 from verify.xfem.cuts.flat import Cut, ImplicitCut, Plane, PolygonPatch
 from verify.xfem.cuts.polyline import Polyline

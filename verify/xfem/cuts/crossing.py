@@ -1,4 +1,4 @@
-"""Whether a cut goes through a piece: from where it crosses the piece's edges."""
+"""Crossing of a piece by a cut, from where it crosses the piece's edges."""
 
 from collections.abc import Callable
 from typing import Literal, NamedTuple

@@ -1,4 +1,4 @@
-"""What a cut is, and the cuts without curvature: plane and planar polygon.
+"""Cuts without curvature, plane and planar polygon, and the base of all cuts.
 
 A cut is a geometric object in the material frame. The solver asks it two things only:
 

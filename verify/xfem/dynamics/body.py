@@ -1,4 +1,4 @@
-"""What moves: elasticity, mass, damping, supports and loads of a cut body, and its state."""
+"""Body in motion: elasticity, mass, damping, supports and loads of a cut body, and its state."""
 
 from collections.abc import Callable
 from copy import copy

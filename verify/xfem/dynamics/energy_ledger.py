@@ -1,4 +1,4 @@
-"""Where the energy of a motion goes, step by step, for any integration scheme.
+"""Energy balance of a motion, step by step, for any integration scheme.
 
 A step is p = f_ext − f_int − f_visc + r with the reactions r at the supports and the inertia p,
 M Δv/h unless the scheme says otherwise. Multiplied by Δu this is an identity, whatever scheme has

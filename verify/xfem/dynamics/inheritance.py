@@ -1,4 +1,4 @@
-"""What a body keeps when it is cut while it moves.
+"""Inheritance of the state of a body that is cut while it moves.
 
 The parts of a piece start with the motion of that piece: every new unknown node takes over the
 value of the unknown node that the same corner had before (a = 0 and ȧ = 0 in the thesis' terms).

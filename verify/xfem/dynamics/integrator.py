@@ -1,4 +1,4 @@
-"""What every integrator is: a step that changes a state and says which forces it has used.
+"""Base of every integrator: a step that changes a state and says which forces it has used.
 
 Each scheme advances M (v₁ − v₀) = h (f_ext − f_int − f_visc + reactions) with forces of its own
 choice, or balances them with an inertia of its own. Knowing them, the energy ledger closes for any

@@ -1,4 +1,4 @@
-"""Which pieces touch: across the faces of the mesh, and across a cut inside a cell."""
+"""Contacts of pieces: across the faces of the mesh, and across a cut inside a cell."""
 
 import numpy as np
 from numpy.typing import NDArray

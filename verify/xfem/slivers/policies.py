@@ -1,4 +1,4 @@
-"""What to do with slivers: pieces with a small share in the volume of their cell.
+"""Policies for slivers: pieces with a small share in the volume of their cell.
 
 Scaling by nodal blocks, which the iterative solver does anyway, bounds the condition number
 whatever the slivers. What it does not cure is the compliance of a piece that hangs on a tiny share

@@ -1,4 +1,4 @@
-"""What a multifrontal factorisation needs to know before it sees a value: rows and places."""
+"""Plan of a multifrontal factorisation before it sees a value: rows and places."""
 
 import numpy as np
 from numba import njit

@@ -1,4 +1,4 @@
-"""What a linear solver is handed must be of its system: compiled loops check no bounds."""
+"""Shapes that a linear solver checks: compiled loops check no bounds."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

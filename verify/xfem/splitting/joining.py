@@ -1,4 +1,4 @@
-"""Which pieces share their unknowns: identity by contact across faces, not by sign vectors.
+"""Unknowns that pieces share: identity by contact across faces, not by sign vectors.
 
 A *slot* is a piece together with a node of its cell. Two slots at one node are the same unknown
 when the pieces, in cells that share a face with that node, touch across the face, in an area (2D:
