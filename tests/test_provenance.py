@@ -1,4 +1,4 @@
-"""Where a number comes from: true of this machine, and found without loading a solver."""
+"""Provenance of a number: true of this machine, and found without loading a solver."""
 
 import os
 import subprocess

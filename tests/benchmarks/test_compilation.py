@@ -1,4 +1,4 @@
-"""What the first use of kernels costs, in a process of its own with an empty cache.
+"""Cost of the first use of kernels, in a process of its own with an empty cache.
 
 Seconds say nothing on a machine that does other things too: the unit is a small kernel, compiled
 in the same process before and after.

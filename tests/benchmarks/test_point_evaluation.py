@@ -1,4 +1,4 @@
-"""How fast a solution is asked at points, beside what finding the nearest of points takes."""
+"""Speed of a solution asked at points, beside that of finding the nearest of points."""
 
 from time import process_time
 

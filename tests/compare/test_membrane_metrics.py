@@ -1,4 +1,4 @@
-"""What membranes have of their own: stretches, folds, sectors, and other triangles beside them."""
+"""Metrics of membranes alone: stretches, folds, sectors, and other triangles beside them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What another program must write is little, and what it gets wrong is named."""
+"""Files of another program: what it must write is little, and what it gets wrong is named."""
 
 import json
 

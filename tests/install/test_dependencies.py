@@ -1,4 +1,4 @@
-"""What is imported is declared, and what is declared is imported."""
+"""Declared dependencies are those that are imported, and the other way round."""
 
 import ast
 import re

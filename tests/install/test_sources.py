@@ -1,4 +1,4 @@
-"""What the sources must not do, because it fails only where the package is installed."""
+"""Sources do nothing that fails only where the package is installed."""
 
 import ast
 from collections import Counter

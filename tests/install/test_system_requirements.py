@@ -1,4 +1,4 @@
-"""What a machine lacks is asked of its loader and named with the apt line that brings it."""
+"""Missing system libraries are asked of the loader and named with the apt line that brings them."""
 
 import importlib.util
 import sys

@@ -1,4 +1,4 @@
-"""What the conformance suite says of each method: which checks it keeps, and which it cannot."""
+"""Conformance of each method: which checks it keeps, and which it cannot."""
 
 import pytest
 

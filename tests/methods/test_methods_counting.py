@@ -1,4 +1,4 @@
-"""What a growing incision costs each method."""
+"""Cost of a growing incision for each method."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What differs between versions of DOLFINx is handled by its number; what is too old is refused."""
+"""Versions of DOLFINx are told by their number; what is too old is refused."""
 
 import sys
 from types import ModuleType

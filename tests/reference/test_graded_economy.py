@@ -1,4 +1,4 @@
-"""What grading is worth in space: accuracy for unknowns, on a penny-shaped cut."""
+"""Worth of grading in space: accuracy for unknowns, on a penny-shaped cut."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Where the reference refines, and by what law."""
+"""Places where the reference refines, and the law by which it does."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a guest does is a row with its reason: nobody else loses a verdict, the run ends."""
+"""Misbehaviour of a guest is a row with its reason: nobody else loses a verdict, the run ends."""
 
 import os
 import time

@@ -1,4 +1,4 @@
-"""Which cases a command line takes."""
+"""Selection of cases by a command line."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What would act nowhere is found when the case is read, not when it is solved."""
+"""Supports and loads that would act nowhere are found when the case is read."""
 
 import meshio
 import numpy as np

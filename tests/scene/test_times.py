@@ -1,4 +1,4 @@
-"""What a scene says of time: histories, output times, openings, the state at the beginning."""
+"""Times of a scene: histories, output times, openings, the state at the beginning."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What accuracy costs: fabricated solvers of known cost are found out; cuts grow as asked."""
+"""Cost of accuracy: fabricated solvers of known cost are found out; cuts grow as asked."""
 
 import math
 

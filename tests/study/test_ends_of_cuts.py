@@ -1,4 +1,4 @@
-"""What the end of a cut costs: the error is that of another end, wherever it falls in an element.
+"""Cost of the end of a cut: the error is that of another end, wherever it falls in an element.
 
 Away from an end, and to first order, the error of linear elements without tip functions is what the
 displacement changes by when the end is moved. By how many elements follows from where the end is

@@ -1,4 +1,4 @@
-"""How two levels differ around a place: on its side of the cut only, and without accidents."""
+"""Difference of two levels around a place: on its side of the cut only, and without accidents."""
 
 from itertools import pairwise
 

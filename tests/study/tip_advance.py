@@ -1,4 +1,4 @@
-"""What the displacement of a body with a straight crack changes by when an end of it advances.
+"""Change of the displacement of a body with a straight crack when an end of it advances.
 
 With the displacement of the outline held, du/da of an end is the field that vanishes on the
 outline, frees the faces of the crack from traction and grows like r^-1/2 at that end: Bueckner's

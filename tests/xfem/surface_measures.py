@@ -1,4 +1,4 @@
-"""What a closed oriented surface must satisfy, measured from its facets alone."""
+"""Measures of a closed oriented surface, from its facets alone."""
 
 import numpy as np
 from numpy.typing import NDArray

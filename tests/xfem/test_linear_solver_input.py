@@ -1,4 +1,4 @@
-"""What does not fit a linear solver is refused in one sentence; extreme loads are solved for."""
+"""Input that fits no linear solver is refused in one sentence; extreme loads are solved for."""
 
 from contextlib import suppress
 

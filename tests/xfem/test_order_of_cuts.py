@@ -1,4 +1,4 @@
-"""How often the order of the cuts or the numbering of the nodes decides what a cut mesh is."""
+"""Frequency with which the order of cuts or the numbering of nodes decides what a cut mesh is."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is set up at every cut equals what plain numpy makes of it."""
+"""Set-up at every cut equals what plain numpy makes of it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is changed during a motion counts from the next step on, as if the scheme began there."""
+"""Changes during a motion count from the next step on, as if the scheme began there."""
 
 import numpy as np
 import pytest

@@ -22,7 +22,7 @@ from uuid import uuid4
 from verify.threads import ONE_THREAD
 from verify.warm import PARENT_VARIABLE, Forked, fork
 
-__all__ = ["PARENT_VARIABLE", "POLL_SECONDS", "Child", "Ending", "descendants"]
+__all__ = ["POLL_SECONDS", "Child", "Ending", "descendants"]
 
 POLL_SECONDS = 0.02
 _MARK_VARIABLE = "VERIFY_CHILD"

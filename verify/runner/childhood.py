@@ -6,7 +6,7 @@ import signal
 import sys
 from pathlib import Path
 
-from verify.runner.child import PARENT_VARIABLE
+from verify.warm import PARENT_VARIABLE
 
 __all__ = ["ANSWER", "ASKING", "JUDGING", "die_with_parent", "peak_memory", "under_a_launcher"]
 

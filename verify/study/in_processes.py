@@ -7,8 +7,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
-from verify.runner.child import PARENT_VARIABLE
 from verify.runner.childhood import die_with_parent
+from verify.warm import PARENT_VARIABLE
 
 __all__ = ["in_processes"]
 
