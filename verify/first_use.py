@@ -21,6 +21,8 @@ from time import perf_counter
 
 import numpy as np
 
+from verify.accelerated import FAST
+from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.compare.cell_tree import build_cell_tree
 from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, find_cells
@@ -46,7 +48,6 @@ from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
 from verify.xfem.statics import solve_static, static_equilibrium
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
@@ -90,12 +91,12 @@ def _held(virtual: VirtualMesh) -> Supports:
 def _linear(virtual: VirtualMesh, kind: State) -> None:
     material, load = isotropic(1.0, 0.3, kind), body_force(virtual, -np.ones(virtual.mesh.space))
     for solver in ("direct", "iterative"):
-        solve_static(virtual, material, _held(virtual), load, solver=solver)
+        solve_static(virtual, material, _held(virtual), load, solver=solver, kernels=FAST)
 
 
 def _turning(virtual: VirtualMesh, kind: State) -> None:
     """Finite rotation in statics, and every scheme in motion."""
-    force = InternalForce(virtual, isotropic(1.0, 0.3, kind))
+    force = InternalForce(virtual, isotropic(1.0, 0.3, kind), kernels=FAST)
     held = _held(virtual)
     load = body_force(virtual, -0.01 * np.ones(virtual.mesh.space))
     static_equilibrium(force, held.fixed, load=load)

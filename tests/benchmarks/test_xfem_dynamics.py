@@ -9,13 +9,14 @@ from time import process_time
 import numpy as np
 import pytest
 
+from verify.accelerated import FAST
+from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import DynamicBody, EnergyMomentum, RealTimeEuler, Trapezoidal
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.sparse.cholesky import Cholesky
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -41,7 +42,7 @@ def _cut_box(divisions, step, solver=None):
     x = mesh.points[:, 0]
     mass = side_wise_mass(v, 1000.0)
     body = DynamicBody(
-        InternalForce(v, isotropic(1e4, 0.3, "solid")),
+        InternalForce(v, isotropic(1e4, 0.3, "solid"), kernels=FAST),
         mass,
         weight=mass.weight([0.0, 0.0, -1.0]),
         supports=Supports.none(v).prescribe(v, (x == 0.0) | (x == x.max())),

@@ -13,15 +13,16 @@ import numpy as np
 import pytest
 from numba import njit
 
+from verify.accelerated import FAST
+from verify.accelerated.conjugate_gradient_kernels import invert_blocks
+from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.accelerated.symmetric_sweep_kernels import solve_lower, solve_upper, vector_width
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.sparse.block_pattern import block_pattern
-from verify.xfem.sparse.conjugate_gradient_kernels import invert_blocks
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
-from verify.xfem.sparse.symmetric_sweep_kernels import solve_lower, solve_upper, vector_width
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.virtual import cut_mesh
@@ -66,7 +67,7 @@ def system():
     """Body, pattern, internal force, and matrix and load of a step of 10 ms under gravity."""
     virtual, _ = treat_slivers(cut_mesh(cube(), [CUT]), "keep")
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    force = InternalForce(virtual, MATERIAL)
+    force = InternalForce(virtual, MATERIAL, kernels=FAST)
     force.evaluate(np.zeros_like(virtual.node_points))
     blocks = np.zeros((len(pattern.columns), 3, 3))
     force.add_stiffness(pattern, blocks)
@@ -167,9 +168,9 @@ def test_a_hundred_thousand_tetrahedra_stay_under_500_megabytes():
 from pathlib import Path
 import numpy as np
 import test_xfem_scale as scale
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.sparse.symmetric_sweep_kernels import solve_lower, solve_upper
+from verify.accelerated.symmetric_sweep_kernels import solve_lower, solve_upper
 
 def peak():
     lines = Path("/proc/self/status").read_text().splitlines()

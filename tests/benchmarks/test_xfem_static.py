@@ -10,13 +10,13 @@ import pytest
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
+from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.assembly_kernels import constrain
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
-from verify.xfem.sparse.block_pattern import block_pattern
-from verify.xfem.sparse.cholesky import Cholesky
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports

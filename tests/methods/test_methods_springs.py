@@ -9,12 +9,12 @@ import pytest
 from verify.methods.catalogue import cut_by
 from verify.methods.spring_fit import spring_stiffness
 from verify.methods.spring_force import SpringForce
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import TangentKind
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 

@@ -7,11 +7,11 @@ from method_bodies import MATERIAL, hang
 from skfem.models.elasticity import linear_elasticity
 
 from verify.methods.catalogue import cut_by
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 

@@ -9,6 +9,7 @@ from cut_bodies import DENSITY, cut_body, material, rotation
 from scipy.sparse import kron
 from scipy.sparse.linalg import eigsh
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step
 from verify.xfem.cuts import Plane, Polyline
@@ -21,7 +22,6 @@ from verify.xfem.dynamics import (
 )
 from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide

@@ -12,13 +12,13 @@ from cut_bodies import (
     rotation,
 )
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import InternalForce
 from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 

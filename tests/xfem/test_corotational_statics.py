@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from cut_bodies import boundary_nodes, cut_cube, cut_square, material, rotation
 
+from verify.accelerated import FAST
 from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
-from verify.xfem.errors import XfemError
-from verify.xfem.sparse.cholesky import SingularStiffnessError
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
+from verify.xfem.errors import SingularStiffnessError, XfemError
+from verify.xfem.kernels import PLAIN
 from verify.xfem.statics import NotInEquilibriumError, newton, static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
@@ -140,7 +140,10 @@ def test_what_cannot_be_found_is_said():
 
 
 @pytest.mark.parametrize("limit", [10_000, 3])
-def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(monkeypatch, limit):
+@pytest.mark.parametrize("kernels", [PLAIN, FAST])
+def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(
+    monkeypatch, limit, kernels
+):
     """Also where the tangent is indefinite on the way, and where iterations run out."""
     v = cut_cube(3)
     X = v.node_points
@@ -154,10 +157,10 @@ def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(monke
     force = InternalForce(v, material(3))
     direct = static_equilibrium(force, fixed, twisted, load_steps=2)
     monkeypatch.setattr(newton, "ITERATE_FROM", 0)
-    monkeypatch.setattr(
-        newton, "ConjugateGradients", lambda *of: ConjugateGradients(*of, limit=limit)
+    monkeypatch.setattr(newton, "_MOST", limit)
+    iterated = static_equilibrium(
+        InternalForce(v, material(3), kernels=kernels), fixed, twisted, load_steps=2
     )
-    iterated = static_equilibrium(force, fixed, twisted, load_steps=2)
     # both to 1e-10 of the forces
     np.testing.assert_allclose(iterated.displacement, direct.displacement, atol=1e-9)
     assert iterated.energy == pytest.approx(direct.energy, rel=1e-9)

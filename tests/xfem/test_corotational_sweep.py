@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from cut_bodies import SOFT, cut_body, cut_membrane, cut_square, material
 
+from verify.accelerated import FAST
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import InternalForce
 from verify.xfem.corotation.averaged_stress_kernels import averaged_force
 from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mass import consistent_mass
-from verify.xfem.sparse.block_pattern import block_pattern
 
 
 def _moving(virtual, size, seed=4):
@@ -45,7 +46,8 @@ def test_force_and_stiffness_are_those_of_evaluation_and_assembly(kinematics, si
     virtual = cut_body(3)
     assert len(virtual.cells) % 8 != 0  # the last batch is not full
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    force, other = (InternalForce(virtual, material(3, SOFT), kinematics) for _ in range(2))
+    force = InternalForce(virtual, material(3, SOFT), kinematics, FAST)
+    other = InternalForce(virtual, material(3, SOFT), kinematics)
     for turn in range(3):
         u, v = _moving(virtual, size, turn)
         two = _in_two(other, pattern, u, v, 0.02, 0.3)
@@ -61,7 +63,8 @@ def test_the_exact_stiffness_is_that_of_assembly(size):
     """With another share of what frozen rotations give, as damping wants it."""
     virtual = cut_body(3)
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    force, other = (InternalForce(virtual, material(3, SOFT)) for _ in range(2))
+    force = InternalForce(virtual, material(3, SOFT), kernels=FAST)
+    other = InternalForce(virtual, material(3, SOFT))
     u, _ = _moving(virtual, size)
     found, wanted = np.full((2, len(pattern.columns), 3, 3), np.nan)
     for whole in (True, False):
@@ -83,7 +86,8 @@ def test_the_averaged_force_is_that_of_the_loop_over_pieces(size):
     """Also where pieces are inside out and take the substitute, and again from another start."""
     virtual = cut_body(3)
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    force, other = (InternalForce(virtual, material(3, SOFT)) for _ in range(2))
+    force = InternalForce(virtual, material(3, SOFT), kernels=FAST)
+    other = InternalForce(virtual, material(3, SOFT))
     blocks = np.empty((len(pattern.columns), 3, 3))
     taken_somewhere = False
     for turn in range(3):
@@ -114,14 +118,14 @@ def test_the_averaged_force_is_that_of_the_loop_over_pieces(size):
 def test_plane_bodies_and_membranes_give_the_same_in_two_steps(body):
     virtual = body()
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    force = InternalForce(virtual, isotropic(1.0, 0.3, "plane stress"))
+    force = InternalForce(virtual, isotropic(1.0, 0.3, "plane stress"), kernels=FAST)
     u, v = _moving(virtual, 0.1)
     _agree(_in_one(force, pattern, u, v, 0.1, 2.0), _in_two(force, pattern, u, v, 0.1, 2.0), 1e-15)
 
 
 def test_the_sweep_follows_a_change_of_sparsity_and_leaves_couplings_of_the_mass_zero():
     virtual = cut_body(3)
-    force = InternalForce(virtual, material(3, 1.0))
+    force = InternalForce(virtual, material(3, 1.0), kernels=FAST)
     u, v = _moving(virtual, 0.05)
     plain = block_pattern(virtual.cells, virtual.node_count)
     ends = np.full((1, 4), 0)
@@ -139,7 +143,9 @@ def test_a_translation_is_free_of_force_to_the_last_digit_that_sums_have():
     virtual = cut_body(3)
     pattern = block_pattern(virtual.cells, virtual.node_count)
     u, _ = _moving(virtual, 0.05)
-    _, blocks = _in_one(InternalForce(virtual, material(3, 1.0)), pattern, u, u, 0.0, 1.0)
+    _, blocks = _in_one(
+        InternalForce(virtual, material(3, 1.0), kernels=FAST), pattern, u, u, 0.0, 1.0
+    )
     K = pattern.matrix(blocks).toarray()
     assert np.abs(K @ np.tile(np.eye(3), (virtual.node_count, 1))).max() < 4e-15 * np.abs(K).max()
     values = np.linalg.eigvalsh(K)
@@ -151,5 +157,7 @@ def test_what_is_not_finite_is_seen_in_the_force():
     pattern = block_pattern(virtual.cells, virtual.node_count)
     u, v = _moving(virtual, 0.05)
     u[3] = np.nan
-    force, _ = _in_one(InternalForce(virtual, material(3, 1.0)), pattern, u, v, 0.0, 1.0)
+    force, _ = _in_one(
+        InternalForce(virtual, material(3, 1.0), kernels=FAST), pattern, u, v, 0.0, 1.0
+    )
     assert np.isnan(force).any()

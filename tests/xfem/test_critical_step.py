@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, material
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane
@@ -12,7 +13,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from verify.xfem.lanes.shuffles import address
-from verify.xfem.sparse.dense_tiles import (
+from verify.accelerated.dense_tiles import (
     COLUMNS,
     ROWS,
     add_run,
@@ -15,6 +14,7 @@ from verify.xfem.sparse.dense_tiles import (
     subtract_columns,
     subtract_product,
 )
+from verify.xfem.lanes.shuffles import address
 
 ROUND_OFF = 1e-13  # of sums of some fifty products of numbers of size one
 

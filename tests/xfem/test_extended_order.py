@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from cut_bodies import material
 
+from verify.accelerated.cholesky import Cholesky
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane, ToolPath
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.splitting.split import split_cells
 from verify.xfem.splitting.unknown_nodes import PieceSides, node_sides
 from verify.xfem.structured_meshes import box_mesh

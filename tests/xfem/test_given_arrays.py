@@ -5,6 +5,7 @@ import pytest
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.bases import from_sidewise, sidewise_from
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import (
     ImplicitCut,
@@ -22,7 +23,6 @@ from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
 from verify.xfem.slivers.policies import treat_slivers
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.statics import solve_static
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

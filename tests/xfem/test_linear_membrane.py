@@ -5,11 +5,11 @@ import pytest
 from cut_bodies import rotation
 from xfem_bodies import boundary_nodes
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.statics import solve_static
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh

@@ -1,22 +1,26 @@
 """Input that fits no linear solver is refused in one sentence; extreme loads are solved for."""
 
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 import pytest
 
-from verify.xfem.dynamics import NearlySymmetric, SparseLU
-from verify.xfem.errors import XfemError
+from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.accelerated.nearly_symmetric import NearlySymmetric
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
+from verify.xfem.linear_solvers import BlockJacobiCG, SparseLU
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import block_pattern
-from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 SOLVERS = {
     "Cholesky": Cholesky,
     "ConjugateGradients": ConjugateGradients,
-    "SparseLU": lambda pattern, _: SparseLU(pattern),
+    "SparseLU": SparseLU,
+    "definite SparseLU": partial(SparseLU, definite=True),
+    "BlockJacobiCG": BlockJacobiCG,
     "NearlySymmetric": NearlySymmetric,
 }
 TWO = SimplexMesh(

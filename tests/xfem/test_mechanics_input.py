@@ -5,6 +5,7 @@ import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane, material
 from time_schemes import SCHEMES
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import InternalForce
 from verify.xfem.corotation.crushed_pieces import collapsed_pieces
 from verify.xfem.dynamics import (
@@ -19,7 +20,6 @@ from verify.xfem.dynamics.energy_ledger import EnergyLedger, run
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.supports import Supports
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cut_bodies import rotation
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
@@ -11,7 +12,6 @@ from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

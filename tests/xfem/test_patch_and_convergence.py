@@ -7,8 +7,8 @@ from xfem_bodies import boundary_nodes, relative_l2_error
 
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import NotConvergedError
 from verify.xfem.loads import body_force
-from verify.xfem.sparse.conjugate_gradients import NotConvergedError
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports

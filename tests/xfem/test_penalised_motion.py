@@ -5,6 +5,7 @@ import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_body, cut_membrane, material, rotation
 from swings import let_go, rest_step, stretched
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step
 from verify.xfem.cuts import Plane
@@ -23,7 +24,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.slivers import GhostPenalty
 from verify.xfem.slivers.penalised_force import PenalisedForce
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

@@ -6,21 +6,22 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_cube, material
 
-from verify.xfem.corotation import InternalForce
-from verify.xfem.dynamics import DynamicBody, MovingSupports, RealTimeEuler, treat_moving_body
-from verify.xfem.dynamics.integrator import StepFailedError
-from verify.xfem.mass import side_wise_mass
-from verify.xfem.sparse.block_pattern import block_pattern
-from verify.xfem.sparse.cholesky import Cholesky
-from verify.xfem.sparse.conjugate_gradient_kernels import invert_blocks
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
-from verify.xfem.sparse.symmetric_sweep_kernels import (
+from verify.accelerated import FAST
+from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.conjugate_gradient_kernels import invert_blocks
+from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.accelerated.symmetric_sweep_kernels import (
     add_lower_product,
     solve_lower,
     solve_upper,
     symmetric_product,
     vector_width,
 )
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.corotation import InternalForce
+from verify.xfem.dynamics import DynamicBody, MovingSupports, RealTimeEuler, treat_moving_body
+from verify.xfem.dynamics.integrator import StepFailedError
+from verify.xfem.mass import side_wise_mass
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 
@@ -42,7 +43,7 @@ def hanging(n=3, drive=None):
 
         supports = MovingSupports(fixed, motion)
     return DynamicBody(
-        InternalForce(virtual, material(3)),
+        InternalForce(virtual, material(3), kernels=FAST),
         mass,
         weight=mass.weight([0.0, 0.0, -9.8]),
         supports=supports,
@@ -104,7 +105,9 @@ def test_a_step_that_fails_does_not_spoil_the_next():
 
 
 def test_a_penalised_solid_is_swept_to_the_force_and_stiffness_of_evaluation_and_assembly():
-    body = treat_moving_body(cut_cube(3), material(3), DENSITY, "penalise", factor=0.01)
+    body = treat_moving_body(
+        cut_cube(3), material(3), DENSITY, "penalise", factor=0.01, kernels=FAST
+    )
     force, virtual = body.force, body.force.virtual
     pattern = body.mass.pattern(virtual, force.ghost.couplings)
     rng = np.random.default_rng(2)

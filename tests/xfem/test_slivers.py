@@ -5,12 +5,12 @@ import pytest
 import xfem_exact_fields as exact
 from xfem_bodies import boundary_nodes, scaled_dense_stiffness
 
+from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.assembly_kernels import constrain
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
-from verify.xfem.sparse.block_pattern import block_pattern
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
 from verify.xfem.statics import solve_static
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_membrane, material
 
+from verify.accelerated import FAST, solver_by_cost
+from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.solver_by_cost import SolverByCost
 from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (
@@ -14,11 +17,8 @@ from verify.xfem.dynamics import (
     RealTimeEuler,
     Trapezoidal,
 )
+from verify.xfem.errors import NotConvergedError
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.sparse import solver_by_cost
-from verify.xfem.sparse.cholesky import Cholesky
-from verify.xfem.sparse.conjugate_gradients import NotConvergedError
-from verify.xfem.sparse.solver_by_cost import SolverByCost
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -33,7 +33,7 @@ def _body(divisions, at=0.5, normal=(1.0, 0.9, 0.4), kinematics="corotational"):
     v = cut_mesh(mesh, [Plane(point, normal[:dim])])
     mass = side_wise_mass(v, DENSITY)
     return DynamicBody(
-        InternalForce(v, material(dim), kinematics),
+        InternalForce(v, material(dim), kinematics, FAST),
         mass,
         weight=mass.weight([0.5, *[0.0] * (dim - 2), -1.0]),
         supports=Supports.none(v).prescribe(v, mesh.points[:, 0] == 0.0),
@@ -65,7 +65,7 @@ def test_a_motion_is_the_same_as_with_a_factorisation(kind, kinematics):
 
 def test_corrections_by_the_symmetric_stiffness_end_where_those_by_the_whole_one_do():
     """The energy–momentum scheme; the solver that is given makes it take the whole one."""
-    from verify.xfem.dynamics import NearlySymmetric
+    from verify.accelerated.nearly_symmetric import NearlySymmetric
 
     body = _body((3, 3, 3))
     whole = NearlySymmetric(body.pattern, 3)
@@ -131,7 +131,7 @@ def test_small_bodies_are_always_factorised():
     for body in (_body((3, 3, 3)), _body((10, 10))):
         assert not RealTimeEuler(body, 1e-6).solver.is_iterative
     v = cut_membrane()
-    sheet = DynamicBody(InternalForce(v, material(2)), side_wise_mass(v, DENSITY))
+    sheet = DynamicBody(InternalForce(v, material(2), kernels=FAST), side_wise_mass(v, DENSITY))
     assert not Trapezoidal(sheet, 1e-6)._solver.is_iterative
 
 

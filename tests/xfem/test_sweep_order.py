@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numba import njit
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.corotation.sweep_order_kernels import assign_slots, fill_lanes, order_pieces
 from verify.xfem.dynamics.real_time import _held_entries
 from verify.xfem.lanes.shuffles import add_to_records, address, gather_records
 from verify.xfem.lanes.vectors import LANES, load, mean, minus, no_lanes, store, transposed
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.structured_meshes import box_mesh
 
 FIRST, SECOND = (0, 0, 0, 1, 1, 2), (1, 2, 3, 2, 3, 3)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.elasticity import isotropic
 from verify.xfem.quadrature import simplex_rule
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.subdivision import subdivide
 

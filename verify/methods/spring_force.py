@@ -5,10 +5,11 @@ from numpy.typing import NDArray
 
 from verify.methods.spring_fit import Fit, cell_edges, spring_stiffness
 from verify.methods.spring_kernels import add_spring_stiffness, spring_force, spring_product
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.corotation import InternalForce, Kinematics, TangentKind
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
-from verify.xfem.sparse.block_pattern import BlockPattern
+from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["SpringForce"]
@@ -32,6 +33,8 @@ class SpringForce(InternalForce):
     kinematics : {"corotational", "linear"}
         Springs that turn (½k(l − l0)², any rotation), or that keep their directions.
     fit : {"fitted", "van_gelder"}
+    kernels : Kernels
+        Its linear solvers.
 
     Attributes
     ----------
@@ -52,8 +55,9 @@ class SpringForce(InternalForce):
         material: Material,
         kinematics: Kinematics = "corotational",
         fit: Fit = "fitted",
+        kernels: Kernels = PLAIN,
     ) -> None:
-        super().__init__(virtual, material, kinematics)
+        super().__init__(virtual, material, kinematics, kernels)
         mesh = virtual.mesh
         stiffness, clamped = spring_stiffness(mesh, material, fit)
         self.springs = stiffness[virtual.parent] * virtual.fraction[:, None]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated import FAST
 from verify.simulator.grips import Grips
 from verify.simulator.stage import Stage
 from verify.xfem.corotation import InternalForce
@@ -56,7 +57,7 @@ class BodyParts:
         """
         mass = side_wise_mass(virtual, stage.density)
         grips = Grips(virtual, stage.holds, stage.hooks, mass.weights, start, facets)
-        return cls(stage, InternalForce(virtual, stage.material), mass, grips)
+        return cls(stage, InternalForce(virtual, stage.material, kernels=FAST), mass, grips)
 
     def body(self, load: Callable[[float], _Floats]) -> DynamicBody:
         """Make the body and its sparsity; `load` gives nodal forces (N, s) at a time, N."""

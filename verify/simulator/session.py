@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated.cholesky import Cholesky
 from verify.simulator.body_parts import BodyParts, held_nodes
 from verify.simulator.collision.surface_collider import Contacts, SurfaceCollider
 from verify.simulator.cutting.growing_body import Increment
@@ -20,7 +21,6 @@ from verify.simulator.touched_memory import touch_memory
 from verify.xfem.cuts import ToolPath
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.dynamics.energy_ledger import EnergyLedger
-from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Session"]

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from verify.accelerated.cholesky import Cholesky
 from verify.simulator.body_parts import BodyParts, held_nodes
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
@@ -17,7 +18,6 @@ from verify.simulator.grips import Grips
 from verify.simulator.surfaces import Surfaces
 from verify.xfem.dynamics import DynamicBody
 from verify.xfem.in_pieces import MANY, InPieces
-from verify.xfem.sparse.cholesky import Cholesky
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.methods.catalogue import METHODS
 from verify.methods.cut_body import CutBody
@@ -212,7 +213,7 @@ class MethodSolver:
 
             def law(body: CutBody) -> InternalForce:
                 material = material_of(scene, body.resisting.mesh)
-                forces.append(self._force(body.resisting, material, kinematics))
+                forces.append(self._force(body.resisting, material, kinematics, kernels=FAST))
                 return forces[-1]
 
             mover = MethodMover(
@@ -233,13 +234,13 @@ class MethodSolver:
         notes: dict[str, str] = {}
         further: list[Regularisation] = []
         if kinematics == "linear" and self._force is InternalForce:
-            static = solve_static(body.resisting, material, supports, load)
+            static = solve_static(body.resisting, material, supports, load, kernels=FAST)
             u, energy, iterations, clamped = static.displacement, static.strain_energy, {}, 0
             timings |= static.timings
         else:
             check_bodies(body.resisting, supports)
             start = perf_counter()
-            force = self._force(body.resisting, material, kinematics)
+            force = self._force(body.resisting, material, kinematics, kernels=FAST)
 
             path = path_of_supports(scene, body.virtual, exact)
             found = static_equilibrium(

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Solution
@@ -19,6 +20,7 @@ from verify.solvers.xfem_supports import supports_of
 from verify.solvers.xfem_system import system_of
 from verify.system import System
 from verify.xfem.errors import BasisError, XfemError
+from verify.xfem.kernels import PLAIN
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.specks import join_specks
@@ -28,6 +30,7 @@ __all__ = ["XfemSolver"]
 
 _BASES = ("sidewise", "shifted", "heaviside")
 _TIPS = ("inside", "through", "nearest")
+_KERNELS = {"fast": FAST, "plain": PLAIN}
 _POLICIES = ("keep", "merge", "drop", "penalise")
 
 
@@ -83,6 +86,8 @@ class XfemSolver:
     step_factor : float
         Dynamics: share of the critical step that an explicit scheme takes at most, and an
         implicit one if the scene states no time step.
+    kernels : {"fast", "plain"}
+        Operations of `verify.accelerated`, or those that `verify.xfem` does alone.
     """
 
     name = "xfem"
@@ -112,6 +117,7 @@ class XfemSolver:
         mass: str = "sidewise",
         step_factor: float = 0.9,
         spectral_radius: float = 0.8,
+        kernels: str = "fast",
     ) -> Solution:
         """Solve `scene` on mesh `level`.
 
@@ -132,6 +138,7 @@ class XfemSolver:
             ("slivers", slivers, _POLICIES),
             ("scheme", scheme, SCHEMES),
             ("mass", mass, MASSES),
+            ("kernels", kernels, _KERNELS),
         )
         for name, value, known in given:
             if value not in known:
@@ -146,7 +153,9 @@ class XfemSolver:
             raise UnsupportedSceneError(f"the {basis} basis is offered for linear statics only")
         if slivers == "penalise":
             _check_penalty(scene, basis, mass)
-        motion = MotionChoice(scheme, mass, step_factor, tip, slivers, spectral_radius)
+        motion = MotionChoice(
+            scheme, mass, step_factor, tip, slivers, spectral_radius, _KERNELS[kernels]
+        )
         return _solve(scene, level, repetitions, _Choice(basis, tip, slivers, load_steps, motion))
 
     def system(
@@ -252,7 +261,9 @@ def _run(
     virtual, slivers, specks = _cut(scene, mesh, size, exact, choice.tip, choice.slivers)
     enrichment = perf_counter() - start
     penalise = choice.slivers == "penalise"
-    found = solve_equilibrium(scene, virtual, exact, choice.basis, choice.load_steps, penalise)
+    found = solve_equilibrium(
+        scene, virtual, exact, choice.basis, choice.load_steps, penalise, choice.motion.kernels
+    )
     return Answer(
         virtual=virtual,
         times=np.zeros(1),

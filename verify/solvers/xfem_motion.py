@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.history import factor_at, first_factor
@@ -34,6 +35,7 @@ from verify.xfem.dynamics import (
 from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.dynamics.newton import NewtonIntegrator
 from verify.xfem.errors import XfemError
+from verify.xfem.kernels import Kernels
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers import GhostPenalty, SliverReport, treat_slivers
@@ -58,6 +60,7 @@ class MotionChoice:
     tip: str
     slivers: str
     spectral_radius: float = 0.8
+    kernels: Kernels = FAST
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.spectral_radius <= 1.0:
@@ -240,14 +243,18 @@ class Mover:
             return self._law(virtual), mass
         kinematics = self.scene.analysis.kinematics
         material = material_of(self.scene, virtual.mesh)
-        treated = treat_moving_body(virtual, material, density, "penalise", kinematics=kinematics)
+        treated = treat_moving_body(
+            virtual, material, density, "penalise", kinematics=kinematics,
+            kernels=self.choice.kernels,
+        )  # fmt: skip
         self.penalty = treated.ghost
         return treated.force, treated.mass
 
     def _law(self, virtual: VirtualMesh) -> InternalForce:
         """Return the elasticity of a cut mesh."""
         material = material_of(self.scene, virtual.mesh)
-        return InternalForce(virtual, material, self.scene.analysis.kinematics)
+        kinematics = self.scene.analysis.kinematics
+        return InternalForce(virtual, material, kinematics, self.choice.kernels)
 
     def _initial(self, body: DynamicBody) -> MotionState:
         """Return the state at the time 0, before what opens then."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated import FAST
 from verify.scene import Scene
 from verify.solution import Regularisation
 from verify.solvers.xfem_answer import penalised
@@ -16,6 +17,7 @@ from verify.solvers.xfem_scene import material_of
 from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.xfem.corotation import InternalForce
 from verify.xfem.corotation.crushed_pieces import inverted_pieces
+from verify.xfem.kernels import Kernels
 from verify.xfem.slivers import GhostPenalty
 from verify.xfem.statics import StaticEquilibrium, solve_static, static_equilibrium
 from verify.xfem.stiffness import LinearStiffness
@@ -46,6 +48,7 @@ def solve_equilibrium(
     basis: str,
     load_steps: int,
     penalise: bool = False,
+    kernels: Kernels = FAST,
 ) -> Equilibrium:
     """Solve a static scene on a cut mesh; with `penalise` with a ghost penalty (linear only).
 
@@ -59,9 +62,9 @@ def solve_equilibrium(
     load = loads_of(scene, virtual, exact)
     loading = perf_counter() - clock
     if scene.analysis.kinematics == "linear":
-        found = _linear(scene, virtual, supports, load, basis, penalise)
+        found = _linear(scene, virtual, supports, load, basis, penalise, kernels)
     else:
-        found = _corotational(scene, virtual, exact, supports, load, load_steps)
+        found = _corotational(scene, virtual, exact, supports, load, load_steps, kernels)
     return replace(found, timings={"loading": loading, **found.timings})
 
 
@@ -72,14 +75,17 @@ def _linear(
     load: _Floats,
     basis: str,
     penalise: bool,
+    kernels: Kernels,
 ) -> Equilibrium:
     material = material_of(scene, virtual.mesh)
     if basis == "sidewise":
         ghost = GhostPenalty(virtual, material) if penalise else None
-        static = solve_static(virtual, material, supports, load, ghost=ghost)
+        static = solve_static(virtual, material, supports, load, ghost=ghost, kernels=kernels)
         share = static.penalty_energy / max(static.strain_energy, np.finfo(float).tiny)
-        own = "sparse Cholesky" if static.solver == "direct" else "conjugate gradients"
-        notes = {"linear solver": f"own {own}", "residual": f"{static.residual:.3e}"}
+        notes = {
+            "linear solver": _said(static.solver, kernels),
+            "residual": f"{static.residual:.3e}",
+        }
         return Equilibrium(
             static.displacement,
             static.strain_energy,
@@ -100,17 +106,17 @@ def _corotational(
     supports: Supports,
     load: _Floats,
     load_steps: int,
+    kernels: Kernels,
 ) -> Equilibrium:
     check_bodies(virtual, supports)
     clock = perf_counter()
-    force = InternalForce(virtual, material_of(scene, virtual.mesh))
+    force = InternalForce(virtual, material_of(scene, virtual.mesh), kernels=kernels)
     path = path_of_supports(scene, virtual, exact)
     found = static_equilibrium(
         force, supports.fixed, lambda share: path(share).values, load, load_steps or 1
     )
-    own = {"direct": "sparse Cholesky", "iterative": "conjugate gradients"}
     notes = {
-        "linear solver": " and ".join(f"own {own[name]}" for name in sorted(found.solvers)),
+        "linear solver": " and ".join(_said(one, kernels) for one in sorted(found.solvers)),
         **path_notes(found),
         "pieces inside out": _inverted(force, found.displacement),
     }
@@ -122,6 +128,13 @@ def _corotational(
         notes,
         dismissed_equilibria(found),
     )
+
+
+def _said(solver: str, kernels: Kernels) -> str:
+    """Say which linear solver has solved."""
+    if kernels is FAST:
+        return {"direct": "own sparse Cholesky", "iterative": "own conjugate gradients"}[solver]
+    return {"direct": "SciPy SuperLU", "iterative": "SciPy conjugate gradients"}[solver]
 
 
 def path_notes(found: StaticEquilibrium) -> dict[str, str]:

@@ -1,6 +1,6 @@
-"""The error that every wrong input to the compact solver raises."""
+"""Errors of the compact solver: wrong input, and systems that have no solution."""
 
-__all__ = ["BasisError", "XfemError"]
+__all__ = ["BasisError", "NotConvergedError", "SingularStiffnessError", "XfemError"]
 
 
 class XfemError(ValueError):
@@ -9,3 +9,25 @@ class XfemError(ValueError):
 
 class BasisError(XfemError):
     """The basis cannot express the cuts; the side-wise one can."""
+
+
+class SingularStiffnessError(XfemError):
+    """The matrix is not positive definite: something moves freely, or a sign is wrong.
+
+    Attributes
+    ----------
+    node : int or None
+        Node at which the factorisation stopped, where it is known.
+    """
+
+    def __init__(self, node: int | None) -> None:
+        self.node = node
+        where = "" if node is None else f" (at unknown node {node})"
+        super().__init__(
+            f"the stiffness is not positive definite{where}: a free piece without support, "
+            "or a wrong sign"
+        )
+
+
+class NotConvergedError(XfemError):
+    """The iterations ran out before the residual was small enough."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
-from verify.xfem.sparse.block_pattern import BlockPattern, block_pattern
 from verify.xfem.virtual import Aggregation, VirtualMesh
 
 __all__ = ["body_pattern", "find_places", "pattern_places"]

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import add_stiffness, linear_force
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["LinearStiffness"]

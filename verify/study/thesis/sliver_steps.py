@@ -8,12 +8,12 @@ from scipy.sparse import csr_array
 
 from verify.methods.catalogue import cut_by
 from verify.methods.cut_body import CutBody
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Cut, Plane
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparse.block_pattern import block_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import VirtualMesh, cut_mesh

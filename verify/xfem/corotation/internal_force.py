@@ -11,14 +11,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.corotation.corotational_kernels import corotational_kernels
-from verify.xfem.corotation.linearisation import Linearisation
 from verify.xfem.corotation.membrane_tension import add_tension
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import check_floats
-from verify.xfem.sparse.block_pattern import BlockPattern
-from verify.xfem.sparse.system_shapes import check_blocks
+from verify.xfem.kernels import PLAIN, Kernels, OnePass
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["InternalForce", "Kinematics", "TangentKind"]
@@ -39,6 +38,8 @@ class InternalForce:
     material : Material
     kinematics : {"corotational", "linear"}
         Linear keeps every rotation at the identity.
+    kernels : Kernels
+        Those of this body, its linear solvers among them.
 
     Attributes
     ----------
@@ -54,14 +55,18 @@ class InternalForce:
     """
 
     def __init__(
-        self, virtual: VirtualMesh, material: Material, kinematics: Kinematics = "corotational"
+        self,
+        virtual: VirtualMesh,
+        material: Material,
+        kinematics: Kinematics = "corotational",
+        kernels: Kernels = PLAIN,
     ) -> None:
         mesh = virtual.mesh
         if kinematics not in ("corotational", "linear"):
             raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
         if mesh.dim < mesh.space and kinematics == "linear":
             raise XfemError("linear kinematics of a membrane in space; expected corotational")
-        self.virtual, self.kinematics = virtual, kinematics
+        self.virtual, self.kinematics, self.kernels = virtual, kinematics, kernels
         self.lam, self.mu = material.of_cells(len(mesh.cells))
         self.left_out = 0
         pieces, space = len(virtual.cells), mesh.space
@@ -73,7 +78,7 @@ class InternalForce:
         self._gradients = np.ascontiguousarray(mesh.gradients)
         self._normals = _unit_normals(virtual)
         self._shape = (virtual.node_count, space)
-        self._sweep: Linearisation | None = None
+        self._sweep: OnePass | None = None
         self._swept = False  # whether the last rotations are those of the sweep
 
     @property
@@ -156,7 +161,8 @@ class InternalForce:
             self._check(name, values)
 
     def _check_blocks(self, pattern: BlockPattern, blocks: _Floats) -> None:
-        check_blocks(blocks, len(pattern.columns), self._shape[1])
+        space = self._shape[1]
+        check_floats("blocks", blocks, (len(pattern.columns), space, space))
         if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.virtual.cells):
             raise XfemError(
                 f"pattern of {pattern.node_count} nodes and {len(pattern.targets)} cells; expected "
@@ -170,13 +176,15 @@ class InternalForce:
 
     @property
     def is_swept(self) -> bool:
-        """Whether one sweep gives force and stiffness: of tetrahedra with unknowns of their own."""
-        return self.virtual.mesh.dim == 3 and self.virtual.aggregation is None
+        """Whether one pass gives force and stiffness: of tetrahedra with unknowns of their own."""
+        solid = self.virtual.mesh.dim == 3 and self.virtual.aggregation is None
+        return solid and self.kernels.one_pass is not None
 
-    def _sweep_over(self, pattern: BlockPattern) -> Linearisation:
+    def _sweep_over(self, pattern: BlockPattern) -> OnePass:
         if self._sweep is not None and self._sweep.pattern is pattern:
             return self._sweep
-        return Linearisation(self.virtual, self.lam, self.mu, pattern, self.turning)
+        assert self.kernels.one_pass is not None
+        return self.kernels.one_pass(self.virtual, self.lam, self.mu, pattern, self.turning)
 
     def linearise(
         self,

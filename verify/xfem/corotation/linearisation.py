@@ -9,13 +9,13 @@ complete.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.corotation.lane_layout import ENTRIES
 from verify.xfem.corotation.polar_kernels import new_lanes
 from verify.xfem.corotation.sweep_order_kernels import assign_slots, fill_lanes, order_pieces
 from verify.xfem.corotation.symmetric_rows import RECORD
 from verify.xfem.corotation.tetrahedron_lanes import linearise, unpack_rotations
 from verify.xfem.lanes.vectors import LANES
-from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Linearisation"]

@@ -11,7 +11,6 @@ from verify.xfem.dynamics.generalised_alpha import GeneralisedAlpha
 from verify.xfem.dynamics.implicit import EnergyMomentum, ImplicitEuler, Trapezoidal
 from verify.xfem.dynamics.inheritance import ancestors, inherit_state
 from verify.xfem.dynamics.integrator import Integrator, StepFailedError, StepForces
-from verify.xfem.dynamics.linear_solver import LinearSolver, NearlySymmetric, SparseLU
 from verify.xfem.dynamics.real_time import RealTimeEuler
 from verify.xfem.dynamics.sliver_treatment import TreatedBody, treat_moving_body
 from verify.xfem.dynamics.step_control import MeasuredPace, StepPerUnknown
@@ -24,14 +23,11 @@ __all__ = [
     "GeneralisedAlpha",
     "ImplicitEuler",
     "Integrator",
-    "LinearSolver",
     "MeasuredPace",
     "MotionState",
     "MovingSupports",
-    "NearlySymmetric",
     "RayleighDamping",
     "RealTimeEuler",
-    "SparseLU",
     "StepFailedError",
     "StepForces",
     "StepPerUnknown",

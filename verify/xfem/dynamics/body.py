@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.corotation.internal_force import InternalForce
 from verify.xfem.errors import XfemError
+from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
 from verify.xfem.slivers.penalised_force import PenalisedForce
 from verify.xfem.supports import Supports
@@ -196,6 +197,12 @@ class DynamicBody:
             )
         self.__dict__["supports"], self.fixed = supports, supports.fixed
         self.moving = isinstance(supports, MovingSupports)
+
+    def step_solver(self, tolerance: float) -> LinearSolver:
+        """Make the linear solver of implicit steps; the tolerance is that of iterations."""
+        virtual, held = self.force.virtual, self.fixed.all(axis=1)
+        solid = virtual.mesh.dim == 3
+        return self.force.kernels.step(self.pattern, self.shape[1], held, solid, tolerance)
 
     def rest(self) -> MotionState:
         """Undeformed and at rest at time 0, apart from what the supports prescribe."""

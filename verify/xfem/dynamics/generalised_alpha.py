@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
 from verify.xfem.dynamics.free_mass import FreeMass
 from verify.xfem.dynamics.integrator import StepForces
-from verify.xfem.dynamics.linear_solver import LinearSolver
 from verify.xfem.dynamics.newton import NewtonIntegrator
 from verify.xfem.errors import XfemError
+from verify.xfem.linear_solvers import LinearSolver
 
 __all__ = ["GeneralisedAlpha"]
 

@@ -10,8 +10,8 @@ from verify.xfem.corotation.internal_force import TangentKind
 from verify.xfem.dynamics.averaged_stress_tangent import add_averaged_stiffness
 from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.dynamics.integrator import StepForces
-from verify.xfem.dynamics.linear_solver import LinearSolver, NearlySymmetric
 from verify.xfem.dynamics.newton import NewtonIntegrator
+from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.slivers.penalised_force import PenalisedForce
 
 __all__ = ["EnergyMomentum", "ImplicitEuler", "Trapezoidal"]
@@ -100,7 +100,7 @@ class EnergyMomentum(NewtonIntegrator):
     def _general(self) -> LinearSolver:
         if self._asks_for_all:
             return self._solver
-        return NearlySymmetric(self.body.pattern, self.body.shape[1])
+        return self.body.force.kernels.general(self.body.pattern, self.body.shape[1])
 
     def _prepare(self) -> None:
         force = self.body.force
@@ -131,7 +131,7 @@ class EnergyMomentum(NewtonIntegrator):
         if force.is_swept:
             force.linearise_average(
                 self.body.pattern, before, displacement, self.substituted, self._stiffness_share,
-                internal, self._blocks, self._reads_all, self.share,
+                internal, self._blocks, not self._solver.reads_half, self.share,
             )  # fmt: skip
             self._is_linearised = True
             return

@@ -15,10 +15,8 @@ from verify.xfem.dynamics.integrator import (
     check_state,
     check_step,
 )
-from verify.xfem.dynamics.linear_solver import LinearSolver, default_solver
-from verify.xfem.errors import XfemError
-from verify.xfem.sparse.cholesky import SingularStiffnessError
-from verify.xfem.sparse.solver_by_cost import SolverByCost
+from verify.xfem.errors import SingularStiffnessError, XfemError
+from verify.xfem.linear_solvers import LinearSolver
 
 __all__ = ["NewtonIntegrator"]
 
@@ -48,8 +46,7 @@ class NewtonIntegrator(ABC):
         Allowed per step; if they do not suffice the step fails rather than go on unsolved. Most
         take 2 to 4; where pieces that are inside out stand up, it may be 50.
     solver : LinearSolver, optional
-        For the sparsity of the body; by default conjugate gradients or a Cholesky factorisation,
-        whichever has less to do.
+        For the sparsity of the body; by default the one that its kernels have for steps.
 
     Attributes
     ----------
@@ -80,7 +77,7 @@ class NewtonIntegrator(ABC):
         self.solves = 0
         space = body.shape[1]
         self._blocks = np.zeros((len(body.pattern.columns), space, space))
-        self._solver = self._default_solver() if solver is None else solver
+        self._solver = body.step_solver(_INEXACT) if solver is None else solver
         self._mass_places = body.mass.places(body.pattern)
         # a consistent mass has ε³ on the diagonal for a sliver whose weight is ε²: over the former
         # that weight alone, 1/ε, would be the scale, beside which nothing else is left to solve
@@ -93,9 +90,6 @@ class NewtonIntegrator(ABC):
         self._is_linearised = False  # whether the stiffness of the last evaluation is in the blocks
         self._at, self._found = np.empty(0), np.empty(0)  # last evaluation: where, and the force
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
-
-    def _default_solver(self) -> LinearSolver:
-        return default_solver(self.body, _INEXACT)
 
     @abstractmethod
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
@@ -123,7 +117,7 @@ class NewtonIntegrator(ABC):
             self._found = np.empty(body.shape)
             body.force.linearise(
                 body.pattern, displacement, displacement, 0.0, scale, self._found, self._blocks,
-                self._reads_all, self.share,
+                not self._solver.reads_half, self.share,
             )  # fmt: skip
             self._at, self._is_linearised = displacement.copy(), True
         return self._found
@@ -132,11 +126,6 @@ class NewtonIntegrator(ABC):
     def _stiffness_share(self) -> float:
         """Of the stiffness with frozen rotations, in the matrix of a correction."""
         return self.share * (1.0 + self.rate / self.step_size * self.body.damping.stiffness)
-
-    @property
-    def _reads_all(self) -> bool:
-        """Whether the solver reads what is below the diagonal."""
-        return not (isinstance(self._solver, SolverByCost) and self._solver.is_iterative)
 
     def _add_stiffness(self, displacement: _Floats, kind: TangentKind) -> None:
         """Add the derivative of the internal force of the step to the blocks."""
@@ -282,8 +271,7 @@ class NewtonIntegrator(ABC):
         self, displacement: _Floats, residual: _Floats, tolerance: float = _INEXACT
     ) -> _Floats:
         self.solves += 1
-        if isinstance(self._solver, SolverByCost):
-            self._solver.tolerance = tolerance
+        self._solver.tolerance = tolerance
         try:
             try:
                 return self._solved(displacement, residual, "exact")

@@ -16,12 +16,8 @@ from verify.xfem.dynamics.integrator import (
     check_state,
     check_step,
 )
-from verify.xfem.dynamics.linear_solver import LinearSolver, default_solver
 from verify.xfem.errors import XfemError
-from verify.xfem.sparse.cholesky import Cholesky
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients
-from verify.xfem.sparse.solver_by_cost import SolverByCost
-from verify.xfem.sparse.symmetric_sweep_kernels import symmetric_product, vector_width
+from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.supports import Supports
 
 __all__ = ["RealTimeEuler"]
@@ -40,8 +36,7 @@ class RealTimeEuler:
     step_size : float
         In seconds.
     solver : LinearSolver, optional
-        For the sparsity of the body; by default conjugate gradients or a Cholesky factorisation,
-        whichever has less to do.
+        For the sparsity of the body; by default the one that its kernels have for steps.
     """
 
     def __init__(
@@ -52,7 +47,7 @@ class RealTimeEuler:
         space = body.shape[1]
         self.blocks = np.zeros((len(body.pattern.columns), space, space))
         self.load = np.empty(body.shape)
-        self.solver: LinearSolver = default_solver(body, _EXACT) if solver is None else solver
+        self.solver = body.step_solver(_EXACT) if solver is None else solver
         self._places = body.mass.places(body.pattern)
         self._values = body.mass.entries[2]
         self._internal = np.empty(body.shape)
@@ -63,15 +58,8 @@ class RealTimeEuler:
         self._held = _held_entries(pattern.starts, pattern.columns, pattern.diagonal, body.fixed)
         row = np.repeat(np.arange(len(body.fixed)), np.diff(pattern.starts))
         self._held_above = self._held[(pattern.columns >= row)[self._held // space**2]]
-        self._driven = np.zeros((len(body.fixed), vector_width(space)))
+        self._driven = np.zeros(body.shape)
         self._resisted = np.empty_like(self._driven)
-
-    @property
-    def _iterates(self) -> bool:
-        """Whether the solver goes on from a guess, and reads the matrix' upper half only."""
-        if isinstance(self.solver, SolverByCost):
-            return self.solver.is_iterative
-        return isinstance(self.solver, ConjugateGradients)
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
@@ -123,16 +111,11 @@ class RealTimeEuler:
         eight off those of ten, and adds one in twenty where steps are so long that nothing goes on
         as it was (measured with the bodies of the benchmarks).
         """
-        if isinstance(self.solver, ConjugateGradients | SolverByCost):
-            last, before, first = self._changes
-            _extrapolate(last, before, first, self._change)
-            self.solver.improve(self.load, self._change, self._change)
-            self._changes.insert(0, self._changes.pop())
-            self._changes[0][:] = self._change
-        elif isinstance(self.solver, Cholesky):
-            self.solver.solve(self.load, self._change)
-        else:
-            self._change[:] = self.solver.solve(self.load)
+        last, before, first = self._changes
+        _extrapolate(last, before, first, self._change)
+        self.solver.solve(self.load, self._change)
+        self._changes.insert(0, self._changes.pop())
+        self._changes[0][:] = self._change
 
     def linearise(self, state: MotionState) -> None:
         """Write M + hC + h²K into `blocks` and the right-hand side into `load`."""
@@ -141,7 +124,7 @@ class RealTimeEuler:
         implicit = h + damping.stiffness
         body.force.linearise(
             body.pattern, state.displacement, state.velocity, implicit, h * implicit,
-            self._internal, self.blocks, not self._iterates,
+            self._internal, self.blocks, not self.solver.reads_half,
         )  # fmt: skip
         if body.force.is_membrane:
             # what tension holds it with across its plane is as stiff as it is thin: implicit too
@@ -168,14 +151,11 @@ class RealTimeEuler:
         )  # fmt: skip
         if driven:
             pattern = body.pattern
-            symmetric_product(
-                pattern.starts, pattern.columns, pattern.diagonal, self.blocks, self._driven,
-                self._resisted,
-            )  # fmt: skip
-            self.load -= self._resisted[:, : self.load.shape[1]]
+            pattern.symmetric_product(self.blocks, self._driven, self._resisted)
+            self.load -= self._resisted
         _hold(
             body.pattern.diagonal, self._supported, body.fixed,
-            self._held_above if self._iterates else self._held, self._driven, self.blocks,
+            self._held_above if self.solver.reads_half else self._held, self._driven, self.blocks,
             self.load,
         )  # fmt: skip
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from verify.xfem.corotation.internal_force import InternalForce, Kinematics
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.slivers.ghost_penalty import DEFAULT_FACTOR, GhostPenalty
 from verify.xfem.slivers.penalised_force import PenalisedForce
@@ -79,6 +80,7 @@ def treat_moving_body(
     factor: float = DEFAULT_FACTOR,
     kinematics: Kinematics = "corotational",
     held: NDArray[np.bool_] | None = None,
+    kernels: Kernels = PLAIN,
 ) -> TreatedBody:
     """Apply a sliver policy and build force and mass of what moves.
 
@@ -96,6 +98,7 @@ def treat_moving_body(
     kinematics : {"corotational", "linear"}
     held : (N,) bool array, optional
         Unknown nodes that a support is going to hold; see `treat_slivers`.
+    kernels : Kernels
 
     Raises
     ------
@@ -107,10 +110,10 @@ def treat_moving_body(
         raise XfemError(f"sliver policy '{policy}'; expected one of {expected}")
     if policy != "penalise":
         treated, report = treat_slivers(virtual, policy, threshold, held)
-        force = InternalForce(treated, material, kinematics)
+        force = InternalForce(treated, material, kinematics, kernels)
         return TreatedBody(treated, force, side_wise_mass(treated, density), report, None)
     treated, report = treat_slivers(virtual, "keep", threshold)
     ghost = GhostPenalty(treated, material, factor)
-    force = PenalisedForce(treated, material, ghost, kinematics)
+    force = PenalisedForce(treated, material, ghost, kinematics, kernels)
     mass = ghost.mass(side_wise_mass(treated, density), density)
     return TreatedBody(treated, force, mass, report, ghost)

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.slivers.piece_contacts import face_contacts
-from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.sparsity import body_pattern, pattern_places
 from verify.xfem.virtual import VirtualMesh
 

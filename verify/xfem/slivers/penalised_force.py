@@ -7,11 +7,12 @@ rotations: its force and stiffness join those of the material in everything that
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.corotation.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
-from verify.xfem.sparse.block_pattern import BlockPattern
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["PenalisedForce"]
@@ -24,7 +25,7 @@ class PenalisedForce(InternalForce):
 
     Parameters
     ----------
-    virtual, material, kinematics
+    virtual, material, kinematics, kernels
         As for `InternalForce`.
     ghost : GhostPenalty
         Of the same body.
@@ -46,8 +47,9 @@ class PenalisedForce(InternalForce):
         material: Material,
         ghost: GhostPenalty,
         kinematics: Kinematics = "corotational",
+        kernels: Kernels = PLAIN,
     ) -> None:
-        super().__init__(virtual, material, kinematics)
+        super().__init__(virtual, material, kinematics, kernels)
         if ghost.virtual is not virtual:
             raise XfemError("the ghost penalty belongs to another body; expected one of this one")
         self.ghost = ghost

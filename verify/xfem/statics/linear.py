@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.assembly_kernels import constrain
+from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
-from verify.xfem.errors import XfemError
+from verify.xfem.errors import NotConvergedError, XfemError
+from verify.xfem.kernels import PLAIN, Kernels
+from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
-from verify.xfem.sparse.block_pattern import BlockPattern
-from verify.xfem.sparse.cholesky import Cholesky
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
 from verify.xfem.sparsity import body_pattern
 from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
@@ -67,6 +67,7 @@ def solve_static(
     load: _Floats | None = None,
     solver: Literal["auto", "direct", "iterative"] = "auto",
     ghost: GhostPenalty | None = None,
+    kernels: Kernels = PLAIN,
 ) -> StaticSolution:
     """Solve K u = f.
 
@@ -79,12 +80,14 @@ def solve_static(
     load : (N, d) float array, optional
         Nodal forces in newtons.
     solver : {"auto", "direct", "iterative"}
-        Sparse Cholesky factorisation, or conjugate gradients with nodal-block Jacobi down to the
-        residual that a factorisation leaves. ``auto`` takes the faster one: the latter for solids
+        Factorisation, or conjugate gradients down to the residual that a factorisation leaves.
+        ``auto`` takes the faster one: the latter for solids
         of 2000 nodes and more, without a ghost penalty; and the former after all if the latter do
         not converge (thin bodies that bend).
     ghost : GhostPenalty, optional
         Added to the stiffness.
+    kernels : Kernels
+        Whose linear solvers are taken.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def solve_static(
     stiffness = LinearStiffness(virtual, material)
     clock = [perf_counter()]
     pattern = ghost.pattern() if ghost else body_pattern(virtual)
-    inverse = _inverse(method, pattern, supports, limit)
+    inverse = _inverse(kernels, method, pattern, supports, limit)
     clock.append(perf_counter())
     blocks, right = _system(stiffness, ghost, pattern, supports, force)
     clock.append(perf_counter())
@@ -118,7 +121,7 @@ def solve_static(
         if solver != "auto":
             raise
         method = "direct"
-        inverse = _inverse(method, pattern, supports, limit)
+        inverse = _inverse(kernels, method, pattern, supports, limit)
         inverse.factorize(blocks)
         displacement = inverse.solve(right)
     displacement += supports.values
@@ -156,12 +159,12 @@ def _system(
 
 
 def _inverse(
-    solver: str, pattern: BlockPattern, supports: Supports, limit: int
-) -> Cholesky | ConjugateGradients:
+    kernels: Kernels, solver: str, pattern: BlockPattern, supports: Supports, limit: int
+) -> LinearSolver:
     block = supports.fixed.shape[1]
     if solver == "iterative":
-        return ConjugateGradients(pattern, block, _ROUNDING, limit)
-    return Cholesky(pattern, block, supports.fixed.all(axis=1))
+        return kernels.iterative(pattern, block, _ROUNDING, limit)
+    return kernels.direct(pattern, block, supports.fixed.all(axis=1))
 
 
 def _solution(

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from verify.xfem.assembly_kernels import constrain
 from verify.xfem.corotation.crushed_pieces import collapsed_pieces
 from verify.xfem.corotation.internal_force import InternalForce
-from verify.xfem.sparse.cholesky import Cholesky, SingularStiffnessError
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
+from verify.xfem.errors import NotConvergedError, SingularStiffnessError
+from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.sparsity import body_pattern
 from verify.xfem.statics.linear import ITERATE_FROM
 
@@ -29,6 +29,7 @@ _COLLAPSED = 1e-3  # of the largest stretch
 _UNSEEN = 1e-12  # of the energy
 _INVERSE_ITERATIONS = 12
 _FIRST_WAY_OUT = 0.1  # of the size of the body, along the softest mode
+_MOST = 10_000  # iterations of conjugate gradients
 _INEXACT = 1e-6  # residual that conjugate gradients leave of a correction: Newton's method goes on
 
 
@@ -75,7 +76,9 @@ class Newton:
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
         large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
         self.solvers: set[str] = set()
-        self._iterative = ConjugateGradients(self._pattern, space, _INEXACT) if large else None
+        self._iterative: LinearSolver | None = None
+        if large:
+            self._iterative = force.kernels.iterative(self._pattern, space, _INEXACT, _MOST)
 
     @property
     def largest_stiffness(self) -> float:
@@ -83,8 +86,10 @@ class Newton:
         return float(np.abs(self._blocks).max(initial=0.0))
 
     @cached_property
-    def _direct(self) -> Cholesky:
-        return Cholesky(self._pattern, self._blocks.shape[1], self._fixed.all(axis=1))
+    def _direct(self) -> LinearSolver:
+        return self._force.kernels.direct(
+            self._pattern, self._blocks.shape[1], self._fixed.all(axis=1)
+        )
 
     def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took."""

@@ -8,9 +8,11 @@ that no clock decides, and the same motion takes the same way twice.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.sparse.block_pattern import BlockPattern
-from verify.xfem.sparse.cholesky import Cholesky
-from verify.xfem.sparse.conjugate_gradients import ConjugateGradients, NotConvergedError
+from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.errors import NotConvergedError
+from verify.xfem.linear_solvers import LinearSolver
 
 __all__ = ["SolverByCost"]
 
@@ -25,7 +27,7 @@ _MANY = 100  # ... before so many iterations were not enough
 _MOST = 10_000  # iterations where there is no memory for a factor
 
 
-class SolverByCost:
+class SolverByCost(LinearSolver):
     """Solver of K x = b, first iterative and direct from the first solution that takes too long.
 
     Parameters
@@ -43,8 +45,7 @@ class SolverByCost:
     Attributes
     ----------
     is_iterative : bool
-        Whether the next solution will be by conjugate gradients; what is below the diagonal of a
-        matrix is then not read.
+        Whether the next solution will be by conjugate gradients.
     """
 
     def __init__(
@@ -63,6 +64,11 @@ class SolverByCost:
         self._is_analysed = not self.is_iterative or not (solid and pattern.node_count >= _LARGE)
         if self._is_analysed:
             self._analyse()
+
+    @property
+    def reads_half(self) -> bool:  # type: ignore[override]
+        """Whether blocks below the diagonal of the next matrix are not read."""
+        return self.is_iterative
 
     @property
     def tolerance(self) -> float:
@@ -85,15 +91,7 @@ class SolverByCost:
         self._iterative.limit = max(1, int(cost / (_ITERATION * self._pattern.node_count)))
 
     def factorize(self, blocks: _Floats) -> None:
-        """Take the matrix with these nodal blocks (B, d, d), kept by reference.
-
-        Raises
-        ------
-        SingularStiffnessError
-            If it is seen not to be positive definite.
-        XfemError
-            If the blocks are not those of the pattern.
-        """
+        """Take the matrix; see `LinearSolver`."""
         self._blocks = blocks
         if self.is_iterative:
             self._iterative.factorize(blocks)
@@ -101,33 +99,14 @@ class SolverByCost:
             assert self._direct is not None
             self._direct.factorize(blocks)
 
-    def solve(self, load: _Floats) -> _Floats:
-        """Solution (N, d) for a right-hand side (N, d).
-
-        Raises
-        ------
-        SingularStiffnessError
-            If the matrix turns out not to be positive definite.
-        NotConvergedError
-            If the iterations run out and there is no memory for a factor.
-        XfemError
-            If a shape is wrong or a number is not finite.
-        RuntimeError
-            If nothing was factorised before.
-        """
-        x = np.empty(np.shape(load))
-        self.improve(load, x)
-        return x
-
-    def improve(self, load: _Floats, x: _Floats, start: _Floats | None = None) -> None:
-        """Overwrite x (N, d) with the solution, as `ConjugateGradients.improve` does."""
+    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+        """Solve; see `LinearSolver`. Iterations run out only if there is no room for a factor."""
+        x = np.zeros(np.shape(load)) if x is None else x
         while self.is_iterative:
             allowed = self._iterative.limit
             try:
-                self._iterative.improve(load, x, start)
-                return
+                return self._iterative.solve(load, x)
             except NotConvergedError:
-                start = x
                 if not self._is_analysed:
                     self._analyse()
                 if self._direct is None and allowed == _MOST:
@@ -135,7 +114,7 @@ class SolverByCost:
                 if self._iterative.limit <= allowed:
                     self._turn()
         assert self._direct is not None
-        self._direct.solve(load, x)
+        return self._direct.solve(load, x)
 
     def _turn(self) -> None:
         """Factorise this matrix and all that follow."""

@@ -69,6 +69,10 @@ class BlockPattern:
         """(B,) of each block (i, j), the place of (j, i)."""
         return _mirror(self.starts, self.columns)
 
+    def symmetric_product(self, blocks: _Floats, vector: _Floats, out: _Floats) -> None:
+        """Write K v (N, d); blocks (B, d, d) below the diagonal are not read."""
+        _symmetric_product(self.starts, self.columns, self.diagonal, blocks, vector, out)
+
     def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
         """Return the matrix of the given blocks (B, d, d), without a copy."""
         size = self.node_count * blocks.shape[1]
@@ -164,3 +168,17 @@ def _mirror(starts, columns):
         place[k] = following[columns[k]]
         following[columns[k]] += 1
     return place
+
+
+@njit(cache=True)
+def _symmetric_product(starts, columns, diagonal, blocks, vector, out):
+    space = vector.shape[1]
+    out[:] = 0.0
+    for row in range(len(diagonal)):
+        for k in range(diagonal[row], starts[row + 1]):
+            column = columns[k]
+            for a in range(space):
+                for b in range(space):
+                    out[row, a] += blocks[k, a, b] * vector[column, b]
+                    if column != row:
+                        out[column, b] += blocks[k, a, b] * vector[row, a]

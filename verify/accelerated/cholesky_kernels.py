@@ -10,8 +10,7 @@ until the parent front adds it.
 import numpy as np
 from numba import njit
 
-from verify.xfem.lanes.shuffles import address
-from verify.xfem.sparse.dense_tiles import (
+from verify.accelerated.dense_tiles import (
     COLUMNS,
     ROWS,
     add_run,
@@ -21,6 +20,7 @@ from verify.xfem.sparse.dense_tiles import (
     subtract_columns,
     subtract_product,
 )
+from verify.xfem.lanes.shuffles import address
 
 __all__ = ["factorise_fronts", "solve_fronts"]
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from verify.xfem.sparse.symmetric_sweep_kernels import (
+from verify.accelerated.symmetric_sweep_kernels import (
     add_lower_product,
     solve_lower,
     solve_upper,

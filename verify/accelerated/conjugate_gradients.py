@@ -8,30 +8,21 @@ them either.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.errors import XfemError
-from verify.xfem.sparse.block_pattern import BlockPattern
-from verify.xfem.sparse.cholesky import SingularStiffnessError
-from verify.xfem.sparse.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
-from verify.xfem.sparse.symmetric_sweep_kernels import vector_width
-from verify.xfem.sparse.system_shapes import (
-    check_blocks,
-    checked_load,
-    checked_start,
-    largest_entry,
-)
+from verify.accelerated.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
+from verify.accelerated.symmetric_sweep_kernels import vector_width
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
+from verify.xfem.given_arrays import check_floats
+from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
-__all__ = ["ConjugateGradients", "NotConvergedError"]
+__all__ = ["ConjugateGradients"]
 
 _Floats = NDArray[np.float64]
 
 _SMALLEST, _LARGEST = 1e-200, 1e200  # squares of loads that are solved for as they are
 
 
-class NotConvergedError(XfemError):
-    """The iterations ran out before the residual was small enough."""
-
-
-class ConjugateGradients:
+class ConjugateGradients(LinearSolver):
     """Iterative solver of K x = b for symmetric positive definite K in nodal blocks.
 
     Parameters
@@ -52,6 +43,8 @@ class ConjugateGradients:
         Of the last solve.
     """
 
+    reads_half = True
+
     def __init__(
         self, pattern: BlockPattern, block: int, tolerance: float = 1e-10, limit: int = 10_000
     ) -> None:
@@ -66,63 +59,31 @@ class ConjugateGradients:
         self.iterations = 0
 
     def factorize(self, blocks: _Floats) -> None:
-        """Take the matrix with these blocks (B, d, d), kept by reference.
-
-        Raises
-        ------
-        SingularStiffnessError
-            If a nodal block is not positive definite.
-        XfemError
-            If the blocks are not those of the pattern.
-        """
-        check_blocks(blocks, len(self._pattern.columns), self._block)
+        """Take the matrix and invert its diagonal blocks; see `LinearSolver`."""
+        check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
         failed = invert_blocks(blocks, self._pattern.diagonal, self._inverse)
         if failed >= 0:
             raise SingularStiffnessError(failed)
         self._blocks = np.ascontiguousarray(blocks)
 
-    def solve(self, load: _Floats, start: _Floats | None = None) -> _Floats:
-        """Solution (N, d) for a right-hand side (N, d), from a first guess.
-
-        Raises
-        ------
-        SingularStiffnessError
-            If the matrix turns out not to be positive definite.
-        NotConvergedError
-            If the iterations run out.
-        XfemError
-            If a shape is wrong or a number is not finite.
-        RuntimeError
-            If nothing was factorised before.
-        """
-        x = np.empty(np.shape(load))
-        self.improve(load, x, start)
-        return x
-
-    def improve(self, load: _Floats, x: _Floats, start: _Floats | None = None) -> None:
-        """Overwrite x (N, d) with the solution, from a first guess (x itself, or by default 0).
-
-        Nothing is allocated. Errors are those of `solve`.
-        """
+    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+        """Solve; see `LinearSolver`. With room for the solution, nothing is allocated."""
         if self._blocks is None:
             raise RuntimeError("solve before factorize")
         pattern, nodes = self._pattern, self._pattern.node_count
-        load = checked_load(load, nodes, self._block)
-        if x.shape != load.shape:
-            raise XfemError(f"room for a solution of shape {x.shape}; expected {load.shape}")
-        if start is None:
-            x[:] = 0.0
-        elif start is not x:
-            x[:] = checked_start(start, nodes, self._block)
+        load = nodal_vector(load, "right-hand side", nodes, self._block)
+        x = np.zeros(load.shape) if x is None else x
+        if nodal_vector(x, "first guess", nodes, self._block) is not x:
+            raise XfemError("first guess with gaps, or not of floats; expected room for x")
         if not _SMALLEST < np.vdot(load, load) < _LARGEST and load.any():
-            scale = 2.0 ** -np.frexp(largest_entry(load))[1]
+            scale = 2.0 ** -np.frexp(np.abs(load).max())[1]
             x *= scale
-            self.improve(scale * load, x, x)
+            self.solve(scale * load, x)
             x /= scale
-            return
+            return x
         iterations, residual = conjugate_gradients(
             pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._inverse,
-            load, x, start is None, self._work, self.tolerance, self.limit,
+            load, x, not x.any(), self._work, self.tolerance, self.limit,
         )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)
@@ -132,3 +93,4 @@ class ConjugateGradients:
                 f"expected {self.tolerance:g}"
             )
         self.iterations = iterations
+        return x

@@ -11,43 +11,27 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.errors import XfemError
+from verify.accelerated.cholesky_kernels import factorise_fronts, solve_fronts
+from verify.accelerated.dense_tiles import COLUMNS, ROWS
+from verify.accelerated.front_plan_kernels import assembly_lists, front_rows
+from verify.accelerated.front_tree import levels, merge_and_order
+from verify.accelerated.minimum_degree import minimum_degree
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.errors import SingularStiffnessError, XfemError
+from verify.xfem.given_arrays import check_floats
 from verify.xfem.in_pieces import InPieces, in_one_go
-from verify.xfem.sparse.block_pattern import BlockPattern
-from verify.xfem.sparse.cholesky_kernels import factorise_fronts, solve_fronts
-from verify.xfem.sparse.dense_tiles import COLUMNS, ROWS
-from verify.xfem.sparse.front_plan_kernels import assembly_lists, front_rows
-from verify.xfem.sparse.front_tree import levels, merge_and_order
-from verify.xfem.sparse.minimum_degree import minimum_degree
-from verify.xfem.sparse.system_shapes import check_blocks, checked_load
+from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
-__all__ = ["Cholesky", "SingularStiffnessError"]
+__all__ = ["Cholesky"]
 
+_Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 _ANYWHERE = np.empty(0, dtype=np.int64)
 _WORN = 1.25  # operations per unknown, over those when the order was found
 
 
-class SingularStiffnessError(XfemError):
-    """The matrix is not positive definite: something moves freely, or a sign is wrong.
-
-    Attributes
-    ----------
-    node : int or None
-        Unknown node at which the factorisation stopped, where it is known.
-    """
-
-    def __init__(self, node: int | None) -> None:
-        self.node = node
-        where = "" if node is None else f" (at unknown node {node})"
-        super().__init__(
-            f"the stiffness is not positive definite{where}: a free piece without support, "
-            "or a wrong sign"
-        )
-
-
-class Cholesky:
+class Cholesky(LinearSolver):
     """Solver of K x = b for symmetric positive definite K in nodal blocks.
 
     Parameters
@@ -187,17 +171,9 @@ class Cholesky:
         """About the operations of a factorisation."""
         return self._work
 
-    def factorize(self, blocks: NDArray[np.float64]) -> None:
-        """Factorise the matrix with these blocks (B, block, block).
-
-        Raises
-        ------
-        SingularStiffnessError
-            If a pivot is not positive beyond round-off.
-        XfemError
-            If the blocks are not those of the pattern.
-        """
-        check_blocks(blocks, self._block_count, self._block)
+    def factorize(self, blocks: _Floats) -> None:
+        """Factorise; see `LinearSolver`."""
+        check_floats("blocks", blocks, (self._block_count, self._block, self._block))
         self._is_factorised = False
         failed = factorise_fronts(
             np.ascontiguousarray(blocks),
@@ -220,22 +196,12 @@ class Cholesky:
             raise SingularStiffnessError(int(self._order[failed // self._block]))
         self._is_factorised = True
 
-    def solve(
-        self, load: NDArray[np.float64], out: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
-        """Solution (N, block) for a right-hand side (N, block), in `out` if that is given.
-
-        Raises
-        ------
-        XfemError
-            If the right-hand side has another shape or is not finite.
-        RuntimeError
-            If nothing was factorised before.
-        """
+    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+        """Solve; see `LinearSolver`."""
         if not self._is_factorised:
             raise RuntimeError("solve before factorize")
-        load = checked_load(load, len(self._order), self._block)
-        solution = np.empty(load.shape) if out is None else out
+        load = nodal_vector(load, "right-hand side", len(self._order), self._block)
+        solution = np.empty(load.shape) if x is None else x
         np.take(load, self._order, axis=0, out=self._permuted, mode="clip")
         solve_fronts(
             self._bounds,
@@ -252,7 +218,7 @@ class Cholesky:
         return solution
 
 
-def _room(store: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+def _room(store: _Floats, size: int) -> _Floats:
     """Array of at least that size: the given one, or a larger one with room to grow.
 
     It begins with a line of the cache, so that no vector in it spans two.

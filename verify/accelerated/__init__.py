@@ -1,0 +1,12 @@
+"""Operations of `verify.xfem` at the speed of the machine, equal to the plain ones to round-off."""
+
+from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.accelerated.nearly_symmetric import NearlySymmetric
+from verify.accelerated.solver_by_cost import SolverByCost
+from verify.xfem.corotation.linearisation import Linearisation
+from verify.xfem.kernels import Kernels
+
+__all__ = ["FAST"]
+
+FAST = Kernels(Cholesky, ConjugateGradients, SolverByCost, NearlySymmetric, Linearisation)

@@ -1,0 +1,211 @@
+"""Linear solvers of nodal blocks by SciPy: sparse LU factorisation, conjugate gradients."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import LinearOperator, SuperLU, cg, splu
+
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
+from verify.xfem.given_arrays import check_floats
+
+__all__ = ["BlockJacobiCG", "LinearSolver", "SparseLU", "nodal_vector"]
+
+_Floats = NDArray[np.float64]
+
+_ROUND_OFF = 1e-14  # of the diagonal entry from which a pivot comes
+_IN_ITS_ORDER = {"SymmetricMode": True}
+
+
+class LinearSolver(Protocol):
+    """Solver of K x = b in nodal blocks, whose analysis of the sparsity is kept.
+
+    Attributes
+    ----------
+    reads_half : bool
+        Whether blocks below the diagonal of the next matrix are not read.
+    tolerance : float
+        Of the residual that iterations leave, relative to the right-hand side; direct solvers read
+        none.
+    """
+
+    reads_half: bool = False
+    tolerance: float = 0.0
+
+    def factorize(self, blocks: _Floats) -> None:
+        """Take the matrix with these nodal blocks (B, d, d), kept by reference.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If it is seen not to be positive definite (of general matrices: not to be regular).
+        XfemError
+            If the blocks are not those of the pattern.
+        """
+        ...
+
+    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+        """Solution (N, d) for a right-hand side (N, d).
+
+        Parameters
+        ----------
+        load : (N, d) float array
+        x : (N, d) float array, optional
+            First guess of iterations, overwritten with the solution; zero without it.
+
+        Raises
+        ------
+        SingularStiffnessError
+            If the matrix turns out not to be positive definite.
+        NotConvergedError
+            If iterations run out.
+        XfemError
+            If a shape is wrong or a number is not finite.
+        RuntimeError
+            If nothing was factorised before.
+        """
+        ...
+
+
+class SparseLU(LinearSolver):
+    """LU factorisation by SuperLU.
+
+    Rows and columns are scaled by the diagonal before: those of a sliver are many orders smaller
+    than others, and a pivot among numbers of both sizes would lose them.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+    definite : bool
+        Whether the matrix must be symmetric and positive definite: pivots are then on the
+        diagonal. Otherwise rows are exchanged, and any regular matrix will do.
+    """
+
+    def __init__(self, pattern: BlockPattern, block: int, definite: bool = False) -> None:
+        self._pattern, self._block, self._definite = pattern, block, definite
+        self._factor: SuperLU | None = None
+        self._scale: _Floats | None = None
+
+    def factorize(self, blocks: _Floats) -> None:
+        """Factorise; see `LinearSolver`."""
+        check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
+        matrix = self._pattern.matrix(blocks)
+        diagonal = matrix.diagonal()
+        if self._definite and not (diagonal > 0.0).all():
+            raise SingularStiffnessError(int(np.argmin(diagonal > 0.0)) // self._block)
+        size = np.abs(diagonal)
+        self._scale = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+        scaling = diags_array(self._scale)
+        scaled = csc_array(scaling @ matrix @ scaling)
+        try:
+            if not self._definite:
+                self._factor = splu(scaled)
+                return
+            factor = splu(scaled, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=_IN_ITS_ORDER)
+        except RuntimeError as failure:
+            raise SingularStiffnessError(None) from failure
+        small = ~(factor.U.diagonal() > _ROUND_OFF) | (factor.perm_r != factor.perm_c)
+        if small.any():
+            place = int(np.argmax(small))
+            raise SingularStiffnessError(int(np.argmax(factor.perm_c == place)) // self._block)
+        self._factor = factor
+
+    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+        """Solve; see `LinearSolver`."""
+        if self._factor is None or self._scale is None:
+            raise RuntimeError("solve before factorize")
+        load = nodal_vector(load, "right-hand side", self._pattern.node_count, self._block)
+        x = np.empty(load.shape) if x is None else x
+        x[:] = (self._scale * self._factor.solve(self._scale * load.ravel())).reshape(load.shape)
+        return x
+
+
+class BlockJacobiCG(LinearSolver):
+    """Conjugate gradients, preconditioned by the nodal blocks on the diagonal.
+
+    Scaling by nodal blocks bounds the condition number of the phantom-node basis whatever the size
+    of the slivers.
+
+    Parameters
+    ----------
+    pattern : BlockPattern
+    block : int
+        Size of the blocks.
+    tolerance : float
+        Of the residual relative to the right-hand side, 2-norm.
+    limit : int
+        Most iterations.
+    """
+
+    def __init__(
+        self, pattern: BlockPattern, block: int, tolerance: float = 1e-10, limit: int = 10_000
+    ) -> None:
+        if not 0.0 < tolerance < 1.0 or limit < 1:
+            raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
+        self._pattern, self._block, self.tolerance, self._limit = pattern, block, tolerance, limit
+        self._blocks: _Floats | None = None
+
+    def factorize(self, blocks: _Floats) -> None:
+        """Take the matrix and invert its diagonal blocks; see `LinearSolver`."""
+        check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
+        own = blocks[self._pattern.diagonal]
+        scale = 1.0 / np.sqrt(np.abs(np.einsum("nii->ni", own)).max(axis=1, initial=1e-300))
+        positive = np.linalg.eigvalsh(own * scale[:, None, None] ** 2)[:, 0] > _ROUND_OFF
+        if not positive.all():
+            raise SingularStiffnessError(int(np.argmin(positive)))
+        self._blocks, self._inverse = blocks, np.linalg.inv(own)
+
+    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+        """Solve; see `LinearSolver`."""
+        if self._blocks is None:
+            raise RuntimeError("solve before factorize")
+        nodes, size = self._pattern.node_count, self._pattern.node_count * self._block
+        load = nodal_vector(load, "right-hand side", nodes, self._block)
+        x = np.zeros(load.shape) if x is None else x
+        start = nodal_vector(x, "first guess", nodes, self._block)
+        matrix = self._pattern.matrix(self._blocks)
+
+        def product(vector: _Floats) -> _Floats:
+            image = matrix @ vector
+            if vector.any() and not vector @ image > 0.0:
+                raise SingularStiffnessError(None)
+            return image
+
+        def precondition(residual: _Floats) -> _Floats:
+            return np.einsum("nij,nj->ni", self._inverse, residual.reshape(load.shape)).ravel()
+
+        found, failed = cg(
+            LinearOperator((size, size), product), load.ravel(), start.ravel(),
+            rtol=self.tolerance, maxiter=self._limit,
+            M=LinearOperator((size, size), precondition),
+        )  # fmt: skip
+        if failed:
+            residual = np.linalg.norm(load.ravel() - matrix @ found) / np.linalg.norm(load)
+            raise NotConvergedError(
+                f"conjugate gradients: residual {residual:.3g} after {self._limit} iterations; "
+                f"expected {self.tolerance:g}"
+            )
+        x[:] = found.reshape(load.shape)
+        return x
+
+
+def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> _Floats:
+    """Right-hand side or first guess as a float array (N, d) without gaps.
+
+    Raises
+    ------
+    XfemError
+        If its shape is another, or a number is not finite.
+    """
+    found = np.ascontiguousarray(values, dtype=float)
+    if found.shape != (nodes, size):
+        raise XfemError(f"{name} of shape {found.shape}; expected {(nodes, size)}")
+    # one pass that allocates nothing tells, but of numbers whose squares overflow
+    if not np.vdot(found, found) < np.inf and not np.isfinite(found).all():
+        first = int(np.argmin(np.isfinite(found).all(axis=1)))
+        raise XfemError(f"the {name} is not finite, first at unknown node {first}")
+    return found

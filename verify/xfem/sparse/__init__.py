@@ -1,1 +1,0 @@
-"""Sparse matrices of nodal blocks: pattern, Cholesky factorisation, conjugate gradients."""
