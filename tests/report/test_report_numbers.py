@@ -2,8 +2,8 @@
 
 import pytest
 
-from verify.report.notation import with_interval
-from verify.report.stability_map import graded
+from verify.report.notation import signed, with_interval
+from verify.report.sliver_view import graded
 from verify.report.tables import check_row
 from verify.result import Verdict, VerdictRecord
 
@@ -34,16 +34,29 @@ def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():
 @pytest.mark.parametrize(
     ("value", "grade", "written"),
     [
-        (1.0, "good", "1"),
-        (0.9, "good", "0.9"),
+        (1.0, "good", "1.0"),
+        (0.9, "good", "0.90"),
         (0.8973, "fair", "0.897"),
         (0.4968, "poor", "0.497"),
         (0.34, "poor", "0.34"),
-        (0.0996, "bad", "9.96e-02"),
-        (9.7e-13, "bad", "1e-12"),
-        (0.0, "bad", "0e+00"),
+        (0.0996, "bad", "0.0996"),
+        (9.7e-13, "bad", "9.7×10⁻¹³"),
+        (0.0, "bad", "0"),
     ],
 )
 def test_a_graded_number_is_not_rounded_up_to_the_grade_that_it_misses(value, grade, written):
-    steps = [(0.9, "good"), (0.5, "fair"), (0.1, "poor")]
-    assert graded(value, steps)[:2] == (grade, written)
+    cell = graded(value, (0.9, 0.5, 0.1))
+    assert (cell.grade, cell.text.split(" ")[1]) == (grade, written)
+
+
+@pytest.mark.parametrize(
+    ("value", "grade", "written"),
+    [(1000.0, "good", "1000"), (1004.0, "fair", "1004"), (1.004e6, "bad", "1.004×10⁶")],
+)
+def test_a_graded_number_is_not_rounded_down_to_what_it_exceeds(value, grade, written):
+    cell = graded(value, (1e3, 1e4, 1e6), most=True)
+    assert (cell.grade, cell.text.split(" ")[1]) == (grade, written)
+
+
+def test_a_signed_number_that_is_written_as_zero_has_no_sign():
+    assert [signed(v) for v in (-1e-9, 1e-9, -0.356, 0.2)] == ["0.00", "0.00", "−0.36", "+0.20"]

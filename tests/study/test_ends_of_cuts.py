@@ -16,8 +16,9 @@ from tip_advance import tip_advances
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
-from verify.report.budget_figures import budget_section
+from verify.report.study_page import render_study
 from verify.study.budget import cut_ends
+from verify.study.record import write_study
 
 ANGLES, PLACES = (20.0, -35.0), range(6)
 RULES = ("inside", "through")
@@ -25,7 +26,7 @@ levels = pytest.mark.parametrize("count", [16, pytest.param(32, marks=pytest.mar
 
 
 PAGE = {"level": 0, "tolerance": 0.05, "metric": "displacement_l2", "chain": [], "notes": [],
-        "budgets": [], "candidates": []}  # fmt: skip
+        "budgets": [], "candidates": [], "findings": [], "seconds": 1.0}  # fmt: skip
 
 
 def ends_at(place, angle, size):
@@ -168,7 +169,12 @@ def test_ends_on_nodes_of_the_mesh_cost_xfem_what_they_cost_conforming_elements(
     assert [end.nodes for end in one.realised] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
-def test_ends_are_found_by_their_edge_and_told_apart():
+def budget_page(folder, ends):
+    write_study(folder, "budget", PAGE | {"ends": ends}, [], "by hand")
+    return render_study(folder, "budget").read_text(encoding="utf-8")
+
+
+def test_ends_are_found_by_their_edge_and_told_apart(tmp_path):
     """A square of two triangles; the cut ends on the diagonal, a quarter from its middle."""
     points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     cells = np.array([[0, 1, 3], [0, 3, 2]])
@@ -179,8 +185,8 @@ def test_ends_are_found_by_their_edge_and_told_apart():
     end = found[0.4, 0.25]
     assert (end.moved, end.nodes) == pytest.approx((-0.15, -0.4))
     assert end.acts == pytest.approx(-0.15 - 2 / 3 * 0.25 - 0.355)
-    page = str(budget_section(PAGE | {"ends": [asdict(end)]}))
+    page = budget_page(tmp_path, [asdict(end)])
     assert [f"{text} h" in page for text in ("−0.15", "−0.40", "−0.67 ± 0.22")] == [True] * 3
-    assert "acts as" not in str(budget_section(PAGE | {"ends": []}))
+    assert "acts as" not in budget_page(tmp_path, [])
     # nothing is realised near an end: nothing is said of it
     assert cut_ends(body_of(scene), facets[:0], points, cells, 1.0) == []

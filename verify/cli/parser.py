@@ -152,14 +152,15 @@ def _add_reading_commands(add: Add) -> None:
 
     command = add(
         "report",
-        "render the report of a run again, without computing anything",
+        "render the report of a run or of studies again, without computing anything",
         "examples:\n  verify report out\n  verify report out --format markdown",
     )
-    command.add_argument("directory", metavar="DIR", type=Path, help="directory of a run")
+    command.add_argument(
+        "directory", metavar="DIR", type=Path, help="directory of a run or of studies"
+    )
     command.add_argument(
         "--format", choices=("html", "markdown", "pdf"), default="html",
-        help="report.html (default); report.md with pictures beside it; report.pdf, which "
-        "needs Chromium",
+        help="a page (default); Markdown with pictures beside it; or PDF, which needs Chromium",
     )  # fmt: skip
 
 

@@ -5,6 +5,9 @@ Their text is without markup; templates write it as HTML or Markdown and escape 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
+
+from verify.report.notation import number
 
 __all__ = ["Cell", "Drawing", "Figure", "Table", "plain_table"]
 
@@ -80,14 +83,14 @@ class Figure:
 
 def plain_table(
     caption: str,
-    head: Sequence[str | Cell],
-    rows: Sequence[Sequence[str | Cell]],
+    head: Sequence[Any],
+    rows: Sequence[Sequence[Any]],
     kind: str = "",
     named: bool = False,
 ) -> Table:
-    """Return a table of which cells may be given as their text alone."""
+    """Return a table of which cells may be given as text, or as a number that `number` writes."""
     return Table(caption, _cells(head), [_cells(row) for row in rows], kind, named)
 
 
-def _cells(row: Sequence[str | Cell]) -> list[Cell]:
-    return [cell if isinstance(cell, Cell) else Cell(str(cell)) for cell in row]
+def _cells(row: Sequence[Any]) -> list[Cell]:
+    return [cell if isinstance(cell, Cell) else Cell(number(cell)) for cell in row]

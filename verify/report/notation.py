@@ -14,7 +14,9 @@ __all__ = [
     "number_text",
     "printable",
     "seconds_text",
+    "signed",
     "solver_title",
+    "spread_text",
     "with_interval",
 ]
 
@@ -74,8 +76,8 @@ def error_title(name: str) -> str:
 
 
 def solver_title(name: str) -> str:
-    """Return the solver's name as it is written in figures."""
-    return _SOLVERS.get(name, name)
+    """Return the name of a solver, with what is varied of it, as it is written in figures."""
+    return re.sub(r"^\w+", lambda first: _SOLVERS.get(first[0], first[0]), name)
 
 
 _MOST_DIGITS = 7  # of the ends of an interval
@@ -103,6 +105,12 @@ def number(value: Any, digits: int = 4) -> str:
         return "not finite"
     mantissa, power = _decimal(value, digits)
     return mantissa if power is None else f"{mantissa}×10{str(power).translate(RAISED)}"
+
+
+def signed(value: float, form: str = ".2f") -> str:
+    """Return `value` with its sign, which nothing has that is written as zero."""
+    written = f"{value:+{form}}"
+    return written.replace("-", "−") if float(written) else written[1:]
 
 
 def number_text(value: float | None, digits: int = 3) -> str:
@@ -142,6 +150,11 @@ def seconds_text(value: float | None, beside: float | None = None) -> str:
     shown = value / size
     written = f"{shown:.3g}" if shown < 999.5 else f"{shown:.0f}"
     return written if beside is not None else f"{written} {unit}"
+
+
+def spread_text(middle: float, low: float, high: float) -> str:
+    """Return a duration and, in its unit, the least and the largest of its repetitions."""
+    return f"{seconds_text(middle)} ({seconds_text(low, middle)}–{seconds_text(high, middle)})"
 
 
 def bytes_text(value: float | None) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from verify.report.blocks import Cell, Drawing, Table
 from verify.report.case_view import CaseView, PictureRow
-from verify.report.notation import bytes_text, solver_title
+from verify.report.notation import bytes_text, number, solver_title
 from verify.report.pictures import Picture
 from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import check_text
@@ -73,12 +73,13 @@ def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     versions = origin.pop("versions", None)
     commit, dirty = origin.pop("commit", None), origin.pop("dirty", None)
     state = {True: ", with changes that are not committed", False: ", unchanged"}.get(dirty, "")
-    said = [
-        ("command", str(record.get("command") or "unknown")),
-        ("started", str(record.get("started") or "unknown")),
-        ("finished", str(record.get("finished") or "not finished")),
-        ("commit", f"{commit}{state}" if commit else "unknown"),
-    ]
+    said = [("command", str(record.get("command") or "unknown"))]
+    if "seconds" in record:  # a study
+        said.append(("took", f"{number(record['seconds'], 3)} s"))
+    else:
+        said.append(("started", str(record.get("started") or "unknown")))
+        said.append(("finished", str(record.get("finished") or "not finished")))
+    said.append(("commit", f"{commit}{state}" if commit else "unknown"))
     if isinstance(memory := origin.pop("memory", None), int | float):
         said.append(("memory", bytes_text(memory)))
     said += [(key, str(value)) for key, value in origin.items()]

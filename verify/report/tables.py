@@ -13,6 +13,7 @@ from verify.report.notation import (
     number,
     seconds_text,
     solver_title,
+    spread_text,
     with_interval,
 )
 from verify.result import CaseResult, Metric, NoticeKind, SolveRecord, Status, VerdictRecord
@@ -279,7 +280,6 @@ def _measured(solve: SolveRecord, name: str, result: CaseResult) -> Cell:
 def _spread(values: Sequence[float]) -> str:
     if not values:
         return "–"
-    middle, low, high = median(values), min(values), max(values)
     if len(values) == 1:
-        return f"{seconds_text(middle)} (once)"
-    return f"{seconds_text(middle)} ({seconds_text(low, middle)}–{seconds_text(high, middle)})"
+        return f"{seconds_text(values[0])} (once)"
+    return spread_text(median(values), min(values), max(values))

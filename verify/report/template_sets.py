@@ -16,8 +16,16 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
-from verify.report.blocks import Drawing
-from verify.report.notation import printable
+from verify.report.blocks import Cell, Drawing, plain_table
+from verify.report.notation import (
+    metric_title,
+    number,
+    printable,
+    seconds_text,
+    signed,
+    solver_title,
+    spread_text,
+)
 from verify.whole_files import write_whole
 
 __all__ = ["PICTURES", "Beside", "as_html", "as_markdown", "in_markdown"]
@@ -39,15 +47,15 @@ def as_html(template: str, **view: Any) -> str:
     )  # fmt: skip
 
 
-def as_markdown(template: str, folder: Path, **view: Any) -> str:
-    """Return the same as Markdown; its pictures are written below `folder`.
+def as_markdown(template: str, folder: Path, pictures: str = PICTURES, **view: Any) -> str:
+    """Return the same as Markdown; its pictures are written into `pictures` below `folder`.
 
     Raises
     ------
     OSError
         If they cannot be written.
     """
-    target = folder / PICTURES
+    target = folder / pictures
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
     text = _environment("markdown").get_template(template).render(assets=Beside(target), **view)
@@ -67,9 +75,17 @@ def _environment(kind: str) -> Environment:
         loader=ChoiceLoader([PackageLoader("verify.report", f"templates/{kind}"),
                              PackageLoader("verify.report", "templates")]),
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-        finalize=_final if kind == "html" else _final_markdown,
+        finalize=_final if kind == "html" else _final_markdown, extensions=["jinja2.ext.do"],
     )  # fmt: skip
-    made.tests["text"] = lambda value: isinstance(value, str)
+    made.globals |= {"table": plain_table, "cell": Cell}
+    made.filters |= {
+        "number": number,
+        "seconds": seconds_text,
+        "metric": metric_title,
+        "solver": solver_title,
+        "signed": signed,
+        "spread": spread_text,
+    }
     return made
 
 
@@ -130,4 +146,4 @@ class Beside:
         self.count += 1
         name = f"{self.count:03d}.{ending}"
         write_whole(self.folder / name, content)
-        return Markup(f"{PICTURES}/{name}")
+        return Markup(f"{self.folder.name}/{name}")

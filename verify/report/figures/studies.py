@@ -1,0 +1,114 @@
+"""Figures of studies: curves and scattered marks on logarithmic axes, bars of a budget."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import wrap
+
+from matplotlib.axes import Axes
+
+from verify.report.blocks import Drawing
+from verify.report.figures.style import Palette, drawing, legend, log_axis, log_range, panel
+
+__all__ = ["Bar", "Series", "bars", "loglog", "scatter"]
+
+_TOTAL, _PART = "#4d4d4d", "#0067a5"
+
+
+@dataclass(frozen=True)
+class Series:
+    """A curve; `second` stands below its name, `ringed` are those of its places that stand out."""
+
+    name: str
+    places: Sequence[tuple[float, float]]
+    second: str = ""
+    ringed: Sequence[tuple[float, float]] = ()
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A part of a whole with the half-width of its interval, and what is written beside it."""
+
+    name: str
+    value: float
+    half: float
+    written: str
+    total: bool = False
+
+
+def loglog(title: str, x_title: str, series: Sequence[Series], palette: Palette) -> Drawing | None:
+    """Return curves on logarithmic axes, or None if there is nothing positive."""
+    drawn = [(s, [(x, y) for x, y in s.places if x > 0 and y > 0]) for s in series]
+    drawn = [(s, places) for s, places in drawn if places]
+    if not drawn:
+        return None
+    with panel(title) as (figure, axes):
+        _logarithmic(axes, x_title, [place for _, places in drawn for place in places])
+        said = [f"{title} against {x_title}."]
+        for s, places in drawn:
+            style = palette[s.name]
+            axes.plot(*zip(*places, strict=True), color=style.colour, marker=style.marker,
+                      markerfacecolor="white" if style.hollow else style.colour,
+                      label=f"{s.name}\n{s.second}".strip())  # fmt: skip
+            if s.ringed:
+                axes.plot(*zip(*s.ringed, strict=True), color=style.colour, marker="o",
+                          markersize=11, markerfacecolor="none", linestyle="none")  # fmt: skip
+            said.append(f"{s.name}: " + ", ".join(f"{y:.3g} at {x:.3g}" for x, y in places) + ".")
+        legend(axes)
+        return drawing(figure, " ".join(said))
+
+
+def scatter(
+    title: str, x_title: str, marks: Sequence[tuple[str, float, float, bool]],
+    factors: Sequence[float], palette: Palette, said: str,
+) -> Drawing:  # fmt: skip
+    """Return marks (name, x, y, filled) and the lines y = factor · x on logarithmic axes."""
+    with panel(title, width=5.2, height=3.4) as (figure, axes):
+        _logarithmic(axes, x_title, [(x, y) for _, x, y, _ in marks])
+        (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+        for factor in factors:
+            low, high = max(left, bottom / factor), min(right, top / factor)
+            if low < high:
+                axes.plot([low, high], [factor * low, factor * high], color="#333", linewidth=0.8)
+                axes.annotate(f"{factor:g}", (high, factor * high), (-7, -2), ha="right",
+                              va="top", textcoords="offset points", fontsize=8)  # fmt: skip
+        for name in dict.fromkeys(name for name, *_ in marks):
+            style, label = palette[name], name
+            for filled in (True, False):
+                own = [(x, y) for n, x, y, full in marks if n == name and full == filled]
+                if own:
+                    axes.plot(*zip(*own, strict=True), color=style.colour, marker=style.marker,
+                              markerfacecolor=style.colour if filled else "white", markersize=4,
+                              linestyle="none", label=label)  # fmt: skip
+                    label = "_named already"
+        legend(axes)
+        return drawing(figure, said)
+
+
+def bars(title: str, parts: Sequence[Bar], said: str) -> Drawing:
+    """Return horizontal bars with their intervals, the first on top."""
+    with panel(title, height=0.5 + 0.3 * len(parts)) as (figure, axes):
+        width, height = figure.get_size_inches()
+        axes.set_position((1.75 / width, 0.05 / height, 1.9 / width, (height - 0.37) / height))
+        axes.set_title(title, loc="left", x=-1.7 / 1.9, fontsize=9)
+        rows = range(len(parts))
+        axes.barh(rows, [p.value for p in parts], xerr=[p.half for p in parts], height=0.6,
+                  color=[_TOTAL if p.total else _PART for p in parts],
+                  error_kw={"elinewidth": 1.0, "capsize": 3})  # fmt: skip
+        axes.axvline(0.0, color="#333", linewidth=0.8)
+        axes.set_yticks(rows, ["\n".join(wrap(p.name, 26)) for p in parts], fontsize=8)
+        axes.set_xticks([])
+        axes.grid(False)
+        axes.invert_yaxis()
+        axes.spines[:].set_visible(False)
+        axes.tick_params(length=0)
+        for row, part in enumerate(parts):
+            axes.annotate(part.written, (max(part.value + part.half, 0.0), row), (5, 0),
+                          textcoords="offset points", va="center", fontsize=8,
+                          annotation_clip=False)  # fmt: skip
+        return drawing(figure, said)
+
+
+def _logarithmic(axes: Axes, x_title: str, places: Sequence[tuple[float, float]]) -> None:
+    log_axis(axes, "x", log_range([x for x, _ in places]))
+    log_axis(axes, "y", log_range([y for _, y in places]))
+    axes.set_xlabel(x_title)
