@@ -4,6 +4,7 @@ import argparse
 import json
 
 from verify.exchange import export_case
+from verify.foreign.template import write_template
 from verify.scene import load_scene
 
 __all__ = ["execute"]
@@ -12,7 +13,10 @@ __all__ = ["execute"]
 def execute(arguments: argparse.Namespace) -> int:
     """Write mesh, cuts, supports and loads of a case."""
     scene = load_scene(arguments.case)
-    files = export_case(scene, arguments.out, arguments.levels or None, arguments.conforming)
+    conforming = arguments.conforming or arguments.template is not None
+    files = export_case(scene, arguments.out, arguments.levels or None, conforming)
+    if arguments.template:
+        files += write_template(arguments.out)
     if arguments.json:
         print(json.dumps({"case": scene.name, "files": [str(file) for file in files]}, indent=2))
         return 0

@@ -18,9 +18,10 @@ __all__ = ["add_extension_commands"]
 
 
 def add_extension_commands(add: Add) -> None:
-    """Add ``export``, ``import``, ``conform`` and ``baseline`` to the command line."""
+    """Add ``export``, ``import``, ``solvers``, ``conform`` and ``baseline``."""
     _add_export(add)
     _add_import(add)
+    _add_solvers(add)
     _add_conform(add)
     _add_baseline(add)
 
@@ -30,7 +31,8 @@ def _add_export(add: Add) -> None:
         "export",
         "write a case as files for another program: meshes, cuts, supports, loads",
         "examples:\n  verify export statics/f3_inclined --out f3\n"
-        "  verify export my_case.toml --out mine --level 0 --conforming\n\n"
+        "  verify export my_case.toml --out mine --level 0 --conforming\n"
+        "  verify export statics/f3_inclined --out f3 --template python\n\n"
         "The program answers in f3/level-<k>/solution.json and .vtu;\n"
         "see docs/guide/your-solver.md.",
     )
@@ -43,6 +45,11 @@ def _add_export(add: Add) -> None:
     command.add_argument(
         "--conforming", action="store_true",
         help="also write meshes that conform to the cuts, with their nodes doubled",
+    )  # fmt: skip
+    command.add_argument(
+        "--template", choices=("python",),
+        help="also write a program that answers the case, on a reader and writer that need "
+        "numpy alone (with --conforming)",
     )  # fmt: skip
     add_json(command, "print the files as JSON")
 
@@ -79,6 +86,29 @@ def _add_import(add: Add) -> None:
     add_repetitions(command, 1, what="timed repetitions of the solves beside it")
     add_strict(command)
     add_json(command, "print the verdicts as JSON")
+
+
+def _add_solvers(add: Add) -> None:
+    command = add(
+        "solvers",
+        "list, install or remove solvers of others",
+        "examples:\n  verify solvers list\n  verify solvers install ngsxfem\n"
+        "  verify run statics/f3_inclined --solver xfem --solver ngsxfem --out out\n"
+        "  verify solvers remove ngsxfem\n\n"
+        "Each has a virtual environment of its own, in $VERIFY_SOLVERS or else below the user's\n"
+        "data folder; its packages are locked by their hashes. Exit code 2 if an installation\n"
+        "fails; nothing of it is left then.",
+    )
+    actions = command.add_subparsers(metavar="ACTION", dest="action", required=True)
+    add_json(add_action(actions.add_parser, "list", "say which there are, and which are here"))
+    action = add_action(actions.add_parser, "install", "install one from its locked packages")
+    action.add_argument("name", metavar="NAME", help="name of the solver")
+    action.add_argument(
+        "--python", metavar="PYTHON",
+        help="interpreter to use; of a package of the system, the one that has it",
+    )  # fmt: skip
+    action = add_action(actions.add_parser, "remove", "remove an installed one")
+    action.add_argument("name", metavar="NAME", help="name of the solver")
 
 
 def _add_conform(add: Add) -> None:

@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar
@@ -12,8 +12,10 @@ from typing import Any, ClassVar
 from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange.answers import read_answers
 from verify.exchange.export import export_case
+from verify.json_files import write_json
 from verify.result import Status
 from verify.scene import Scene
+from verify.scene.nearest import nearest
 from verify.solution import Solution
 
 __all__ = ["ProgramSolver"]
@@ -32,17 +34,25 @@ class ProgramSolver:
         mesh level to solve; the program writes ``level-<k>/solution.json`` and its VTU there.
     conforming : bool
         Whether it wants the conforming meshes.
+    parameters : mapping
+        Names of the parameters that it takes, with their defaults.
+    repeats : bool
+        Whether it times its repetitions itself; else it is called as often.
 
     Notes
     -----
+    The program finds ``request.json`` in the folder: ``level``, ``repetitions`` and all
+    ``parameters``.
     A program that cannot do a case answers ``{"schema": 1, "refused": "why"}``. Its own
     ``timings`` are used if it gives some; else its wall time, start-up included, is taken and
     that is said in the notes.
     """
 
-    name: ClassVar[str] = "program"
-    command: ClassVar[Sequence[str]] = ()
-    conforming: ClassVar[bool] = False
+    name: str = "program"
+    command: Sequence[str] = ()
+    conforming: bool = False
+    parameters: Mapping[str, Any] = {}
+    repeats: ClassVar[bool] = False
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse nothing; the program itself may, and a subclass that knows better."""
@@ -64,12 +74,18 @@ class ProgramSolver:
         RuntimeError
             If the program fails; with the end of what it said.
         """
-        if parameters:
-            raise InputError(f"'{self.name}' takes no parameters, got {', '.join(parameters)}")
+        for word in parameters:
+            if word not in self.parameters:
+                near = nearest(word, self.parameters)
+                raise InputError(f"{self.name} has no parameter '{word}'{near}")
         with tempfile.TemporaryDirectory(prefix="verify-") as place:
             folder = Path(place)
             export_case(scene, folder, [level], self.conforming)
-            walls = [self._run(folder, level) for _ in range(repetitions)]
+            asked = {"level": level, "repetitions": repetitions if self.repeats else 1}
+            handed = {**self.parameters, **parameters}
+            write_json({**asked, "parameters": handed}, folder / "request.json")
+            calls = 1 if self.repeats else repetitions
+            walls = [self._run(folder, level) for _ in range(calls)]
             answers = read_answers(scene, folder)
         if level in answers.missing:
             status, why = answers.missing[level]
@@ -82,14 +98,18 @@ class ProgramSolver:
             solution.notes["timed"] = "wall time of the program, its start-up included"
         return solution
 
+    def environment(self) -> dict[str, str]:
+        """Return the environment that the program is run in."""
+        return dict(os.environ)
+
     def _run(self, folder: Path, level: int) -> float:
         words = [word.format(folder=folder, level=level) for word in self.command]
         if not words or shutil.which(words[0]) is None:
             raise InputError(f"'{self.name}': no program '{words[0] if words else ''}'")
         start = perf_counter()
         done = subprocess.run(
-            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, env=os.environ,
-            errors="replace",
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            env=self.environment(), errors="replace",
         )  # fmt: skip
         wall = perf_counter() - start
         if done.returncode:

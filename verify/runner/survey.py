@@ -15,7 +15,7 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line, words_of
 from verify.runner.childhood import ANSWER, ASKING, die_with_parent
-from verify.runner.fingerprint import file_digest
+from verify.runner.fingerprint import digest_of, file_digest
 from verify.whole_files import write_whole
 
 __all__ = ["main", "survey"]
@@ -103,9 +103,12 @@ def _answer(name: str, solver: Any, content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _source(solver: Any) -> str:
+    """Digest of the file that defines it, and of those that it says its answers depend on."""
     try:
         source = inspect.getsourcefile(type(solver))
-        return file_digest(Path(source)) if source else ""
+        files = [Path(source)] if source else []
+        digests = [file_digest(path) for path in [*files, *getattr(solver, "files", ())]]
+        return digests[0] if len(digests) == 1 else digest_of(digests) if digests else ""
     except (OSError, TypeError):  # of no file, or of one that is not there
         return ""
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import Parameter, signature
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,6 +35,9 @@ _METHODS = (
 )  # fmt: skip
 _BUILT_IN |= dict.fromkeys(_METHODS, "verify.solvers.methods_adapter:MethodSolver")
 _GROUP = "verify.solvers"
+# programs of others, a folder each, of the class named here, which is told the name
+_PROGRAMS = Path(__file__).resolve().parents[1] / "foreign" / "programs"
+_FOREIGN = "verify.foreign.program:ForeignProgram"
 _MOST_LEVELS = 32  # the coarsest cell halved so often is of round-off size
 
 
@@ -104,9 +108,14 @@ def is_built_in(name: str) -> bool:
     return name in _BUILT_IN
 
 
+def _foreign_names() -> set[str]:
+    return {path.parent.name for path in _PROGRAMS.glob("*/solver.toml")}
+
+
 def solver_names() -> list[str]:
-    """Names of all solvers: built in, and registered as entry points ``verify.solvers``."""
-    return sorted({*_BUILT_IN, *(point.name for point in entry_points(group=_GROUP))})
+    """Names of all solvers: built in, foreign, and entry points of the group ``verify.solvers``."""
+    points = (point.name for point in entry_points(group=_GROUP))
+    return sorted({*_BUILT_IN, *_foreign_names(), *points})
 
 
 def find_solver(name: str) -> Solver:
@@ -122,9 +131,10 @@ def find_solver(name: str) -> Solver:
     InputError
         If there is no such solver, or what it needs is not installed.
     """
+    told = name in _METHODS or name in _foreign_names()
     try:
-        if name in _BUILT_IN:
-            module, _, attribute = _BUILT_IN[name].partition(":")
+        if name in _BUILT_IN or told:
+            module, _, attribute = _BUILT_IN.get(name, _FOREIGN).partition(":")
             found = getattr(import_module(module), attribute)
         elif ":" in name:
             module, _, attribute = name.partition(":")
@@ -140,19 +150,22 @@ def find_solver(name: str) -> Solver:
         if (error.name or "").partition(".")[0] in ("verify", "reference"):
             raise  # our own mistake, not a missing dependency
         raise InputError(f"solver '{name}' needs '{error.name}', which is not installed") from None
-    solver: Solver = found(name) if name in _METHODS else found()
+    solver: Solver = found(name) if told else found()
     return solver
 
 
 def check_parameters(name: str, solver: Solver, given: Iterable[str]) -> None:
     """Raise `InputError` if the solver called `name` has no parameter of a name that is `given`.
 
-    One that takes any name (``**parameters``) is not asked.
+    One that takes any name (``**parameters``) is asked only if it lists its ``parameters``.
     """
     taken = signature(solver.solve).parameters
-    if any(one.kind is Parameter.VAR_KEYWORD for one in taken.values()):
-        return
     known = set(taken) - {"scene", "level", "repetitions"}
+    if any(one.kind is Parameter.VAR_KEYWORD for one in taken.values()):
+        listed = getattr(solver, "parameters", None)
+        if listed is None:
+            return
+        known = set(listed)
     for word in given:
         if word not in known:
             raise InputError(f"{name} has no parameter '{word}'{nearest(word, known)}")

@@ -1,0 +1,91 @@
+"""Installation: hash-checked, whole or not at all, one clear error."""
+
+import json
+import sys
+
+import pytest
+
+from verify.cli import main
+from verify.errors import InputError
+from verify.foreign import foreign_solver, install, remove, state_of
+from verify.foreign.installing import mark_of, solvers_folder
+
+
+@pytest.fixture
+def locked(add_example, wheel):
+    """A solver of the package ``cutfake``, with the hash of its wheel in the lock."""
+    folder = add_example("fake", module="cutfake", kind="packages", python="3.12")
+    (folder / "requirements.lock").write_text(f"cutfake==1.5 --hash=sha256:{wheel}\n")
+    return folder
+
+
+def test_a_solver_is_installed_with_its_hash_into_an_environment_of_its_own_and_removed(
+    locked, capsys
+):
+    assert "install fake" in state_of(foreign_solver("fake")).missing
+    assert main(["solvers", "install", "fake"]) == 0
+    state = state_of(foreign_solver("fake"))
+    assert state.version == "1.5"
+    assert state.python.startswith(str(solvers_folder() / "fake"))
+    capsys.readouterr()
+    assert main(["solvers", "list", "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert (row["name"], row["version"], row["licence"]) == ("fake", "1.5", "Apache-2.0")
+    # the lock of another version of the project: what is there is not what it names
+    with (locked / "requirements.lock").open("a") as lock:
+        lock.write("# newer\n")
+    assert "another lock" in state_of(foreign_solver("fake")).missing
+    assert main(["solvers", "remove", "fake"]) == 0
+    assert not (solvers_folder() / "fake").exists()
+    with pytest.raises(InputError, match="not installed"):
+        remove("fake")
+
+
+@pytest.mark.parametrize("fault", ["hash", "package", "module"])
+def test_nothing_is_left_of_an_installation_that_fails(locked, fault, capsys):
+    lock = locked / "requirements.lock"
+    if fault == "hash":
+        lock.write_text(f"cutfake==1.5 --hash=sha256:{'0' * 64}\n")
+    elif fault == "package":
+        lock.write_text(f"nowhere==1.5 --hash=sha256:{'0' * 64}\n")
+    else:
+        record = locked / "solver.toml"
+        record.write_text(record.read_text().replace('module = "cutfake"', 'module = "other"'))
+    assert main(["solvers", "install", "fake"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert len(said.splitlines()) == 1
+    assert "fake" in said
+    assert not (solvers_folder() / "fake").exists()
+    assert state_of(foreign_solver("fake")).python == ""
+
+
+def test_an_environment_without_its_mark_is_not_installed(locked):
+    (solvers_folder() / "fake" / "environment").mkdir(parents=True)
+    assert state_of(foreign_solver("fake")).missing
+    assert install("fake").version == "1.5"  # what was half there is replaced
+
+
+def test_a_python_that_is_too_old_or_missing_is_said(add_example, capsys):
+    add_example("fake", kind="packages", python="99.1")
+    with pytest.raises(InputError, match=r"99\.1 or later"):
+        install("fake")
+    assert main(["solvers", "install", "fake", "--python", "no-such-python"]) == 2
+    assert "--python" in capsys.readouterr().err
+
+
+def test_a_system_package_is_found_where_it_is_and_else_the_way_to_it_is_said(add_example):
+    add_example("here", module="numpy")
+    add_example("elsewhere", module="no_such_module_anywhere")
+    assert state_of(foreign_solver("here")).python == sys.executable
+    assert "administrator" in state_of(foreign_solver("elsewhere")).missing
+    with pytest.raises(InputError, match="no_such_module_anywhere"):
+        install("elsewhere")
+    assert not mark_of("elsewhere").exists()
+    install("here", sys.executable)  # remembers this Python
+    assert mark_of("here").is_file()
+
+
+def test_an_unknown_name_is_said_with_the_nearest(add_example, capsys):
+    add_example("ngs")
+    assert main(["solvers", "install", "ngz"]) == 2
+    assert "ngs" in capsys.readouterr().err

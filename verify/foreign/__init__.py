@@ -1,0 +1,20 @@
+"""Solvers of others, each in a virtual environment of its own, spoken to through files.
+
+`records` reads what `programs/` says of each, `installing` makes and removes the environments,
+and `ForeignProgram` makes one a solver. The programs themselves are stand-alone: they are run by
+their own Python and import nothing of this package.
+"""
+
+from verify.foreign.installing import install, remove, state_of
+from verify.foreign.program import ForeignProgram
+from verify.foreign.records import ForeignSolver, foreign_solver, foreign_solvers
+
+__all__ = [
+    "ForeignProgram",
+    "ForeignSolver",
+    "foreign_solver",
+    "foreign_solvers",
+    "install",
+    "remove",
+    "state_of",
+]

@@ -1,0 +1,197 @@
+"""Installation of foreign solvers: a virtual environment each, below the user's data folder.
+
+An environment counts as installed once ``installed.json`` lies in its folder, which is written
+last. Packages are taken by the user's own pip, with hashes, as wheels only.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from verify.errors import InputError
+from verify.foreign.records import ForeignSolver, foreign_solver
+from verify.json_files import read_json, write_json
+from verify.printable import one_line
+from verify.runner.fingerprint import file_digest
+
+__all__ = ["State", "install", "remove", "solvers_folder", "state_of"]
+
+_ASKED = """
+import importlib, importlib.metadata, json, platform, sys
+module, of = sys.argv[1:]
+importlib.import_module(module)
+if ":" in of:
+    version = str(getattr(importlib.import_module(of.split(":")[0]), of.split(":")[1]))
+else:
+    version = importlib.metadata.version(of)
+print(json.dumps({"version": version, "python": platform.python_version()}))
+"""
+
+
+@dataclass(frozen=True)
+class State:
+    """Whether a foreign solver can be run here.
+
+    Attributes
+    ----------
+    python : str
+        Its interpreter; empty if it is not there.
+    version : str
+    missing : str
+        What to do about it, if it is not there.
+    """
+
+    python: str = ""
+    version: str = ""
+    missing: str = ""
+
+
+def solvers_folder() -> Path:
+    """Return where they are installed: ``VERIFY_SOLVERS``, else below the user's data folder."""
+    if named := os.environ.get("VERIFY_SOLVERS"):
+        return Path(named)
+    home = os.environ.get("XDG_DATA_HOME")
+    root = Path(home) if home else Path.home() / ".local" / "share"
+    return root / "cutting-verification" / "solvers"
+
+
+def mark_of(name: str) -> Path:
+    """File that says that a solver is installed, and where."""
+    return solvers_folder() / name / "installed.json"
+
+
+def state_of(solver: ForeignSolver) -> State:
+    """Look whether a solver is there; a Python of the system is asked, an own one is not."""
+    mark = mark_of(solver.name)
+    command = f"verify solvers install {solver.name}"
+    if mark.is_file():
+        said = read_json(mark)
+        if not Path(said["python"]).exists():
+            return State(missing=f"its Python {said['python']} has gone: {command}")
+        if said["lock"] != _lock_digest(solver):
+            return State(missing=f"installed from another lock: {command}")
+        return State(said["python"], said["version"])
+    if solver.install.kind == "system":
+        try:
+            said = _ask(solver, solver.install.python)
+        except InputError:
+            command = f"{solver.install.how}; or {command} --python THE-PYTHON-THAT-HAS-IT"
+            return State(missing=command)
+        return State(solver.install.python, said["version"])
+    return State(missing=command)
+
+
+def install(name: str, python: str | None = None) -> State:
+    """Install the solver `name`, or remember the Python of the system that has it.
+
+    Parameters
+    ----------
+    name : str
+    python : str, optional
+        Interpreter; default that of this process, or that which the record names.
+
+    Raises
+    ------
+    InputError
+        If there is no such solver, the Python does not do, or the packages cannot be installed.
+        Nothing of the attempt is left.
+    """
+    solver = foreign_solver(name)
+    state, folder = state_of(solver), solvers_folder() / name
+    if state.python and mark_of(name).is_file() and python is None:
+        return state
+    system = solver.install.kind == "system"
+    asked = python or (solver.install.python if system else sys.executable)
+    interpreter = shutil.which(asked)
+    if interpreter is None:
+        raise InputError(f"{name}: no Python '{asked}'", "--python")
+    if system:
+        said = _ask(solver, interpreter)
+    else:
+        _check_version(solver, interpreter)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    try:
+        if not system:
+            interpreter = _environment(solver, interpreter, folder / "environment")
+            said = _ask(solver, interpreter)
+        write_json(
+            {"python": interpreter, "version": said["version"], "lock": _lock_digest(solver)},
+            mark_of(name),
+        )
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return State(interpreter, said["version"])
+
+
+def remove(name: str) -> Path:
+    """Remove the environment of the solver `name`, whole or not; return its folder.
+
+    Raises
+    ------
+    InputError
+        If nothing of it is installed here.
+    """
+    folder = solvers_folder() / foreign_solver(name).name
+    if not folder.is_dir():
+        raise InputError(f"'{name}' is not installed in {folder.parent}")
+    shutil.rmtree(folder)
+    return folder
+
+
+def _environment(solver: ForeignSolver, python: str, place: Path) -> str:
+    """Make the environment and fill it; return its interpreter."""
+    own = str(place / "bin" / "python")
+    _call(solver, [python, "-m", "venv", str(place)])
+    pip = [own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input"]
+    exact = ["--require-hashes", "--no-deps", "--only-binary", ":all:"]
+    _call(solver, [*pip, *exact, "--requirement", str(solver.lock)])
+    return own
+
+
+def _check_version(solver: ForeignSolver, python: str) -> None:
+    least = tuple(map(int, solver.install.python.split(".")))
+    said = _call(solver, [python, "-c", "import sys; print(*sys.version_info[:2])"])
+    found = tuple(map(int, said.split()))
+    if found < least:
+        text = f"is Python {'.'.join(map(str, found))}; {solver.name} needs"
+        raise InputError(f"{python} {text} {solver.install.python} or later", "--python")
+
+
+def _ask(solver: ForeignSolver, python: str) -> dict[str, str]:
+    """Import it with its Python; return the versions."""
+    said = _call(solver, [python, "-c", _ASKED, solver.module, solver.version_of])
+    answer: dict[str, str] = json.loads(said.splitlines()[-1])
+    return answer
+
+
+def _call(solver: ForeignSolver, words: list[str]) -> str:
+    """Run a command; what it says.
+
+    Raises
+    ------
+    InputError
+        If it fails: with the last line that it said.
+    """
+    outside = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+    try:
+        done = subprocess.run(
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+            env=outside,
+        )  # fmt: skip
+    except OSError as error:
+        raise InputError(f"{solver.name}: {words[0]}: {error.strerror}") from None
+    if done.returncode:
+        said = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
+        why = one_line(said[-1] if said else f"exit code {done.returncode}")
+        raise InputError(f"{solver.name} cannot be used with {words[0]}: {why}")
+    return done.stdout
+
+
+def _lock_digest(solver: ForeignSolver) -> str:
+    return file_digest(solver.lock) if solver.lock.is_file() else ""

@@ -1,0 +1,178 @@
+"""Records of the foreign solvers: a folder of ``programs/`` each.
+
+::
+
+    programs/NAME/solver.toml         what it is, how it is installed, what it takes
+    programs/NAME/program.py          the program, run by its own Python
+    programs/NAME/requirements.lock   its packages with their hashes, if it is installed from them
+"""
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from verify.errors import InputError
+from verify.scene import Scene
+from verify.scene.nearest import nearest
+
+__all__ = ["PROGRAMS", "ForeignSolver", "Install", "Takes", "foreign_solver", "foreign_solvers"]
+
+PROGRAMS = Path(__file__).resolve().parent / "programs"
+_ALL = ("static", "dynamic")
+
+
+@dataclass(frozen=True)
+class Install:
+    """How a foreign solver is installed.
+
+    Attributes
+    ----------
+    kind : {"packages", "system"}
+        From ``requirements.lock`` into an environment of its own; or by the user, into a Python
+        of the system.
+    python : str
+        The least version of Python; of a system package the interpreter that it is installed for.
+    how : str
+        The command that installs a system package, for the user to read.
+    """
+
+    kind: str
+    python: str
+    how: str = ""
+
+
+@dataclass(frozen=True)
+class Takes:
+    """What a solver takes; all else it refuses before anything runs.
+
+    Attributes
+    ----------
+    dimensions, analyses, kinematics, cuts : list
+        As in case files; ``cuts`` are their kinds.
+    materials : {"one", "several"}
+    opening : bool
+        Whether cuts may open in the course of a motion.
+    histories : bool
+        Whether supports and loads may change in time.
+    membranes : bool
+    initial : list of str
+        Kinds of initial states.
+    """
+
+    dimensions: list[int]
+    analyses: list[str]
+    kinematics: list[str]
+    cuts: list[str] = field(
+        default_factory=lambda: [
+            "polyline", "arc", "polygon", "disc", "cylinder", "sphere", "swept",
+        ]
+    )  # fmt: skip
+    materials: str = "several"
+    opening: bool = False
+    histories: bool = False
+    membranes: bool = False
+    damping: bool = False
+    initial: list[str] = field(default_factory=lambda: ["rest"])
+
+    def refusal(self, scene: Scene) -> str | None:
+        """Say in one sentence why the scene is not taken, or None."""
+        analysis, timed = scene.analysis, [*scene.supports, *scene.loads]
+        if scene.cell_dimension != scene.dimension and not self.membranes:
+            return "membranes are not offered"
+        asked: list[tuple[str, Any, list[Any]]] = [
+            ("dimension", scene.dimension, self.dimensions),
+            ("analysis", analysis.kind, self.analyses),
+            ("kinematics", analysis.kinematics, self.kinematics),
+            ("initial state", scene.initial.kind, self.initial),
+            *(("cut", cut.kind, self.cuts) for cut in scene.cuts),
+        ]
+        for name, found, offered in asked:
+            if found not in offered:
+                return f"{name} {found!r} is not offered; {', '.join(map(str, offered))} is"
+        if self.materials == "one" and not scene.material.is_uniform:
+            return "several materials are not offered"
+        if not self.opening and any(getattr(cut, "opens_at", 0.0) for cut in scene.cuts):
+            return "cuts that open in the course of a motion are not offered"
+        if not self.histories and any(getattr(one, "history", None) for one in timed):
+            return "supports and loads that change in time are not offered"
+        if not self.damping and any(analysis.damping):
+            return "damping is not offered"
+        return None
+
+
+@dataclass(frozen=True)
+class ForeignSolver:
+    """What ``solver.toml`` says.
+
+    Attributes
+    ----------
+    name : str
+        That of its folder.
+    title, licence, source : str
+        What it is; its licence; the publication.
+    module, version_of : str
+        The module that must be importable; the distribution, or attribute ``module:name``, that
+        has the version.
+    install : Install
+    takes : Takes
+    parameters : dict
+        Those of ``--set NAME.…`` with their defaults.
+    conforming : bool
+        Whether the program wants the conforming mesh.
+    """
+
+    name: str
+    title: str
+    licence: str
+    module: str
+    version_of: str
+    install: Install
+    takes: Takes
+    source: str = ""
+    parameters: dict[str, Any] = field(default_factory=dict)
+    conforming: bool = False
+
+    @property
+    def folder(self) -> Path:
+        """Folder of its program."""
+        return PROGRAMS / self.name
+
+    @property
+    def lock(self) -> Path:
+        """File of its packages with their hashes."""
+        return self.folder / "requirements.lock"
+
+
+def foreign_solvers() -> dict[str, ForeignSolver]:
+    """All foreign solvers that the project has a program for, by name."""
+    return {path.parent.name: _read(path) for path in sorted(PROGRAMS.glob("*/solver.toml"))}
+
+
+def foreign_solver(name: str) -> ForeignSolver:
+    """Return the record of one.
+
+    Raises
+    ------
+    InputError
+        If there is none of this name.
+    """
+    known = foreign_solvers()
+    if name not in known:
+        raise InputError(f"no foreign solver '{name}'{nearest(name, known)}")
+    return known[name]
+
+
+def _read(path: Path) -> ForeignSolver:
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    try:
+        return _RECORD.validate_python({"name": path.parent.name, **content})
+    except ValidationError as error:
+        raise InputError(
+            f"{error.errors()[0]['loc']}: {error.errors()[0]['msg']}", str(path)
+        ) from None
+
+
+_RECORD = TypeAdapter(ForeignSolver)
