@@ -21,9 +21,8 @@ def execute(arguments: argparse.Namespace) -> int:
     rows: list[dict[str, Any]] = []
     for name, solver in foreign_solvers().items():
         state = state_of(solver)
-        row = {"name": name, "title": solver.title, "licence": solver.licence}
-        row |= {"source": solver.source, "parameters": solver.parameters}
-        rows.append({**row, **vars(state)})
+        said = {"title": solver.title, "licence": solver.licence, "source": solver.source}
+        rows.append({"name": name, **said, "parameters": solver.parameters, **vars(state)})
     if arguments.json:
         print(json.dumps(rows, indent=2, ensure_ascii=False))
         return 0
