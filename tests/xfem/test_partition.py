@@ -5,11 +5,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from verify.xfem.clip import staircase
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.splitting.clipping import staircase
-from verify.xfem.splitting.split import split_cells
+from verify.xfem.pieces import split_cells
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh
@@ -38,7 +38,7 @@ def check_pieces(mesh, cuts):
     partition = split_cells(mesh, cuts)
     total = np.bincount(partition.parent, partition.fraction, minlength=len(mesh.cells))
     split = np.unique(partition.parent)
-    assert (partition.sub_fraction >= 0.0).all()
+    assert (partition.simplices.fraction >= 0.0).all()
     # sums of at most some ten products of a few factors each
     assert np.abs(total[split] - 1.0).max(initial=0.0) <= 1e-14
     virtual = cut_mesh(mesh, cuts)

@@ -4,25 +4,7 @@ import numpy as np
 
 from verify.simulator.cutting.renumber_kernels import simplices_of
 from verify.simulator.mapping.near_facet_kernels import concerned_facets, levels_at
-from verify.xfem.splitting.joining_kernels import patch_around
 from verify.xfem.structured_meshes import box_mesh
-
-
-def test_the_patch_around_split_cells_has_all_cells_at_their_nodes_and_all_their_pieces() -> None:
-    mesh, rng = box_mesh((4, 3, 3)), np.random.default_rng(1)
-    for _ in range(5):
-        parent = np.repeat(np.sort(rng.choice(len(mesh.cells), 6, replace=False)), 2)
-        patch, place, piece_cell, starts, pieces = patch_around(
-            parent, mesh.cells, len(mesh.points)
-        )
-        expected = np.flatnonzero(np.isin(mesh.cells, mesh.cells[parent]).any(axis=1))
-        np.testing.assert_array_equal(patch, expected)
-        np.testing.assert_array_equal(np.flatnonzero(place >= 0), expected)
-        np.testing.assert_array_equal(place[patch], np.arange(len(patch)))
-        cells = np.concatenate([parent, expected[~np.isin(expected, parent)]])
-        np.testing.assert_array_equal(patch[piece_cell], cells)
-        np.testing.assert_array_equal(np.diff(starts), np.bincount(piece_cell))
-        np.testing.assert_array_equal(pieces, np.argsort(piece_cell, kind="stable"))
 
 
 def test_simplices_of_cells_are_those_with_a_volume_in_their_order() -> None:

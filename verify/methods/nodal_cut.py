@@ -14,7 +14,7 @@ __all__ = ["CrossedEdges", "NodalCut", "crossed_edges"]
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
-_REACH = 0.5  # element sizes: as in `verify.xfem.splitting`; farther off is another place
+_REACH = 0.5  # element sizes: as in `verify.xfem.pieces`; farther off is another place
 _AT_END = 1e-9  # element sizes
 
 

@@ -13,9 +13,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.methods.opened_mesh import OpenedMesh
+from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.splitting.split import TipRule
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["OpenedCells", "Seams", "cut_so_far", "seams_of", "welded"]

@@ -1,7 +1,7 @@
 """Cutting by subdivision: cells are split into simplices along the cut, slivers and all.
 
 The template that splits a simplex by a plane, with the same diagonals on both sides of every
-quadrilateral face, is that of `verify.xfem.splitting.clipping` (by ascending node number; nodes
+quadrilateral face, is that of `verify.xfem.clip` (by ascending node number; nodes
 are numbered by their coordinates first, so that their numbers as given do not matter). Bielser,
 Glardon, Teschner & Gross, *A state machine for real-time cutting of tetrahedral meshes*, Graphical
 Models 66 (2004); with snapping of near nodes before it: Nienhuys & van der Stappen 2001,
@@ -19,10 +19,10 @@ from verify.methods.nodal_cut import NodalCut
 from verify.methods.opened_mesh import OpenedMesh, conforming_to, facets_without_twin
 from verify.methods.snapped_mesh import SnappedMesh, snap_nodes, take_near_nodes
 from verify.methods.tip_points import add_tip_points
+from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.splitting.split import TipRule
 from verify.xfem.subdivision import subdivide
 from verify.xfem.virtual import cut_mesh
 

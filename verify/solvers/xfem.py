@@ -67,7 +67,7 @@ class XfemSolver:
         are for linear statics.
     tip : {"inside", "through", "nearest"}
         What happens to an element in which a cut ends; see
-        `verify.xfem.splitting.split.split_cells`.
+        `verify.xfem.pieces.split_cells`.
     slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
         `verify.xfem.slivers`; "merge" is cell aggregation. A direct static solve does not mind

@@ -6,9 +6,11 @@ lines of code, in an order of reading:
 
 `mesh`, `cuts`
     simplices; what a cut is: flat, a polyline, a triangulated surface (to skip: what a tool sweeps)
-`splitting`, `virtual`
-    pieces of the elements that cuts go through, which of them share unknowns (by contact across
-    faces), and the result: standard finite elements with weights
+`zero_points`, `clip`, `partition`, `crossing`, `junctions`, `pieces`
+    exact division of cells at zero points of level sets; parts of the cells that cuts go through
+`join`, `sides`, `virtual`
+    which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
+    the result: standard finite elements with weights
 `mass`
     consistent, row sum, weighted diagonal, side-wise (`mass_shifted`: as in the thesis)
 `elasticity`, `stiffness`, `loads`, `supports`

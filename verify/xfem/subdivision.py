@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from verify.xfem.splitting.bisection import Simplices, bisect_at
+from verify.xfem.clip import Simplices, bisected
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Subdivision", "subdivide"]
@@ -57,8 +57,7 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
         return replace(divided, interpolation=interpolation)
     mesh, zero = virtual.mesh, virtual.sub_cells.zero_points
     simplices = _conforming(virtual)
-    source, ids, barycentric = simplices.source, simplices.points, simplices.barycentric
-    piece = virtual.solid_simplices[0][source]
+    piece, ids, barycentric = simplices.piece, simplices.points, simplices.barycentric
 
     # a mesh node moves with one unknown, a point of the cut with those of its edge
     unknowns = virtual.cells[piece]
@@ -100,14 +99,14 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
 
 def _conforming(virtual: VirtualMesh) -> Simplices:
     """Solid simplices, bisected where a neighbour has a point that they do not have."""
-    solid, barycentric, fraction = virtual.solid_simplices
-    sub = virtual.sub_cells
-    whole = virtual.parent[solid[: len(solid) - len(sub.piece)]]
-    points = np.concatenate([virtual.mesh.cells[whole], sub.points])
+    sub, mesh = virtual.sub_cells, virtual.mesh
+    whole = np.flatnonzero(~virtual.split)
+    sign = np.ones(len(sub.piece), dtype=np.int8)
+    simplices = Simplices.of_cells(whole, mesh.cells[virtual.parent[whole]])
+    simplices += Simplices(sub.piece, sub.points, sub.barycentric, sub.fraction, sign)
     used = np.unique(sub.points)
-    hanging = used[used >= len(virtual.mesh.points)] - len(virtual.mesh.points)
-    simplices = Simplices(np.arange(len(solid)), points, barycentric, fraction)
-    return bisect_at(sub.zero_points, hanging, simplices)
+    hanging = used[used >= len(mesh.points)] - len(mesh.points)
+    return bisected(simplices, sub.zero_points, hanging)
 
 
 def _oriented(points: _Floats, cells: _Ints) -> _Ints:

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.cuts.crossing import TipRule
+from verify.xfem.crossing import TipRule
 from verify.xfem.cuts.flat import Cut
+from verify.xfem.join import PatchNodes, join_parts, number_nodes
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.splitting.joining import PatchSlots, join_slots
-from verify.xfem.splitting.partition import Partition
-from verify.xfem.splitting.split import split_cells
-from verify.xfem.splitting.unknown_nodes import node_sides, number_groups, piece_sides
-from verify.xfem.splitting.zero_points import ZeroPoints
+from verify.xfem.partition import Partition
+from verify.xfem.pieces import split_cells
+from verify.xfem.sides import node_sides, piece_sides
+from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["Aggregation", "SubCells", "VirtualMesh", "cut_mesh"]
 
@@ -293,7 +293,7 @@ def cut_mesh(
     cuts : sequence of Cut
         In any order; they may cross, branch, touch and run through nodes or along faces.
     tip : {"inside", "through", "nearest"}
-        Treatment of elements in which a cut ends; see `verify.xfem.splitting.split.split_cells`.
+        Treatment of elements in which a cut ends; see `verify.xfem.pieces.split_cells`.
     opened : (m, cuts) bool array, optional
         Cells that each cut has opened; the others are as whole as if it did not meet them.
 
@@ -311,15 +311,15 @@ def cut_mesh(
     partition = split_cells(mesh, cuts, tip, opened=opened)
     fraction = partition.fraction
     solid = fraction > 0.0
-    slots = join_slots(mesh, partition, solid)
-    group_node, numbering = number_groups(mesh, partition, slots, solid)
-    return _virtual_mesh(mesh, partition, slots, solid, fraction, group_node, numbering)
+    joined = join_parts(mesh, partition, solid)
+    node_parent, numbering = number_nodes(mesh, partition, joined, solid)
+    return _virtual_mesh(mesh, partition, joined, solid, fraction, node_parent, numbering)
 
 
 def _virtual_mesh(
     mesh: SimplexMesh,
     partition: Partition,
-    slots: PatchSlots,
+    joined: PatchNodes,
     solid: NDArray[np.bool_],
     fraction: _Floats,
     node_parent: _Ints,
@@ -327,10 +327,10 @@ def _virtual_mesh(
 ) -> VirtualMesh:
     pieces, cuts = partition.label.shape
     untouched = np.ones(len(mesh.cells), dtype=bool)
-    untouched[slots.cells] = False
+    untouched[joined.cells] = False
     rest = np.flatnonzero(untouched)
-    patch_cells = numbering[slots.group]
-    parent = np.concatenate([slots.cells[slots.piece_cell], rest])
+    patch_cells = numbering[joined.group]
+    parent = np.concatenate([joined.cells[joined.piece_cell], rest])
     cells = np.concatenate([patch_cells, mesh.cells[rest]])
     label = np.zeros((len(parent), cuts), dtype=np.int8)
     label[:pieces] = partition.label
@@ -343,13 +343,9 @@ def _virtual_mesh(
     number = np.full(len(parent), -1)
     number[order] = np.arange(len(order))
 
-    thick = partition.sub_fraction > 0.0
+    sub = partition.simplices[partition.simplices.fraction > 0.0]
     sub_cells = SubCells(
-        piece=number[partition.sub_piece[thick]],
-        points=partition.sub_points[thick],
-        barycentric=partition.sub_barycentric[thick],
-        fraction=partition.sub_fraction[thick],
-        zero_points=partition.points,
+        number[sub.piece], sub.points, sub.barycentric, sub.fraction, partition.points
     )
     level_sets = partition.points.values[: len(mesh.points)]
     cells, label, parent = cells[order], label[order], parent[order]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from verify.simulator.cutting.patch import MeshPatch
 from verify.xfem.arrays.distinct import distinct
-from verify.xfem.splitting.partition import Partition
+from verify.xfem.partition import Partition
 
 __all__ = ["Division"]
 

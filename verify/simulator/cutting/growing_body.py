@@ -30,10 +30,10 @@ from verify.xfem.arrays.growing_array import GrowingArray
 from verify.xfem.cuts.flat import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import InPieces, in_one_go
+from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.splitting.joining import join_slots
-from verify.xfem.splitting.partition import Partition
-from verify.xfem.splitting.split import ROUND_OFF, Held, split_cells
+from verify.xfem.partition import Partition
+from verify.xfem.pieces import ROUND_OFF, Held, split_cells
 
 __all__ = ["CutsNear", "GrowingBody", "Increment"]
 
@@ -279,7 +279,7 @@ class GrowingBody:
     def _renumber(self, state: Division) -> _Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
         patch, partition = state.patch, state.partition
-        slots = join_slots(patch, partition, state.solid)
+        slots = join_parts(patch, partition, state.solid)
         cell, touched, home, solid, old = slots_before(
             slots.cells[slots.piece_cell],
             np.searchsorted(patch.whole_cells, state.changed_cells),
@@ -370,17 +370,17 @@ class GrowingBody:
             cells,
             patch.whole_cells,
             partition.parent,
-            partition.sub_piece,
+            partition.simplices.piece,
             place,
-            partition.sub_fraction,
+            partition.simplices.fraction,
         )
         retire(self.sub_piece.rows, self.sub_range, cells)
         begin = len(self.sub_piece)
-        self.sub_piece.append(place[partition.sub_piece[rows]])
-        self.sub_points.append(ids[partition.sub_points[rows]])
-        self.sub_barycentric.append(partition.sub_barycentric[rows])
-        self.sub_fraction.append(partition.sub_fraction[rows])
-        self.sub_sign.append(partition.sub_sign[rows])
+        self.sub_piece.append(place[partition.simplices.piece[rows]])
+        self.sub_points.append(ids[partition.simplices.points[rows]])
+        self.sub_barycentric.append(partition.simplices.barycentric[rows])
+        self.sub_fraction.append(partition.simplices.fraction[rows])
+        self.sub_sign.append(partition.simplices.sign[rows])
         self.sub_range[cells] = begin + bounds
 
 

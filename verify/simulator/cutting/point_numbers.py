@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from verify.xfem.arrays.growing_array import GrowingArray
 from verify.xfem.arrays.row_numbers import RowNumbers, find_row, number_of_row
-from verify.xfem.splitting.zero_points import ZeroPoints
+from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["FoundPoints", "PointNumbers", "runs_through", "spans"]
 

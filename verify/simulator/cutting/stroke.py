@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from verify.simulator.collision.bounding_tree import BoundingTree
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.walk_kernels import cells_hit, walk
-from verify.xfem.cuts.crossing import REACH
+from verify.xfem.crossing import REACH
 from verify.xfem.cuts.flat import Cut
 from verify.xfem.cuts.tool_path import Sweep, ToolPath
 from verify.xfem.mesh import SimplexMesh
@@ -16,7 +16,7 @@ __all__ = ["SeenCut", "Stroke"]
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
-_ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.splitting.split`
+_ROUND_OFF = 8.0 * np.finfo(float).eps  # as in `verify.xfem.pieces`
 
 
 class SeenCut:

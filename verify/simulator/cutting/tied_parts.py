@@ -14,7 +14,7 @@ _Bools = NDArray[np.bool_]
 
 
 class TiedParts:
-    """Which stored pieces are tied: see `verify.xfem.splitting.junctions`.
+    """Which stored pieces are tied: see `verify.xfem.junctions`.
 
     Parameters
     ----------

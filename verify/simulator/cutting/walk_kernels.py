@@ -2,7 +2,7 @@
 
 For a cell the kernel asks where the zero set of the level set crosses its edges, and of each such
 point whether it lies on the sweep and whether the blade has passed it. The tolerances are those of
-`verify.xfem.splitting`, so that a cell that the walk calls crossed through is one that is split.
+`verify.xfem.pieces`, so that a cell that the walk calls crossed through is one that is split.
 A sweep comes as its `arrays`, `verify.xfem.cuts.sweep_surface.SweepArrays`.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from verify.simulator.collision.tree_kernels import as_array, items_near_plane
-from verify.xfem.cuts.crossing import AT_END, REACH
+from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.cuts.sweep_kernels import probe
 
 __all__ = ["cells_hit", "walk"]

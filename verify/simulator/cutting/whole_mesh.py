@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.simulator.cutting.growing_body import GrowingBody
-from verify.xfem.splitting.unknown_nodes import node_sides, piece_sides
-from verify.xfem.splitting.zero_points import ZeroPoints
+from verify.xfem.sides import node_sides, piece_sides
 from verify.xfem.virtual import SubCells, VirtualMesh
+from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["whole_mesh"]
 

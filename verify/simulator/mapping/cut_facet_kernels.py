@@ -1,6 +1,6 @@
 """Triangles of a surface divided by one cut, wherever the body beneath is split.
 
-What `verify.xfem.splitting` does for any number of cuts, for the one that is under way: at a step a
+What `verify.xfem.pieces` does for any number of cuts, for the one that is under way: at a step a
 blade meets a hundred facets, and with so few only the number of calls costs.
 """
 
@@ -167,7 +167,7 @@ def divide_facets(
             where[u, j] = share[first, near] * where[a, j] + share[first, far] * where[b, j]
             where[v, j] = share[second, near] * where[a, j] + share[second, far] * where[c, j]
         end = _write(end, out, f, corners, a, u, v, where, mine)
-        # as in `splitting.clipping`: the diagonal begins at the corner with the lower number
+        # as in `verify.xfem.clip`: the diagonal begins at the corner with the lower number
         third, start = (v, b) if corners[b] < corners[c] else (c, u)
         end = _write(end, out, f, corners, u, b, third, where, -mine)
         end = _write(end, out, f, corners, start, c, v, where, -mine)

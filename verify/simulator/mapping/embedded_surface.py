@@ -34,7 +34,7 @@ from verify.xfem.arrays.distinct import (
 )
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import MANY, InPieces, in_one_go
-from verify.xfem.splitting.split import ROUND_OFF, split_cells
+from verify.xfem.pieces import ROUND_OFF, split_cells
 
 __all__ = ["EmbeddedSurface"]
 
@@ -269,18 +269,18 @@ class EmbeddedSurface:
             _SurfaceCut(patch.points, values[:, k], int(cut), self) for k, cut in enumerate(numbers)
         ]
         parts = split_cells(patch, cuts)
-        solid = np.flatnonzero(parts.sub_fraction > 0.0)
+        solid = np.flatnonzero(parts.simplices.fraction > 0.0)
         unsplit = np.ones(len(facets), dtype=bool)
         unsplit[parts.parent] = False
         whole = np.flatnonzero(unsplit)
         size = self.facets.shape[1]
         point = self._numbers.number(parts.points, nodes, numbers)
-        ids = np.concatenate([self.facets[facets[whole]], point[parts.sub_points[solid]]])
+        ids = np.concatenate([self.facets[facets[whole]], point[parts.simplices.points[solid]]])
         eye = np.broadcast_to(np.eye(size), (len(whole), size, size))
-        at = np.concatenate([eye, parts.sub_barycentric[solid]])
-        source = np.concatenate([whole, parts.parent[parts.sub_piece[solid]]])
+        at = np.concatenate([eye, parts.simplices.barycentric[solid]])
+        source = np.concatenate([whole, parts.parent[parts.simplices.piece[solid]]])
         side = np.zeros((len(ids), len(numbers)), dtype=np.int8)
-        side[len(whole) :] = parts.label[parts.sub_piece[solid]]
+        side[len(whole) :] = parts.label[parts.simplices.piece[solid]]
         # sub-simplices come in the order of their numbers; facets keep their direction
         wrong = np.linalg.det(at) < 0.0
         ids[wrong, 0], ids[wrong, 1] = ids[wrong, 1], ids[wrong, 0].copy()

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.cuts.crossing import AT_END, REACH, level_and_depth
+from verify.xfem.crossing import AT_END, REACH, level_and_depth
 from verify.xfem.cuts.flat import Cut
-from verify.xfem.splitting.partition import Partition
-from verify.xfem.splitting.zero_points import ZeroPoints
+from verify.xfem.partition import Partition
+from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["joint_cuts", "meeting_cells", "reached", "tied_pieces", "without_specks"]
 
@@ -69,8 +69,9 @@ def without_specks(partition: Partition, cells: _Bools) -> Partition:
     speck = cells[partition.parent] & (partition.fraction <= _SPECK)
     if not speck.any():
         return partition
-    fraction = np.where(speck[partition.sub_piece], 0.0, partition.sub_fraction)
-    return replace(partition, sub_fraction=fraction)
+    sub = partition.simplices
+    fraction = np.where(speck[sub.piece], 0.0, sub.fraction)
+    return replace(partition, simplices=replace(sub, fraction=fraction))
 
 
 def joint_cuts(
@@ -130,12 +131,12 @@ def _components(count: int, first: _Ints, second: _Ints) -> _Ints:
 
 def _inner_facets(partition: Partition, cells: _Bools) -> _Facets:
     """Facets between sub-simplices with a volume, in different pieces of one of some cells (m,)."""
-    cell = partition.parent[partition.sub_piece]
-    rows = np.flatnonzero(cells[cell] & (partition.sub_fraction > 0.0))
-    corners = partition.sub_points.shape[1]
+    sub, corners = partition.simplices, partition.simplices.points.shape[1]
+    sub = sub[cells[partition.parent[sub.piece]] & (sub.fraction > 0.0)]
     keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
-    points = np.sort(partition.sub_points[rows][:, keep].reshape(-1, corners - 1), axis=1)
-    piece, cell = np.repeat(partition.sub_piece[rows], corners), np.repeat(cell[rows], corners)
+    points = np.sort(sub.points[:, keep].reshape(-1, corners - 1), axis=1)
+    piece = np.repeat(sub.piece, corners)
+    cell = partition.parent[piece]
     order = np.lexsort([*points.T[::-1], cell])
     points, piece, cell = points[order], piece[order], cell[order]
     met = (points[1:] == points[:-1]).all(axis=1) & (cell[1:] == cell[:-1])

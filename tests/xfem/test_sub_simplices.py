@@ -1,0 +1,114 @@
+"""Sub-simplices and contacts of cut-cell parts, against slower ways that share no code."""
+
+import numpy as np
+import pytest
+from degenerate_strokes import body, strokes
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from verify.xfem import clip
+from verify.xfem.cuts import Plane
+from verify.xfem.join import join_parts
+from verify.xfem.pieces import split_cells
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
+from verify.xfem.virtual import cut_mesh
+
+# products of the same factors, taken in another order: a few ulp
+ROUND_OFF = 4e-15
+
+
+def one_by_one(zero, order, points, fraction):
+    """Points and shares after bisection at one zero point after the other."""
+    for z in order:
+        plus, minus = zero.ends[z]
+        has = (points == plus).any(axis=1) & (points == minus).any(axis=1)
+        r, s = zero.shares(zero.cut[z], plus, minus)
+        parts = [(points[~has], fraction[~has])]
+        for end, share in ((plus, s), (minus, r)):
+            half = points[has].copy()
+            half[np.arange(len(half)), (half == end).argmax(axis=1)] = zero.nodes + z
+            parts.append((half, fraction[has] * share))
+        points, fraction = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return points, fraction
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_bisection_at_once_is_that_at_one_point_after_the_other(dim, monkeypatch) -> None:
+    given = []
+
+    def noted(simplices, zero, numbers):
+        given.append((simplices, zero, zero.in_order(numbers)))
+        return clip.bisected(simplices, zero, numbers)
+
+    monkeypatch.setattr("verify.xfem.pieces.bisected", noted)
+    monkeypatch.setattr("verify.xfem.subdivision.bisected", noted)
+    more = 0
+    for seed in range(25):
+        rng = np.random.default_rng([dim, seed, 1])
+        mesh = body(rng, dim)
+        subdivide(cut_mesh(mesh, [path.sweep for path in strokes(rng, mesh, 3)]))
+    for simplices, zero, order in given:
+        found = clip.bisected(simplices, zero, order)
+        points, share = one_by_one(zero, order, simplices.points, simplices.fraction)
+        mine, twin = (
+            np.lexsort([f, *np.sort(p, axis=1).T])
+            for p, f in ((found.points, found.fraction), (points, share))
+        )
+        np.testing.assert_array_equal(
+            np.sort(found.points[mine], axis=1), np.sort(points[twin], axis=1)
+        )
+        np.testing.assert_allclose(found.fraction[mine], share[twin], rtol=ROUND_OFF)
+        more += len(found) - len(simplices)
+    assert more > 10
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_signs_of_sub_simplices_are_those_of_their_determinants(dim) -> None:
+    for seed in range(25):
+        rng = np.random.default_rng([dim, seed, 1])
+        mesh = body(rng, dim)
+        sub = split_cells(mesh, [path.sweep for path in strokes(rng, mesh, 3)]).simplices
+        determinant = np.linalg.det(sub.barycentric)
+        thick = np.abs(determinant) > 1e-12
+        np.testing.assert_array_equal(np.sign(determinant[thick]), sub.sign[thick])
+        np.testing.assert_allclose(np.abs(determinant[thick]), sub.fraction[thick], rtol=1e-2)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_parts_share_dof_nodes_where_points_of_a_common_face_lie_in_both(dim) -> None:
+    rng = np.random.default_rng(dim)
+    mesh = rectangle_mesh((4, 4)) if dim == 2 else box_mesh((2, 2, 2))
+    for _ in range(6):
+        cuts = [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim)) for _ in range(5 - dim)]
+        partition = split_cells(mesh, cuts)
+        joined = join_parts(mesh, partition, partition.fraction > 0.0)
+        cell = joined.cells[joined.piece_cell]
+        label = np.zeros((len(cell), len(cuts)), dtype=int)
+        label[: len(partition.label)] = partition.label
+        slots = np.arange(joined.group.size).reshape(joined.group.shape)
+        pairs = []
+        for here, opposite in np.argwhere(mesh.neighbours > np.arange(len(mesh.cells))[:, None]):
+            there = mesh.neighbours[here, opposite]
+            nodes = np.delete(mesh.cells[here], opposite)
+            # many of them near corners and edges, where contacts may be small
+            weights = rng.dirichlet(np.full(dim, 0.3), 4000)
+            at = weights @ partition.points.values[nodes]
+            for side in np.unique(np.sign(at), axis=0):
+                fits = ((label == 0) | (label == side)).all(axis=1)
+                touching = [slots[fits & (cell == one)] for one in (here, there)]
+                assert all(len(found) <= 1 for found in touching)
+                if all(len(found) for found in touching):  # both are cells of the patch
+                    pairs += [
+                        [
+                            found[0, mesh.cells[one] == node].item()
+                            for found, one in zip(touching, (here, there), strict=True)
+                        ]
+                        for node in nodes
+                    ]
+        row, column = np.transpose(pairs)
+        graph = coo_array((np.ones(len(row)), (row, column)), shape=(slots.size, slots.size))
+        count, part = connected_components(graph, directed=False)
+        # each sampled contact is one of the joins, and there are no others
+        assert count == joined.group.max() + 1
+        assert len(np.unique(np.stack([part, joined.group.ravel()]), axis=1).T) == count

@@ -1,0 +1,269 @@
+"""Division of simplices by linear level sets, into sub-simplices with exact volume shares.
+
+The part of a simplex on one side of a plane is a staircase of simplices: the plus vertices p and
+the minus vertices m span a product, every lattice path through which gives one sub-simplex. The
+vertices are corners or points z_pm = s p + r m of the zero set, with r = φ_p/(φ_p − φ_m) and
+s = −φ_m/(φ_p − φ_m). Along a path each vertex brings in one new corner, so the determinant is
+triangular and the volume share is a *product* of positive r and s: no cancellation however thin
+the sliver. Paths follow the order of the corners; with corners ordered by their global number the
+sub-simplices of neighbours match on shared faces.
+
+Where a cut ends, the cells that it divides have points on faces and edges that their undivided
+neighbours do not know of. Bisected at these (`bisected`), the neighbours match again.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations, pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.zero_points import ZeroPoints
+
+__all__ = ["Simplices", "Staircase", "bisected", "divided", "staircase", "staircase_entries"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+
+_Path = list[tuple[int, int]]
+
+
+class Staircase(NamedTuple):
+    """Sub-simplices of a clipped simplex, for every pattern of signs.
+
+    The pattern of a simplex is Σ 2^k over the corners k on the plus side. Its sub-simplices are
+    the entries ``start[pattern]`` to ``start[pattern + 1]`` of the other arrays.
+
+    Attributes
+    ----------
+    start : (2^corners + 1,) int array
+        First entry of each pattern; patterns without a sign change have none.
+    plus, minus : (entries, corners) int array
+        Sub-simplex vertex k is z_ab with a = plus, b = minus; a corner if a = b.
+    factors : (entries, corners, 3) int array
+        (0 for r or 1 for s, a, b): the volume share is the product over these.
+    side : (entries,) int8 array
+        +1 or −1.
+    sign : (entries,) int8 array
+        Orientation relative to the simplex: +1 or −1, the same wherever the zero points are.
+    """
+
+    start: NDArray[np.int64]
+    plus: NDArray[np.int64]
+    minus: NDArray[np.int64]
+    factors: NDArray[np.int64]
+    side: NDArray[np.int8]
+    sign: NDArray[np.int8]
+
+
+@cache
+def staircase(corners: int) -> Staircase:
+    """Make the staircase of a simplex with that many corners."""
+    start, plus, minus, factors, side = [0], [], [], [], []
+    for pattern in range(2**corners):
+        above = [k for k in range(corners) if pattern >> k & 1]
+        below = [k for k in range(corners) if not pattern >> k & 1]
+        for sign, vertices, steps in _parts(above, below) if above and below else ():
+            plus.append([a for a, _ in vertices])
+            minus.append([b for _, b in vertices])
+            factors.append(steps + [(1, 0, 0)] * (corners - len(steps)))
+            side.append(sign)
+        start.append(len(side))
+    ends = np.eye(corners)[np.array([plus, minus])]
+    return Staircase(
+        np.array(start),
+        np.array(plus),
+        np.array(minus),
+        np.array(factors),
+        np.array(side, dtype=np.int8),
+        # with all zero points in the middle of their edges
+        np.sign(np.linalg.det(0.5 * (ends[0] + ends[1]))).astype(np.int8),
+    )
+
+
+def _parts(
+    above: list[int], below: list[int]
+) -> Iterator[tuple[int, _Path, list[tuple[int, int, int]]]]:
+    """(side, vertices, factors) of all sub-simplices."""
+    end = len(above) - 1, len(below) - 1
+    for side, own in ((1, above), (-1, below)):
+        for first in range(len(own)):
+            corners = [(corner, corner) for corner in own[: first + 1]]
+            for path in _lattice_paths((first, 0) if side > 0 else (0, first), end):
+                points = [(above[i], below[j]) for i, j in path]
+                # the coefficient with which each vertex of the path brings in its new corner
+                steps = [(int(side < 0), *points[0])]
+                steps += [(int(k > i), above[k], below[l]) for (i, _), (k, l) in pairwise(path)]
+                yield side, corners + points, steps
+
+
+def _lattice_paths(start: tuple[int, int], end: tuple[int, int]) -> Iterator[_Path]:
+    """Monotone paths from start to end, one step in one direction at a time."""
+    down, right = end[0] - start[0], end[1] - start[1]
+    for turns in combinations(range(down + right), down):
+        path = [start]
+        for step in range(down + right):
+            i, j = path[-1]
+            path.append((i + 1, j) if step in turns else (i, j + 1))
+        yield path
+
+
+@dataclass(frozen=True)
+class Simplices:
+    """Simplices inside cells.
+
+    Attributes
+    ----------
+    piece : (q,) int array
+        Cut-cell part, or whatever else a simplex hands on to its parts.
+    points : (q, c) int array
+        Numbers of the vertices.
+    barycentric : (q, c, c) float array
+        Barycentric coordinates of the vertices (second axis) in the cell.
+    fraction : (q,) float array
+        Share in the volume of the cell.
+    sign : (q,) int8 array
+        Orientation in the cell, +1 or −1: from how it came about, hence right for any sliver.
+    """
+
+    piece: _Ints
+    points: _Ints
+    barycentric: _Floats
+    fraction: _Floats
+    sign: NDArray[np.int8]
+
+    @staticmethod
+    def of_cells(piece: _Ints, cells: _Ints) -> "Simplices":
+        """Whole cells (q, c) as simplices."""
+        count, corners = cells.shape
+        eye = np.broadcast_to(np.eye(corners), (count, corners, corners))
+        return Simplices(piece, cells, eye, np.ones(count), np.ones(count, dtype=np.int8))
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+    def __getitem__(self, rows: NDArray) -> "Simplices":
+        """Return some of them."""
+        return Simplices(*(x[rows] for x in vars(self).values()))
+
+    def __add__(self, other: "Simplices") -> "Simplices":
+        """Return them and others."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Simplices(*(np.concatenate(pair) for pair in pairs))
+
+
+def staircase_entries(plus: _Bools) -> tuple[_Ints, _Ints]:
+    """Entries (k,) of the staircase for simplices with these signs (q, c); of which each is."""
+    stairs = staircase(plus.shape[1])
+    pattern = plus @ (1 << np.arange(plus.shape[1]))
+    count = stairs.start[pattern + 1] - stairs.start[pattern]
+    of = np.repeat(np.arange(len(plus)), count)
+    within = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    return stairs.start[pattern][of] + within, of
+
+
+def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: _Ints) -> Simplices:
+    """Divide simplices by a cut; those that are not clipped come first.
+
+    Parameters
+    ----------
+    simplices : Simplices
+    zero : ZeroPoints
+    cut : int
+    below : (p,) int array
+        Piece that takes what is on the minus side of each piece; −1 if that is not divided.
+    """
+    plus = zero.values[simplices.points, cut] >= 0.0
+    touched, all_plus = below[simplices.piece] >= 0, plus.all(axis=1)
+    clipped = touched & ~all_plus & plus.any(axis=1)
+    beneath = touched & ~plus.any(axis=1)
+    moved = np.where(beneath, below[simplices.piece], simplices.piece)
+    whole = Simplices(moved, *list(vars(simplices).values())[1:])[~clipped]
+    parts = simplices[clipped]
+    if len(parts) == 0:
+        return whole
+    order = np.argsort(parts.points, axis=1, kind="stable")
+    ids = np.take_along_axis(parts.points, order, axis=1)
+    corners = np.take_along_axis(parts.barycentric, order[:, :, None], axis=1)
+    level = zero.values[ids, cut]
+    number = zero.on_edges(cut, ids)
+    entry, of = staircase_entries(level >= 0.0)
+    stairs = staircase(ids.shape[1])
+    at, p, m = of[:, None], stairs.plus[entry], stairs.minus[entry]
+    kind, a, b = (stairs.factors[entry][:, :, k] for k in range(3))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r = level[:, :, None] / (level[:, :, None] - level[:, None, :])
+        s = -level[:, None, :] / (level[:, :, None] - level[:, None, :])
+    diagonal = np.arange(ids.shape[1])
+    r[:, diagonal, diagonal], s[:, diagonal, diagonal] = 0.0, 1.0
+    share = np.where(kind == 0, r[at, a, b], s[at, a, b]).prod(axis=1)
+    swaps = sum(parts.points[:, i] > parts.points[:, j] for i, j in combinations(diagonal, 2))
+    turned = (1 - 2 * (np.asarray(swaps) % 2)).astype(np.int8)
+    new = Simplices(
+        np.where(stairs.side[entry] > 0, parts.piece[of], below[parts.piece[of]]),
+        number[at, p, m],
+        s[at, p, m][..., None] * corners[at, p] + r[at, p, m][..., None] * corners[at, m],
+        parts.fraction[of] * share,
+        parts.sign[of] * turned[of] * stairs.sign[entry],
+    )
+    zero.divided(new.points)
+    return whole + new
+
+
+def bisected(simplices: Simplices, zero: ZeroPoints, numbers: _Ints) -> Simplices:
+    """Bisect simplices at those of the given points that lie on their edges.
+
+    Parameters
+    ----------
+    simplices : Simplices
+    zero : ZeroPoints
+    numbers : (k,) int array
+        Places of the points in `zero.ends`.
+    """
+    order = zero.in_order(numbers)
+    ends, none = zero.ends[order], len(order)
+    key, rank = np.unique(_edge_keys(ends[:, 0], ends[:, 1]), return_index=True)
+    near = np.zeros(len(zero.positions), dtype=bool)
+    near[ends] = True
+    some = near[simplices.points].sum(axis=1) >= 2
+    done, rest = simplices[~some], simplices[some]
+    pairs = np.array(list(combinations(range(simplices.points.shape[1]), 2)))
+    while len(rest):
+        # of the points on its edges, every simplex is bisected at that which comes first
+        edges = _edge_keys(*rest.points[:, pairs.T].transpose(1, 0, 2))
+        place = np.minimum(np.searchsorted(key, edges), len(key) - 1)
+        first = np.where(key[place] == edges, rank[place], none)
+        edge = first.argmin(axis=1)
+        first = first[np.arange(len(rest)), edge]
+        done, rest = done + rest[first == none], rest[first < none]
+        first, edge = first[first < none], pairs[edge[first < none]]
+        rest = _halves(rest, zero, order[first], edge)
+    return done
+
+
+def _edge_keys(one: _Ints, other: _Ints) -> _Ints:
+    return np.minimum(one, other) << 32 | np.maximum(one, other)
+
+
+def _halves(simplices: Simplices, zero: ZeroPoints, at: _Ints, edge: _Ints) -> Simplices:
+    """Halves of simplices at points (q,) on their edges (q, 2), local corners."""
+    row, ends = np.arange(len(simplices)), zero.ends[at]
+    turned = simplices.points[row, edge[:, 0]] != ends[:, 0]
+    plus, minus = np.where(turned[:, None], edge[:, ::-1], edge).T
+    r, s = zero.shares(zero.cut[at], ends[:, 0], ends[:, 1])
+    corners = simplices.barycentric
+    middle = s[:, None] * corners[row, plus] + r[:, None] * corners[row, minus]
+    halves = []
+    for corner, share in ((plus, s), (minus, r)):
+        points, barycentric = simplices.points.copy(), corners.copy()
+        points[row, corner], barycentric[row, corner] = zero.nodes + at, middle
+        halves.append(
+            Simplices(
+                simplices.piece, points, barycentric, simplices.fraction * share, simplices.sign
+            )
+        )
+    return halves[0] + halves[1]

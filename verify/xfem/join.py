@@ -1,0 +1,202 @@
+"""Degrees of freedom that cut-cell parts share: by contact across faces, not by sign vectors.
+
+Two (part, local node) pairs at one node are the same dof node when the parts, in cells that share
+a face with that node, touch across the face, in an area (2D: a length). What touches in a corner
+or an edge only is apart, as parts that turn about a hinge are no body, and a part without volume
+joins nothing. Tips, mouths, parallel, crossing and branching cuts, cuts through nodes and along
+faces all follow from this one rule (formulation: "one set of node values per piece of material
+connected inside the element").
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from verify.xfem.clip import staircase, staircase_entries
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.partition import Partition
+from verify.xfem.zero_points import ZeroPoints
+
+__all__ = ["PatchNodes", "join_parts", "number_nodes"]
+
+_Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+_Sides = NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class PatchNodes:
+    """Equivalence classes of (part, local node) in all cells around the nodes of split cells.
+
+    Attributes
+    ----------
+    cells : (c,) int array
+        The cells of the patch, ascending.
+    piece_cell : (p,) int array
+        Place in `cells` of each piece of the patch: the pieces of the partition first, then the
+        cells that are not split.
+    group : (p, d + 1) int array
+        Class of each local node, numbered in the order of their first ones.
+    """
+
+    cells: _Ints
+    piece_cell: _Ints
+    group: _Ints
+
+
+def join_parts(mesh: SimplexMesh, partition: Partition, solid: _Bools) -> PatchNodes:
+    """Join the local nodes of tied pieces, and of all that touch, around the nodes of split cells.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    partition : Partition
+    solid : (q,) bool array
+        Pieces that have a volume; the others join nothing.
+    """
+    near = np.zeros(len(mesh.points), dtype=bool)
+    near[mesh.cells[partition.parent]] = True
+    patch = np.flatnonzero(near[mesh.cells].any(axis=1))
+    place = np.full(len(mesh.cells), -1)
+    place[patch] = np.arange(len(patch))
+    is_whole = np.ones(len(patch), dtype=bool)
+    is_whole[place[partition.parent]] = False
+    whole = np.flatnonzero(is_whole)
+    piece_cell = np.concatenate([place[partition.parent], whole])
+    label = np.zeros((len(piece_cell), partition.label.shape[1]), dtype=np.int8)
+    label[: len(solid)] = partition.label
+    alive = np.concatenate([solid, np.ones(len(whole), dtype=bool)])
+
+    across = mesh.neighbours[patch]
+    here, opposite = np.nonzero(across > patch[:, None])
+    there = place[across[here, opposite]]
+    here, opposite, there = here[there >= 0], opposite[there >= 0], there[there >= 0]
+    corners = mesh.dim + 1
+    on_face = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
+    nodes = mesh.cells[patch[here, None], on_face[opposite]]
+
+    dividing = np.zeros((len(patch), label.shape[1]), dtype=bool)
+    piece, cut = np.nonzero(partition.label)
+    dividing[piece_cell[piece], cut] = True
+    face, side = _regions(nodes, dividing[here] | dividing[there], partition.points)
+    pieces = _Pieces(piece_cell, label, len(patch))
+    first, second = (pieces.fitting(cells[face], side) for cells in (here, there))
+    touch = alive[first] & alive[second]
+    first, second, face = first[touch], second[touch], face[touch]
+    local = on_face[opposite[face]]
+    other = mesh.cells[patch[there[face]]]
+    other_local = (other[:, None, :] == nodes[face][:, :, None]).argmax(axis=2)
+    tied = partition.tied[:, :, None] * corners + np.arange(corners)
+    one = np.concatenate([(first[:, None] * corners + local).ravel(), tied[:, 0].ravel()])
+    two = np.concatenate([(second[:, None] * corners + other_local).ravel(), tied[:, 1].ravel()])
+    size = len(piece_cell) * corners
+    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(size, size))
+    group = connected_components(graph, directed=False)[1].astype(np.int64)
+    return PatchNodes(patch, piece_cell, group.reshape(-1, corners))
+
+
+def _regions(nodes: _Ints, dividing: _Bools, points: ZeroPoints) -> tuple[_Ints, _Sides]:
+    """Face (q,) and sides (q, cuts) of the regions into which cuts divide faces.
+
+    Parameters
+    ----------
+    nodes : (f, d) int array
+        Corners of each face.
+    dividing : (f, cuts) bool array
+        Cuts that divide a cell beside the face.
+    points : ZeroPoints
+    """
+    face, side = np.arange(len(nodes)), np.zeros(dividing.shape, dtype=np.int8)
+    stairs = staircase(nodes.shape[1])
+    for cut in range(dividing.shape[1]):
+        chosen = np.flatnonzero(dividing[face, cut])
+        plus = points.values[nodes[chosen], cut] >= 0.0
+        side[chosen, cut] = np.where(plus.all(axis=1), 1, -1)
+        mixed = chosen[plus.any(axis=1) & ~plus.all(axis=1)]
+        if len(mixed) == 0:
+            continue
+        ids = np.sort(nodes[mixed], axis=1)
+        entry, of = staircase_entries(points.values[ids, cut] >= 0.0)
+        number = points.on_edges(cut, ids)
+        parts = number[of[:, None], stairs.plus[entry], stairs.minus[entry]]
+        part_side = side[mixed[of]]
+        part_side[:, cut] = stairs.side[entry]
+        rest = np.ones(len(face), dtype=bool)
+        rest[mixed] = False
+        nodes = np.concatenate([nodes[rest], parts])
+        face = np.concatenate([face[rest], face[mixed[of]]])
+        side = np.concatenate([side[rest], part_side])
+    # a zero point that is a corner comes twice: there the region has no area (2D: no length)
+    ordered = np.sort(nodes, axis=1)
+    area = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
+    return face[area], side[area]
+
+
+class _Pieces:
+    """Pieces by their cells."""
+
+    def __init__(self, piece_cell: _Ints, label: _Sides, cells: int) -> None:
+        self.order, self.label = np.argsort(piece_cell, kind="stable"), label
+        self.count = np.bincount(piece_cell, minlength=cells)
+        self.start = np.cumsum(self.count) - self.count
+
+    def fitting(self, cells: _Ints, side: _Sides) -> _Ints:
+        """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts)."""
+        count = self.count[cells]
+        of = np.repeat(np.arange(len(cells)), count)
+        within = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+        piece = self.order[self.start[cells[of]] + within]
+        label = self.label[piece]
+        fits = ((label == 0) | (label == side[of])).all(axis=1)
+        if not np.array_equal(of[fits], np.arange(len(cells))):
+            raise RuntimeError("the pieces of a cell do not partition the plane of a face")
+        return piece[fits]
+
+
+def number_nodes(
+    mesh: SimplexMesh, partition: Partition, joined: PatchNodes, solid: _Bools
+) -> tuple[_Ints, _Ints]:
+    """Mesh node (N,) of each dof node, and the dof node of each class of local nodes.
+
+    The first dof nodes are the nodes of the mesh, each with the material in which it lies.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    partition : Partition
+    joined : PatchNodes
+    solid : (p,) bool array
+        Pieces that have a volume; classes without any get the number -1.
+    """
+    nodes = mesh.cells[joined.cells[joined.piece_cell]]
+    pieces = len(partition.parent)
+    alive = np.ones(len(nodes), dtype=bool)
+    alive[:pieces] = solid
+    groups = joined.group.max(initial=-1) + 1
+    node_of = np.full(groups, -1)
+    node_of[joined.group[alive]] = nodes[alive]
+
+    # the material in which a node lies keeps the node's number
+    home = np.ones(nodes.shape, dtype=bool)
+    sign = np.where(partition.points.values[nodes[:pieces]] >= 0.0, 1, -1)
+    label = partition.label[:, None, :]
+    home[:pieces] = ((label == 0) | (label == sign)).all(axis=2)
+    is_home = np.zeros(groups, dtype=bool)
+    is_home[joined.group[home & alive[:, None]]] = True
+
+    inner = np.zeros(len(mesh.points), dtype=bool)
+    inner[mesh.cells[partition.parent]] = True
+    used = np.flatnonzero(node_of >= 0)
+    used = used[inner[node_of[used]]]
+    used = used[np.lexsort([used, ~is_home[used], node_of[used]])]
+    first = np.diff(node_of[used], prepend=-1) != 0
+    number = np.full(groups, -1)
+    number[used[first]] = node_of[used[first]]
+    number[used[~first]] = len(mesh.points) + np.arange(int((~first).sum()))
+    # around nodes that touch no split cell the patch is not complete, but nothing is cut either
+    outer = np.flatnonzero((node_of >= 0) & ~inner[node_of])
+    number[outer] = node_of[outer]
+    return np.concatenate([np.arange(len(mesh.points)), node_of[used[~first]]]), number

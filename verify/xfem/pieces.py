@@ -1,0 +1,219 @@
+"""Cut-cell parts: a binary space partition of the cells that cuts go through, one cut at a time.
+
+A cut splits a part only when it goes through: when the zero points on its edges lie inside the
+extent of the cut. So tips end on element edges (2D) or faces (3D), and a branch splits only the
+part that it crosses. |φ| below round-off is exactly zero, and zero counts as the plus side: the
+cut is in effect moved a little to its minus side, the same at every node. Parts that have no
+volume then still take their place at the face in which they lie, so that nothing else is joined
+across it, and are left out afterwards.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.clip import bisected, divided
+from verify.xfem.crossing import Crossing, TipRule, crossed_through
+from verify.xfem.cuts.flat import Cut
+from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import real_array
+from verify.xfem.junctions import (
+    joint_cuts,
+    meeting_cells,
+    reached,
+    tied_pieces,
+    without_specks,
+)
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.partition import Partition
+from verify.xfem.zero_points import ZeroPoints
+
+__all__ = ["ROUND_OFF", "Held", "split_cells"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+
+Held = Callable[[_Ints, NDArray[np.int8], int], _Bools]
+
+ROUND_OFF = 8.0 * np.finfo(float).eps
+
+
+class _Rules(NamedTuple):
+    """How cuts divide: what `split_cells` was given, and sizes of the cells."""
+
+    cuts: Sequence[Cut]
+    sizes: _Floats
+    tip: TipRule
+    held: Held | None
+    opened: _Bools | None
+    through: _Bools | None = None  # (m, cuts) cells in which a cut has no end
+
+
+def split_cells(
+    mesh: SimplexMesh,
+    cuts: Sequence[Cut],
+    tip: TipRule = "inside",
+    held: Held | None = None,
+    opened: _Bools | None = None,
+    joint: _Bools | None = None,
+) -> Partition:
+    """Split every cell that a cut goes through, or that several part together.
+
+    The others do not appear in the result.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    cuts : sequence of Cut
+        A branch may come before or after the cut from which it leaves.
+    tip : {"inside", "through", "nearest"}
+        What to do where a cut ends inside an element: leave the element whole (the rule of the
+        thesis, 3.2.1), split it, or whichever of the two moves the tip less. With the last two
+        the order of the cuts matters where one ends in an element that another divides: it splits
+        what it finds, the element or a piece.
+    held : callable, optional
+        For a cut that grows: given the cells and labels of pieces that a cut meets but does not
+        go through, and its number, tells which it shall split: those that it split before.
+    opened : (m, cuts) bool array, optional
+        Cells in which each cut may split anything; without it all.
+    joint : (m,) bool array, optional
+        Cells that several cuts have parted together before.
+
+    Raises
+    ------
+    XfemError
+        If the cuts are no sequence, a level set is not finite, a depth is NaN, either has a wrong
+        shape, the tip rule is unknown, or `opened` is of another mesh.
+    """
+    if tip not in get_args(TipRule):
+        raise XfemError(f"tip rule '{tip}'; expected inside, through or nearest")
+    if not isinstance(cuts, Sequence):
+        raise XfemError(f"cuts of type {type(cuts).__name__}; expected a list of cuts")
+    if opened is not None and opened.shape != (len(mesh.cells), len(cuts)):
+        raise XfemError(
+            f"opened cells of shape {opened.shape}; expected ({len(mesh.cells)}, {len(cuts)})"
+        )
+    values, snapped = _nodal_values(mesh, cuts)
+    plus = values[mesh.cells] >= 0.0
+    crossed = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
+    sizes = np.zeros(len(mesh.cells))
+    sizes[crossed] = mesh.longest_edges(crossed)
+
+    def parted(cells: _Ints, rules: _Rules) -> tuple[Partition, list[_Ints]]:
+        points = ZeroPoints(mesh.points, values, ROUND_OFF * mesh.extent)
+        return _parted(Partition.whole(mesh.cells, cells, points, snapped), rules)
+
+    rules = _Rules(cuts, sizes, tip, held, opened)
+    partition, ends = parted(crossed, rules)
+    if tip != "inside" or len(cuts) < 2:
+        return partition.only_split()
+    # what all cuts part together they part when some of them are not open yet, too
+    free = rules._replace(held=None, opened=None)
+    alone, ends = (partition, ends) if opened is None else parted(crossed, free)
+    meets = meeting_cells(alone, ends, len(mesh.cells), joint)
+    suspects = np.flatnonzero(meets.any(axis=1))
+    if len(suspects) == 0:
+        return partition.only_split()
+    trial = parted(suspects, free._replace(through=meets))[0]
+    through = joint_cuts(without_specks(trial, meets.any(axis=1)), alone, cuts, sizes, joint)
+    if not through.any():
+        return partition.only_split()
+    cells = through.any(axis=1)
+    partition = parted(crossed, rules._replace(through=through))[0]
+    partition = without_specks(partition, cells).only_split()
+    return replace(partition, tied=tied_pieces(partition, cuts, sizes, cells))
+
+
+def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
+    values = np.empty((len(mesh.points), len(cuts)))
+    for index, cut in enumerate(cuts):
+        if not hasattr(cut, "level_set"):
+            raise XfemError(f"cut {index} of type {type(cut).__name__}; expected a cut")
+        try:
+            column = real_array(cut.level_set(mesh.points), "level set")
+        except XfemError as error:
+            raise XfemError(f"cut {index}: {error}") from None
+        if column.shape != (len(mesh.points),) or not np.isfinite(column).all():
+            raise XfemError(f"cut {index}: level set of shape {column.shape} or not finite")
+        values[:, index] = column
+    tiny = (np.abs(values) <= ROUND_OFF * mesh.extent) & (values != 0.0)
+    values[tiny] = 0.0
+    return values, int(tiny.sum())
+
+
+def _parted(partition: Partition, rules: _Rules) -> tuple[Partition, list[_Ints]]:
+    """Divide pieces by all cuts; also the cells in pieces of which each cut ends."""
+    ends = [np.empty(0, dtype=np.int64)] * len(rules.cuts)
+    # a branch given before its stem can split only once the stem has: hence more than one pass
+    for _ in rules.cuts:
+        before = len(partition.parent)
+        for index in range(len(rules.cuts)):
+            partition, ends[index] = _split_by(partition, index, rules)
+        if len(partition.parent) == before or len(rules.cuts) == 1:
+            break
+    return partition, ends
+
+
+def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partition, _Ints]:
+    """Divide pieces by one cut; also the cells in pieces of which it ends."""
+    points, parent, cut = partition.points, partition.parent, rules.cuts[index]
+    edges, piece = partition.crossed_edges(index)
+    if len(edges) == 0:
+        return partition, np.empty(0, dtype=np.int64)
+    crossing = Crossing(
+        zero=points.find(index, edges[:, 0], edges[:, 1]),
+        piece=piece,
+        size=rules.sizes[parent[piece]],
+        pieces=len(parent),
+    )
+    further = None
+    if rules.tip == "inside" and len(rules.cuts) > 1:
+
+        def further(past: _Ints, size: _Floats) -> _Bools:
+            return reached(rules.cuts, index, points, past, size)
+
+    active, ending = crossed_through(cut, points.positions, crossing, rules.tip, further)
+    meets = np.bincount(piece, minlength=len(active)) > 0
+    if rules.through is not None:
+        active |= meets & rules.through[parent, index]
+    if rules.held is not None:
+        doubtful = np.flatnonzero(meets & ~active)
+        active[doubtful] = rules.held(parent[doubtful], partition.label[doubtful], index)
+    if rules.opened is not None:
+        active &= rules.opened[parent, index]
+    ends = parent[ending]
+    if not active.any():
+        return partition, ends
+    partition = _divide(partition, index, active)
+    return (partition if len(rules.cuts) == 1 else _bisect_beside(partition, index)), ends
+
+
+def _divide(partition: Partition, index: int, active: _Bools) -> Partition:
+    """Replace each active piece by its part above (same place) and below (appended)."""
+    below = np.where(active, len(active) - 1 + np.cumsum(active), -1)
+    label = np.concatenate([partition.label, partition.label[active]])
+    label[: len(active)][active, index] = 1
+    label[len(active) :, index] = -1
+    return replace(
+        partition,
+        parent=np.concatenate([partition.parent, partition.parent[active]]),
+        label=label,
+        simplices=divided(partition.simplices, partition.points, index, below),
+    )
+
+
+def _bisect_beside(partition: Partition, index: int) -> Partition:
+    """Bisect what a cut leaves whole where it ends, so that later cuts find matching edges."""
+    zero, simplices = partition.points, partition.simplices
+    if len(partition.crossed_edges(index)[0]) == 0:
+        return partition
+    labelled = partition.label[simplices.piece, index] != 0
+    on_cut = np.zeros(len(zero.positions), dtype=bool)
+    on_cut[simplices.points[labelled]] = True
+    numbers = np.flatnonzero(on_cut[zero.nodes :] & (zero.cut == index))
+    beside = bisected(simplices[~labelled], zero, numbers)
+    return replace(partition, simplices=simplices[labelled] + beside)

@@ -1,1 +1,0 @@
-"""Elements that cuts go through: their pieces, and which of these share unknowns."""
