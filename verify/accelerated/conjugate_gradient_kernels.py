@@ -3,12 +3,8 @@
 import numpy as np
 from numba import njit
 
-from verify.accelerated.symmetric_sweep_kernels import (
-    add_lower_product,
-    solve_lower,
-    solve_upper,
-    symmetric_product,
-)
+from verify.accelerated.symmetric_sweep_kernels import add_lower_product, solve_lower, solve_upper
+from verify.xfem.block_pattern import symmetric_product
 
 __all__ = ["conjugate_gradients", "invert_blocks"]
 
@@ -116,8 +112,9 @@ def _invert_blocks_3(blocks, diagonal, out):
 
 @njit(cache=True)
 def conjugate_gradients(
-    starts, columns, diagonal, blocks, inverse, load, x, is_zero, work, tolerance, limit
-):
+    starts, columns, diagonal, blocks, upper_starts, upper_columns, upper, inverse, load, x,
+    is_zero, work, tolerance, limit,
+):  # fmt: skip
     """Improve x (N, d) in place until ‖b − Kx‖ ≤ tolerance·‖b‖, in the 2-norm.
 
     With K = L + D + Lᵀ, of the system (D + L)⁻¹ K (D + Lᵀ)⁻¹ x̂ = (D + L)⁻¹ b, preconditioned by D,
@@ -131,13 +128,14 @@ def conjugate_gradients(
     ----------
     starts, columns, diagonal, blocks
         The matrix; what is below its diagonal is not read.
-    inverse : (N, d, `vector_width`) float array
-        Of the diagonal blocks; for blocks of three the fourth numbers are zero.
+    upper_starts, upper_columns, upper
+        What is above it, as the sweeps take it.
+    inverse : (N, d, d) float array
+        Of the diagonal blocks.
     load, x : (N, d) float array
     is_zero : bool
         Whether x is, so that the first residual is the load.
-    work : (8, N, `vector_width`) float array
-        Zero where there is no component.
+    work : (8, N, d) float array
 
     Returns
     -------
@@ -168,15 +166,15 @@ def conjugate_gradients(
     target, norm = tolerance**2 * size, _square(flat_z)
     if norm <= target or limit == 0:
         return 0, np.sqrt(norm / size)
-    solve_lower(starts, columns, diagonal, blocks, inverse, z, r)  # z becomes D r
+    solve_lower(upper_starts, upper_columns, upper, inverse, z, r)  # z becomes D r
     rho = 0.0
     for i in range(len(flat_z)):
         flat_p[i] = flat_z[i]
         rho += flat_r[i] * flat_z[i]
     promise = rho * target / norm
     for iteration in range(1, limit + 1):
-        solve_upper(starts, columns, diagonal, blocks, inverse, p, t, g, u)
-        solve_lower(starts, columns, diagonal, blocks, inverse, g, q)
+        solve_upper(upper_starts, upper_columns, upper, inverse, p, t, g, u)
+        solve_lower(upper_starts, upper_columns, upper, inverse, g, q)
         curvature = _curvature(flat_p, flat_t, flat_q, flat_q, flat_u, flat_g)
         if not curvature > 0.0:
             return -1, np.sqrt(norm / size)
@@ -187,7 +185,7 @@ def conjugate_gradients(
         if rho <= promise or iteration == limit or broken:
             for i in range(len(flat_z)):  # not a slice: numba would compile its words for a misfit
                 flat_t[i] = flat_z[i]
-            add_lower_product(starts, columns, diagonal, blocks, r, t)
+            add_lower_product(upper_starts, upper_columns, upper, r, t)
             norm = _square(flat_t)
             if norm <= target or iteration == limit or broken:
                 for row in range(x.shape[0]):

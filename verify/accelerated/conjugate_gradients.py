@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.accelerated.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
-from verify.accelerated.symmetric_sweep_kernels import vector_width
+from verify.accelerated.symmetric_sweep_kernels import take_upper, upper_pattern
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
 from verify.xfem.given_arrays import check_floats
@@ -51,9 +51,10 @@ class ConjugateGradients(LinearSolver):
         if not 0.0 < tolerance < 1.0 or limit < 1:
             raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
         self._pattern, self.tolerance, self.limit = pattern, tolerance, limit
-        width = vector_width(block)
-        self._inverse = np.zeros((pattern.node_count, block, width))
-        self._work = np.zeros((8, pattern.node_count, width))
+        self._rows, self._columns = upper_pattern(pattern.starts, pattern.columns, pattern.diagonal)
+        self._upper = np.empty((len(self._columns), block, block))
+        self._inverse = np.zeros((pattern.node_count, block, block))
+        self._work = np.zeros((8, pattern.node_count, block))
         self._block = block
         self._blocks: _Floats | None = None
         self.iterations = 0
@@ -65,6 +66,7 @@ class ConjugateGradients(LinearSolver):
         if failed >= 0:
             raise SingularStiffnessError(failed)
         self._blocks = np.ascontiguousarray(blocks)
+        take_upper(self._pattern.starts, self._pattern.diagonal, self._blocks, self._upper)
 
     def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
         """Solve; see `LinearSolver`. With room for the solution, nothing is allocated."""
@@ -82,8 +84,9 @@ class ConjugateGradients(LinearSolver):
             x /= scale
             return x
         iterations, residual = conjugate_gradients(
-            pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._inverse,
-            load, x, not x.any(), self._work, self.tolerance, self.limit,
+            pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._rows,
+            self._columns, self._upper, self._inverse, load, x, not x.any(), self._work,
+            self.tolerance, self.limit,
         )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)

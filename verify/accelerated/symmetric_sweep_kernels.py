@@ -1,72 +1,67 @@
-"""Sweeps over the upper half of a symmetric matrix in nodal blocks, K = L + D + Lᵀ.
+"""Gauß–Seidel sweeps over a symmetric matrix in nodal blocks, K = L + D + Lᵀ.
 
-Only blocks above the diagonal are read, those of a row as they lie, forwards and backwards: where
-the cache holds most of them, the sweep back finds what the sweep there has left. Blocks of three
-are multiplied row by row in vectors of four numbers, so that vectors over the nodes have a fourth
-component, which is zero (`vector_width`); others take general loops.
+They read the blocks above the diagonal, which lie one after the other in a memory of their own:
+read forwards and backwards without gaps, they arrive before they are asked for. Blocks of three are
+written out, so that sums stay in registers.
 """
 
+import numpy as np
 from numba import njit
 
-from verify.xfem.lanes.node_vectors import (
-    WIDTH,
-    add_product,
-    add_rows,
-    load_node,
-    load_three,
-    no_node,
-    row_sums,
-    three,
-)
-from verify.xfem.lanes.shuffles import address
-from verify.xfem.lanes.vectors import fetch, minus, plus, store
+__all__ = ["add_lower_product", "solve_lower", "solve_upper", "take_upper", "upper_pattern"]
 
-__all__ = ["add_lower_product", "solve_lower", "solve_upper", "symmetric_product", "vector_width"]
-
-_AHEAD = 4  # rows by which blocks are brought to the cache before they are read
-_LINE = 8  # numbers in a line of the cache
+_FUSED = {"contract"}  # multiply and add in one, rounded once
 
 
-def vector_width(size: int) -> int:
-    """Numbers of each node, for blocks of this size, in the vectors that the sweeps take."""
-    return WIDTH if size == 3 else size
+def upper_pattern(starts, columns, diagonal):
+    """First block and columns of each row above the diagonal; unsigned, no index is negative."""
+    above = columns > np.repeat(np.arange(len(diagonal)), np.diff(starts))
+    count = starts[1:] - diagonal - 1
+    return np.concatenate([[0], np.cumsum(count)]), columns[above].astype(np.uint32)
 
 
 @njit(cache=True)
-def _fetch_row(row, starts, diagonal, blocks):
-    """Have the blocks of a row above the diagonal brought to the cache."""
-    for place in range(9 * diagonal[row] + 9, 9 * starts[row + 1], _LINE):
-        fetch(blocks, place)
+def take_upper(starts, diagonal, blocks, upper):
+    """Copy the blocks (B, d, d) above the diagonal."""
+    size, count = blocks.shape[1], 0
+    for row in range(len(diagonal)):
+        for at in range(diagonal[row] + 1, starts[row + 1]):
+            if size == 3:
+                for k in range(3):
+                    upper[count, k, 0] = blocks[at, k, 0]
+                    upper[count, k, 1] = blocks[at, k, 1]
+                    upper[count, k, 2] = blocks[at, k, 2]
+            else:
+                upper[count] = blocks[at]
+            count += 1
 
 
 @njit(cache=True)
-def solve_upper(starts, columns, diagonal, blocks, inverse, p, t, e, u):
+def solve_upper(starts, columns, upper, inverse, p, t, e, u):
     """Find t = (D + Lᵀ)⁻¹ p, with e = Lᵀ t and u = D t = p − e.
 
     Parameters
     ----------
-    starts, columns, diagonal : int arrays
-        Pattern.
-    blocks : (B, d, d) float array
-    inverse : (N, d, `vector_width`) float array
+    starts, columns : int arrays
+        As of `upper_pattern`.
+    upper : (B, d, d) float array
+        Blocks above the diagonal.
+    inverse : (N, d, d) float array
         Of the diagonal blocks.
-    p : (N, `vector_width`) float array
-    t, e, u : (N, `vector_width`) float array
+    p : (N, d) float array
+    t, e, u : (N, d) float array
         Overwritten.
     """
-    if blocks.shape[1] == 3:
-        _solve_upper_3(
-            len(diagonal), address(starts), address(columns), address(diagonal), address(blocks),
-            address(inverse), address(p), address(t), address(e), address(u),
-        )  # fmt: skip
+    size = upper.shape[1]
+    if size == 3:
+        _solve_upper_3(starts, columns, upper, inverse, p, t, e, u)
         return
-    size = blocks.shape[1]
-    for row in range(len(diagonal) - 1, -1, -1):
+    for row in range(len(inverse) - 1, -1, -1):
         for k in range(size):
             e[row, k] = 0.0
-            for at in range(diagonal[row] + 1, starts[row + 1]):
+            for at in range(starts[row], starts[row + 1]):
                 for l in range(size):
-                    e[row, k] += blocks[at, k, l] * t[columns[at], l]
+                    e[row, k] += upper[at, k, l] * t[columns[at], l]
             u[row, k] = p[row, k] - e[row, k]
         for k in range(size):
             t[row, k] = 0.0
@@ -74,134 +69,75 @@ def solve_upper(starts, columns, diagonal, blocks, inverse, p, t, e, u):
                 t[row, k] += inverse[row, k, l] * u[row, l]
 
 
-@njit(cache=True)
-def _solve_upper_3(rows, starts, columns, diagonal, blocks, inverse, p, t, e, u):
-    for row in range(rows - 1, -1, -1):
-        if row >= _AHEAD:
-            _fetch_row(row - _AHEAD, starts, diagonal, blocks)
-        a = b = c = no_node()
+@njit(cache=True, fastmath=_FUSED)
+def _solve_upper_3(starts, columns, upper, inverse, p, t, e, u):
+    for row in range(len(inverse) - 1, -1, -1):
+        a = b = c = 0.0
         # backwards: the neighbour whose value is the last to be known comes last
-        for back in range(starts[row + 1] - 1 - diagonal[row]):
-            place = starts[row + 1] - 1 - back
-            at, node = 9 * place, load_node(t, WIDTH * columns[place])
-            a = add_product(a, load_node(blocks, at), node)
-            b = add_product(b, load_node(blocks, at + 3), node)
-            c = add_product(c, load_node(blocks, at + 6), node)
-        beside = row_sums(a, b, c)
-        rest = minus(load_node(p, WIDTH * row), beside)
-        store(e, WIDTH * row, beside)
-        store(u, WIDTH * row, rest)
-        store(t, WIDTH * row, add_rows(no_node(), inverse, 3 * WIDTH * row, WIDTH, rest))
+        for at in range(starts[row + 1] - 1, starts[row] - 1, -1):
+            j = columns[at]
+            x, y, z = t[j, 0], t[j, 1], t[j, 2]
+            a += upper[at, 0, 0] * x + upper[at, 0, 1] * y + upper[at, 0, 2] * z
+            b += upper[at, 1, 0] * x + upper[at, 1, 1] * y + upper[at, 1, 2] * z
+            c += upper[at, 2, 0] * x + upper[at, 2, 1] * y + upper[at, 2, 2] * z
+        e[row, 0], e[row, 1], e[row, 2] = a, b, c
+        a, b, c = p[row, 0] - a, p[row, 1] - b, p[row, 2] - c
+        u[row, 0], u[row, 1], u[row, 2] = a, b, c
+        for k in range(3):
+            t[row, k] = inverse[row, k, 0] * a + inverse[row, k, 1] * b + inverse[row, k, 2] * c
 
 
 @njit(cache=True)
-def solve_lower(starts, columns, diagonal, blocks, inverse, g, s):
+def solve_lower(starts, columns, upper, inverse, g, s):
     """Find s = (D + L)⁻¹ g; of g only D s is left.
 
     Parameters
     ----------
-    starts, columns, diagonal, blocks, inverse
+    starts, columns, upper, inverse
         As for `solve_upper`.
-    g : (N, `vector_width`) float array
+    g : (N, d) float array
         Right-hand side.
-    s : (N, `vector_width`) float array
+    s : (N, d) float array
         Overwritten.
     """
-    if blocks.shape[1] == 3:
-        _solve_lower_3(
-            len(diagonal), address(starts), address(columns), address(diagonal), address(blocks),
-            address(inverse), address(g), address(s),
-        )  # fmt: skip
+    size = upper.shape[1]
+    if size == 3:
+        _solve_lower_3(starts, columns, upper, inverse, g, s)
         return
-    size = blocks.shape[1]
-    for row in range(len(diagonal)):
+    for row in range(len(inverse)):
         for k in range(size):
             s[row, k] = 0.0
             for l in range(size):
                 s[row, k] += inverse[row, k, l] * g[row, l]
-        for at in range(diagonal[row] + 1, starts[row + 1]):
+        for at in range(starts[row], starts[row + 1]):
             for k in range(size):
                 for l in range(size):
-                    g[columns[at], l] -= blocks[at, k, l] * s[row, k]
+                    g[columns[at], l] -= upper[at, k, l] * s[row, k]
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _solve_lower_3(starts, columns, upper, inverse, g, s):
+    for row in range(len(inverse)):
+        a, b, c = g[row, 0], g[row, 1], g[row, 2]
+        x = inverse[row, 0, 0] * a + inverse[row, 0, 1] * b + inverse[row, 0, 2] * c
+        y = inverse[row, 1, 0] * a + inverse[row, 1, 1] * b + inverse[row, 1, 2] * c
+        z = inverse[row, 2, 0] * a + inverse[row, 2, 1] * b + inverse[row, 2, 2] * c
+        s[row, 0], s[row, 1], s[row, 2] = x, y, z
+        for at in range(starts[row], starts[row + 1]):
+            j = columns[at]
+            a, b, c = g[j, 0], g[j, 1], g[j, 2]
+            a = a - upper[at, 0, 0] * x - upper[at, 1, 0] * y - upper[at, 2, 0] * z
+            b = b - upper[at, 0, 1] * x - upper[at, 1, 1] * y - upper[at, 2, 1] * z
+            c = c - upper[at, 0, 2] * x - upper[at, 1, 2] * y - upper[at, 2, 2] * z
+            g[j, 0], g[j, 1], g[j, 2] = a, b, c
 
 
 @njit(cache=True)
-def _solve_lower_3(rows, starts, columns, diagonal, blocks, inverse, g, s):
-    for row in range(rows):
-        if row + _AHEAD < rows:
-            _fetch_row(row + _AHEAD, starts, diagonal, blocks)
-        rest = load_node(g, WIDTH * row)
-        store(g, WIDTH * row, three(rest))  # the fourth number is what stood beside blocks
-        node = add_rows(no_node(), inverse, 3 * WIDTH * row, WIDTH, rest)
-        store(s, WIDTH * row, node)
-        negative = minus(no_node(), node)
-        for place in range(diagonal[row] + 1, starts[row + 1]):
-            other = WIDTH * columns[place]
-            store(g, other, add_rows(load_node(g, other), blocks, 9 * place, 3, negative))
-
-
-@njit(cache=True)
-def add_lower_product(starts, columns, diagonal, blocks, s, out):
-    """Add L s (N, `vector_width`) to `out`."""
-    size = blocks.shape[1]
-    if size == 3:
-        _add_lower_product_3(
-            len(diagonal), address(starts), address(columns), address(diagonal), address(blocks),
-            address(s), address(out),
-        )  # fmt: skip
-        return
-    for row in range(len(diagonal)):
-        for at in range(diagonal[row] + 1, starts[row + 1]):
+def add_lower_product(starts, columns, upper, s, out):
+    """Add L s (N, d) to `out`."""
+    size = upper.shape[1]
+    for row in range(len(s)):
+        for at in range(starts[row], starts[row + 1]):
             for k in range(size):
                 for l in range(size):
-                    out[columns[at], l] += blocks[at, k, l] * s[row, k]
-
-
-@njit(cache=True)
-def _add_lower_product_3(rows, starts, columns, diagonal, blocks, s, out):
-    for row in range(rows):
-        if row + _AHEAD < rows:
-            _fetch_row(row + _AHEAD, starts, diagonal, blocks)
-        node = load_node(s, WIDTH * row)
-        for place in range(diagonal[row] + 1, starts[row + 1]):
-            other = WIDTH * columns[place]
-            store(out, other, add_rows(load_node(out, other), blocks, 9 * place, 3, node))
-        store(out, WIDTH * row, three(load_node(out, WIDTH * row)))
-
-
-@njit(cache=True)
-def symmetric_product(starts, columns, diagonal, blocks, x, out):
-    """Write K x (N, `vector_width`) to `out`."""
-    out[:] = 0.0
-    size = blocks.shape[1]
-    if size == 3:
-        _symmetric_product_3(
-            len(diagonal), address(starts), address(columns), address(diagonal), address(blocks),
-            address(x), address(out),
-        )  # fmt: skip
-        return
-    for row in range(len(diagonal)):
-        for k in range(size):
-            for at in range(diagonal[row], starts[row + 1]):
-                for l in range(size):
-                    out[row, k] += blocks[at, k, l] * x[columns[at], l]
-    add_lower_product(starts, columns, diagonal, blocks, x, out)
-
-
-@njit(cache=True)
-def _symmetric_product_3(rows, starts, columns, diagonal, blocks, x, out):
-    for row in range(rows):
-        if row + _AHEAD < rows:
-            _fetch_row(row + _AHEAD, starts, diagonal, blocks)
-        here, middle = load_node(x, WIDTH * row), 9 * diagonal[row]
-        a = add_product(no_node(), load_node(blocks, middle), here)
-        b = add_product(no_node(), load_node(blocks, middle + 3), here)
-        c = add_product(no_node(), load_three(blocks, middle + 6), here)  # the last of all, once
-        for place in range(diagonal[row] + 1, starts[row + 1]):
-            at, other = 9 * place, WIDTH * columns[place]
-            node = load_node(x, other)
-            a = add_product(a, load_node(blocks, at), node)
-            b = add_product(b, load_node(blocks, at + 3), node)
-            c = add_product(c, load_node(blocks, at + 6), node)
-            store(out, other, add_rows(load_node(out, other), blocks, at, 3, here))
-        store(out, WIDTH * row, plus(three(load_node(out, WIDTH * row)), row_sums(a, b, c)))
+                    out[columns[at], l] += upper[at, k, l] * s[row, k]

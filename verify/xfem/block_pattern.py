@@ -11,7 +11,7 @@ from scipy.sparse import bsr_array, csr_array
 from verify.xfem.arrays.short_sort import sort_short
 from verify.xfem.errors import XfemError
 
-__all__ = ["BlockPattern", "block_pattern"]
+__all__ = ["BlockPattern", "block_pattern", "symmetric_product"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int32]
@@ -71,7 +71,7 @@ class BlockPattern:
 
     def symmetric_product(self, blocks: _Floats, vector: _Floats, out: _Floats) -> None:
         """Write K v (N, d); blocks (B, d, d) below the diagonal are not read."""
-        _symmetric_product(self.starts, self.columns, self.diagonal, blocks, vector, out)
+        symmetric_product(self.starts, self.columns, self.diagonal, blocks, vector, out)
 
     def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
         """Return the matrix of the given blocks (B, d, d), without a copy."""
@@ -171,7 +171,8 @@ def _mirror(starts, columns):
 
 
 @njit(cache=True)
-def _symmetric_product(starts, columns, diagonal, blocks, vector, out):
+def symmetric_product(starts, columns, diagonal, blocks, vector, out):
+    """Write K v (N, d) to `out`; blocks (B, d, d) below the diagonal are not read."""
     space = vector.shape[1]
     out[:] = 0.0
     for row in range(len(diagonal)):
