@@ -1,0 +1,157 @@
+"""Plain and fast kernels give one answer, to round-off: plates, blocks, membranes, slivers."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, cut_membrane, isotropic
+from turned_bodies import random_mesh, turn, turned_body, turned_sheet
+
+from verify.accelerated import FAST
+from verify.xfem.corotation import InternalForce
+from verify.xfem.cuts import Plane
+from verify.xfem.dynamics import (
+    DynamicBody,
+    EnergyMomentum,
+    GeneralisedAlpha,
+    ImplicitEuler,
+    RealTimeEuler,
+    Trapezoidal,
+)
+from verify.xfem.errors import SingularStiffnessError
+from verify.xfem.kernels import PLAIN
+from verify.xfem.loads import body_force
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.slivers import GhostPenalty
+from verify.xfem.statics import solve_static, static_equilibrium
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+KERNELS = {"plain": PLAIN, "fast": FAST}
+
+
+def _stuff(virtual):
+    mesh = virtual.mesh
+    kind = "solid" if mesh.dim == 3 else "plane strain" if mesh.space == 2 else "plane stress"
+    return isotropic(1e4, 0.3, kind)
+
+
+def _cut(mesh, fraction=0.43):
+    """Across in a general position, or beside the nodes of a plane of them."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    normal = np.array([1.0, 0.37, -0.21])[: mesh.space]
+    if fraction < 0.1:
+        normal[1:] = 0.0
+    return cut_mesh(mesh, [Plane(low + (0.4 + fraction) * (high - low), normal)])
+
+
+BODIES = {
+    "plate": lambda: _cut(random_mesh(3, 2, 7)),
+    "block": lambda: _cut(random_mesh(4, 3, 4)),
+    "membrane": cut_membrane,
+    "plate with slivers": lambda: _cut(rectangle_mesh((10, 10)), 1e-9),
+    "block with slivers": lambda: _cut(box_mesh((5, 5, 5)), 1e-6),
+}
+
+
+def _held(virtual):
+    points = virtual.mesh.points
+    low, high = points[:, 0].min(), points[:, 0].max()
+    ends = (points[:, 0] == low) | (points[:, 0] == high)
+    held = Supports.none(virtual).prescribe(virtual, ends)
+    if virtual.mesh.dim < virtual.mesh.space:  # resists in its plane alone
+        whole = np.ones(len(points), dtype=bool)
+        held = held.prescribe(virtual, whole, components=(2,))
+    return held
+
+
+def _load(virtual):
+    return body_force(virtual, [30.0, -20.0, 10.0][: virtual.mesh.space])
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_linear_statics(solver, name):
+    virtual = BODIES[name]()
+    stuff, held, load = _stuff(virtual), _held(virtual), _load(virtual)
+    plain, fast = (
+        solve_static(virtual, stuff, held, load, solver=solver, kernels=kernels)
+        for kernels in KERNELS.values()
+    )
+    size = np.abs(fast.displacement).max()
+    # round-off of sliver unknowns is amplified by at most the condition scaled by the diagonal
+    assert np.abs(plain.displacement - fast.displacement).max() < 1e-9 * size
+    assert plain.strain_energy == pytest.approx(fast.strain_energy, rel=1e-11)
+    assert plain.residual < 1e-10
+
+
+def test_linear_statics_with_a_ghost_penalty():
+    virtual = BODIES["block with slivers"]()
+    stuff, held, load = _stuff(virtual), _held(virtual), _load(virtual)
+    ghost = GhostPenalty(virtual, stuff)
+    plain, fast = (
+        solve_static(virtual, stuff, held, load, ghost=ghost, kernels=kernels)
+        for kernels in KERNELS.values()
+    )
+    assert plain.strain_energy == pytest.approx(fast.strain_energy, rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("make", "degrees"),
+    [
+        (partial(turned_body, 1, 2, 6), 70.0),
+        (partial(turned_body, 1, 3, 3), 70.0),
+        (partial(turned_sheet, 1, 5), 30.0),
+    ],
+    ids=["plate", "block", "membrane"],
+)
+def test_equilibria_after_large_turns(make, degrees):
+    body = make()
+    path = turn(body, degrees)
+    stuff = _stuff(body.virtual)
+    plain, fast = (
+        static_equilibrium(
+            InternalForce(body.virtual, stuff, kernels=kernels), body.fixed, path, load_steps=2
+        )
+        for kernels in KERNELS.values()
+    )
+    assert plain.energy == pytest.approx(fast.energy, rel=1e-9)
+    assert plain.iterations == fast.iterations
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize(
+    "scheme", [RealTimeEuler, ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum]
+)
+def test_motion(scheme, name):
+    virtual = BODIES[name]()
+    moved = []
+    for kernels in KERNELS.values():
+        mass = side_wise_mass(virtual, DENSITY)
+        body = DynamicBody(
+            InternalForce(virtual, _stuff(virtual), kernels=kernels),
+            mass,
+            weight=mass.weight([3.0, -2.0, 1.0][: virtual.mesh.space]),
+            supports=_held(virtual),
+        )
+        integrator, state = scheme(body, 0.02), body.rest()
+        for _ in range(6):
+            integrator.step(state)
+        moved.append(state)
+    plain, fast = moved
+    # each step is solved to 1e-10 of its forces
+    for one, other in ((plain.displacement, fast.displacement), (plain.velocity, fast.velocity)):
+        assert np.abs(one - other).max() < 1e-7 * np.abs(other).max()
+
+
+@pytest.mark.parametrize("name", ["plate", "block"])
+@pytest.mark.parametrize("kernels", KERNELS.values(), ids=KERNELS)
+def test_a_free_piece_is_refused_by_both(kernels, name):
+    """Held by one end, cut right through: the other half floats."""
+    virtual = BODIES[name]()
+    points = virtual.node_points
+    fixed = np.repeat((points[:, 0] == points[:, 0].min())[:, None], virtual.mesh.space, axis=1)
+    force = InternalForce(virtual, _stuff(virtual), kernels=kernels)
+    with pytest.raises(SingularStiffnessError):
+        static_equilibrium(force, fixed, load=_load(virtual))
