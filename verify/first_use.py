@@ -34,7 +34,6 @@ from verify.simulator.session import Session
 from verify.simulator.stage import Stage
 from verify.solution import Solution
 from verify.threads import ONE_THREAD
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane, ToolPath
 from verify.xfem.dynamics import (
     CentralDifferences,
@@ -44,6 +43,7 @@ from verify.xfem.dynamics import (
     Trapezoidal,
 )
 from verify.xfem.elasticity import State, isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh

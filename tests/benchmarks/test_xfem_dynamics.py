@@ -12,10 +12,10 @@ import pytest
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import DynamicBody, EnergyMomentum, RealTimeEuler, Trapezoidal
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports

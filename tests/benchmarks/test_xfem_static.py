@@ -12,12 +12,12 @@ from scipy.sparse.linalg import splu
 
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.xfem.assembly_kernels import constrain
+from verify.xfem.assembly import constrain
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -39,9 +39,9 @@ BODIES = {
 def prepare(name):
     mesh, cut = BODIES[name]
     virtual = cut_mesh(mesh, [cut])
-    stiffness = LinearStiffness(virtual, isotropic(1.0, 0.3, "solid"))
+    stiffness = InternalForce(virtual, isotropic(1.0, 0.3, "solid"), "linear")
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    blocks = stiffness.assemble(pattern)
+    blocks = stiffness.stiffness(pattern)
     first = mesh.points[:, 0]
     ends = (first == first.min()) | (first == first.max())
     supports = Supports.none(virtual).prescribe(virtual, ends)
@@ -70,8 +70,8 @@ def test_cutting_a_mesh(benchmark, name):
 
 @pytest.mark.parametrize("name", BODIES)
 def test_assembly(benchmark, name):
-    _, stiffness, pattern, blocks, _ = prepare(name)
-    benchmark(stiffness.assemble, pattern, blocks)
+    _, stiffness, pattern, *_ = prepare(name)
+    benchmark(stiffness.stiffness, pattern)
 
 
 @pytest.mark.parametrize("name", BODIES)

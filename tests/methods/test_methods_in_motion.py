@@ -6,10 +6,10 @@ from method_bodies import CUTTING, held_at
 
 from verify.methods.catalogue import cut_by
 from verify.methods.spring_force import SpringForce
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Polyline
 from verify.xfem.dynamics import CentralDifferences, DynamicBody, ImplicitEuler
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.statics import static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh

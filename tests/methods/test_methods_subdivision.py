@@ -11,8 +11,8 @@ from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 LINES = [Polyline([[-0.1, 0.31], [0.62, 0.55]])]
@@ -74,7 +74,7 @@ def test_the_critical_step_of_subdivision_vanishes_with_the_sliver_that_of_xfem_
         for method, found in steps.items():
             body = cut_by(method, mesh, [cut])
             pattern = block_pattern(body.virtual.cells, body.virtual.node_count)
-            blocks = LinearStiffness(body.virtual, material).assemble(pattern)
+            blocks = InternalForce(body.virtual, material, "linear").stiffness(pattern)
             mass = side_wise_mass(body.virtual, 1.0)
             found.append(critical_step(pattern.matrix(blocks), mass))
     slope = np.diff(np.log(steps["subdivision"])) / np.diff(np.log(sizes))

@@ -4,14 +4,13 @@ import numpy as np
 from cut_bodies import DENSITY, material
 from test_sliver_policies import shaken
 
-from verify.xfem.corotation import InternalForce
-from verify.xfem.corotation.crushed_pieces import inverted_pieces
+from verify.xfem.assembly import body_pattern
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import CentralDifferences, DynamicBody
+from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.sparsity import body_pattern
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -22,7 +21,7 @@ STRAIN, POISSON = 0.15, 0.3
 def rest_step(virtual, mass, stuff):
     force = InternalForce(virtual, stuff, "linear")
     pattern = body_pattern(virtual)
-    blocks = force.stiffness(pattern, np.zeros_like(virtual.node_points), "frozen")
+    blocks = force.stiffness(pattern, np.zeros_like(virtual.node_points), "rotation-fixed")
     return critical_step(pattern.matrix(blocks), mass)
 
 
@@ -65,7 +64,7 @@ def let_go(virtual, share, steps, every=10, start=stretched):
     for step in range(steps):
         integrator.step(state)
         if step % every == 0:
-            inverted += len(inverted_pieces(force, state.displacement)) > 0
+            inverted += len(inverted_cells(force, state.displacement)) > 0
             kinetic = 0.5 * (mass.apply(state.velocity) * state.velocity).sum()
             largest = max(largest, (force.evaluate(state.displacement)[1] + kinetic) / before)
             if not largest < 100.0:

@@ -3,26 +3,35 @@
 import numpy as np
 import pytest
 
-from verify.xfem.corotation.averaged_stress_kernels import stress
-from verify.xfem.corotation.polar_kernels import nearest_rotation
-from verify.xfem.dynamics.averaged_stress_tangent import stress_slope
+from verify.xfem.averaged_stress import StepEnds, averaged_moduli, averaged_stress
+from verify.xfem.element import Elements
+from verify.xfem.polar import nearest_rotations
 
 LAM, MU = 1.3, 0.7
 
 
 def _rotation(F):
-    R = np.empty_like(F)
-    nearest_rotation(F, R)
-    return R
+    return nearest_rotations(F[None])[0]
+
+
+def _element(space, dim, normal):
+    """One element; its stress reads no more than these."""
+    one = np.zeros(1, dtype=np.int64)
+    return Elements(
+        cells=np.zeros((1, dim + 1), dtype=np.int64), parent=one, gradients=np.empty(0),
+        volumes=np.ones(1), normals=normal[None], lam=np.array([LAM]), mu=np.array([MU]),
+        axes=tuple(range(space)), corners=tuple(range(dim + 1)),
+    )  # fmt: skip
+
+
+def _step(F0, F1):
+    return StepEnds(*(X[None] for X in (F0, F1, _rotation(F0), _rotation(F1))))
 
 
 def _stress(F0, F1, dim, normal, substituted):
-    P = np.empty_like(F0)
-    taken = stress(
-        F0, F1, _rotation(F0), _rotation(F1), LAM, MU, dim, normal, substituted,
-        np.empty((3, 3, 3)), P,
-    )  # fmt: skip
-    return P, taken
+    taken = np.array([substituted])
+    P = averaged_stress(_element(len(F0), dim, normal), _step(F0, F1), taken)[0]
+    return P, bool(taken[0])
 
 
 def _energy(F, dim):
@@ -68,10 +77,8 @@ def test_the_derivative_of_the_averaged_stress_equals_central_differences(kind, 
         taken_somewhere |= taken
         # the substitute is kept once taken, as it is in a step
         space = len(F0)
-        slope = stress_slope(
-            *(X[None] for X in (F0, F1, _rotation(F0), _rotation(F1))),
-            np.array([LAM]), np.array([MU]), dim, normal[None], np.array([taken]),
-        )[0]  # fmt: skip
+        element = _element(space, dim, normal)
+        slope = averaged_moduli(element, _step(F0, F1), np.array([taken]))[0]
         # differences see curvature and round-off, both 1/gap³ times what they are at gap 1
         gap = min(np.linalg.svd(F)[1][:dim].min() for F in (F0 + F1, F1))
         if gap < 0.1:

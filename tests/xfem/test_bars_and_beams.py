@@ -10,7 +10,6 @@ from scipy.sparse import kron
 from scipy.sparse.linalg import eigsh
 
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.dynamics import (
@@ -21,8 +20,8 @@ from verify.xfem.dynamics import (
     treat_moving_body,
 )
 from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
@@ -125,7 +124,7 @@ def tones(rows, cuts, mass, columns, count):
     mesh = rectangle_mesh((columns, rows), upper=(1.0, 0.2))
     v = cut_mesh(mesh, cuts)
     pattern = block_pattern(v.cells, v.node_count)
-    K = pattern.matrix(LinearStiffness(v, material(2)).assemble(pattern)).tocsc()
+    K = pattern.matrix(InternalForce(v, material(2), "linear").stiffness(pattern)).tocsc()
     M = kron(mass(v, DENSITY).matrix, np.eye(2)).tocsc()
     free = np.flatnonzero(np.repeat(v.node_points[:, 0] > 1e-12, 2))
     values = eigsh(

@@ -8,17 +8,16 @@ from scipy.spatial import cKDTree
 from test_sliver_policies import degenerate_cuts, shaken
 from xfem_bodies import boundary_nodes, relative_l2_error
 
-from verify.xfem.corotation import InternalForce
+from verify.xfem.assembly import body_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.slivers import GhostPenalty, treat_slivers
-from verify.xfem.sparsity import body_pattern
 from verify.xfem.statics import solve_static, static_equilibrium
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
@@ -104,7 +103,7 @@ def test_the_patch_test_holds_without_values_on_slivers(dim, count):
         supports = Supports.none(treated).prescribe(treated, far, field)
         # what the exact stress asks of the other nodes: internal forces of the uncut policy
         everywhere = field(virtual.node_points, virtual.node_side)
-        load = LinearStiffness(virtual, SOFT[dim]).force(everywhere)[0]
+        load = InternalForce(virtual, SOFT[dim], "linear").evaluate(everywhere)[0]
         solution = solve_static(treated, SOFT[dim], supports, treated.restrict(load))
         want = field(treated.node_points, treated.node_side)
         assert np.abs(solution.displacement - want).max() < 1e-12
@@ -224,7 +223,7 @@ def test_the_displacement_keeps_its_error_in_space():
 
 def dense_stiffness(virtual):
     pattern = body_pattern(virtual)
-    blocks = LinearStiffness(virtual, SOFT[virtual.mesh.dim]).assemble(pattern)
+    blocks = InternalForce(virtual, SOFT[virtual.mesh.dim], "linear").stiffness(pattern)
     return pattern.matrix(blocks).toarray()
 
 

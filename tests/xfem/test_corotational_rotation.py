@@ -3,36 +3,28 @@
 import numpy as np
 import pytest
 
-from verify.xfem.corotation.polar_kernels import (
-    mend_lane,
-    nearest_rotation,
-    new_lanes,
-    rotation_matrix,
-    turn_lanes,
+from verify.xfem.polar import (
+    largest_eigenvector,
+    nearest_rotations,
+    rotation_matrices,
+    rotations_in_space,
 )
-from verify.xfem.lanes.vectors import LANES
 
 
 def _rotation(F, start=None):
-    """In space in the last of the lanes, by Newton's method from a quaternion."""
-    R = np.empty_like(F)
-    if len(F) == 2:
-        nearest_rotation(F, R)
-        return R
-    lanes = new_lanes()
-    last = lanes.reshape(-1, LANES)[:, -1]
-    last[:9] = F.ravel()
-    last[9:13] = [1.0, 0.0, 0.0, 0.0] if start is None else start
-    if not turn_lanes(lanes):
-        mend_lane(lanes, LANES - 1)
-    rotation_matrix(last[9:13].copy(), R)
-    return R
+    """In space by Newton's method from a quaternion."""
+    if len(F) == 2 or start is None:
+        return nearest_rotations(F[None])[0]
+    R = np.empty((1, 3, 3))
+    rotations_in_space(F[None], start[None].copy(), R)
+    return R[0]
 
 
 def _by_eigenvector(F, _start=None):
-    R = np.empty_like(F)
-    nearest_rotation(F, R)
-    return R
+    q, R = np.empty((1, 4)), np.empty((1, 3, 3))
+    largest_eigenvector(F, q[0])
+    rotation_matrices(q, R)
+    return R[0]
 
 
 def _by_svd(F):

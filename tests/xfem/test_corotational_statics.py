@@ -5,9 +5,9 @@ import pytest
 from cut_bodies import boundary_nodes, cut_cube, cut_square, material, rotation
 
 from verify.accelerated import FAST
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.errors import SingularStiffnessError, XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN
 from verify.xfem.statics import NotInEquilibriumError, newton, static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh

@@ -5,15 +5,14 @@ import pytest
 from cut_bodies import DENSITY, cut_body, material
 
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import CentralDifferences, DynamicBody, StepFailedError
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -33,7 +32,7 @@ def _mesh(dim):
 
 def _stiffness(v):
     pattern = block_pattern(v.cells, v.node_count)
-    return pattern.matrix(LinearStiffness(v, material(v.mesh.dim)).assemble(pattern))
+    return pattern.matrix(InternalForce(v, material(v.mesh.dim), "linear").stiffness(pattern))
 
 
 def _step(v, mass):

@@ -5,12 +5,12 @@ import pytest
 from cut_bodies import DENSITY, material
 from time_schemes import SCHEMES
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     DynamicBody,
     ForwardEuler,
 )
 from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import cut_mesh

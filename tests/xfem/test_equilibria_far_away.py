@@ -6,11 +6,10 @@ from cut_bodies import cut_cube, cut_square, material
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from verify.xfem.corotation import InternalForce
-from verify.xfem.corotation.crushed_pieces import collapsed_pieces
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce, collapsed_cells
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import static_equilibrium
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -117,7 +116,7 @@ def test_a_strip_is_as_wide_as_hooke_says_until_nothing_is_left_of_its_width(str
     energy = stuff.mu * (strains**2).sum() + 0.5 * stuff.lam * strains.sum() ** 2
     assert found.energy == pytest.approx(float(energy), rel=1e-9)
     assert np.ptp(found.displacement[:, 1] + X[:, 1]) == pytest.approx(left, abs=1e-6)
-    assert len(collapsed_pieces(force, found.displacement, 1e-3)) == (0 if left else len(v.cells))
+    assert len(collapsed_cells(force, found.displacement, 1e-3)) == (0 if left else len(v.cells))
 
 
 @pytest.mark.parametrize("v", [cut_square(2), cut_cube(1)], ids=["2D", "3D"])
@@ -133,7 +132,7 @@ def test_pieces_whose_rotation_is_not_unique_are_found(v) -> None:
         ([2.0, 0.0, 0.0], [3]),
     ):
         F = np.diag(stretches[:dim])
-        found = collapsed_pieces(force, X @ F.T - X, 1e-6)
+        found = collapsed_cells(force, X @ F.T - X, 1e-6)
         np.testing.assert_array_equal(found, every if dim in expected else [])
 
 

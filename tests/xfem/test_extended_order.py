@@ -6,8 +6,8 @@ from cut_bodies import material
 
 from verify.accelerated.cholesky import Cholesky
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane, ToolPath
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.pieces import split_cells
 from verify.xfem.sides import PieceSides, node_sides

@@ -7,7 +7,6 @@ import pytest
 from cut_bodies import DENSITY, cut_body, cut_square, material
 from time_schemes import SCHEMES
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     DynamicBody,
     GeneralisedAlpha,
@@ -18,8 +17,8 @@ from verify.xfem.dynamics import (
 )
 from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -34,7 +33,9 @@ def _body(v, kinematics="linear", mass_of=side_wise_mass, **further):
 
 def _modes(body):
     v = body.force.virtual
-    K = body.pattern.matrix(LinearStiffness(v, material(v.mesh.dim)).assemble(body.pattern))
+    K = body.pattern.matrix(
+        InternalForce(v, material(v.mesh.dim), "linear").stiffness(body.pattern)
+    )
     root = np.repeat(np.sqrt(body.mass.diagonal), body.shape[1])
     values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
     first = int(np.argmax(values > 1e-6 * values[-1]))
@@ -118,7 +119,7 @@ def test_what_linear_motion_dissipates_is_the_formula_of_the_scheme(rho, dim):
         du, dv = state.displacement - before.displacement, state.velocity - before.velocity
         da, a = scheme.acceleration - a, scheme.acceleration
         stretched = np.zeros(body.shape)
-        body.force.add_frozen_product(du, 1.0, stretched)
+        body.force.add_tangent_product(du, 1.0, stretched)
         lost = scheme.step_size * (scheme.beta - 0.5 * scheme.gamma) * np.sum(
             da * body.mass.apply(dv)
         ) + (0.5 - scheme.alpha_f) * np.sum(du * (body.mass.apply(da) + stretched))

@@ -18,13 +18,13 @@ from verify.xfem.cuts import (
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.in_pieces import in_one_go
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
 from verify.xfem.slivers.policies import treat_slivers
 from verify.xfem.statics import solve_static
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -45,7 +45,7 @@ def to_the_left(extent):
 
 def stiffness():
     pattern = block_pattern(CUT.cells, CUT.node_count)
-    return pattern.matrix(LinearStiffness(CUT, SOFT).assemble(pattern))
+    return pattern.matrix(InternalForce(CUT, SOFT, "linear").stiffness(pattern))
 
 
 @pytest.mark.parametrize(

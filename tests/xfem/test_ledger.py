@@ -5,8 +5,6 @@ import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_body, cut_cube, cut_square, material, rotation
 from time_schemes import SCHEMES
 
-from verify.xfem.corotation import InternalForce
-from verify.xfem.corotation.crushed_pieces import inverted_pieces
 from verify.xfem.critical_step import critical_step
 from verify.xfem.dynamics import (
     CentralDifferences,
@@ -23,9 +21,9 @@ from verify.xfem.dynamics import (
     Trapezoidal,
 )
 from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports
 
 
@@ -37,7 +35,7 @@ def _free(v, kinematics="corotational"):
 
 def _critical(body):
     v = body.force.virtual
-    stiffness = LinearStiffness(v, material(v.mesh.dim)).assemble(body.pattern)
+    stiffness = InternalForce(v, material(v.mesh.dim), "linear").stiffness(body.pattern)
     return critical_step(body.pattern.matrix(stiffness), body.mass)
 
 
@@ -158,7 +156,7 @@ def test_central_differences_stay_bounded_at_large_strain_and_spin():
     share = account.mechanical / account.mechanical[0]
     assert share.min() > 0.9
     assert share.max() < 1.02
-    assert len(inverted_pieces(body.force, state.displacement)) == 0
+    assert len(inverted_cells(body.force, state.displacement)) == 0
     turning = account.angular_momentum
     assert np.abs(turning - turning[0]).max() < 1e-9 * np.abs(turning).max()
 
@@ -201,14 +199,16 @@ def test_energy_is_kept_while_pieces_turn_inside_out():
     for _ in range(8):
         account = run(scheme, body, state, 25)
         first = account.mechanical[0] if first is None else first
-        inverted = max(inverted, len(inverted_pieces(body.force, state.displacement)))
+        inverted = max(inverted, len(inverted_cells(body.force, state.displacement)))
         assert account.mechanical[-1] == pytest.approx(first, rel=1e-9)
     assert inverted > 0
 
 
 def test_implicit_euler_halves_the_energy_of_a_mode_in_ln_2_over_omega_squared_h():
     body = _free(cut_square(4), "linear")
-    K = body.pattern.matrix(LinearStiffness(body.force.virtual, material(2)).assemble(body.pattern))
+    K = body.pattern.matrix(
+        InternalForce(body.force.virtual, material(2), "linear").stiffness(body.pattern)
+    )
     root = np.repeat(np.sqrt(body.mass.diagonal), 2)
     values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
     mode = int(np.argmax(values > 1e-6 * values[-1]))  # the slowest that is not rigid
@@ -242,7 +242,9 @@ def test_forward_euler_gains_energy_at_any_step():
 @pytest.mark.parametrize("scheme", [s for s in SCHEMES if s is not RealTimeEuler])
 def test_a_damped_mode_decays_as_rayleigh_says(scheme):
     body = _free(cut_square(4), "linear")
-    K = body.pattern.matrix(LinearStiffness(body.force.virtual, material(2)).assemble(body.pattern))
+    K = body.pattern.matrix(
+        InternalForce(body.force.virtual, material(2), "linear").stiffness(body.pattern)
+    )
     root = np.repeat(np.sqrt(body.mass.diagonal), 2)
     values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
     mode = int(np.argmax(values > 1e-6 * values[-1]))

@@ -8,10 +8,10 @@ from xfem_bodies import boundary_nodes
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import solve_static
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -33,7 +33,7 @@ def plate(turn=None):
 
 def dense(virtual):
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    return pattern.matrix(LinearStiffness(virtual, MATERIAL).assemble(pattern)).toarray()
+    return pattern.matrix(InternalForce(virtual, MATERIAL, "linear").stiffness(pattern)).toarray()
 
 
 def test_a_turned_membrane_has_the_turned_stiffness_of_the_plate_and_none_across():
@@ -48,7 +48,7 @@ def test_a_turned_membrane_has_the_turned_stiffness_of_the_plate_and_none_across
 def test_the_force_of_a_membrane_is_its_stiffness_times_the_displacement():
     membrane = plate(TURN)
     displacement = np.random.default_rng(1).normal(size=(membrane.node_count, 3))
-    force, energy = LinearStiffness(membrane, MATERIAL).force(displacement)
+    force, energy = InternalForce(membrane, MATERIAL, "linear").evaluate(displacement)
     want = (dense(membrane) @ displacement.ravel()).reshape(force.shape)
     assert force == pytest.approx(want, abs=1e-11 * np.abs(want).max())
     assert energy == pytest.approx(0.5 * (want * displacement).sum(), rel=1e-12)

@@ -8,7 +8,6 @@ import pytest
 from cut_bodies import DENSITY, material
 from swings import aggregated, cube, let_go, plate, stretched
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.critical_step import element_critical_steps
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (
@@ -16,6 +15,7 @@ from verify.xfem.dynamics import (
     EnergyMomentum,
     ImplicitEuler,
 )
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports

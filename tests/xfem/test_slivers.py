@@ -6,13 +6,13 @@ import xfem_exact_fields as exact
 from xfem_bodies import boundary_nodes, scaled_dense_stiffness
 
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.xfem.assembly_kernels import constrain
+from verify.xfem.assembly import constrain
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.statics import solve_static
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -53,8 +53,8 @@ def test_the_scaled_condition_number_does_not_see_slivers(dim):
 def test_conjugate_gradients_need_no_more_iterations_with_slivers(dim):
     def iterations(virtual):
         pattern = block_pattern(virtual.cells, virtual.node_count)
-        stiffness = LinearStiffness(virtual, isotropic(1e4, 0.3, "solid"))
-        blocks = stiffness.assemble(pattern)
+        stiffness = InternalForce(virtual, isotropic(1e4, 0.3, "solid"), "linear")
+        blocks = stiffness.stiffness(pattern)
         supports = clamped(virtual)
         constrain(pattern.starts, pattern.columns, supports.fixed, blocks)
         solver = ConjugateGradients(pattern, dim, tolerance=1e-8)

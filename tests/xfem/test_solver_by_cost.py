@@ -7,7 +7,6 @@ from cut_bodies import DENSITY, cut_membrane, material
 from verify.accelerated import FAST, solver_by_cost
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.solver_by_cost import SolverByCost
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (
     DynamicBody,
@@ -18,6 +17,7 @@ from verify.xfem.dynamics import (
     Trapezoidal,
 )
 from verify.xfem.errors import NotConvergedError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports

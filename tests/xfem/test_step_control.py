@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, material
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (
     DynamicBody,
@@ -15,6 +14,7 @@ from verify.xfem.dynamics import (
 )
 from verify.xfem.dynamics.step_control import StepLimits
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports

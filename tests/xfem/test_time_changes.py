@@ -5,7 +5,6 @@ import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane, material
 from time_schemes import SCHEMES
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -15,6 +14,7 @@ from verify.xfem.dynamics import (
     Trapezoidal,
 )
 from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.supports import Supports
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, material
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -18,6 +17,7 @@ from verify.xfem.dynamics import (
     Trapezoidal,
 )
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.supports import Supports

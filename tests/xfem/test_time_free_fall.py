@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_body, cut_cube, cut_square, material
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     CentralDifferences,
     DynamicBody,
@@ -15,6 +14,7 @@ from verify.xfem.dynamics import (
     SymplecticEuler,
     Trapezoidal,
 )
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.supports import Supports

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, material, rotation
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane, PolygonPatch, Polyline
 from verify.xfem.dynamics import (
     CentralDifferences,
@@ -18,6 +17,7 @@ from verify.xfem.dynamics import (
 )
 from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

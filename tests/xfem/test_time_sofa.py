@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.supports import Supports

@@ -5,7 +5,7 @@ import pytest
 from cut_bodies import cut_cube, isotropic, rotation
 from turned_bodies import YOUNG, random_mesh, turn, turned_body, turned_sheet
 
-from verify.xfem.corotation import InternalForce
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import NotInEquilibriumError, load_path, static_equilibrium
 from verify.xfem.statics.rigid_motion import RigidMotions, nearest_rotation, part_of_rotation

@@ -7,8 +7,8 @@ from cut_bodies import isotropic, rotation
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane, Polyline
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 

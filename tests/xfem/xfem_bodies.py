@@ -4,8 +4,8 @@ import numpy as np
 
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.quadrature import simplex_rule
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.subdivision import subdivide
 
 
@@ -18,7 +18,7 @@ def boundary_nodes(mesh):
 def sparse_stiffness(virtual, young=1.0, poisson=0.3):
     state = "plane strain" if virtual.mesh.dim == 2 else "solid"
     pattern = block_pattern(virtual.cells, virtual.node_count)
-    blocks = LinearStiffness(virtual, isotropic(young, poisson, state)).assemble(pattern)
+    blocks = InternalForce(virtual, isotropic(young, poisson, state), "linear").stiffness(pattern)
     return pattern.matrix(blocks).tocsr()
 
 

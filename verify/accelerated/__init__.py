@@ -3,10 +3,10 @@
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.accelerated.nearly_symmetric import NearlySymmetric
+from verify.accelerated.one_pass import OnePassTetrahedra
 from verify.accelerated.solver_by_cost import SolverByCost
-from verify.xfem.corotation.linearisation import Linearisation
 from verify.xfem.kernels import Kernels
 
 __all__ = ["FAST"]
 
-FAST = Kernels(Cholesky, ConjugateGradients, SolverByCost, NearlySymmetric, Linearisation)
+FAST = Kernels(Cholesky, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra)

@@ -1,14 +1,16 @@
 """Mass–spring model of a cut body: springs on the edges of its cells."""
 
+from typing import get_args
+
 import numpy as np
 from numpy.typing import NDArray
 
 from verify.methods.spring_fit import Fit, cell_edges, spring_stiffness
 from verify.methods.spring_kernels import add_spring_stiffness, spring_force, spring_product
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.corotation import InternalForce, Kinematics, TangentKind
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.virtual import VirtualMesh
 
@@ -70,22 +72,16 @@ class SpringForce(InternalForce):
         self._excess = np.zeros(self.springs.shape)
 
     @property
-    def geometry(self) -> tuple[_Floats, NDArray[np.int64], _Floats, _Floats, _Floats, _Floats]:
-        """Springs have no stress to average: always an error."""
-        raise XfemError("springs have no stress field; expected an integrator that needs none")
-
-    @property
-    def is_swept(self) -> bool:
-        """Springs are no elements: the sweep of tetrahedra is not theirs."""
+    def has_stress(self) -> bool:
+        """Springs have none."""
         return False
 
-    def evaluate(
-        self,
-        displacement: _Floats,
-        out: _Floats | None = None,
-        velocity: _Floats | None = None,
-        scale: float = 0.0,
-    ) -> tuple[_Floats, float]:
+    @property
+    def has_one_pass(self) -> bool:
+        """Springs are no elements: the pass over tetrahedra is not theirs."""
+        return False
+
+    def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
         """Return internal force (N, d) in newtons and energy in joules; see `InternalForce`."""
         if displacement.shape != self._shape:
             raise XfemError(f"displacement of shape {displacement.shape}; expected {self._shape}")
@@ -93,13 +89,11 @@ class SpringForce(InternalForce):
         force[:] = 0.0
         energy = spring_force(
             self.virtual.cells, self._edges, self._rest, self.springs, displacement,
-            self.turning, self._directions, self._excess, force,
+            self.is_corotational, self._directions, self._excess, force,
         )  # fmt: skip
-        if velocity is not None:
-            self.add_frozen_product(velocity, scale, force)
         return force, float(energy)
 
-    def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+    def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
         """Add `scale` K v (N, d), K along the springs of the last `evaluate`, to `out`."""
         spring_product(
             self.virtual.cells, self._edges, self.springs, self._directions, vector, scale, out
@@ -110,18 +104,19 @@ class SpringForce(InternalForce):
         pattern: BlockPattern,
         blocks: _Floats,
         scale: float = 1.0,
-        kind: TangentKind = "frozen",
+        kind: TangentKind = "rotation-fixed",
         displacement: _Floats | None = None,
     ) -> None:
         """Add `scale` times the stiffness at the last `evaluate`; see `InternalForce`.
 
-        "frozen" and "tensioned" leave out what compressed springs take away from it across, so that
-        they are never indefinite.
+        "rotation-fixed" and "geometric" leave out what compressed springs take away from it
+        across, so that they are never indefinite.
         """
-        if kind not in ("frozen", "tensioned", "exact"):
-            raise XfemError(f"stiffness '{kind}'; expected frozen, tensioned or exact")
+        if kind not in get_args(TangentKind):
+            expected = ", ".join(get_args(TangentKind))
+            raise XfemError(f"stiffness '{kind}'; expected one of {expected}")
         targets = pattern.targets[: len(self.virtual.cells)]
         add_spring_stiffness(
             targets, self._edges, self.springs, self._directions, self._excess,
-            kind == "exact", scale, blocks,
+            kind == "consistent", scale, blocks,
         )  # fmt: skip

@@ -28,8 +28,8 @@ from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.solvers.xfem_system import system_of
 from verify.system import System
-from verify.xfem.corotation import InternalForce
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import solve_static, static_equilibrium
 from verify.xfem.supports import check_bodies

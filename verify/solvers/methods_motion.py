@@ -12,9 +12,9 @@ from verify.methods.opening import Seams, seams_of, welded
 from verify.solvers.xfem_answer import Answer
 from verify.solvers.xfem_motion import Mover
 from verify.solvers.xfem_openings import opening_times, seam_times
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import DynamicBody, MotionState, ancestors
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MethodMover"]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
+from verify.xfem.assembly import body_pattern
 from verify.xfem.bases import (
     Basis,
     from_sidewise,
@@ -21,8 +22,7 @@ from verify.xfem.bases import (
 )
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import BasisError
-from verify.xfem.sparsity import body_pattern
-from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
@@ -53,7 +53,7 @@ def solve_in_basis(
     check_bodies(virtual, supports)
     clock = [perf_counter()]
     pattern = body_pattern(virtual)
-    blocks = LinearStiffness(virtual, material).assemble(pattern)
+    blocks = InternalForce(virtual, material, "linear").stiffness(pattern)
     matrix = transformed_matrix(virtual, basis, csr_array(pattern.matrix(blocks)))
     known = from_sidewise(virtual, basis, supports.values).ravel()
     held = held_in_basis(virtual, supports, basis)

@@ -21,7 +21,6 @@ from verify.solvers.xfem_openings import opening_times, stops_of
 from verify.solvers.xfem_scene import density_of, material_of
 from verify.solvers.xfem_steps import MASSES, integrator_of, largest_step
 from verify.solvers.xfem_supports import initial_path, motion_of_supports
-from verify.xfem.corotation import InternalForce
 from verify.xfem.dynamics import (
     DynamicBody,
     Integrator,
@@ -35,6 +34,7 @@ from verify.xfem.dynamics import (
 from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.dynamics.newton import NewtonIntegrator
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import Kernels
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh

@@ -15,12 +15,10 @@ from verify.solvers.xfem_bases import solve_in_basis
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_scene import material_of
 from verify.solvers.xfem_supports import path_of_supports, supports_of
-from verify.xfem.corotation import InternalForce
-from verify.xfem.corotation.crushed_pieces import inverted_pieces
+from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.kernels import Kernels
 from verify.xfem.slivers import GhostPenalty
 from verify.xfem.statics import StaticEquilibrium, solve_static, static_equilibrium
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
@@ -95,7 +93,7 @@ def _linear(
         )
     other: Any = basis
     displacement, phases = solve_in_basis(virtual, material, supports, load, other)
-    energy = LinearStiffness(virtual, material).force(displacement)[1]
+    energy = InternalForce(virtual, material, "linear").evaluate(displacement)[1]
     return Equilibrium(displacement, energy, phases, notes={"linear solver": "SciPy SuperLU"})
 
 
@@ -164,4 +162,4 @@ def _inverted(force: InternalForce, displacement: _Floats) -> str:
     mesh = force.virtual.mesh
     if mesh.dim < mesh.space:
         return "not defined for a membrane"
-    return str(len(inverted_pieces(force, displacement)))
+    return str(len(inverted_cells(force, displacement)))

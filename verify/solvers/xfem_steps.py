@@ -98,7 +98,7 @@ def largest_step(
     if not explicit and asked is not None:
         return asked, "analysis.time_step"
     critical = _critical(body, material, density, explicit)
-    turning = explicit and body.force.turning
+    turning = explicit and body.force.is_corotational
     found = factor * critical * (RESONANCE_FREE if turning else 1.0)
     said = f"{factor:g} of {'√½ of ' if turning else ''}the critical step {critical:.4g} s"
     if not np.isfinite(found) or found <= 0.0:
@@ -112,11 +112,11 @@ def _critical(body: DynamicBody, material: Material, density: ArrayLike, explici
     virtual = body.force.virtual
     if not explicit or body.mass.keeps_element_steps:
         # side-wise mass: no cut makes it smaller than that of the smallest uncut element
-        strain = _REACH if body.force.turning else 0.0
+        strain = _REACH if body.force.is_corotational else 0.0
         step = float(element_critical_steps(virtual.mesh, material, density, strain).min())
     else:
         force: Any = body.force
-        blocks = force.stiffness(body.pattern, np.zeros(body.shape), "frozen")
+        blocks = force.stiffness(body.pattern, np.zeros(body.shape), "rotation-fixed")
         step = critical_step(csr_array(body.pattern.matrix(blocks)), body.mass, body.fixed)
     if not explicit:
         return step

@@ -11,11 +11,11 @@ from verify.solvers.xfem_scene import density_of
 from verify.solvers.xfem_steps import MASSES
 from verify.solvers.xfem_supports import supports_of
 from verify.system import System
+from verify.xfem.assembly import body_pattern
 from verify.xfem.bases import transformed_matrix
 from verify.xfem.elasticity import Material
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.slivers import GhostPenalty
-from verify.xfem.sparsity import body_pattern
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["system_of"]
@@ -56,7 +56,9 @@ def system_of(
     if mass not in MASSES:
         raise InputError(f"mass '{mass}'; expected one of {', '.join(MASSES)}")
     pattern = body_pattern(resisting)
-    stiffness = csr_array(pattern.matrix(LinearStiffness(resisting, material).assemble(pattern)))
+    stiffness = csr_array(
+        pattern.matrix(InternalForce(resisting, material, "linear").stiffness(pattern))
+    )
     supports = supports_of(scene, virtual, exact)
     components = supports.fixed.shape[1]
     inertia = None

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.element import Elements
 from verify.xfem.linear_solvers import BlockJacobiCG, LinearSolver, SparseLU
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["PLAIN", "Kernels", "OnePass"]
 
@@ -26,7 +26,7 @@ _SMALL = 1500  # nodes of a solid, up to which a factorisation is quicker than i
 class OnePass(Protocol):
     """Force and stiffness of corotational tetrahedra in one pass over the elements.
 
-    `verify.xfem.corotation.InternalForce.linearise` and `linearise_average` say what is asked for.
+    `InternalForce.linearise` and `linearise_average` of `verify.xfem.internal_force` ask for it.
     """
 
     pattern: BlockPattern
@@ -40,9 +40,9 @@ class OnePass(Protocol):
         force: _Floats,
         blocks: _Floats,
         whole: bool = True,
-        spin: float = 0.0,
+        rotational: float = 0.0,
     ) -> int:
-        """Overwrite force (N, 3) and blocks (B, 3, 3); return the elements without a spin part."""
+        """Overwrite force (N, 3) and blocks (B, 3, 3); return the cells without rotational part."""
         ...
 
     def average(
@@ -50,7 +50,7 @@ class OnePass(Protocol):
         start: _Floats,
         end: _Floats,
         scale: float,
-        spin: float,
+        rotational: float,
         substituted: _Bools,
         force: _Floats,
         blocks: _Floats,
@@ -59,8 +59,8 @@ class OnePass(Protocol):
         """Overwrite the force averaged over a step, and the stiffness at its end."""
         ...
 
-    def write_rotations(self, rotations: _Floats, first: bool = False) -> None:
-        """Write the rotations (p, 3, 3) of the last pass, or of the start of an averaged step."""
+    def write_rotations(self, rotations: _Floats) -> None:
+        """Write the rotations (p, 3, 3) of the last pass."""
         ...
 
 
@@ -81,7 +81,7 @@ class Kernels:
     general : callable
         (pattern, block) → solver for any regular matrix, nearly symmetric as a rule.
     one_pass : callable, optional
-        (virtual, λ, μ, pattern, turning) → `OnePass`; without it force and stiffness are found one
+        (elements, pattern, corotational) → `OnePass`; without it force and stiffness are found one
         after the other.
     """
 
@@ -89,7 +89,7 @@ class Kernels:
     iterative: Callable[[BlockPattern, int, float, int], LinearSolver]
     step: Callable[[BlockPattern, int, _Bools, bool, float], LinearSolver]
     general: Callable[[BlockPattern, int], LinearSolver]
-    one_pass: Callable[[VirtualMesh, _Floats, _Floats, BlockPattern, bool], OnePass] | None = None
+    one_pass: Callable[[Elements, BlockPattern, bool], OnePass] | None = None
 
 
 def _direct(pattern: BlockPattern, block: int, held: _Bools | None) -> LinearSolver:

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
+from verify.xfem.assembly import body_pattern, find_places, pattern_places
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import real_array
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.sparsity import body_pattern, find_places, pattern_places
 from verify.xfem.virtual import Aggregation, VirtualMesh
 
 __all__ = [

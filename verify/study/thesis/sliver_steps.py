@@ -12,9 +12,9 @@ from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Cut, Plane
 from verify.xfem.elasticity import Material, isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
@@ -109,5 +109,5 @@ def exponent(steps: Sequence[SliverStep]) -> float:
 
 def _critical(resisting: VirtualMesh, material: Material, mass: Mass) -> float:
     pattern = block_pattern(resisting.cells, resisting.node_count)
-    blocks = LinearStiffness(resisting, material).assemble(pattern)
+    blocks = InternalForce(resisting, material, "linear").stiffness(pattern)
     return critical_step(csr_array(pattern.matrix(blocks)), mass)

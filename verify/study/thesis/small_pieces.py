@@ -9,10 +9,10 @@ from scipy.sparse.linalg import splu
 
 from verify.study.slivers.system_numbers import condition_numbers
 from verify.system import System
+from verify.xfem.assembly import body_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
-from verify.xfem.sparsity import body_pattern
-from verify.xfem.stiffness import LinearStiffness
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
@@ -61,7 +61,9 @@ def small_pieces(sizes: Sequence[float]) -> list[SmallPiece]:
 def _clamped(virtual: VirtualMesh) -> System:
     """Soft tissue (Table 4.1), held at its lower and upper side."""
     pattern = body_pattern(virtual)
-    blocks = LinearStiffness(virtual, isotropic(1e4, 0.3, "plane strain")).assemble(pattern)
+    blocks = InternalForce(virtual, isotropic(1e4, 0.3, "plane strain"), "linear").stiffness(
+        pattern
+    )
     height = virtual.node_points[:, 1]
     held = (height < 1e-9) | (height > 1.0 - 1e-9)
     return System(csr_array(pattern.matrix(blocks)), None, np.repeat(held, 2))

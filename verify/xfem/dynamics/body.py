@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotation.internal_force import InternalForce
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
 from verify.xfem.slivers.penalised_force import PenalisedForce
@@ -119,7 +119,8 @@ class DynamicBody:
     Raises
     ------
     XfemError
-        If a shape does not match the body.
+        If a shape does not match the body, or a membrane is to be linear: nothing would resist
+        across its plane.
     """
 
     force: InternalForce
@@ -131,6 +132,8 @@ class DynamicBody:
 
     def __post_init__(self) -> None:
         virtual = self.force.virtual
+        if self.force.is_membrane and not self.force.is_corotational:
+            raise XfemError("linear kinematics of a membrane in motion; expected corotational")
         self.shape: tuple[int, int] = (virtual.node_count, virtual.mesh.space)
         if len(self.mass.weights) != self.shape[0]:
             raise XfemError(
@@ -241,5 +244,5 @@ class DynamicBody:
             return np.zeros(self.shape)
         force = self.damping.mass * self.mass.apply(velocity)
         if self.damping.stiffness > 0.0:
-            self.force.add_frozen_product(velocity, self.damping.stiffness, force)
+            self.force.add_tangent_product(velocity, self.damping.stiffness, force)
         return force

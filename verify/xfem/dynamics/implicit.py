@@ -5,12 +5,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotation.averaged_stress_kernels import averaged_force
-from verify.xfem.corotation.internal_force import TangentKind
-from verify.xfem.dynamics.averaged_stress_tangent import add_averaged_stiffness
+from verify.xfem.averaged_stress import StepEnds, averaged_moduli, averaged_stress
 from verify.xfem.dynamics.body import DynamicBody
 from verify.xfem.dynamics.integrator import StepForces
 from verify.xfem.dynamics.newton import NewtonIntegrator
+from verify.xfem.element import add_moduli
+from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.slivers.penalised_force import PenalisedForce
 
@@ -66,7 +67,7 @@ class EnergyMomentum(NewtonIntegrator):
     """Conserves energy, linear and angular momentum of a free body at any amplitude and step.
 
     The internal force is a discrete gradient of the potential; see
-    `verify.xfem.corotation.averaged_stress_kernels`. Its stiffness is not symmetric, and differs
+    `verify.xfem.averaged_stress`. Its stiffness is not symmetric, and differs
     from half of that at the end by the square of the turn in a step. Corrections take the latter,
     which is found in a tenth of the time, as long as each takes half of the residual off.
 
@@ -89,10 +90,12 @@ class EnergyMomentum(NewtonIntegrator):
         iterations: int = 80,
         solver: LinearSolver | None = None,
     ) -> None:
+        if not body.force.has_stress:
+            raise XfemError("springs have no stress field; expected an integrator that needs none")
         super().__init__(body, step_size, tolerance, iterations, solver)
         self._first = body.force.rotations.copy()
         self._evaluations = 0
-        self._asks_for_all = solver is not None and body.force.turning
+        self._asks_for_all = solver is not None and body.force.is_corotational
         self._takes_all = False  # of the derivative of the force
         self.substituted = np.zeros(len(self._first), dtype=bool)
 
@@ -104,7 +107,7 @@ class EnergyMomentum(NewtonIntegrator):
 
     def _prepare(self) -> None:
         force = self.body.force
-        if not force.is_swept:
+        if not force.has_one_pass:
             force.evaluate(self._start.displacement)
             self._first[:] = force.rotations
         self._evaluations = 0
@@ -113,22 +116,28 @@ class EnergyMomentum(NewtonIntegrator):
     def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
         body, start = self.body, self._start
         internal = np.zeros(body.shape)
-        if body.force.turning:
+        if body.force.is_corotational:
             self._evaluations += 1
             if self._evaluations <= _FREE_EVALUATIONS:
                 self.substituted[:] = False
             self._average(displacement, internal)
         else:
             mean = 0.5 * (start.displacement + displacement)
-            body.force.add_frozen_product(mean, 1.0, internal)
+            body.force.add_tangent_product(mean, 1.0, internal)
         middle = start.time + 0.5 * self.step_size
         viscous = body.viscous(0.5 * (start.velocity + velocity))
         return StepForces(internal, body.external(middle), viscous)
 
+    def _ends(self, displacement: _Floats) -> StepEnds:
+        """Both ends of the step, with the rotations of the last evaluation."""
+        force = self.body.force
+        F0 = force.deformation(self._start.displacement).copy()
+        return StepEnds(F0, force.deformation(displacement), self._first, force.rotations)
+
     def _average(self, displacement: _Floats, internal: _Floats) -> None:
         """Write the force of a step that ends like this; substituted pieces are updated."""
         force, before = self.body.force, self._start.displacement
-        if force.is_swept:
+        if force.has_one_pass:
             force.linearise_average(
                 self.body.pattern, before, displacement, self.substituted, self._stiffness_share,
                 internal, self._blocks, not self._solver.reads_half, self.share,
@@ -136,18 +145,15 @@ class EnergyMomentum(NewtonIntegrator):
             self._is_linearised = True
             return
         force.evaluate(displacement)
-        v = force.virtual
-        found = np.zeros(v.corners.node_points.shape)
-        averaged_force(
-            v.cells, *force.geometry, self._first, force.rotations, v.extend(before),
-            v.extend(displacement), self.substituted, found,
-        )  # fmt: skip
-        internal[:] = v.restrict(found)
+        P = averaged_stress(force.elements, self._ends(displacement), self.substituted)
+        P *= force.elements.volumes[:, None, None]
+        gradients = force.elements.gradients[force.elements.parent]
+        internal[:] = force.nodal_force(gradients @ P.transpose(0, 2, 1))
         if isinstance(force, PenalisedForce):
             force.add_penalty(0.5 * (before + displacement), 1.0, internal)
 
     def _solved(self, displacement: _Floats, residual: _Floats, kind: TangentKind) -> _Floats:
-        self._takes_all |= self._is_slow and self.body.force.turning
+        self._takes_all |= self._is_slow and self.body.force.is_corotational
         if not self._takes_all:
             return super()._solved(displacement, residual, kind)
         self._is_linearised = False
@@ -161,16 +167,13 @@ class EnergyMomentum(NewtonIntegrator):
             super()._add_stiffness(displacement, kind)
             return
         v, pattern = force.virtual, self.body.pattern
-        if force.is_swept:
+        if force.has_one_pass:
             force.evaluate(self._start.displacement)
             self._first[:] = force.rotations
             force.evaluate(displacement)
-        added = pattern.unfold(self._blocks)
-        add_averaged_stiffness(
-            v.cells, pattern.targets[: len(v.cells)], *force.geometry, self._first,
-            force.rotations, v.extend(self._start.displacement), v.extend(displacement),
-            self.substituted, added,
-        )  # fmt: skip
+        added, elements = pattern.unfold(self._blocks), force.elements
+        moduli = averaged_moduli(elements, self._ends(displacement), self.substituted)
+        add_moduli(elements, moduli, 1.0, pattern.targets[: len(v.cells)], added)
         pattern.fold(added, self._blocks)
         if isinstance(force, PenalisedForce):
             force.ghost.add_stiffness(self.body.pattern, self._blocks, self.share)

@@ -5,9 +5,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly_kernels import constrain
-from verify.xfem.corotation.crushed_pieces import inverted_pieces
-from verify.xfem.corotation.internal_force import TangentKind
+from verify.xfem.assembly import constrain
 from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
 from verify.xfem.dynamics.integrator import (
     StepFailedError,
@@ -16,6 +14,7 @@ from verify.xfem.dynamics.integrator import (
     check_step,
 )
 from verify.xfem.errors import SingularStiffnessError, XfemError
+from verify.xfem.internal_force import TangentKind, inverted_cells
 from verify.xfem.linear_solvers import LinearSolver
 
 __all__ = ["NewtonIntegrator"]
@@ -109,7 +108,7 @@ class NewtonIntegrator(ABC):
     def _internal(self, displacement: _Floats) -> _Floats:
         """Return the internal force (N, d); where it is swept, also find the stiffness."""
         body = self.body
-        if not (body.force.is_swept and body.force.turning):
+        if not (body.force.has_one_pass and body.force.is_corotational):
             return body.force.evaluate(displacement)[0]
         scale = self._stiffness_share
         # damping wants rotations too, and others may have turned them since
@@ -259,7 +258,7 @@ class NewtonIntegrator(ABC):
         force = self.body.force
         found = [f"{leaps} of {self.iterations} corrections did not lower the residual"]
         if force.virtual.mesh.dim == force.virtual.mesh.space:
-            inverted = inverted_pieces(force, displacement)
+            inverted = inverted_cells(force, displacement)
             if len(inverted) > 0:
                 found.append(
                     f"{len(inverted)} of {len(force.virtual.cells)} pieces are inside out, the "
@@ -274,10 +273,10 @@ class NewtonIntegrator(ABC):
         self._solver.tolerance = tolerance
         try:
             try:
-                return self._solved(displacement, residual, "exact")
+                return self._solved(displacement, residual, "consistent")
             except SingularStiffnessError:
                 # the exact one may be indefinite far from equilibrium; that without turns is not
-                return self._solved(displacement, residual, "tensioned")
+                return self._solved(displacement, residual, "geometric")
         except SingularStiffnessError as failure:
             raise StepFailedError(f"{type(self).__name__}: {failure}") from failure
         except XfemError as failure:
@@ -287,7 +286,7 @@ class NewtonIntegrator(ABC):
             ) from failure
 
     def _solved(self, displacement: _Floats, residual: _Floats, kind: TangentKind) -> _Floats:
-        given = None if self.body.force.turning else (self.step_size, self.body.damping)
+        given = None if self.body.force.is_corotational else (self.step_size, self.body.damping)
         if given is None or given != self._factorised:  # the matrix of linear motion stays
             self._factorised = None
             self._assemble(displacement, kind)
@@ -298,7 +297,7 @@ class NewtonIntegrator(ABC):
     def _assemble(self, displacement: _Floats, kind: TangentKind) -> None:
         body, h = self.body, self.step_size
         per_velocity = self.share * self.rate / h
-        if not self._is_linearised or kind != "exact":
+        if not self._is_linearised or kind != "consistent":
             self._blocks[:] = 0.0
             self._add_stiffness(displacement, kind)
             if body.damping.stiffness > 0.0:

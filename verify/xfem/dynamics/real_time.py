@@ -69,13 +69,11 @@ class RealTimeEuler:
         self.advance(state)
         # rotations are still those at the start of the step, with which it was linearised
         internal = self._internal.copy()
-        force.add_frozen_product(before.velocity, -(h + self.body.damping.stiffness), internal)
-        force.add_frozen_product(state.velocity, h, internal)
+        force.add_tangent_product(before.velocity, -(h + self.body.damping.stiffness), internal)
+        force.add_tangent_product(state.velocity, h, internal)
         if force.is_membrane:
-            force.add_tension(
-                self.body.pattern, before.displacement, state.velocity - before.velocity, h, 0.0,
-                internal, self.blocks,
-            )  # fmt: skip
+            change = state.velocity - before.velocity
+            force.add_geometric_product(before.displacement, change, h, internal)
         return StepForces(internal, external, self.body.viscous(state.velocity))
 
     def advance(self, state: MotionState) -> None:
@@ -128,10 +126,9 @@ class RealTimeEuler:
         )  # fmt: skip
         if body.force.is_membrane:
             # what tension holds it with across its plane is as stiff as it is thin: implicit too
-            body.force.add_tension(
-                body.pattern, state.displacement, state.velocity, h, h * h, self._internal,
-                self.blocks,
-            )  # fmt: skip
+            at = state.displacement
+            body.force.add_geometric_product(at, state.velocity, h, self._internal)
+            body.force.add_geometric(body.pattern, at, self.blocks, h * h)
         _add_mass(self.blocks, self._places, self._values, 1.0 + h * damping.mass)
         np.subtract(body.external(state.time + h), self._internal, out=self.load)
         if damping.mass > 0.0:

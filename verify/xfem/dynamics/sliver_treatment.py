@@ -11,9 +11,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotation.internal_force import InternalForce, Kinematics
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce, Kinematics
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.slivers.ghost_penalty import DEFAULT_FACTOR, GhostPenalty

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from verify.xfem.assembly import body_pattern, pattern_places
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.slivers.piece_contacts import face_contacts
-from verify.xfem.sparsity import body_pattern, pattern_places
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["DEFAULT_FACTOR", "GhostPenalty"]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.corotation.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
 from verify.xfem.virtual import VirtualMesh
@@ -55,28 +55,20 @@ class PenalisedForce(InternalForce):
         self.ghost = ghost
         self.penalty_energy = 0.0
 
-    def evaluate(
-        self,
-        displacement: _Floats,
-        out: _Floats | None = None,
-        velocity: _Floats | None = None,
-        scale: float = 0.0,
-    ) -> tuple[_Floats, float]:
+    def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
         """Return force and energy of material and penalty together; see `InternalForce`."""
-        force, energy = super().evaluate(displacement, out, velocity, scale)
+        force, energy = super().evaluate(displacement, out)
         penalty, self.penalty_energy = self.ghost.force(displacement)
         force += penalty
-        if velocity is not None and scale != 0.0:
-            self.add_penalty(velocity, scale, force)
         return force, energy + self.penalty_energy
 
     def add_penalty(self, vector: _Floats, scale: float, out: _Floats) -> None:
         """Add `scale` times the penalty's stiffness times a vector (N, d) to `out`."""
         out += scale * (self.ghost.matrix @ vector)
 
-    def add_frozen_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+    def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
         """Add `scale` K v (N, d) to `out`, the penalty's stiffness included."""
-        super().add_frozen_product(vector, scale, out)
+        super().add_tangent_product(vector, scale, out)
         self.add_penalty(vector, scale, out)
 
     def add_stiffness(
@@ -84,7 +76,7 @@ class PenalisedForce(InternalForce):
         pattern: BlockPattern,
         blocks: _Floats,
         scale: float = 1.0,
-        kind: TangentKind = "frozen",
+        kind: TangentKind = "rotation-fixed",
         displacement: _Floats | None = None,
     ) -> None:
         """Add `scale` times the stiffness of material and penalty to the nodal blocks."""
@@ -101,12 +93,12 @@ class PenalisedForce(InternalForce):
         force: _Floats,
         blocks: _Floats,
         whole: bool = True,
-        spin: float = 0.0,
+        rotational: float = 0.0,
     ) -> None:
         """Overwrite force and stiffness of an implicit step, the penalty's included."""
         moved = displacement, velocity, implicit
-        super().linearise(pattern, *moved, scale, force, blocks, whole, spin)
-        if self.is_swept:  # else the material has called `evaluate` and `add_stiffness` of here
+        super().linearise(pattern, *moved, scale, force, blocks, whole, rotational)
+        if self.has_one_pass:  # else the material has called `evaluate` and `add_stiffness` of here
             self.add_penalty(displacement + implicit * velocity, 1.0, force)
             self.ghost.add_stiffness(pattern, blocks, scale)
 
@@ -120,10 +112,10 @@ class PenalisedForce(InternalForce):
         force: _Floats,
         blocks: _Floats,
         whole: bool = True,
-        spin: float = 0.0,
+        rotational: float = 0.0,
     ) -> None:
         """Overwrite averaged force and stiffness, the penalty's included."""
         moved = start, end, substituted
-        super().linearise_average(pattern, *moved, scale, force, blocks, whole, spin)
+        super().linearise_average(pattern, *moved, scale, force, blocks, whole, rotational)
         self.add_penalty(0.5 * (start + end), 1.0, force)
         self.ghost.add_stiffness(pattern, blocks, scale)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotation.internal_force import InternalForce
 from verify.xfem.errors import XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.statics.load_path import LoadPath, PathCheck
 from verify.xfem.statics.newton import Descent, Newton
 
@@ -99,6 +99,8 @@ def static_equilibrium(
     shape = (virtual.node_count, virtual.mesh.space)
     if fixed.shape != shape or fixed.dtype != bool:
         raise XfemError(f"supports of shape {fixed.shape}, {fixed.dtype}; expected {shape}, bool")
+    if force.is_membrane and not force.is_corotational:
+        raise XfemError("linear kinematics of a membrane at finite rotation; expected corotational")
     if load_steps < 1 or iterations < 1 or not tolerance > 0.0:
         raise XfemError(
             f"{load_steps} load steps, {iterations} iterations, tolerance {tolerance:g}; expected "

@@ -7,15 +7,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly_kernels import constrain
+from verify.xfem.assembly import body_pattern, constrain
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import NotConvergedError, XfemError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.slivers.ghost_penalty import GhostPenalty
-from verify.xfem.sparsity import body_pattern
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
@@ -106,7 +105,7 @@ def solve_static(
         )
     check_bodies(virtual, supports)
     method, limit = _method(solver, virtual, ghost)
-    stiffness = LinearStiffness(virtual, material)
+    stiffness = InternalForce(virtual, material, "linear", kernels)
     clock = [perf_counter()]
     pattern = ghost.pattern() if ghost else body_pattern(virtual)
     inverse = _inverse(kernels, method, pattern, supports, limit)
@@ -142,15 +141,15 @@ def _method(solver: str, virtual: VirtualMesh, ghost: GhostPenalty | None) -> tu
 
 
 def _system(
-    stiffness: LinearStiffness,
+    stiffness: InternalForce,
     ghost: GhostPenalty | None,
     pattern: BlockPattern,
     supports: Supports,
     force: _Floats,
 ) -> tuple[_Floats, _Floats]:
     """Blocks of the matrix, and the right-hand side (N, d) for what is added to the supports."""
-    blocks = stiffness.assemble(pattern)
-    internal, _ = stiffness.force(supports.values)
+    blocks = stiffness.stiffness(pattern)
+    internal, _ = stiffness.evaluate(supports.values)
     if ghost:
         ghost.add_stiffness(pattern, blocks)
         internal += ghost.force(supports.values)[0]
@@ -168,7 +167,7 @@ def _inverse(
 
 
 def _solution(
-    stiffness: LinearStiffness,
+    stiffness: InternalForce,
     ghost: GhostPenalty | None,
     supports: Supports,
     force: _Floats,
@@ -177,7 +176,7 @@ def _solution(
     solver: str,
 ) -> StaticSolution:
     """Energies, reactions (N) and residual of a displacement (N, d) under forces (N, d)."""
-    internal, energy = stiffness.force(displacement)
+    internal, energy = stiffness.evaluate(displacement)
     penalty, penalty_energy = ghost.force(displacement) if ghost else (0.0, 0.0)
     internal += penalty
     unbalanced = internal - force

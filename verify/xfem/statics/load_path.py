@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.corotation.crushed_pieces import inverted_pieces
-from verify.xfem.corotation.internal_force import InternalForce
+from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.statics.newton import Newton, NotInEquilibriumError
 from verify.xfem.statics.rigid_motion import RigidMotions
 
@@ -89,7 +88,7 @@ class LoadPath:
         newton: Newton,
     ) -> None:
         self._force, self._fixed, self._load, self._newton = force, fixed, load, newton
-        self._motions = RigidMotions(force.virtual, fixed) if force.turning else None
+        self._motions = RigidMotions(force.virtual, fixed) if force.is_corotational else None
         self._prescribed = prescribed if self._motions is None else self._along_turns(prescribed)
         self._sampled: dict[float, _Floats] = {}
         self._stable: bool | None = None
@@ -239,5 +238,5 @@ class LoadPath:
         if self._force.is_membrane:
             return False
         volumes = self._force.virtual.volumes
-        was, now = (volumes[inverted_pieces(self._force, u)].sum() for u in (before, after))
+        was, now = (volumes[inverted_cells(self._force, u)].sum() for u in (before, after))
         return bool(now - was > _INVERTED * volumes.sum())

@@ -6,12 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly_kernels import constrain
-from verify.xfem.corotation.crushed_pieces import collapsed_pieces
-from verify.xfem.corotation.internal_force import InternalForce
+from verify.xfem.assembly import body_pattern, constrain
 from verify.xfem.errors import NotConvergedError, SingularStiffnessError
+from verify.xfem.internal_force import InternalForce, collapsed_cells
 from verify.xfem.linear_solvers import LinearSolver
-from verify.xfem.sparsity import body_pattern
 from verify.xfem.statics.linear import ITERATE_FROM
 
 __all__ = ["Descent", "Newton", "NotInEquilibriumError", "Place"]
@@ -109,7 +107,7 @@ class Newton:
 
     def _why(self, place: Place) -> str:
         """Say what stood in the way, as far as it can be seen."""
-        collapsed = collapsed_pieces(self._force, place.displacement, _COLLAPSED)
+        collapsed = collapsed_cells(self._force, place.displacement, _COLLAPSED)
         if len(collapsed) == 0:
             return "More load steps may help"
         return (
@@ -258,14 +256,11 @@ class Newton:
         blocks[:] = 0.0
         self._force.evaluate(displacement)
         if turning > 0.0:
-            self._force.add_stiffness(pattern, blocks, turning, "exact", displacement)
+            self._force.add_stiffness(pattern, blocks, turning, "consistent", displacement)
         if turning < 1.0:
             self._force.add_stiffness(pattern, blocks, 1.0 - turning)
         if turning == 0.0 and self._force.is_membrane:
-            nothing = np.zeros_like(displacement)
-            self._force.add_tension(
-                pattern, displacement, nothing, 0.0, 1.0, nothing, blocks, least
-            )
+            self._force.add_geometric(pattern, displacement, blocks, 1.0, least)
 
     def _solved(self, load: _Floats) -> _Floats:
         """Solve with the blocks; iterate if the body is large, factorise if that fails.

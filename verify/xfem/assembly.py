@@ -1,4 +1,4 @@
-"""Sparsity of the stiffness of a cut body, with couplings that no cell makes.
+"""Block pattern of a cut body, with couplings that no cell makes, and supports in its matrix.
 
 Without aggregation it is that of the cells. With it a corner without an unknown of its own couples
 all that it follows: the elements around such corners add to blocks of their own, from which
@@ -6,6 +6,7 @@ all that it follows: the elements around such corners add to blocks of their own
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -13,10 +14,12 @@ from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
 from verify.xfem.virtual import Aggregation, VirtualMesh
 
-__all__ = ["body_pattern", "find_places", "pattern_places"]
+__all__ = ["body_pattern", "constrain", "find_places", "pattern_places"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+
+_ROUND_OFF = 1e-14  # of the largest diagonal entry of a node
 
 
 def body_pattern(virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockPattern:
@@ -106,3 +109,39 @@ def find_places(
     wanted = rows * pattern.node_count + columns
     at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
     return at, keys[at] == wanted
+
+
+@njit(cache=True)
+def constrain(starts, columns, fixed, blocks):
+    """Decouple the fixed components: zero their rows and columns but for the diagonal.
+
+    Parameters
+    ----------
+    starts, columns : int arrays
+        Pattern of the blocks.
+    fixed : (N, d) bool array
+    blocks : (B, d, d) float array
+        Changed in place; the diagonal entries stay, so that scaling stays meaningful, but for
+        those that are not positive (zero or its round-off across a flat membrane, less than that
+        across a compressed one), which become one.
+    """
+    dim = fixed.shape[1]
+    constrained = np.zeros(len(fixed), dtype=np.bool_)
+    for node in range(len(fixed)):
+        for k in range(dim):
+            constrained[node] |= fixed[node, k]
+    for row in range(len(starts) - 1):
+        for at in range(starts[row], starts[row + 1]):
+            column = columns[at]
+            if not (constrained[row] or constrained[column]):
+                continue
+            least = 0.0
+            if row == column:
+                for k in range(dim):
+                    least = max(least, _ROUND_OFF * blocks[at, k, k])
+            for k in range(dim):
+                for l in range(dim):
+                    if (fixed[row, k] or fixed[column, l]) and not (row == column and k == l):
+                        blocks[at, k, l] = 0.0
+                    elif row == column and k == l and fixed[row, k] and blocks[at, k, k] <= least:
+                        blocks[at, k, k] = 1.0

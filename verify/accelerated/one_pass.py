@@ -1,0 +1,282 @@
+"""Force and tangent of corotational tetrahedra in one pass over them: what an implicit step needs.
+
+The corners of each cell are sorted by node, so that the blocks of its pairs are above the diagonal
+of the matrix, where they are added up. The rest of a symmetric matrix without force in translation
+follows, row by row: what is below the diagonal, and the diagonal as Σ_j K_ij = 0.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.accelerated.tetrahedron_batches import (
+    BATCH,
+    BLOCKS,
+    CORNERS,
+    ENTRIES,
+    FIRST,
+    FORCE,
+    GRADIENTS,
+    IRREGULAR,
+    QUATERNION,
+    average,
+    deform,
+    resist,
+    resist_rotation,
+    rotate,
+)
+from verify.xfem.averaged_stress import StepEnds, averaged_stress
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.element import Elements
+from verify.xfem.element import deform as deform_cells
+from verify.xfem.polar import rotation_matrices
+
+__all__ = ["OnePassTetrahedra"]
+
+_Floats = NDArray[np.float64]
+_Bools = NDArray[np.bool_]
+
+_WINDOW = 8 * BATCH  # cells among which those of a batch are not neighbours
+_FIRST, _SECOND = np.triu_indices(4, 1)
+
+
+class OnePassTetrahedra:
+    """One pass over the tetrahedra of a cut body, for one sparsity.
+
+    Parameters
+    ----------
+    elements : Elements
+        Tetrahedra.
+    pattern : BlockPattern
+        Its first cells must be those of the body.
+    corotational : bool
+        Whether cells have rotations of their own.
+    """
+
+    def __init__(self, elements: Elements, pattern: BlockPattern, corotational: bool) -> None:
+        count = len(elements.cells)
+        batches = -(-count // BATCH)
+        corner = np.argsort(elements.cells, axis=1)
+        nodes = np.take_along_axis(elements.cells, corner, axis=1)
+        cells = np.lexsort(nodes.T[::-1])
+        whole = count // _WINDOW * _WINDOW
+        windows = cells[:whole].reshape(-1, BATCH, _WINDOW // BATCH)
+        cells[:whole] = windows.transpose(0, 2, 1).ravel()
+        corner, parent = corner[cells], elements.parent[cells]
+        self.pattern, self._corotational = pattern, corotational
+        self._elements, self._cells = elements, cells
+        # cells beyond the last one fill a batch: they have no stiffness
+        self._nodes = np.zeros((batches * BATCH, 4), dtype=np.uint32)
+        self._nodes[:count] = nodes[cells]
+        self._targets = np.zeros((batches * BATCH, 6), dtype=np.uint32)
+        rows = cells[:, None]
+        self._targets[:count] = pattern.targets[rows, corner[:, _FIRST], corner[:, _SECOND]]
+        constants = np.zeros((batches * BATCH, 11))
+        gradients = elements.gradients[parent[:, None], corner[:, 1:]]
+        constants[:count, :9] = gradients.reshape(count, 9)
+        constants[:count, 9] = elements.volumes[cells] * elements.lam[parent]
+        constants[:count, 10] = elements.volumes[cells] * elements.mu[parent]
+        self._constants = _by_batch(constants)
+        # cells after which nothing is added to a row any more
+        ends = np.searchsorted(np.sort(nodes[:, 0]), np.arange(pattern.node_count), "right")
+        self._ends = np.minimum(-(-ends // _WINDOW) * _WINDOW, batches * BATCH)
+        self._quaternions = _by_batch(np.tile([1.0, 0.0, 0.0, 0.0], (batches * BATCH, 1)))
+        self._first = self._quaternions  # at the start of a step, once one is averaged
+        self._at = np.full((2, pattern.node_count, 3), np.nan)  # of which both are the rotations
+        self._irregular = np.zeros(batches * BATCH, dtype=np.bool_)
+        self._memory = np.zeros(ENTRIES * BATCH)
+
+    def __call__(
+        self,
+        displacement: _Floats,
+        velocity: _Floats,
+        implicit: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+        rotational: float = 0.0,
+    ) -> int:
+        """Overwrite force (N, 3) and blocks (B, 3, 3); see `verify.xfem.kernels.OnePass`."""
+        moved = displacement, velocity, implicit
+        return self._run(moved, scale, rotational, False, force, blocks, whole)
+
+    def average(
+        self,
+        start: _Floats,
+        end: _Floats,
+        scale: float,
+        rotational: float,
+        substituted: _Bools,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+    ) -> int:
+        """Overwrite the averaged force and the tangent at the end; see `OnePass`."""
+        if not np.array_equal(self._at[1], start):
+            if not np.array_equal(self._at[0], start):
+                self._run((start, start, 0.0), 0.0, 0.0, False, force, blocks, False)
+            self._first, self._at[1] = self._quaternions.copy(), start
+        irregular = self._irregular[: len(self._cells)]
+        irregular[:] = substituted[self._cells]
+        moved = end, start - end, 1.0
+        left_out = self._run(moved, scale, rotational, True, force, blocks, whole)
+        if irregular.any():
+            self._add_substitutes(irregular, start, end, force)
+            substituted[self._cells] = irregular
+        return left_out
+
+    def _add_substitutes(
+        self, irregular: _Bools, start: _Floats, end: _Floats, force: _Floats
+    ) -> None:
+        """Add the forces of the few cells without a plain form, as `verify.xfem` does."""
+        some = self._elements.part(self._cells[irregular])
+        count = len(some.cells)
+        F0, F1, R0, R1 = np.empty((4, count, 3, 3))
+        deform_cells(some, start, 1.0, F0)
+        deform_cells(some, end, 1.0, F1)
+        rotation_matrices(_by_cell(self._first)[: len(irregular)][irregular], R0)
+        rotation_matrices(_by_cell(self._quaternions)[: len(irregular)][irregular], R1)
+        P = averaged_stress(some, StepEnds(F0, F1, R0, R1), np.ones(count, dtype=np.bool_))
+        P *= some.volumes[:, None, None]
+        np.add.at(force, some.cells, some.gradients[some.parent] @ P.transpose(0, 2, 1))
+
+    def _run(
+        self,
+        moved: tuple[_Floats, _Floats, float],
+        scale: float,
+        rotational: float,
+        averaged: bool,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool,
+    ) -> int:
+        self._at[0] = moved[0]
+        pattern = self.pattern
+        return int(
+            _linearise(
+                self._memory, self._nodes, self._targets, self._constants, self._quaternions,
+                self._first, *moved, self._corotational, scale, rotational, averaged,
+                self._irregular, self._ends, pattern.starts, pattern.diagonal, pattern.mirror,
+                whole, force, blocks,
+            )
+        )  # fmt: skip
+
+    def write_rotations(self, rotations: _Floats) -> None:
+        """Write the rotations (p, 3, 3) of the last pass."""
+        found = np.empty((len(self._cells), 3, 3))
+        rotation_matrices(_by_cell(self._quaternions)[: len(found)], found)
+        rotations[self._cells] = found
+
+
+@njit(cache=True)
+def _linearise(
+    v, nodes, targets, constants, quaternions, first, displacement, velocity, implicit,
+    corotational, scale, rotational, averaged, irregular, ends, starts, diagonal, mirror, whole,
+    force, blocks,
+):  # fmt: skip
+    """Write force and tangent of a displacement; return the cells without rotational part."""
+    left_out = row = begun = 0
+    d = np.empty((3, 3))
+    force[:] = 0.0
+    for batch in range(len(constants)):
+        start = batch * BATCH
+        for entry in range(11 * BATCH):
+            v[GRADIENTS * BATCH + entry] = constants[batch, entry]
+        for entry in range(4 * BATCH):
+            v[QUATERNION * BATCH + entry] = quaternions[batch, entry]
+        for l in range(BATCH):
+            for corner in range(4):
+                node, at = nodes[start + l, corner], (CORNERS + 6 * corner) * BATCH + l
+                for k in range(3):
+                    u = displacement[node, k]
+                    v[at + k * BATCH] = u
+                    v[at + (3 + k) * BATCH] = u + implicit * velocity[node, k]
+        deform(v)
+        if corotational:
+            rotate(v)
+            for entry in range(4 * BATCH):
+                quaternions[batch, entry] = v[QUATERNION * BATCH + entry]
+        resist(v, scale)
+        if rotational != 0.0:
+            resist_rotation(v, rotational)
+            for l in range(BATCH):
+                left_out += v[IRREGULAR * BATCH + l] > 0.0
+        if averaged:
+            for entry in range(4 * BATCH):
+                v[FIRST * BATCH + entry] = first[batch, entry]
+            average(v)
+            for l in range(BATCH):
+                if irregular[start + l]:
+                    for entry in range(FORCE, FORCE + 12):
+                        v[entry * BATCH + l] = 0.0
+                irregular[start + l] |= v[IRREGULAR * BATCH + l] > 0.0
+        last = np.uint32(0)
+        for l in range(BATCH):
+            last = max(last, nodes[start + l, 2])
+        begun = _begin(begun, last, starts, diagonal, blocks)
+        for l in range(BATCH):
+            for corner in range(4):
+                node, at = nodes[start + l, corner], (FORCE + 3 * corner) * BATCH + l
+                for k in range(3):
+                    force[node, k] += v[at + k * BATCH]
+            for pair in range(6):
+                target, at = targets[start + l, pair], (BLOCKS + 9 * pair) * BATCH + l
+                for k in range(3):
+                    for m in range(3):
+                        blocks[target, k, m] += v[at + (3 * k + m) * BATCH]
+        while row < len(ends) and ends[row] <= start + BATCH:
+            begun = _begin(begun, row, starts, diagonal, blocks)
+            _complete(row, starts, diagonal, mirror, whole, d, blocks)
+            row += 1
+    return left_out
+
+
+@njit(cache=True)
+def _begin(row, last, starts, diagonal, blocks):
+    """Empty rows up to the last one from the diagonal on; return the one after it."""
+    while row <= last:
+        for place in range(diagonal[row] + 1, starts[row + 1]):
+            for k in range(3):
+                for l in range(3):
+                    blocks[place, k, l] = 0.0
+        row += 1
+    return row
+
+
+@njit(cache=True)
+def _complete(row, starts, diagonal, mirror, whole, d, blocks):
+    """Write the diagonal of a row and, if wanted, what is below it, from what is above it."""
+    middle = diagonal[row]
+    d[:] = 0.0
+    for place in range(starts[row], middle):
+        above = mirror[place]
+        for k in range(3):
+            for l in range(3):
+                value = blocks[above, l, k]
+                d[k, l] -= value
+                if whole:
+                    blocks[place, k, l] = value
+    for place in range(middle + 1, starts[row + 1]):
+        for k in range(3):
+            for l in range(3):
+                d[k, l] -= blocks[place, k, l]
+    # a sum of blocks that are not symmetric is so but for round-off
+    for k in range(3):
+        for l in range(3):
+            blocks[middle, k, l] = 0.5 * (d[k, l] + d[l, k])
+
+
+def _by_batch(values: _Floats) -> _Floats:
+    """Entries (cells, k) of cells as (batches, k · BATCH), those of a batch beside each other."""
+    entries = values.reshape(-1, BATCH, values.shape[1]).transpose(0, 2, 1)
+    return np.ascontiguousarray(entries).reshape(len(entries), -1)
+
+
+def _by_cell(entries: _Floats) -> _Floats:
+    """Entries (batches, k · BATCH) as (cells, k)."""
+    return (
+        entries.reshape(len(entries), -1, BATCH)
+        .transpose(0, 2, 1)
+        .reshape(-1, entries.shape[1] // BATCH)
+    )

@@ -1,0 +1,364 @@
+"""Force and tangent of corotational linear elements, per cell of a cut body.
+
+With b_i the material gradient of shape function i, w the volume of a cell, F = I + Σ u_i b_iᵀ = R U
+and E = sym(Rᵀ F) − I, the potential is w (μ‖E‖² + ½λ tr² E). The force f_i = P b_i,
+P = w R (2μE + λ tr(E) I), is its gradient as long as R is the nearest rotation; R = I is linear
+elasticity. A tangent is K_ij,kl = w b_in A_knlm b_jm, A a derivative of P by F:
+
+    rotation-fixed   A = μ (δ_kl δ_nm + R_km R_ln) + λ R_kn R_lm,
+    consistent       A = 2μ δ_kl δ_nm + λ R_kn R_lm + (λ tr(E) − 2μ) ∂R_kn/∂F_lm.
+
+A membrane is the same with F and I restricted to its tangent plane. It has no stiffness against
+the displacement φ along its turned normal n but w (∇φ · S ∇φ) of its tension S, the second
+Piola–Kirchhoff stress with principal values (2μ(λ_k − 1) + λ(λ_1 + λ_2 − 2))/λ_k at the stretches
+λ_k. The geometric stiffness takes its positive part alone, so that it has no negative mode.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from verify.xfem.elasticity import Material
+from verify.xfem.polar import adjugate
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = [
+    "Elements",
+    "add_blocks",
+    "add_force",
+    "add_moduli",
+    "add_rotation_fixed",
+    "consistent_moduli",
+    "deform",
+    "elements_of",
+    "geometric_stiffness",
+    "polar_slope",
+    "restricted",
+]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+_SINGULAR = 1e-8  # of the trace of the stretch: a rotation without a derivative
+_COLLAPSED = 1e-6  # stretch below which a direction carries no tension that could be meant
+_SPINS = {
+    2: np.array([[[0.0, -1.0], [1.0, 0.0]]]),
+    3: np.zeros((3, 3, 3)),
+}  # of infinitesimal turns
+_SPINS[3][[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0
+_SPINS[3][[0, 1, 2], [1, 2, 0], [2, 0, 1]] = -1.0
+
+
+class Elements(NamedTuple):
+    """What the loops over the cells of a cut body read.
+
+    Attributes
+    ----------
+    cells : (p, c) int array
+        Nodes.
+    parent : (p,) int array
+        Cells of the uncut mesh.
+    gradients : (m, c, d) float array
+        Of the shape functions, in 1/m.
+    volumes : (p,) float array
+    normals : (m, d) float array
+        Unit normals of membranes; one row of zeros of all other bodies.
+    lam, mu : (m,) float array
+        Lamé parameters in pascal.
+    axes, corners : tuple of int
+        0…d − 1 and 0…c − 1: lengths that the compiler knows.
+    """
+
+    cells: _Ints
+    parent: _Ints
+    gradients: _Floats
+    volumes: _Floats
+    normals: _Floats
+    lam: _Floats
+    mu: _Floats
+    axes: tuple[int, ...]
+    corners: tuple[int, ...]
+
+    @property
+    def is_membrane(self) -> bool:
+        """Whether cells are triangles in space."""
+        return len(self.axes) == len(self.corners)
+
+    def part(self, some: slice | _Ints) -> "Elements":
+        """Return some of the cells."""
+        return self._replace(
+            cells=self.cells[some], parent=self.parent[some], volumes=self.volumes[some]
+        )
+
+
+def elements_of(virtual: VirtualMesh, material: Material) -> Elements:
+    """Elements of a cut body.
+
+    Raises
+    ------
+    XfemError
+        If the material has neither one value nor one per cell of the uncut mesh.
+    """
+    mesh = virtual.mesh
+    normals = np.zeros((1, mesh.space))
+    if mesh.dim < mesh.space:
+        normals = np.cross(mesh.edge_vectors[:, 0], mesh.edge_vectors[:, 1])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lam, mu = material.of_cells(len(mesh.cells))
+    gradients = np.ascontiguousarray(mesh.gradients)
+    axes, corners = tuple(range(mesh.space)), tuple(range(mesh.dim + 1))
+    return Elements(
+        virtual.cells, virtual.parent, gradients, virtual.volumes, normals, lam, mu, axes, corners
+    )
+
+
+@njit(cache=True)
+def deform(elements, displacement, share, F):
+    """Write `share` I + ∇u to F (p, d, d), restricted to the tangent plane of membranes."""
+    cells, parent, gradients, _, normals, _, _, axes, corners = elements
+    d, c = len(axes), len(corners)
+    for p in range(len(cells)):
+        cell = parent[p]
+        for k in range(d):
+            for l in range(d):
+                total = share if k == l else 0.0
+                if c == d:
+                    total -= share * normals[cell, k] * normals[cell, l]
+                for i in range(c):
+                    total += displacement[cells[p, i], k] * gradients[cell, i, l]
+                F[p, k, l] = total
+
+
+@njit(cache=True)
+def add_force(elements, R, F, share, scale, force):
+    """Add `scale` times the forces of E = sym(Rᵀ F) − `share` I; return as much of the energy.
+
+    With F from `deform`: the internal force for a share of one, for a share of zero the product of
+    rotation-fixed tangent and vector.
+
+    Parameters
+    ----------
+    elements : Elements
+    R, F : (p, d, d) float array
+    share, scale : float
+    force : (N, d) float array
+    """
+    cells, parent, gradients, volumes, normals, lam, mu, axes, corners = elements
+    d, c = len(axes), len(corners)
+    E, P = np.empty((d, d)), np.empty((d, d))
+    energy = 0.0
+    for p in range(len(cells)):
+        cell = parent[p]
+        for k in range(d):
+            for l in range(d):
+                E[k, l] = 0.0
+                for m in range(d):
+                    E[k, l] += R[p, m, k] * F[p, m, l]
+        if c == d:  # nothing resists across the turned plane
+            for l in range(d):
+                across = 0.0
+                for k in range(d):
+                    across += normals[cell, k] * E[k, l]
+                for k in range(d):
+                    E[k, l] -= normals[cell, k] * (across - share * normals[cell, l])
+        trace = square = 0.0
+        for k in range(d):
+            E[k, k] -= share
+            trace += E[k, k]
+            for l in range(k):
+                E[k, l] = E[l, k] = 0.5 * (E[k, l] + E[l, k])
+        for k in range(d):
+            for l in range(d):
+                square += E[k, l] * E[k, l]
+        w, pressure, double = scale * volumes[p], lam[cell] * trace, 2.0 * mu[cell]
+        energy += 0.5 * w * (double * square + pressure * trace)
+        for k in range(d):
+            for l in range(d):
+                total = pressure * R[p, k, l]
+                for m in range(d):
+                    total += double * R[p, k, m] * E[m, l]
+                P[k, l] = w * total
+        for i in range(c):
+            for k in range(d):
+                total = 0.0
+                for l in range(d):
+                    total += P[k, l] * gradients[cell, i, l]
+                force[cells[p, i], k] += total
+    return energy
+
+
+@njit(cache=True)
+def add_rotation_fixed(elements, R, scale, targets, blocks):
+    """Add `scale` times the rotation-fixed tangent to nodal blocks.
+
+    Parameters
+    ----------
+    elements : Elements
+    R : (p, d, d) float array
+    scale : float
+    targets : (p, c, c) int array
+        Block of each pair of corners.
+    blocks : (B, d, d) float array
+    """
+    cells, parent, gradients, volumes, normals, lam, mu, axes, corners = elements
+    d, c = len(axes), len(corners)
+    g, n = np.empty((c, d)), np.zeros(d)
+    for p in range(len(cells)):
+        cell = parent[p]
+        wl, wm = scale * volumes[p] * lam[cell], scale * volumes[p] * mu[cell]
+        for k in range(d):
+            for i in range(c):
+                g[i, k] = 0.0
+                for l in range(d):
+                    g[i, k] += R[p, k, l] * gradients[cell, i, l]
+            if c == d:
+                n[k] = 0.0
+                for l in range(d):
+                    n[k] += R[p, k, l] * normals[cell, l]
+        for i in range(c):
+            for j in range(i, c):
+                dot = 0.0
+                for k in range(d):
+                    dot += wm * g[i, k] * g[j, k]
+                upper, lower = targets[p, i, j], targets[p, j, i]
+                for k in range(d):
+                    for l in range(d):
+                        value = wl * g[i, k] * g[j, l] + wm * g[j, k] * g[i, l]
+                        if k == l:
+                            value += dot
+                        if c == d:
+                            value -= dot * n[k] * n[l]
+                        blocks[upper, k, l] += value
+                        if i != j:
+                            blocks[lower, l, k] += value
+
+
+@njit(cache=True)
+def add_moduli(elements, A, scale, targets, blocks):
+    """Add the tangent of the moduli A (p, d, d, d, d), times `scale`, to nodal blocks."""
+    cells, parent, gradients, volumes, _, _, _, axes, corners = elements
+    d, c = len(axes), len(corners)
+    half = np.empty((d, d, d))
+    for p in range(len(cells)):
+        cell = parent[p]
+        for i in range(c):
+            for k in range(d):
+                for l in range(d):
+                    for m in range(d):
+                        total = 0.0
+                        for n in range(d):
+                            total += gradients[cell, i, n] * A[p, k, n, l, m]
+                        half[k, l, m] = scale * volumes[p] * total
+            for j in range(c):
+                at = targets[p, i, j]
+                for k in range(d):
+                    for l in range(d):
+                        for m in range(d):
+                            blocks[at, k, l] += half[k, l, m] * gradients[cell, j, m]
+
+
+@njit(cache=True)
+def add_blocks(targets, K, blocks):
+    """Add the blocks K (p, c, c, d, d) of all pairs of corners to nodal blocks."""
+    d = blocks.shape[1]
+    for p in range(K.shape[0]):
+        for i in range(K.shape[1]):
+            for j in range(K.shape[1]):
+                for k in range(d):
+                    for l in range(d):
+                        blocks[targets[p, i, j], k, l] += K[p, i, j, k, l]
+
+
+def restricted(elements: Elements) -> _Floats:
+    """Projections (p, d, d) on the tangent plane of membranes; one identity of other bodies."""
+    identity = np.eye(len(elements.axes))[None]
+    if not elements.is_membrane:
+        return identity
+    normals = elements.normals[elements.parent]
+    return identity - normals[:, :, None] * normals[:, None, :]
+
+
+def polar_slope(
+    R: _Floats, F: _Floats, singular: float = _SINGULAR
+) -> tuple[_Floats, NDArray[np.bool_]]:
+    """∂R/∂F (p, d, d, d, d) of nearest rotations; zero, and listed as such, where there is none.
+
+    With the skew matrices S_a of infinitesimal rotations and G_a = R S_a it is G_a (H⁻¹)_ab G_b,
+    H = tr(U) I − U in space and tr(U) in the plane.
+
+    Parameters
+    ----------
+    R, F : (p, d, d) float array
+    singular : float
+        Determinant of H over a power of the trace of U, up to which there is no derivative.
+
+    Returns
+    -------
+    slope : (p, d, d, d, d) float array
+    without : (p,) bool array
+    """
+    spins = _SPINS[F.shape[1]]
+    U = R.transpose(0, 2, 1) @ F
+    trace = np.einsum("pkk->p", U)
+    H = np.einsum("aij,bik,pkj->pab", spins, spins, 0.5 * (U + U.transpose(0, 2, 1)), optimize=True)
+    cofactors, determinant = adjugate(H) if len(spins) == 3 else (np.ones_like(H), H[:, 0, 0])
+    without = ~(determinant > singular * np.abs(trace) ** len(spins))
+    inverse = cofactors / np.where(without, 1.0, determinant)[:, None, None]
+    inverse[without] = 0.0
+    G = np.einsum("pka,san->pskn", R, spins)
+    half = np.einsum("pst,ptlm->pslm", inverse, G)
+    return np.einsum("pskn,pslm->pknlm", G, half), without
+
+
+def consistent_moduli(elements: Elements, R: _Floats, F: _Floats) -> tuple[_Floats, int]:
+    """Second derivative of the potential by F, (p, d, d, d, d) per volume.
+
+    Cells whose rotation is not differentiable have the rotation-fixed moduli; the second value
+    is how many they are.
+    """
+    identity = np.eye(F.shape[1])
+    lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
+    trace = np.einsum("pkl,pkl->p", R, F) - (len(elements.corners) - 1)
+    A, without = polar_slope(R, F)
+    A *= (lam * trace - 2.0 * mu)[:, None, None, None, None]
+    A += (2.0 * mu)[:, None, None, None, None] * np.einsum("kl,nm->knlm", identity, identity)
+    if without.any():
+        turned = R[without] @ restricted(elements)[without if elements.is_membrane else [0]]
+        plane = turned @ turned.transpose(0, 2, 1)
+        fixed = np.einsum("pkl,nm->pknlm", plane, identity)
+        fixed += np.einsum("pkm,pln->pknlm", R[without], R[without])
+        A[without] = mu[without, None, None, None, None] * fixed
+    A += np.einsum("pkn,plm->pknlm", lam[:, None, None] * R, R)
+    return A, int(without.sum())
+
+
+def geometric_stiffness(elements: Elements, R: _Floats, F: _Floats, least: float) -> _Floats:
+    """Stiffness (p, 3, 3) between corners of membranes, of displacements along the turned normal.
+
+    The positive part of the tension is α I + β U in the tangent plane. Principal values below
+    `least` times μ are taken as that: without it what is slack has no stiffness.
+    """
+    lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
+    U = R.transpose(0, 2, 1) @ F
+    U = 0.5 * (U + U.transpose(0, 2, 1))
+    trace, square = np.einsum("pkk->p", U), np.einsum("pkl,pkl->p", U, U)
+    gap = np.sqrt(np.maximum(2.0 * square - trace**2, 0.0))
+    high, low = 0.5 * (trace + gap), 0.5 * (trace - gap)
+
+    def tension(stretch: _Floats) -> _Floats:
+        carries = stretch > _COLLAPSED
+        value = 2.0 * mu * (stretch - 1.0) + lam * (trace - 2.0)
+        return np.maximum(
+            least * mu, np.where(carries, value / np.where(carries, stretch, 1.0), -np.inf)
+        )
+
+    first, second = tension(high), tension(low)
+    apart = gap > 1e-12 * trace
+    beta = np.where(apart, (first - second) / np.where(apart, gap, 1.0), 0.0)
+    alpha = np.where(apart, first - beta * high, 0.5 * (first + second))
+    b = elements.gradients[elements.parent]
+    found = alpha[:, None, None] * (b @ b.transpose(0, 2, 1))
+    found += beta[:, None, None] * (b @ U @ b.transpose(0, 2, 1))
+    return found * elements.volumes[:, None, None]

@@ -1,0 +1,447 @@
+"""Internal force, energy and stiffness of a cut body, linear or corotational (2.42, 2.66-70).
+
+Every cell of the phantom-node mesh has one polar rotation of its own, so that the parts of a cut
+cell need not agree on one. `verify.xfem.element` has the equations.
+"""
+
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.elasticity import Material
+from verify.xfem.element import (
+    add_blocks,
+    add_force,
+    add_moduli,
+    add_rotation_fixed,
+    consistent_moduli,
+    deform,
+    elements_of,
+    geometric_stiffness,
+)
+from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_floats
+from verify.xfem.kernels import PLAIN, Kernels, OnePass
+from verify.xfem.polar import rotations_in_plane, rotations_in_space
+from verify.xfem.virtual import VirtualMesh
+
+__all__ = ["InternalForce", "Kinematics", "TangentKind", "collapsed_cells", "inverted_cells"]
+
+_Floats = NDArray[np.float64]
+Kinematics = Literal["corotational", "linear"]
+TangentKind = Literal["rotation-fixed", "geometric", "consistent"]
+
+_CHUNK = 512  # cells whose moduli are held at once
+
+
+class InternalForce:
+    """Internal force, strain energy and stiffness of a cut body.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+        Triangles in the plane, tetrahedra, or triangles in space (membranes without bending
+        stiffness; their material is in plane stress times the thickness, its unit N/m).
+    material : Material
+    kinematics : {"corotational", "linear"}
+        Linear keeps every rotation at the identity. A linear membrane resists in its plane alone.
+    kernels : Kernels
+        Of which `one_pass` serves tetrahedra here; the rest is for what solves with this force.
+
+    Attributes
+    ----------
+    elements : Elements
+    left_out : int
+        Cells whose rotation was not differentiable at the last consistent tangent, and which
+        therefore entered with the rotation-fixed one.
+
+    Raises
+    ------
+    XfemError
+        If the material fits neither () nor (m,), or the kinematics is unknown.
+    """
+
+    def __init__(
+        self,
+        virtual: VirtualMesh,
+        material: Material,
+        kinematics: Kinematics = "corotational",
+        kernels: Kernels = PLAIN,
+    ) -> None:
+        if kinematics not in get_args(Kinematics):
+            raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
+        self.virtual, self.kinematics, self.kernels = virtual, kinematics, kernels
+        self.elements = elements_of(virtual, material)
+        self.left_out = 0
+        cells, space = len(virtual.cells), virtual.mesh.space
+        self._rotations = np.tile(np.eye(space), (cells, 1, 1))
+        self._quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (cells, 1))  # where rotations start
+        self._gradient = np.empty((cells, space, space))
+        self._shape = (virtual.node_count, space)
+        self._pass: OnePass | None = None
+        self._passed = False  # whether the last rotations are those of the pass
+
+    @property
+    def rotations(self) -> _Floats:
+        """(p, d, d) rotation of each cell at the last evaluation."""
+        if self._passed and self._pass is not None:
+            self._pass.write_rotations(self._rotations)
+            self._passed = False
+        return self._rotations
+
+    @property
+    def is_corotational(self) -> bool:
+        """Whether cells have rotations of their own."""
+        return self.kinematics == "corotational"
+
+    @property
+    def is_membrane(self) -> bool:
+        """Whether the body is of triangles in space."""
+        return self.elements.is_membrane
+
+    @property
+    def has_stress(self) -> bool:
+        """Whether the force is that of a stress, which can be averaged over a step."""
+        return True
+
+    @property
+    def has_one_pass(self) -> bool:
+        """Whether `linearise` takes the one pass of the kernels: of tetrahedra that follow none."""
+        solid = self.virtual.mesh.dim == 3 and self.virtual.aggregation is None
+        return solid and self.kernels.one_pass is not None
+
+    def deformation(self, displacement: _Floats) -> _Floats:
+        """Deformation gradients (p, d, d), of membranes zero across their plane; overwritten."""
+        self._check(displacement=displacement)
+        deform(self.elements, self.virtual.extend(displacement), 1.0, self._gradient)
+        return self._gradient
+
+    def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
+        """Return internal force (N, d) in newtons and strain energy in joules; update rotations.
+
+        Parameters
+        ----------
+        displacement : (N, d) float array
+            Of the dof nodes, in metres.
+        out : (N, d) float array, optional
+            Overwritten with the force.
+
+        Raises
+        ------
+        XfemError
+            If an array has a wrong shape or type.
+        """
+        force = np.empty(self._shape) if out is None else out
+        self._check(force=force)
+        F = self.deformation(displacement)
+        if self.is_corotational:
+            if self._shape[1] == 2:
+                rotations_in_plane(F, self._rotations)
+            else:
+                rotations_in_space(F, self._quaternions, self._rotations)
+            self._passed = False
+        return self._restrict_force(F, 1.0, 1.0, force, overwrite=True)
+
+    def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` K v (N, d), K the rotation-fixed tangent of the last evaluation, to `out`.
+
+        Raises
+        ------
+        XfemError
+            If an array has a wrong shape or type.
+        """
+        self._check(vector=vector, force=out)
+        deform(self.elements, self.virtual.extend(vector), 0.0, self._gradient)
+        self._restrict_force(self._gradient, 0.0, scale, out)
+
+    def _restrict_force(
+        self, F: _Floats, share: float, scale: float, out: _Floats, overwrite: bool = False
+    ) -> tuple[_Floats, float]:
+        corner_force = np.zeros_like(self.virtual.corners.node_points)
+        energy = add_force(self.elements, self.rotations, F, share, scale, corner_force)
+        if overwrite:
+            out[:] = 0.0
+        out += self.virtual.restrict(corner_force)
+        return out, float(energy)
+
+    def _check(self, **arrays: _Floats) -> None:
+        for name, values in arrays.items():
+            check_floats(name, values, self._shape)
+
+    def _check_blocks(self, pattern: BlockPattern, blocks: _Floats) -> None:
+        space = self._shape[1]
+        check_floats("blocks", blocks, (len(pattern.columns), space, space))
+        if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.virtual.cells):
+            raise XfemError(
+                f"pattern of {pattern.node_count} nodes and {len(pattern.targets)} cells; expected "
+                f"that of the body, {self._shape[0]} and {len(self.virtual.cells)}"
+            )
+
+    def add_stiffness(
+        self,
+        pattern: BlockPattern,
+        blocks: _Floats,
+        scale: float = 1.0,
+        kind: TangentKind = "rotation-fixed",
+        displacement: _Floats | None = None,
+    ) -> None:
+        """Add `scale` times a tangent at the last evaluation to the nodal blocks.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Its first cells must be those of the body.
+        blocks : (B, d, d) float array
+        kind : {"rotation-fixed", "geometric", "consistent"}
+            Rotations held; the same and the geometric stiffness of membranes, which has no
+            negative mode either; or the second derivative of the potential.
+        displacement : (N, d) float array, optional
+            That of the last evaluation; needed for all but the rotation-fixed tangent.
+
+        Raises
+        ------
+        XfemError
+            If the kind is unknown or needs a displacement that is not given, or an array is not of
+            the body.
+        """
+        self._check_blocks(pattern, blocks)
+        if kind not in get_args(TangentKind):
+            expected = ", ".join(get_args(TangentKind))
+            raise XfemError(f"stiffness '{kind}'; expected one of {expected}")
+        targets, added = pattern.targets[: len(self.virtual.cells)], pattern.unfold(blocks)
+        if kind == "rotation-fixed" or not self.is_corotational:
+            add_rotation_fixed(self.elements, self.rotations, scale, targets, added)
+        elif displacement is None:
+            raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
+        elif kind == "geometric":
+            add_rotation_fixed(self.elements, self.rotations, scale, targets, added)
+            if self.is_membrane:
+                self._add_geometric(displacement, 0.0, scale, targets, added)
+        else:
+            F, R, self.left_out = self.deformation(displacement), self.rotations, 0
+            for start in range(0, len(F), _CHUNK):
+                some = slice(start, start + _CHUNK)
+                elements = self.elements.part(some)
+                moduli, left_out = consistent_moduli(elements, R[some], F[some])
+                add_moduli(elements, moduli, scale, targets[some], added)
+                self.left_out += left_out
+        pattern.fold(added, blocks)
+
+    def add_geometric(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats,
+        blocks: _Floats,
+        scale: float,
+        least: float = 0.0,
+    ) -> None:
+        """Add `scale` times the geometric stiffness of a membrane at the last evaluation.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+        displacement : (N, 3) float array
+            That of the last evaluation.
+        blocks : (B, 3, 3) float array
+        scale : float
+        least : float
+            Tension over μ that every direction is taken to have at least: without it what is slack
+            has no stiffness across its plane.
+
+        Raises
+        ------
+        XfemError
+            If the body is no membrane, or an array not of it.
+        """
+        self._check_blocks(pattern, blocks)
+        added = pattern.unfold(blocks)
+        targets = pattern.targets[: len(self.virtual.cells)]
+        self._add_geometric(displacement, least, scale, targets, added)
+        pattern.fold(added, blocks)
+
+    def _add_geometric(
+        self,
+        displacement: _Floats,
+        least: float,
+        scale: float,
+        targets: NDArray[np.int32],
+        blocks: _Floats,
+    ) -> None:
+        stiffness, n = self._geometric(displacement, least)
+        across = (scale * n)[:, :, None] * n[:, None, :]
+        add_blocks(targets, stiffness[..., None, None] * across[:, None, None], blocks)
+
+    def add_geometric_product(
+        self, displacement: _Floats, vector: _Floats, scale: float, out: _Floats
+    ) -> None:
+        """Add `scale` times the geometric stiffness of a membrane times a vector (N, 3) to `out`.
+
+        Raises
+        ------
+        XfemError
+            If the body is no membrane, or an array not of it.
+        """
+        self._check(vector=vector, force=out)
+        stiffness, n = self._geometric(displacement, 0.0)
+        moved = self.virtual.extend(vector)[self.virtual.cells]
+        across = np.einsum("pjk,pk->pj", moved, scale * n)
+        out += self.nodal_force((stiffness @ across[:, :, None]) * n[:, None, :])
+
+    def nodal_force(self, forces: _Floats) -> _Floats:
+        """Sum (N, d) of forces (p, c, d) at the corners of cells."""
+        v = self.virtual
+        nodes, count = v.cells.ravel(), len(v.corners.node_points)
+        columns = forces.reshape(-1, forces.shape[2]).T
+        return v.restrict(np.stack([np.bincount(nodes, f, count) for f in columns], axis=1))
+
+    def _geometric(self, displacement: _Floats, least: float) -> tuple[_Floats, _Floats]:
+        """Stiffness between corners (p, 3, 3) of displacements along turned normals (p, 3)."""
+        if not self.is_membrane:
+            raise XfemError("geometric stiffness of a solid; expected a membrane in space")
+        R, elements = self.rotations, self.elements
+        stiffness = geometric_stiffness(elements, R, self.deformation(displacement), least)
+        return stiffness, np.einsum("pkl,pl->pk", R, elements.normals[elements.parent])
+
+    def stiffness(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats | None = None,
+        kind: TangentKind = "consistent",
+    ) -> _Floats:
+        """(B, d, d) nodal blocks of a tangent in N/m, at a displacement or at rest."""
+        at = np.zeros(self._shape) if displacement is None else displacement
+        self.evaluate(at)
+        blocks = np.zeros((len(pattern.columns), self._shape[1], self._shape[1]))
+        self.add_stiffness(pattern, blocks, 1.0, kind, at)
+        return blocks
+
+    def prepare(self, pattern: BlockPattern) -> None:
+        """Do what `linearise` does otherwise when it is first called with a sparsity."""
+        if self.has_one_pass:
+            self._one_pass(pattern)
+
+    def _one_pass(self, pattern: BlockPattern) -> OnePass:
+        if self._pass is None or self._pass.pattern is not pattern:
+            assert self.kernels.one_pass is not None
+            self._pass = self.kernels.one_pass(self.elements, pattern, self.is_corotational)
+        return self._pass
+
+    def linearise(
+        self,
+        pattern: BlockPattern,
+        displacement: _Floats,
+        velocity: _Floats,
+        implicit: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+        rotational: float = 0.0,
+    ) -> None:
+        """Overwrite force and stiffness as an implicit step wants them; update rotations.
+
+        Parameters
+        ----------
+        pattern : BlockPattern
+            Its first cells must be those of the body.
+        displacement, velocity : (N, d) float array
+        implicit : float
+            In seconds; the force is f_int(u) + `implicit` K v, K the rotation-fixed tangent.
+        scale : float
+            Of the rotation-fixed tangent in the blocks.
+        force : (N, d) float array
+            Overwritten.
+        blocks : (B, d, d) float array
+            Overwritten.
+        whole : bool
+            Without it what is below the diagonal may be anything.
+        rotational : float
+            Of what the consistent tangent has beyond the rotation-fixed one.
+
+        Raises
+        ------
+        XfemError
+            If an array is not of the body, or not of the pattern.
+        """
+        if self.has_one_pass:
+            self._check(displacement=displacement, velocity=velocity, force=force)
+            self._check_blocks(pattern, blocks)
+            moved = displacement, velocity, implicit
+            one_pass = self._one_pass(pattern)
+            self.left_out = one_pass(*moved, scale, force, blocks, whole, rotational)
+            self._passed = self.is_corotational
+            return
+        self.evaluate(displacement, force)
+        if implicit != 0.0:
+            self.add_tangent_product(velocity, implicit, force)
+        blocks[:] = 0.0
+        if scale != rotational:
+            self.add_stiffness(pattern, blocks, scale - rotational)
+        if rotational != 0.0:
+            self.add_stiffness(pattern, blocks, rotational, "consistent", displacement)
+
+    def linearise_average(
+        self,
+        pattern: BlockPattern,
+        start: _Floats,
+        end: _Floats,
+        substituted: NDArray[np.bool_],
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+        rotational: float = 0.0,
+    ) -> None:
+        """Overwrite the force averaged over a step, and the stiffness at its end, in one pass.
+
+        Parameters
+        ----------
+        start, end : (N, 3) float array
+            Displacements.
+        substituted : (p,) bool array
+            Cells that have taken the substitute for the averaged stress; updated.
+        pattern, scale, force, blocks, whole, rotational
+            As for `linearise`.
+
+        Raises
+        ------
+        XfemError
+            If an array is not of the body, or not of the pattern.
+        """
+        assert self.has_one_pass
+        self._check(start=start, end=end, force=force)
+        self._check_blocks(pattern, blocks)
+        average = self._one_pass(pattern).average
+        self.left_out = average(start, end, scale, rotational, substituted, force, blocks, whole)
+        self._passed = True
+
+
+def inverted_cells(force: InternalForce, displacement: _Floats) -> NDArray[np.int64]:
+    """Cells whose deformation gradient has a negative determinant (solids only)."""
+    if force.is_membrane:
+        raise XfemError("inversion of a membrane in space is not defined")
+    return np.flatnonzero(np.linalg.det(force.deformation(displacement)) < 0.0)
+
+
+def collapsed_cells(force: InternalForce, displacement: _Floats, ratio: float) -> NDArray[np.int64]:
+    """Cells whose rotation, and with it the force, is not unique, or nearly so.
+
+    That is where the two principal stretches of a plane cell cancel (of an inverted cell the
+    smallest is negative), where the two smallest do in space, and where a membrane has shrunk
+    to a line.
+
+    Parameters
+    ----------
+    force : InternalForce
+    displacement : (N, d) float array
+    ratio : float
+        Of what is left to the largest stretch, below which a cell counts.
+    """
+    F = force.deformation(displacement)
+    stretches = np.linalg.svd(F, compute_uv=False)
+    left = stretches[:, 1]
+    if not force.is_membrane:
+        left = np.abs(stretches[:, -2] + np.sign(np.linalg.det(F)) * stretches[:, -1])
+    return np.flatnonzero(left <= ratio * stretches[:, 0])
