@@ -8,7 +8,6 @@ from cut_bodies import DENSITY, cut_membrane, isotropic
 from turned_bodies import random_mesh, turn, turned_body, turned_sheet
 
 from verify.accelerated import FAST
-from verify.xfem.corotation import InternalForce
 from verify.xfem.cuts import Plane
 from verify.xfem.dynamics import (
     DynamicBody,
@@ -19,6 +18,7 @@ from verify.xfem.dynamics import (
     Trapezoidal,
 )
 from verify.xfem.errors import SingularStiffnessError
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN
 from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
