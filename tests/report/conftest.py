@@ -1,5 +1,6 @@
 import pytest
 from synthetic_run import make_run
+from synthetic_studies import make_studies
 
 from verify.report import render
 
@@ -22,3 +23,9 @@ def pictured_run(tmp_path_factory):
     root = make_run(tmp_path_factory.mktemp("pictured") / "run")
     render(root)
     return root
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory):
+    """Return a directory with the records of studies."""
+    return make_studies(tmp_path_factory.mktemp("studies"))

@@ -4,12 +4,16 @@ import json
 import re
 import shutil
 import subprocess
+import zlib
 
 import pytest
+from synthetic_studies import STUDIES
+
+from verify.report.printing import BROWSERS, print_page
+from verify.report.study_page import render_study
 
 pytestmark = pytest.mark.browser
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # what is measured is written into the page by a script that is added to a copy of it
 PROBE = """<script>addEventListener('load', () => {
   const wide = document.documentElement;
@@ -19,6 +23,7 @@ PROBE = """<script>addEventListener('load', () => {
   }).map(e => e.tagName + '.' + (e.getAttribute('class') || ''));
   const images = [...document.images];
   const found = {width: innerWidth, content: wide.scrollWidth, left: [...new Set(left)],
+    cases: [...document.querySelectorAll('details.case')].map(e => e.offsetHeight),
     images: images.length, loaded: images.filter(i => i.complete && i.naturalWidth > 1).length};
   document.body.innerHTML = '<pre id="probe">' + JSON.stringify(found) + '</pre>';
 });</script>"""
@@ -26,9 +31,9 @@ PROBE = """<script>addEventListener('load', () => {
 
 @pytest.fixture(scope="module")
 def browser():
-    found = next((path for name in NAMES if (path := shutil.which(name))), None)
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if found is None:
-        pytest.skip(f"no Chromium here (looked for {', '.join(NAMES)})")
+        pytest.skip(f"no Chromium here (looked for {', '.join(BROWSERS)})")
     return found
 
 
@@ -57,19 +62,33 @@ def opened(browser, page, width, tmp_path):
     return json.loads(found[1].replace("&amp;", "&")), console
 
 
+def probed(page, place):
+    """Return a copy of `page` that measures itself."""
+    place.mkdir()
+    text = page.read_text(encoding="utf-8").replace("</body>", PROBE + "</body>")
+    (place / page.name).write_text(text, encoding="utf-8")
+    return place / page.name
+
+
 @pytest.mark.parametrize("width", [390, 768, 1200])
 def test_the_page_opens_whole_without_errors_and_does_not_overflow(
     browser, pictured_run, tmp_path, width
 ):
-    text = (pictured_run / "report.html").read_text(encoding="utf-8")
-    page = tmp_path / "source" / "probed.html"
-    page.parent.mkdir()
-    page.write_text(text.replace("</body>", PROBE + "</body>"), encoding="utf-8")
+    page = probed(pictured_run / "report.html", tmp_path / "source")
     found, console = opened(browser, page, width, tmp_path)
     assert console == []
     assert found["width"] == width
     assert found["images"] == found["loaded"] == 13
     assert found["content"] <= width, found["left"]
+    assert found["left"] == []
+
+
+@pytest.mark.parametrize("kind", STUDIES)
+def test_pages_of_studies_fit_a_phone(browser, studies, tmp_path, kind):
+    page = probed(render_study(studies, kind), tmp_path / "source")
+    found, console = opened(browser, page, 390, tmp_path)
+    assert console == []
+    assert found["content"] <= 390, found["left"]
     assert found["left"] == []
 
 
@@ -86,12 +105,27 @@ def test_the_browser_test_would_see_an_overflow_a_broken_image_and_an_error(brow
     assert any("seen" in line for line in console)
 
 
-def test_the_page_prints(browser, pictured_run, tmp_path):
+A4 = (718, 1047)  # what is printed on, in px: 190 mm × 277 mm
+
+
+def test_no_case_takes_more_than_two_pages_of_paper(browser, pictured_run, tmp_path):
+    page = probed(pictured_run / "report.html", tmp_path / "source")
+    text = page.read_text(encoding="utf-8").replace("@media print", "@media all")
+    page.write_text(text.replace("@media (max-width", "@media not all and (max-width"))
+    found, _ = opened(browser, page, A4[0], tmp_path)
+    assert len(found["cases"]) == 3
+    assert max(found["cases"]) < 2 * A4[1]
+    assert found["content"] <= A4[0]
+
+
+def test_the_print_has_no_empty_page_and_two_pages_a_case_at_most(browser, pictured_run, tmp_path):
     target = tmp_path / "report.pdf"
-    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", f"--print-to-pdf={target}"]
-    command += [f"--user-data-dir={tmp_path / 'profile'}", (pictured_run / "report.html").as_uri()]
-    subprocess.run(command, capture_output=True, timeout=120)
+    print_page(pictured_run / "report.html", target)
     pdf = target.read_bytes()
-    pages = len(re.findall(rb"/Type\s*/Page\b", pdf))
-    assert pdf.startswith(b"%PDF")
-    assert 5 <= pages <= 14
+    pages = re.findall(rb"/Type /Page\b.*?/Contents (\d+) 0 R", pdf, re.DOTALL)
+    front_and_back = 2
+    assert 3 <= len(pages) <= 3 * 2 + front_and_back
+    for number in pages:
+        stream = re.search(rb"\n%s 0 obj.*?stream\r?\n(.*?)endstream" % number, pdf, re.DOTALL)
+        shown = zlib.decompress(stream[1])
+        assert len(re.findall(rb"T[jJ]", shown)) > 10, f"page of object {number} is empty"

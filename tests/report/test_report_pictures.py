@@ -173,10 +173,10 @@ def test_the_error_of_each_solver_is_drawn_the_largest_first_at_one_scale(tmp_pa
     (folder / "result.json").write_text(json.dumps(result))
     found = case_pictures(root, load_run(root).entries[1])
     assert [picture.title for picture in found.error] == [
-        "error of still:Still, at most 5 m",
-        "error of b:B, at most 4 m",
-        "error of a:A, at most 3 m",
-        "error of conforming P1, at most 2 m",
+        "error of still:Still, at most 5.00 m",
+        "error of b:B, at most 4.00 m",
+        "error of a:A, at most 3.00 m",
+        "error of conforming P1, at most 2.00 m",
     ]
     assert {picture.view.limits for picture in found.error} == {(0.0, 5.0)}
     assert "Without picture of the error, 4 being shown: XFEM." in found.notes

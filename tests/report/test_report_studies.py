@@ -1,120 +1,12 @@
 """Claims about the pages of studies: both forms from one record, its numbers, no markup."""
 
-import json
-
 import pytest
 from page_parser import parsed
+from synthetic_studies import HOSTILE, STUDIES
 
 from verify.cli import main
 from verify.errors import InputError
 from verify.report.study_page import render_study
-
-HOSTILE = "a|b <script>alert(1)</script> `x` *y*"
-FINDING = {"topic": HOSTILE, "sentence": "Seen: 2 of 3.", "expected": "all", "verdict": "FAIL"}
-POINT = {"level": 0, "unknowns": 1200, "error": 0.125, "seconds": 0.25, "memory": 2e8,
-         "phases": {"solve": 0.0025}}  # fmt: skip
-
-
-def measured(solver, size, quantity, value, reason=""):
-    return {"family": "f", "solver": solver, "size": size, "quantity": quantity, "unit": "",
-            "value": value, "reason": reason}  # fmt: skip
-
-
-STUDIES = {
-    "slivers": {
-        "measurements": [
-            measured("xfem", size, name, value, "" if value else "did not finish")
-            for size in (0.1, 1e-3, 0.0)
-            for name, value in (
-                ("critical explicit step", 0.899 * size or None),
-                ("critical explicit step, uncut", 0.1),
-                ("condition number scaled by the diagonal", 1004.0),
-                ("displacement_l2", 0.01),
-            )
-        ],
-        "growths": [
-            {"family": "f", "solver": "xfem", "quantity": "displacement_l2", "exponent": -0.001}
-        ],
-    },
-    "energy": {"measurements": [measured("xfem scheme=x", None, "energy_drift", 2.5e-13)]},
-    "cost": {
-        "metric": "energy_norm",
-        "front": [["mine", 0]],
-        "running": {"xfem": [[0.5, 0.4, 0.6], None], "mine": [[0.25, 0.2, 0.3]] * 2},
-        "steps": [
-            {"step": 1, "error": 0.125, "times": {"xfem": [0.5, 0.4, 0.6]}},
-            {"step": 2, "error": 0.25, "times": {}},
-        ],
-        "points": [POINT | {"solver": "xfem"}, POINT | {"solver": "mine", "error": 0.0625}],
-        "left_out": [
-            {"case": "c", "solver": "mine", "level": 2, "status": "timeout", "reason": HOSTILE}
-        ],
-    },
-    "budget": {
-        "level": 1,
-        "tolerance": 0.05,
-        "metric": "displacement_l2",
-        "chain": ["one", "two"],
-        "notes": [HOSTILE],
-        "missing": [{"source": "s", "reason": "r", "where": "w"}],
-        "budgets": [
-            {
-                "metric": "displacement_l2",
-                "parts": [{"source": "mesh", "value": -0.0203, "uncertainty": 0.001}],
-                "total": {"source": "total", "value": 0.0, "uncertainty": 0.0, "round_off": True},
-            }
-        ],
-        "candidates": [
-            {
-                "kinematics": "linear",
-                "choices": "",
-                "level": 0,
-                "reason": "it ran away",
-                "high": None,
-            },
-            {
-                "kinematics": "finite",
-                "choices": "",
-                "level": 0,
-                "reason": "",
-                "size": 0.1,
-                "unknowns": 10,
-                "error": 0.0204,
-                "low": 0.02,
-                "high": 0.021,
-                "seconds": 0.5,
-                "fastest": 0.4,
-                "slowest": 0.6,
-            },
-        ],
-    },
-    "calibration": {
-        "trials": [
-            {
-                "family": "airy",
-                "scene": 0,
-                "degree": 1,
-                "level": 2,
-                "quantity": "jump_l2",
-                "stated": 2e-3,
-                "true": 1e-3,
-                "ratio": 2.0,
-                "covered": True,
-                "left_out": "",
-            }
-        ],
-    },
-}
-
-
-@pytest.fixture(scope="module")
-def studies(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("studies")
-    for kind, own in STUDIES.items():
-        record = {"schema": 1, "kind": f"{kind} study", "command": "verify study", "seconds": 1.0,
-                  "provenance": {"date": "today"}, "findings": [FINDING], **own}  # fmt: skip
-        (folder / f"{kind}.json").write_text(json.dumps(record), encoding="utf-8")
-    return folder
 
 
 @pytest.mark.parametrize("kind", STUDIES)

@@ -11,7 +11,7 @@ from verify.report.figures.convergence import convergence_panel, cost_panel, err
 from verify.report.figures.sketch import sketch
 from verify.report.figures.style import Palette
 from verify.report.motion_view import MotionView, motion_view
-from verify.report.notation import error_title, number, number_text, solver_title
+from verify.report.notation import ROUND_OFF, error_title, number, number_text, solver_title
 from verify.report.opening_view import opening_figures
 from verify.report.pictures import CasePictures, Picture
 from verify.report.problem import problem_facts
@@ -29,8 +29,6 @@ from verify.report.tables import (
 from verify.result import CaseResult, NoticeKind, Verdict
 
 __all__ = ["CaseView", "PictureRow", "case_view", "floor_text", "required_slope", "verdict_of"]
-
-ROUND_OFF = 1e-11  # relative errors below are round-off, as the rates of a result have it
 
 
 @dataclass(frozen=True)
@@ -86,6 +84,7 @@ class CaseView:
     openings: list[Figure] = field(default_factory=list)
     motion: MotionView | None = None
     orders: Table | None = None
+    has_order: bool = False
     numbers: Table | None = None
     times: Table | None = None
     regularisations: Table | None = None
@@ -141,6 +140,7 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     view.openings = opening_figures(result, palette)
     view.motion = motion_view(result, palette)
     view.orders, view.numbers = orders_table(result), numbers_table(result)
+    view.has_order = any(rate.order is not None for rate in result.rates)
     view.times, view.regularisations = times_table(result), regularisations_table(result)
     view.reference = reference_facts(result.reference)
     view.reference_tables = reference_tables(result.reference)

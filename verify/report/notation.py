@@ -5,6 +5,7 @@ import re
 from typing import Any
 
 __all__ = [
+    "ROUND_OFF",
     "SECONDARY",
     "bytes_text",
     "error_title",
@@ -53,6 +54,7 @@ _ERRORS = set(_METRICS) - {"strain_energy"}
 # not drawn and not in tables unless the case judges them; they are in the exported files
 SECONDARY = _ERRORS - {"displacement_l2", "energy_norm", "jump_l2"}
 _SOLVERS = {"xfem": "XFEM", "conforming": "conforming P1", "reference": "reference"}
+ROUND_OFF = 1e-11  # relative errors below are round-off, as the rates of a result have it
 _MISSING = "–"
 # Control characters (not allowed in XML, invisible in HTML), and marks that turn the
 # direction of the text around them

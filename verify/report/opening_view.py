@@ -61,7 +61,7 @@ def _panel(
     if all(abs(v) <= nothing for _, values in curves for v in values if math.isfinite(v)):
         return None
     band = None
-    if reference is not None and (half := getattr(reference, f"{part}_band")):
+    if reference is not None and any(half := getattr(reference, f"{part}_band")):
         middle = getattr(reference, part)
         band = (
             [v - w for v, w in zip(middle, half, strict=True)],

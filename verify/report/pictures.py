@@ -18,7 +18,7 @@ from verify.applied_checks import REFERENCE
 from verify.errors import InputError
 from verify.report import draw_with_matplotlib
 from verify.report.bodies import Body, deformed_body, error_body, read_stored
-from verify.report.notation import number_text, solver_title
+from verify.report.notation import ROUND_OFF, number, number_text, solver_title
 from verify.report.run_directory import CaseEntry
 from verify.report.turntable import packed
 from verify.report.view import View, common_view
@@ -237,17 +237,25 @@ def _errors(pictures: CasePictures, root: Path, result: CaseResult) -> None:
         pictures.notes.append("No picture of the error: no error field is stored for this case.")
         return
     largest = {solver: float(body.values.max()) for solver, body in bodies.items()}
+    moved = max((float(one.body.values.max()) for one in pictures.deformed), default=0.0)
+    for solver in [name for name, most in largest.items() if most <= ROUND_OFF * moved]:
+        most = number(largest[solver], 2)
+        said = f"Error of {solver_title(solver)}: at most {most} m, which is round-off."
+        pictures.notes.append(said)
+        del bodies[solver]
+    if not bodies:
+        return
     worst_first = sorted(bodies, key=lambda solver: -largest[solver])
     shown, rest = worst_first[:_MOST], worst_first[_MOST:]
     _say_left_out(pictures, "error", rest)
     view = common_view([bodies[solver] for solver in shown], ERROR_COLOURS)
     for solver in shown:
-        number = number_text(largest[solver])
-        title = f"error of {solver_title(solver)}, at most {number} m"
+        most = number(largest[solver], 3)
+        title = f"error of {solver_title(solver)}, at most {most} m"
         title += " (FAIL)" if solver in result.failing else ""
         description = (
             f"Error of the displacement of {solver_title(solver)} on the undeformed body; "
-            f"largest {number} m."
+            f"largest {most} m."
         )
         pictures.error.append(Picture(title, description, bodies[solver], view))
 

@@ -1,6 +1,6 @@
 """Account of the energy that a blade released: one line per solver."""
 
-from verify.report.notation import solver_title
+from verify.report.notation import number, solver_title
 from verify.result import SolveRecord
 
 __all__ = ["released_line"]
@@ -24,12 +24,12 @@ def released_line(solve: SolveRecord) -> str:
     rate = None if whole is None else whole.value
     said = [f"{_amount(value, rate)} {_PARTS[name]}" for name, value in found.items()]
     said += [f"{_PARTS[name]}: unavailable ({why})" for name, why in lacking.items()]
-    of = "" if whole is None else f"of the {whole.value:.3g} J/m² released "
+    of = "" if whole is None else f"of the {number(whole.value, 3)} J/m² released "
     return f"{solver_title(solve.solver)}: {of}per unit advance of the blade: {', '.join(said)}."
 
 
 def _amount(value: float, whole: float | None) -> str:
     if not whole:
-        return f"{value:.3g} J/m²"
+        return f"{number(value, 3)} J/m²"
     # round-off of nothing is nothing
     return f"{round(100 * value / whole) + 0:d} %"

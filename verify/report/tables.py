@@ -31,7 +31,7 @@ __all__ = [
     "times_table",
 ]
 
-_CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the"}
+_CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the", "value": ""}
 
 
 def check_text(record: VerdictRecord, named: bool = True) -> str:

@@ -143,11 +143,18 @@ def log_axis(axes: Axes, which: str, ends: tuple[float, float]) -> None:
 
 
 def plain_axis(axes: Axes, which: str, ends: tuple[float, float]) -> None:
-    """Make an axis linear over `ends`, with a few round ticks."""
+    """Make an axis linear over `ends`, with a few round ticks; a power of ten stands at its end."""
     getattr(axes, f"set_{which}lim")(*ends)
     axis = getattr(axes, f"{which}axis")
     axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−")))
+    power = math.floor(math.log10(max(map(abs, ends)) or 1.0))
+    power = 0 if -3 <= power < 5 else power
+    unit = 10.0**power or 1.0
+    axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v / unit:.4g}".replace("-", "−")))
+    if power:
+        place, move = ((0.0, 1.0), (3, -7)) if which == "y" else ((1.0, 0.0), (4, -2))
+        axes.annotate(f"×10{str(power).translate(RAISED)}", place, move, fontsize=8,
+                      xycoords="axes fraction", textcoords="offset points")  # fmt: skip
 
 
 def log_ticks(low: float, high: float) -> list[float]:

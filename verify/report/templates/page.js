@@ -3,10 +3,9 @@
   'use strict';
   const cases = [...document.querySelectorAll('details.case')];
   const form = document.querySelector('.filters');
-  const all = [...document.querySelectorAll('details')];
   let before = [];
-  addEventListener('beforeprint', () => { before = all.map(d => d.open); all.forEach(d => { d.open = true; }); });
-  addEventListener('afterprint', () => all.forEach((d, i) => { d.open = before[i]; }));
+  addEventListener('beforeprint', () => { before = cases.map(d => d.open); cases.forEach(d => { d.open = true; }); });
+  addEventListener('afterprint', () => cases.forEach((d, i) => { d.open = before[i]; }));
   const follow = () => {
     const target = location.hash.length > 1 && document.getElementById(location.hash.slice(1));
     if (!target) return;
@@ -40,6 +39,8 @@
   form.addEventListener('input', filter);
   form.addEventListener('submit', e => e.preventDefault());
   form.addEventListener('click', e => {
-    if ('fold' in e.target.dataset) cases.forEach(one => { one.open = !!e.target.dataset.fold; });
+    if (!('fold' in e.target.dataset)) return;
+    const open = !!e.target.dataset.fold;
+    (open ? document.querySelectorAll('details') : cases).forEach(one => { one.open = open; });
   });
 })();
