@@ -167,6 +167,6 @@ def test_the_line_of_a_report_gives_shares_of_what_is_released():
     metrics = [Metric(name, value, "J/m²") for name, value in values.items()]
     solve = SolveRecord("strip", "xfem", 0, Status.SOLVED, metrics=metrics)
     assert released_line(solve) == (
-        "XFEM: of the 0.36 J/m² released per unit advance of the blade: 71 % dissipated by the "
+        "XFEM: of the 0.360 J/m² released per unit advance of the blade: 71 % dissipated by the "
         "scheme, 0 % by damping, 26 % left as kinetic energy beside the exact field."
     )
