@@ -10,8 +10,8 @@ from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.cuts import ToolPath
-from verify.xfem.cuts.simplex_kernels import nearest_on_facet
 from verify.xfem.errors import XfemError
+from verify.xfem.nearest_points import nearest_on_facet
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 

@@ -7,11 +7,11 @@ from scipy.spatial import Delaunay
 from xfem_bodies import zero_modes
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.cuts.flat import Cut, Plane, PolygonPatch
-from verify.xfem.cuts.polyline import Polyline
-from verify.xfem.cuts.tool_path import ToolPath
+from verify.xfem.faceted_cuts import Polyline
+from verify.xfem.flat_cuts import Cut, Plane, PolygonPatch
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import cut_mesh
 
 

@@ -7,10 +7,10 @@ from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.pull_back import pull_back
-from verify.xfem.cuts.simplex_kernels import nearest_on_facet
-from verify.xfem.cuts.tool_path import ToolPath
 from verify.xfem.errors import XfemError
+from verify.xfem.nearest_points import nearest_on_facet
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.tool_path import ToolPath
 
 
 def _model(dim):

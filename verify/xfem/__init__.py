@@ -4,8 +4,8 @@ It knows no scene, no file format and no other solver, and needs numpy, scipy an
 Its parts are layers (`make check` tests that none imports one above it). The method, about 4800
 lines of code, in an order of reading:
 
-`mesh`, `cuts`
-    simplices; what a cut is: flat, a polyline, a triangulated surface (to skip: what a tool sweeps)
+`mesh`, `flat_cuts`, `faceted_cuts`, `tool_path`; `cuts` names them all
+    simplices; what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
 `zero_points`, `clip`, `partition`, `crossing`, `junctions`, `pieces`
     exact division of cells at zero points of level sets; parts of the cells that cuts go through
 `join`, `sides`, `virtual`

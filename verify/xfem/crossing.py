@@ -6,8 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.cuts.flat import Cut
 from verify.xfem.errors import XfemError
+from verify.xfem.flat_cuts import Cut
 
 __all__ = [
     "AT_END",

@@ -16,7 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.crossing import AT_END, REACH, level_and_depth
-from verify.xfem.cuts.flat import Cut
+from verify.xfem.flat_cuts import Cut
 from verify.xfem.partition import Partition
 from verify.xfem.zero_points import ZeroPoints
 

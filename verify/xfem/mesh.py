@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import real_array
 
-__all__ = ["SimplexMesh"]
+__all__ = ["SimplexMesh", "neighbours_across"]
 
 # A cell whose volume is below this fraction of (longest edge)^dim is called degenerate: its
 # gradients would lose all digits.
@@ -122,7 +122,7 @@ class SimplexMesh:
     @cached_property
     def neighbours(self) -> NDArray[np.int64]:
         """(m, dim + 1) cell across the facet opposite to each node, -1 on the boundary."""
-        return _neighbours(self.cells)
+        return neighbours_across(self.cells)
 
     @cached_property
     def boundary_facets(self) -> NDArray[np.int64]:
@@ -171,7 +171,8 @@ def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
         raise XfemError(f"point {int(np.argmin(used))} belongs to no cell")
 
 
-def _neighbours(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+def neighbours_across(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, d + 1) cell across the facet opposite to each node, -1 on the boundary."""
     corners = cells.shape[1]
     keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
     facets = np.sort(cells[:, keep].reshape(-1, corners - 1), axis=1)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from verify.xfem.clip import bisected, divided
 from verify.xfem.crossing import Crossing, TipRule, crossed_through
-from verify.xfem.cuts.flat import Cut
 from verify.xfem.errors import XfemError
+from verify.xfem.flat_cuts import Cut
 from verify.xfem.given_arrays import real_array
 from verify.xfem.junctions import (
     joint_cuts,

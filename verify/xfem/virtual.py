@@ -15,7 +15,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.crossing import TipRule
-from verify.xfem.cuts.flat import Cut
+from verify.xfem.flat_cuts import Cut
 from verify.xfem.join import PatchNodes, join_parts, number_nodes
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.partition import Partition

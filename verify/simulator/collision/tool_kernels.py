@@ -6,7 +6,7 @@ In numbers, not rows: sums and copies of rows take numba five times as long to c
 import numpy as np
 from numba import njit
 
-from verify.xfem.cuts.simplex_kernels import (
+from verify.xfem.nearest_points import (
     foot_on_facet,
     nearest_on_facet,
     signed_volume,

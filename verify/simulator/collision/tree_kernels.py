@@ -7,7 +7,7 @@ is one sort and refitting one backward sweep, without recursion and without allo
 import numpy as np
 from numba import njit
 
-from verify.xfem.cuts.simplex_kernels import (
+from verify.xfem.nearest_points import (
     box_gap,
     foot_on_facet,
     nearest_on_facet,

@@ -27,8 +27,8 @@ from verify.simulator.cutting.renumber_kernels import (
 from verify.simulator.cutting.tied_parts import TiedParts
 from verify.xfem.arrays.distinct import distinct
 from verify.xfem.arrays.growing_array import GrowingArray
-from verify.xfem.cuts.flat import Cut
 from verify.xfem.errors import XfemError
+from verify.xfem.flat_cuts import Cut
 from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh

@@ -19,11 +19,11 @@ from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.stroke import Stroke
 from verify.simulator.cutting.whole_mesh import whole_mesh
-from verify.xfem.cuts.flat import Cut
-from verify.xfem.cuts.tool_path import ToolPath
 from verify.xfem.errors import XfemError
+from verify.xfem.flat_cuts import Cut
 from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Crossings", "SemiProgressiveCutter"]

@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.simulator.collision.bounding_tree import BoundingTree
+from verify.simulator.cutting.blade_walk_kernels import cells_hit, walk
 from verify.simulator.cutting.patch import MeshPatch
-from verify.simulator.cutting.walk_kernels import cells_hit, walk
 from verify.xfem.crossing import REACH
-from verify.xfem.cuts.flat import Cut
-from verify.xfem.cuts.tool_path import Sweep, ToolPath
+from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.tool_path import Sweep, ToolPath
 
 __all__ = ["SeenCut", "Stroke"]
 

@@ -5,7 +5,7 @@ from numba import njit
 
 from verify.simulator.mapping.material_share_kernels import is_material
 from verify.simulator.mapping.partner_kernels import partner
-from verify.xfem.cuts.simplex_kernels import (
+from verify.xfem.nearest_points import (
     foot_on_facet,
     nearest_on_facet,
     squared_distance,

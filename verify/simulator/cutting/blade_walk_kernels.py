@@ -3,7 +3,7 @@
 For a cell the kernel asks where the zero set of the level set crosses its edges, and of each such
 point whether it lies on the sweep and whether the blade has passed it. The tolerances are those of
 `verify.xfem.pieces`, so that a cell that the walk calls crossed through is one that is split.
-A sweep comes as its `arrays`, `verify.xfem.cuts.sweep_surface.SweepArrays`.
+A sweep comes as its `arrays`, `verify.xfem.faceted_cuts.FacetArrays`.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from numba import njit
 
 from verify.simulator.collision.tree_kernels import as_array, items_near_plane
 from verify.xfem.crossing import AT_END, REACH
-from verify.xfem.cuts.sweep_kernels import probe
+from verify.xfem.faceted_cuts import probe
 
 __all__ = ["cells_hit", "walk"]
 

@@ -8,19 +8,32 @@ the fastest point of the blade.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.cuts.polyline import Polyline
-from verify.xfem.cuts.sweep_kernels import probe_points
-from verify.xfem.cuts.sweep_surface import STILL, SweepSurface, sweep_surface
 from verify.xfem.errors import XfemError
+from verify.xfem.faceted_cuts import FacetArrays, Polyline, facet_arrays, probe_points
 from verify.xfem.given_arrays import places, real_array
+from verify.xfem.mesh import neighbours_across
 
-__all__ = ["PartOfSweep", "Sweep", "ToolPath"]
+__all__ = ["PartOfSweep", "Sweep", "SweepSurface", "ToolPath"]
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+_FLAT = 1e-12  # area over squared edge below which a swept triangle counts as not swept
+_STILL = 1e-14  # of the length of the path: shorter moves are none
+_TURNED_BACK = -1.0 + 1e-9  # cosine between the normals of neighbouring facets
+
+
+class SweepSurface(NamedTuple):
+    """Vertices (v, s), facets (t, k), and the arrays for kernels."""
+
+    points: _Floats
+    facets: _Ints
+    arrays: FacetArrays
 
 
 @dataclass(frozen=True)
@@ -52,7 +65,7 @@ class ToolPath:
         object.__setattr__(self, "times", moments)
         if self.length > 0.0:
             if positions.shape[2] == 2:
-                moves = np.flatnonzero(np.diff(self.travel, prepend=-np.inf) > STILL * self.length)
+                moves = np.flatnonzero(np.diff(self.travel, prepend=-np.inf) > _STILL * self.length)
                 Polyline(positions[moves, 0])  # raises if it turns back or intersects itself
             _ = self.surface
 
@@ -100,7 +113,7 @@ class ToolPath:
     @cached_property
     def surface(self) -> SweepSurface:
         """The swept segments or triangles."""
-        return sweep_surface(self.blades, self.travel)
+        return _sweep_surface(self.blades, self.travel)
 
     @property
     def sweep(self) -> "Sweep":
@@ -203,3 +216,38 @@ def _check(blades: _Floats, times: _Floats) -> None:
         raise XfemError(f"time runs backwards after position {int(np.diff(times).argmin())}")
     if (np.linalg.norm(np.diff(blades, axis=1), axis=2) == 0.0).any():
         raise XfemError("blade with two neighbouring points in one place; expected a length")
+
+
+def _sweep_surface(blades: _Floats, travel: _Floats) -> SweepSurface:
+    """Triangulate the sweep of blades (k, b, s) with the travel (k,) of each position."""
+    points, lengths, facets = _facets(blades, travel)
+    arrays = facet_arrays(points, facets, lengths)
+    if facets.shape[1] == 3:
+        across = neighbours_across(facets)
+        cosine = (arrays.normals[:, None] * arrays.normals[np.maximum(across, 0)]).sum(axis=2)
+        back = (across >= 0) & (cosine < _TURNED_BACK)
+        if back.any():
+            where = points[facets[back.any(axis=1)][0]].mean(axis=0)
+            raise XfemError(f"the blade turns back on its own sweep near {where.tolist()}")
+    return SweepSurface(points, facets, arrays)
+
+
+def _facets(blades: _Floats, travel: _Floats) -> tuple[_Floats, _Floats, _Ints]:
+    """Vertices, their travel, and the facets that have a length or an area."""
+    count, width, space = blades.shape
+    ids = np.arange(count * width).reshape(count, width)
+    for k in range(1, count):
+        # a point of the blade that stays, up to round-off of the path, is one vertex: what turns
+        # around it is connected
+        still = np.linalg.norm(blades[k] - blades[k - 1], axis=1) <= _STILL * travel[-1]
+        ids[k, still] = ids[k - 1, still]
+    points = blades.reshape(-1, space)
+    lengths = np.repeat(travel, width)
+    if width == 1:
+        facets = np.stack([ids[:-1, 0], ids[1:, 0]], axis=1)
+        return points, lengths, facets[facets[:, 0] != facets[:, 1]]
+    a, b, c, d = ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]
+    both = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], axis=2).reshape(-1, 3)
+    edges = points[both][:, [1, 2, 0]] - points[both]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return points, lengths, both[area > _FLAT * (edges**2).sum(axis=2).max(axis=1)]

@@ -1,0 +1,339 @@
+"""Cuts made of facets: polylines in the plane, triangulated surfaces in space.
+
+The side of a point is told by the normal of the nearest face, edge or vertex, angle-weighted at
+vertices (Bærentzen & Aanæs 2005). Where the nearest feature is on the rim, the level set is that
+of the tangent plane there.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import index_array, places, real_array
+from verify.xfem.mesh import neighbours_across
+from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_distance
+
+__all__ = [
+    "FacetArrays",
+    "Polyline",
+    "TriangulatedSurface",
+    "facet_arrays",
+    "probe",
+    "probe_points",
+]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+
+_FLAT = 1e-12  # area over squared edge below which a triangle has none
+
+
+class FacetArrays(NamedTuple):
+    """Per facet and corner, for kernels; k corners in k dimensions.
+
+    Attributes
+    ----------
+    corners : (t, k, k) float array
+    normals : (t, k) float array
+        Of length one.
+    edge_normals, vertex_normals : (t, k, k) float array
+        At the edge opposite to, and at, each corner; of length one.
+    edge_rim, vertex_rim : (t, k) bool array
+        Whether the surface ends there.
+    rim : (r, k - 1, k) float array
+        The facets of the rim: points in 2D, edges in 3D.
+    travel : (t, k) float array
+        Of a sweep: how far the blade has come at each corner, in metres.
+    """
+
+    corners: _Floats
+    normals: _Floats
+    edge_normals: _Floats
+    vertex_normals: _Floats
+    edge_rim: NDArray[np.bool_]
+    vertex_rim: NDArray[np.bool_]
+    rim: _Floats
+    travel: _Floats
+
+
+def facet_arrays(points: _Floats, facets: _Ints, travel: _Floats | None = None) -> FacetArrays:
+    """Find normals and rim of facets (t, k) with vertices (n, k), and the travel (n,) there."""
+    count = facets.shape[1]
+    corners = np.ascontiguousarray(points[facets])
+    if count == 2:
+        along = corners[:, 1] - corners[:, 0]
+        normals = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        angles = np.ones(facets.shape)
+    else:
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        angles = _corner_angles(corners)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    across = neighbours_across(facets)
+    rim = across < 0
+    edge_normals = normals[:, None] + np.where(
+        rim[..., None], normals[:, None], normals[np.maximum(across, 0)]
+    )
+    total = np.zeros_like(points)
+    np.add.at(total, facets, angles[:, :, None] * normals[:, None])
+    facet, k = np.nonzero(rim)
+    others = np.array([[j for j in range(count) if j != k] for k in range(count)])
+    rim_facets = facets[facet[:, None], others[k]]
+    on_rim = np.zeros(len(points), dtype=bool)
+    on_rim[rim_facets] = True
+    return FacetArrays(
+        corners=corners,
+        normals=normals,
+        edge_normals=_of_length_one(edge_normals),
+        vertex_normals=_of_length_one(total)[facets],
+        edge_rim=rim,
+        vertex_rim=on_rim[facets],
+        rim=np.ascontiguousarray(points[rim_facets]),
+        travel=np.zeros(facets.shape) if travel is None else travel[facets],
+    )
+
+
+def _of_length_one(vectors: _Floats) -> _Floats:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1), 1e-300)[..., None]
+
+
+def _corner_angles(corners: _Floats) -> _Floats:
+    angles = np.empty(corners.shape[:2])
+    for k in range(3):
+        p, q = (corners[:, (k + i) % 3] - corners[:, k] for i in (1, 2))
+        cross = np.linalg.norm(np.cross(p, q), axis=1)
+        angles[:, k] = np.arctan2(cross, (p * q).sum(axis=1))
+    return angles
+
+
+@njit(cache=True)
+def probe(x, facets, room):
+    """Give (level set, distance past the rim or 0, travel of the nearest point) at x (s,).
+
+    `room` (4, 3) is written: a walk asks this thousands of times and allocates nothing.
+    """
+    count, size, space = facets.corners.shape
+    weights, best_weights = room[0, :size], room[1, :size]
+    foot, best_foot = room[2, :space], room[3, :space]
+    best, nearest = np.inf, 0
+    for t in range(count):
+        nearest_on_facet(x, facets.corners[t], weights)
+        foot_on_facet(facets.corners[t], weights, foot)
+        distance = squared_distance(x, foot)
+        if distance < best:
+            best, nearest = distance, t
+            for k in range(size):
+                best_weights[k] = weights[k]
+            for i in range(space):
+                best_foot[i] = foot[i]
+    zeros, last, only, travel = 0, 0, 0, 0.0
+    for k in range(size):
+        if best_weights[k] == 0.0:
+            zeros, last = zeros + 1, k
+        else:
+            only = k
+        travel += best_weights[k] * facets.travel[nearest, k]
+    normal, rim = facets.normals[nearest], False
+    if zeros == size - 1:
+        normal, rim = facets.vertex_normals[nearest, only], facets.vertex_rim[nearest, only]
+    elif zeros == 1:
+        rim = facets.edge_rim[nearest, last]
+        if not rim:
+            normal = facets.edge_normals[nearest, last]
+    along = 0.0
+    for i in range(space):
+        along += (x[i] - best_foot[i]) * normal[i]
+    if zeros == 0:
+        return along, 0.0, travel
+    if rim:
+        beyond = 0.0
+        for i in range(space):
+            beyond += (x[i] - best_foot[i] - along * normal[i]) ** 2
+        return along, np.sqrt(beyond), travel
+    return (np.sqrt(best) if along >= 0.0 else -np.sqrt(best)), 0.0, travel
+
+
+@njit(cache=True)
+def probe_points(points, facets):
+    """(n, 3): level set, depth (distance to the rim, negative past it), travel."""
+    found = np.empty((len(points), 3))
+    space = points.shape[1]
+    size = facets.rim.shape[1]
+    weights, corner, room = np.empty(size), np.empty(space), np.empty((4, 3))
+    for n in range(len(points)):
+        x = points[n]
+        level, beyond, travel = probe(x, facets, room)
+        if beyond > 0.0:
+            depth = -beyond
+        else:
+            gap = np.inf
+            for r in range(len(facets.rim)):
+                if size == 1:
+                    for i in range(space):
+                        corner[i] = facets.rim[r, 0, i]
+                else:
+                    nearest_on_facet(x, facets.rim[r], weights)
+                    foot_on_facet(facets.rim[r], weights, corner)
+                gap = min(gap, squared_distance(x, corner))
+            # measured along the facets: without the part across it
+            depth = np.sqrt(max(gap - level * level, 0.0))
+        found[n, 0], found[n, 1], found[n, 2] = level, depth, travel
+    return found
+
+
+class _FacetCut:
+    """A cut made of facets."""
+
+    _name: ClassVar[str]
+
+    def _mesh(self) -> tuple[_Floats, _Ints]:
+        raise NotImplementedError
+
+    @cached_property
+    def arrays(self) -> FacetArrays:
+        """Its facets, as kernels take them."""
+        return facet_arrays(*self._mesh())
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Signed distance (n,) to the facets, to their tangent plane past the rim."""
+        return self._probe(points)[:, 0]
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Distance (n,) to the rim along the tangent, negative past it; infinite without a rim."""
+        return self._probe(points)[:, 1]
+
+    def _probe(self, points: _Floats) -> _Floats:
+        at = places(points, self.arrays.corners.shape[2], self._name)
+        return probe_points(np.ascontiguousarray(at), self.arrays)
+
+
+@dataclass(frozen=True)
+class Polyline(_FacetCut):
+    """A polyline in the plane.
+
+    The positive side is on the left when one walks along it. Past an open end the level set is
+    that of the last segment's line.
+
+    Parameters
+    ----------
+    vertices : (k, 2) array_like
+        Vertices in order, in metres.
+    closed : bool
+        Whether the last vertex is joined to the first.
+
+    Raises
+    ------
+    XfemError
+        If there are too few vertices, a segment without length, a segment that turns back on
+        the one before, or segments that intersect.
+    """
+
+    vertices: _Floats
+    closed: bool
+    _name = "polyline"
+
+    def __init__(self, vertices: ArrayLike, closed: bool = False) -> None:
+        corners = real_array(vertices, "polyline with vertices")
+        fewest = 3 if closed else 2
+        if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < fewest:
+            raise XfemError(f"polyline of shape {corners.shape}; expected (k, 2) with k ≥ {fewest}")
+        if not np.isfinite(corners).all():
+            raise XfemError("polyline with a vertex that is not finite")
+        object.__setattr__(self, "vertices", corners)
+        object.__setattr__(self, "closed", bool(closed))
+        _check_segments(self.vertices, self.closed)
+
+    def _mesh(self) -> tuple[_Floats, _Ints]:
+        count = len(self.vertices)
+        first = np.arange(count if self.closed else count - 1)
+        return self.vertices, np.stack([first, (first + 1) % count], axis=1)
+
+
+def _check_segments(vertices: _Floats, closed: bool) -> None:
+    starts = vertices if closed else vertices[:-1]
+    segments = np.diff(vertices, axis=0, append=vertices[:1])[: len(starts)]
+    lengths = np.linalg.norm(segments, axis=1)
+    if not (lengths > 1e-14 * np.abs(vertices).max()).all():
+        raise XfemError(f"segment {int(lengths.argmin())} of the polyline has no length")
+    t = segments / lengths[:, None]
+    following = np.roll(t, -1, axis=0) if closed else t[1:]
+    back = (t[: len(following)] * following).sum(axis=1) < -1.0 + 1e-12
+    if back.any():
+        raise XfemError(f"the polyline turns back on itself at vertex {int(back.argmax()) + 1}")
+    pair = _first_intersection(starts, segments, closed)
+    if pair is not None:
+        raise XfemError(f"segments {pair[0]} and {pair[1]} of the polyline intersect")
+
+
+def _first_intersection(starts: _Floats, segments: _Floats, closed: bool) -> tuple[int, int] | None:
+    """First pair of segments, not neighbours, that have a point in common."""
+    count = len(starts)
+    ends = starts + segments
+    for i in range(count - 2):
+        others = slice(i + 2, count - 1 if closed and i == 0 else count)
+        side_a = _cross(segments[i], starts[others] - starts[i])
+        side_b = _cross(segments[i], ends[others] - starts[i])
+        side_c = _cross(segments[others], starts[i] - starts[others])
+        side_d = _cross(segments[others], ends[i] - starts[others])
+        low_i, high_i = np.minimum(starts[i], ends[i]), np.maximum(starts[i], ends[i])
+        low, high = np.minimum(starts, ends)[others], np.maximum(starts, ends)[others]
+        boxes = ((low <= high_i) & (low_i <= high)).all(axis=1)
+        meet = boxes & (side_a * side_b <= 0.0) & (side_c * side_d <= 0.0)
+        if meet.any():
+            return i, i + 2 + int(meet.argmax())
+    return None
+
+
+def _cross(a: _Floats, b: _Floats) -> _Floats:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+@dataclass(frozen=True)
+class TriangulatedSurface(_FacetCut):
+    """An oriented triangulated surface, open or closed.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+        Vertices, in metres.
+    triangles : (m, 3) array_like of int
+        Consistently oriented; the normal points to the positive side.
+
+    Raises
+    ------
+    XfemError
+        If a triangle has no area, or an edge is used twice in the same direction (orientation
+        not consistent, or more than two triangles at an edge).
+    """
+
+    points: _Floats
+    triangles: _Ints
+    _name = "surface"
+
+    def __init__(self, points: ArrayLike, triangles: ArrayLike) -> None:
+        vertices = real_array(points, "surface points")
+        faces = index_array(triangles, "surface triangles")
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
+            raise XfemError(f"surface points of shape {vertices.shape}; expected finite (n, 3)")
+        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
+            raise XfemError(f"surface triangles of shape {faces.shape}; expected (m, 3), m > 0")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise XfemError(f"a surface triangle has a vertex outside 0..{len(vertices) - 1}")
+        object.__setattr__(self, "points", vertices)
+        object.__setattr__(self, "triangles", faces)
+        sides = vertices[faces] - np.roll(vertices[faces], 1, axis=1)
+        areas = np.linalg.norm(np.cross(sides[:, 1], sides[:, 2]), axis=1)
+        longest = np.linalg.norm(sides, axis=2)
+        flat = ~(areas > _FLAT * longest.max(axis=1) ** 2)
+        if flat.any():
+            raise XfemError(f"surface triangle {int(flat.argmax())} has no area")
+        edges = faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+        if len(np.unique(edges, axis=0)) < len(edges):
+            raise XfemError("the triangles of the surface are not consistently oriented")
+
+    def _mesh(self) -> tuple[_Floats, _Ints]:
+        return self.points, self.triangles
