@@ -166,7 +166,9 @@ def _check_version(solver: ForeignSolver, python: str) -> None:
 def _ask(solver: ForeignSolver, python: str) -> dict[str, str]:
     """Import it with its Python; return the versions."""
     said = _call(solver, [python, "-c", _ASKED, solver.module, solver.version_of])
-    answer: dict[str, str] = json.loads(said.splitlines()[-1])
+    # what it imports may speak too, at its end as well
+    line = next(line for line in reversed(said.splitlines()) if line.startswith("{"))
+    answer: dict[str, str] = json.loads(line)
     return answer
 
 

@@ -37,7 +37,7 @@ class ForeignProgram(ProgramSolver):
         self.parameters, self._takes = record.parameters, record.takes
         # without the user's packages and paths, which belong to another Python
         self.command = (state.python, "-s", str(program), "{folder}", "{level}")
-        self.files = [*record.folder.glob("*.*"), PROGRAMS / "exchange_files.py", mark_of(name)]
+        self.files = [*record.folder.glob("*.*"), *PROGRAMS.glob("*.py"), mark_of(name)]
         self.files = [file for file in self.files if file.is_file()]
 
     def refuses(self, scene: Scene) -> str | None:

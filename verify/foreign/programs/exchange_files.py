@@ -96,7 +96,9 @@ class Case:
         self.timings[phase] = seconds
         return answer
 
-    def answer(self, points, cells, displacement, times=None, velocity=None, **more):
+    def answer(
+        self, points, cells, displacement, times=None, velocity=None, acceleration=None, **more
+    ):
         """Write the answer of the level.
 
         Parameters
@@ -107,8 +109,8 @@ class Case:
             m.
         times : sequence of float, optional
             Output times in s, of a motion.
-        velocity : (t, n, d) array, optional
-            m/s.
+        velocity, acceleration : (t, n, d) arrays, optional
+            m/s, m/s².
         more
             Further keys of ``solution.json``: ``unknowns``, ``cut_facets``, ``notes``, …
         """
@@ -121,6 +123,8 @@ class Case:
             fields = {"displacement": frame}
             if velocity is not None:
                 fields["velocity"] = velocity[k]
+            if acceleration is not None:
+                fields["acceleration"] = acceleration[k]
             files.append("solution.vtu" if len(frames) == 1 else f"solution-{k}.vtu")
             write_vtu(self.folder / files[-1], points, cells, fields)
         content = {"schema": 1, "files": files, "dimension": self.dimension, "order": 1,

@@ -1,0 +1,201 @@
+"""Motion on the exchange of files: stages of a body that is cut, and codes that march on them."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from verify.exchange import export_case
+from verify.foreign import foreign_solver, state_of
+from verify.foreign.records import PROGRAMS
+from verify.scene import load_scene
+from verify.solvers import find_solver
+
+
+@pytest.fixture
+def modules(monkeypatch):
+    """Modules of the programs, which import each other by their plain names."""
+    monkeypatch.syspath_prepend(PROGRAMS)
+    monkeypatch.syspath_prepend(PROGRAMS / "vbd")
+    names = ("exchange_files", "motion", "example", "implicit_euler")
+    yield {name: __import__(name) for name in names}
+    for name in names:
+        sys.modules.pop(name, None)
+
+
+def newmark(example):
+    """Dense average acceleration as an engine of `motion`, with the mass of linear simplices."""
+
+    class Engine:
+        def __init__(self, case, stage):
+            self.free, self.shape = ~stage.held.ravel(), stage.points.shape
+            body = type("Body", (), {"constant": case.constant, "dimension": case.dimension})()
+            body.points, body.cells = stage.points, stage.cells
+            self.stiffness = example.stiffness(body).toarray()
+            n, k = len(stage.points), stage.cells.shape[1]
+            edges = stage.points[stage.cells[:, 1:]] - stage.points[stage.cells[:, :1]]
+            weight = case.constant("density") * np.abs(np.linalg.det(edges)) / {3: 2, 4: 6}[k]
+            mass = np.zeros((n, n))
+            for cell, share in zip(stage.cells, weight / (k * (k + 1)), strict=True):
+                mass[np.ix_(cell, cell)] += share * (1.0 + np.eye(k))
+            self.mass = np.kron(mass, np.eye(self.shape[1]))
+
+        def solved(self, matrix, right):
+            found, free = np.zeros(right.size), self.free
+            found[free] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
+            return found
+
+        def equilibrium(self, values, force):
+            u = values.ravel()
+            u = u + self.solved(self.stiffness, force.ravel() - self.stiffness @ u)
+            return u.reshape(self.shape)
+
+        def begin(self, u, v, force, dt):
+            self.u, self.v = u.ravel(), v.ravel()
+            self.a = self.solved(self.mass, force.ravel() - self.stiffness @ self.u)
+
+        def step(self, dt, values, force):
+            guess = self.u + dt * self.v + 0.25 * dt**2 * self.a
+            a = self.solved(
+                self.mass + 0.25 * dt**2 * self.stiffness, force.ravel() - self.stiffness @ guess
+            )
+            self.v = self.v + 0.5 * dt * (self.a + a)
+            self.u, self.a = guess + 0.25 * dt**2 * a, a
+
+        def state(self):
+            return [field.reshape(self.shape) for field in (self.u, self.v, self.a)]
+
+    return Engine
+
+
+def same_nodes(one, other):
+    """Rows of `other` that are the nodes of `one`, told apart by the middles of their cells."""
+
+    def keys(solution):
+        middle = np.zeros(solution.points.shape)
+        count = np.bincount(solution.cells.ravel(), minlength=len(middle))[:, None]
+        centroids = solution.points[solution.cells].mean(axis=1)
+        np.add.at(middle, solution.cells, centroids[:, None])
+        return np.round(np.hstack([solution.points, middle / count]), 9)
+
+    first, second = (np.lexsort(keys(solution).T) for solution in (one, other))
+    np.testing.assert_allclose(keys(one)[first], keys(other)[second], atol=1e-8)
+    rows = np.empty(len(first), dtype=int)
+    rows[first] = second
+    return rows
+
+
+def assert_same_motion(found, expected, relative):
+    rows = same_nodes(found, expected)
+    for name in ("displacement", "velocity"):
+        field, other = getattr(found, name), getattr(expected, name)[:, rows]
+        assert np.abs(field - other).max() <= relative * np.abs(other).max(), name
+
+
+@pytest.mark.parametrize("case", ["dynamics/block_falls_apart", "dynamics/prestrained_bar_solid"])
+def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(case, modules, tmp_path):
+    scene = load_scene(case)
+    export_case(scene, tmp_path, [0], conforming=True)
+    laid = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
+    modules["motion"].run_engine(laid, newmark(modules["example"]))
+    from verify.exchange import read_answers
+
+    found = read_answers(scene, tmp_path).solutions[0]
+    expected = find_solver("conforming").solve(scene, 0, repetitions=1)
+    assert_same_motion(found, expected, 1e-9)
+
+
+def test_cuts_that_open_in_turn_open_one_by_one(modules, tmp_path):
+    scene = load_scene("dynamics/two_cuts_in_turn")
+    export_case(scene, tmp_path, [0], conforming=True)
+    case = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
+    stages = [modules["motion"].Stage(case, instant) for instant in (0.0, 0.1, 0.2)]
+    parts = [modules["exchange_files"].parts(s.cells, len(s.points)) for s in stages]
+    assert [len(np.unique(part)) for part in parts] == [1, 2, 3]
+    np.testing.assert_array_equal(stages[2].points[stages[2].node], case.points)
+    weights = [stage.force(0.0).sum(axis=0) for stage in stages]
+    np.testing.assert_allclose(weights, 3 * [[0.0, -9.8 * 1000 * 0.03]], atol=1e-9)
+
+
+def test_an_initial_field_is_refused_and_a_loose_part_reported(modules, tmp_path):
+    scene = load_scene("dynamics/block_falls_apart")
+    export_case(scene, tmp_path, [0], conforming=True)
+    content = json.loads((tmp_path / "case.json").read_text())
+    for change, error in (
+        ({"initial": {"kind": "field"}}, modules["exchange_files"].RefusedError),
+        ({"initial": {"kind": "equilibrium", "cuts": "open"},
+          "cuts": [{**content["cuts"][0], "opens_at": 0.0}]}, RuntimeError),
+    ):  # fmt: skip
+        (tmp_path / "case.json").write_text(json.dumps({**content, **change}))
+        case = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
+        with pytest.raises(error):
+            modules["motion"].run_engine(case, newmark(modules["example"]))
+
+
+def cube(modules, held=False):
+    """Six tetrahedra of a cube, their stable neo-Hookean body."""
+    rng = np.random.default_rng(3)
+    points = np.array(np.meshgrid(*3 * [[0.0, 1.0]], indexing="ij")).reshape(3, 8).T
+    cells = np.array(
+        [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]]
+    )
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    cells[np.linalg.det(edges) < 0] = cells[np.linalg.det(edges) < 0][:, [0, 1, 3, 2]]
+    marks = (points[:, 0] == 0.0) & held
+    lame, shear = rng.uniform(1.0, 2.0, (2, 6))
+    return modules["implicit_euler"].ImplicitEuler(points, cells, lame, shear, np.ones(8), marks)
+
+
+def test_the_stable_neo_hookean_tangent_is_the_derivative_of_its_forces(modules):
+    body, rng = cube(modules), np.random.default_rng(4)
+    u, way = 0.1 * rng.normal(size=(2, 8, 3))
+    tangent = body.forces(u, True)[1]
+    ahead, behind = (body.forces(u + side * 1e-6 * way)[0] for side in (1, -1))
+    expected = (ahead - behind).ravel() / 2e-6
+    np.testing.assert_allclose(tangent @ way.ravel(), expected, atol=1e-8 * np.abs(expected).max())
+    assert abs(tangent - tangent.T).max() < 1e-14
+
+
+def test_a_turned_neo_hookean_body_has_no_forces(modules):
+    body, angle = cube(modules), 2.0
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    assert np.abs(body.forces(body.points @ (turn - np.eye(3)).T)[0]).max() < 1e-14
+
+
+def installed(name):
+    """Mark of a test that needs a foreign solver."""
+    missing = state_of(foreign_solver(name)).missing
+    return pytest.param(name, marks=pytest.mark.skipif(bool(missing), reason=missing))
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("case", ["block_falls_apart", "cantilever_release", "two_rates"])
+@pytest.mark.parametrize("name", [installed("kratos"), installed("akantu")])
+def test_a_foreign_code_moves_as_the_conforming_solver_says(name, case):
+    scene = load_scene("dynamics/block_falls_apart" if case == "two_rates" else f"dynamics/{case}")
+    if case == "two_rates":  # the step before the cut opens is another than that after it
+        cut = scene.cuts[0].model_copy(update={"opens_at": 0.052})
+        scene = scene.model_copy(update={"cuts": [cut]})
+    found = find_solver(name).solve(scene, 0, repetitions=1)
+    expected = find_solver("conforming").solve(scene, 0, repetitions=1)
+    # its first acceleration is that of a step 1e-4 as long: off by (ω dt)²/4 where slivers ring
+    assert_same_motion(found, expected, 1e-5)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", [installed("kratos"), installed("akantu")])
+@pytest.mark.parametrize(
+    "case", ["statics/f1_patch", "statics/f1_3d", "material/plane_stress_patch"]
+)
+def test_a_foreign_code_solves_as_the_conforming_solver_says(name, case):
+    scene = load_scene(case)
+    found = find_solver(name).solve(scene, 0, repetitions=1)
+    expected = find_solver("conforming").solve(scene, 0, repetitions=1)
+    rows = same_nodes(found, expected)
+    scale = np.abs(expected.displacement).max()
+    np.testing.assert_allclose(
+        found.displacement, expected.displacement[:, rows], atol=1e-12 * scale
+    )
