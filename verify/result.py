@@ -16,6 +16,7 @@ from verify.printable import one_line, words_of
 
 __all__ = [
     "COMPILING",
+    "CRITICAL_STEP",
     "SCHEMA_VERSION",
     "CaseResult",
     "Metric",
@@ -37,6 +38,9 @@ __all__ = [
 
 SCHEMA_VERSION = 1
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
+CRITICAL_STEP = (
+    "critical step"  #: of the notes of a solve in motion: of central differences, at rest
+)
 
 
 def _closed[Kind](kind: Kind) -> Kind:

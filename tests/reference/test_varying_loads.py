@@ -65,9 +65,9 @@ def test_the_compact_solver_answers_as_under_the_exact_tractions():
 
 
 def test_a_varying_body_force_has_its_integral_on_both_sides_of_a_cut():
+    from verify.solvers.body_of_scene import background_mesh
     from verify.solvers.xfem_cuts import cuts_of
     from verify.solvers.xfem_loads import loads_of
-    from verify.solvers.xfem_scene import background_mesh
     from verify.xfem.virtual import cut_mesh
 
     scene = bar(True).model_copy(

@@ -14,7 +14,7 @@ from verify.compare.integration import rules
 from verify.compare.realised import field_of
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
-from verify.solvers.xfem_scene import background_mesh
+from verify.solvers.body_of_scene import background_mesh
 from verify.study.budget import CutEnd, cut_ends
 
 __all__ = ["Crack", "Off", "crack_scene"]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from test_budget_of_cases import budget_of, parts
 
+from verify.compare.body import body_of
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.study.budget.crossing_delay import mean_wait
@@ -60,7 +61,7 @@ def test_a_place_waits_on_average_for_half_of_its_element(tmp_path, level):
     below = (0.27 % h) / h  # share of the square below the path
     chords = h * np.array([below, 1.0 - below])
     expected = (chords**2).sum() / chords.sum() / 2 / SPEED
-    assert mean_wait(scene, solution) == pytest.approx(expected, rel=1e-9)
+    assert mean_wait(scene, body_of(scene), solution) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.fenicsx

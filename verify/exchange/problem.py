@@ -32,7 +32,7 @@ from verify.scene import (
     is_uniform,
 )
 from verify.scene.parts import copies_on_part, on_part
-from verify.solvers.xfem_scene import background_mesh
+from verify.solvers.body_of_scene import background_mesh
 
 __all__ = ["HeldNodes", "Load", "Problem", "problem_of"]
 

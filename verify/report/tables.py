@@ -16,7 +16,15 @@ from verify.report.notation import (
     spread_text,
     with_interval,
 )
-from verify.result import CaseResult, Metric, NoticeKind, SolveRecord, Status, VerdictRecord
+from verify.result import (
+    CRITICAL_STEP,
+    CaseResult,
+    Metric,
+    NoticeKind,
+    SolveRecord,
+    Status,
+    VerdictRecord,
+)
 
 __all__ = [
     "check_row",
@@ -97,8 +105,10 @@ def times_table(result: CaseResult) -> Table | None:
     if not phases:
         return None
     iterative = any(solve.iterations for solve in result.solves)
+    stepping = any(CRITICAL_STEP in solve.notes for solve in result.solves)
     head = ["solver", "level", *phases, "total without meshing", "process", "memory"]
     head += ["iterations"] if iterative else []
+    head += ["critical step"] if stepping else []
     rows = []
     for solve in _ordered(result):
         if not solve.timings:
@@ -114,6 +124,7 @@ def times_table(result: CaseResult) -> Table | None:
                 seconds_text(solve.wall),
                 bytes_text(solve.peak_memory),
                 *([iterations or "–"] if iterative else []),
+                *([solve.notes.get(CRITICAL_STEP, "–")] if stepping else []),
             ]
         )
     return plain_table("Wall times: median (smallest to largest repetition)", head, rows)

@@ -16,7 +16,7 @@ from typing import Any
 from verify.errors import InputError, UnsupportedSceneError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line, words_of
-from verify.result import COMPILING, Status
+from verify.result import COMPILING, CRITICAL_STEP, Status
 from verify.runner.childhood import die_with_parent, peak_memory
 from verify.runner.ranks import give_up, world
 
@@ -24,6 +24,7 @@ __all__ = ["main", "solve_job"]
 
 _WORTH_SAYING = 0.5  # seconds of compilation
 _LONGEST = 400  # characters of a reason
+_LARGE = 30_000  # unknowns from which an eigenvalue takes longer than many a motion
 
 
 def main(job_file: Path) -> None:
@@ -109,9 +110,27 @@ def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
         "notes": {
             **solution.notes,
             "calibration": calibration_note(),
+            **_critical_step(solver, scene, job, solution.unknowns or 0),
             **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > _WORTH_SAYING else {}),
         },
     }
+
+
+def _critical_step(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
+    """Note the critical explicit step of the undeformed body with all cuts open, or why not."""
+    from verify.assess.system_numbers import critical_step
+    from verify.system import checked_system
+
+    system = getattr(solver, "system", None)
+    if scene.analysis.kind != "dynamic" or system is None:
+        return {}
+    if unknowns > _LARGE:
+        return {CRITICAL_STEP: f"not computed for more than {_LARGE} unknowns"}
+    try:
+        own = checked_system(system(scene, job["level"], **job["parameters"]))
+        return {CRITICAL_STEP: f"{critical_step(own):.4g} s"}
+    except Exception as problem:  # a guest may raise anything
+        return {CRITICAL_STEP: f"not known: {one_line(problem, _LONGEST)}"}
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from verify.simulator.anatomy.skin_mesh import quartered, skin_mesh, skin_surfac
 from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.stage import Hold, Hook, Stage
-from verify.solvers.xfem_scene import background_mesh
+from verify.solvers.body_of_scene import background_mesh
 from verify.xfem.cuts import ToolPath
 from verify.xfem.dynamics import RayleighDamping
 from verify.xfem.elasticity import Material, isotropic

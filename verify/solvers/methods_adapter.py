@@ -17,12 +17,12 @@ from verify.methods.cut_body import CutBody
 from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
+from verify.solvers.body_of_scene import across_interfaces, background_mesh, material_of
 from verify.solvers.methods_motion import MethodMover
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_motion import MotionChoice
-from verify.solvers.xfem_scene import across_interfaces, background_mesh, material_of
 from verify.solvers.xfem_static import dismissed_equilibria, path_notes
 from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_supports import path_of_supports, supports_of
@@ -165,12 +165,10 @@ class MethodSolver:
         Raises
         ------
         UnsupportedSceneError, InputError
-            As of `solve`; of springs, which have no linear system of their own here.
+            As of `solve`.
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        if self._force is not InternalForce:
-            raise UnsupportedSceneError("springs have no stiffness of elements")
         taken = list(signature(METHODS[self._method]).parameters)[2:]
         own = {name: value for name, value in parameters.items() if name in taken}
         exact = _exact(scene)
@@ -311,6 +309,10 @@ class MassSpringSolver(MethodSolver):
             spectral_radius,
             **parameters,
         )
+
+    def system(self, scene: Scene, level: int, **parameters: Any) -> System:
+        """Refuse: springs have no linear system of their own here."""
+        raise UnsupportedSceneError("springs have no stiffness of elements")
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         super()._check(scene, scheme, parameters)

@@ -10,10 +10,10 @@ from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Solution
+from verify.solvers.body_of_scene import background_mesh, material_of
 from verify.solvers.xfem_answer import Answer, joined, solution_of
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_motion import MotionChoice, move
-from verify.solvers.xfem_scene import background_mesh, material_of
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
 from verify.solvers.xfem_supports import supports_of

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from verify.scene import Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
-from verify.solvers.xfem_scene import across_interfaces
+from verify.solvers.body_of_scene import across_interfaces
 from verify.xfem.slivers import GhostPenalty, SliverReport
 from verify.xfem.specks import Specks
 from verify.xfem.subdivision import Subdivision, subdivide

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, is_uniform
 from verify.scene.physics import Load
+from verify.solvers.body_of_scene import density_of
 from verify.solvers.xfem_boundary import facets_on
 from verify.solvers.xfem_faces import face_forces
-from verify.solvers.xfem_scene import density_of
 from verify.xfem.loads import Density, body_force, traction
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from verify.accelerated import FAST
 from verify.scene import Scene
 from verify.solution import Regularisation
+from verify.solvers.body_of_scene import material_of
 from verify.solvers.xfem_answer import penalised
 from verify.solvers.xfem_bases import solve_in_basis
 from verify.solvers.xfem_loads import loads_of
-from verify.solvers.xfem_scene import material_of
 from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.kernels import Kernels

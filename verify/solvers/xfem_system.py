@@ -6,8 +6,8 @@ from scipy.sparse import csr_array, identity, kron
 
 from verify.errors import InputError
 from verify.scene import Scene
+from verify.solvers.body_of_scene import density_of
 from verify.solvers.xfem_bases import held_in_basis
-from verify.solvers.xfem_scene import density_of
 from verify.solvers.xfem_steps import MASSES
 from verify.solvers.xfem_supports import supports_of
 from verify.system import System

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from verify.assess.system_numbers import condition_numbers, critical_step
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.study.slivers.step_by_running import step_by_running
-from verify.study.slivers.system_numbers import condition_numbers, critical_step
 from verify.system import checked_system
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"

@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.sparse import csr_array, diags_array
 
+from verify.assess.system_numbers import condition_numbers, critical_step
 from verify.errors import InputError
-from verify.study.slivers.system_numbers import condition_numbers, critical_step
+from verify.scene import load_scene
+from verify.solvers.xfem import XfemSolver
 from verify.system import System, checked_system
 
 
@@ -72,3 +75,19 @@ def test_a_hook_that_hands_over_something_else_is_one_clear_error(change, messag
     with pytest.raises(InputError, match="expected a verify"):
         checked_system((whole.stiffness, whole.mass))
     assert checked_system(whole).fixed[0]
+
+
+@pytest.mark.parametrize("mass", ["sidewise", "consistent"])
+def test_many_unknowns_have_the_step_of_all_eigenvalues(mass):
+    """A general position: an inclined cut, with pieces of many sizes."""
+    scene = load_scene("statics/f3_inclined").model_copy(deep=True)
+    scene = scene.model_copy(
+        update={"material": scene.material.model_copy(update={"density": 1e3})}
+    )
+    system = XfemSolver().system(scene, 2, mass=mass)
+    free = ~system.fixed
+    assert free.sum() > 600
+    dense = [one[free][:, free].toarray() for one in (system.stiffness, system.mass)]
+    scale = 1.0 / np.sqrt(np.diag(dense[1]))
+    largest = eigh(*(scale[:, None] * one * scale for one in dense), eigvals_only=True)[-1]
+    assert critical_step(system) == pytest.approx(2.0 / np.sqrt(largest), rel=1e-6)

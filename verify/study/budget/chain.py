@@ -180,7 +180,7 @@ class _Maker:
 
     def _open_late(self) -> None:
         """Let the reference wait for the blade as long as the judged elements do."""
-        wait = mean_wait(self._scene, self._judged)
+        wait = mean_wait(self._scene, self.chain.body, self._judged)
         if wait is None:
             return
         change = "crossing delay"

@@ -8,20 +8,22 @@ the tip (1/√r): the delay is an error of order 1 in h in the mean square, and 
 
 import numpy as np
 
+from verify.compare.body import AnyBody
+from verify.compare.sides import distance_to_cut
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
-from verify.solvers.xfem_cuts import cuts_of
-from verify.solvers.xfem_openings import seam_times
 
 __all__ = ["mean_wait"]
 
 
-def mean_wait(scene: Scene, solution: Solution) -> float | None:
+def mean_wait(scene: Scene, body: AnyBody, solution: Solution) -> float | None:
     """Mean over the realised cut of the time from the blade's passing to the opening, s.
 
     Parameters
     ----------
     scene : Scene
+    body : AnyBody
+        With the cuts as asked.
     solution : Solution
         Whose facets of the cut are those of its elements.
 
@@ -30,13 +32,24 @@ def mean_wait(scene: Scene, solution: Solution) -> float | None:
     float or None
         None if no blade opens anything.
     """
-    if not any(isinstance(cut, ToolPathCut) for cut in scene.cuts) or not len(solution.cut_facets):
+    blades = {cut.name: cut for cut in scene.cuts if isinstance(cut, ToolPathCut)}
+    facets = solution.cut_facets
+    if not blades or not len(facets):
         return None
-    facets, size = solution.cut_facets, solution.size or 1.0
-    asked, levels = scene.cuts, cuts_of(scene, size)
-    whole = [np.nan if isinstance(cut, ToolPathCut) else 0.0 for cut in asked]
-    middles = facets.mean(axis=1, keepdims=True)
-    waits = seam_times(asked, levels, facets, whole) - seam_times(asked, levels, middles, whole)
+    count, corners, space = facets.shape
+    middles = facets.mean(axis=1)
+    away = np.stack([
+        distance_to_cut(pieces, facets.reshape(-1, space))[0].reshape(count, corners).max(axis=1)
+        + distance_to_cut(pieces, middles)[0]
+        for pieces in body.cuts.values()
+    ])  # fmt: skip
+    waits = np.zeros(count)
+    for k, name in enumerate(body.cuts):
+        mine = np.flatnonzero(away.argmin(axis=0) == k)
+        if name in blades and len(mine):
+            passed = blades[name].passed_at(facets[mine].reshape(-1, space))
+            waits[mine] = passed.reshape(len(mine), corners).max(axis=1)
+            waits[mine] -= blades[name].passed_at(middles[mine])
     edges = facets[:, 1:] - facets[:, :1]
     measures = np.sqrt(np.linalg.det(edges @ edges.swapaxes(1, 2)).clip(0.0))
     return float(np.average(waits, weights=measures))

@@ -12,7 +12,7 @@ from verify.compare.hooke import hooke
 from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Verdict
 from verify.scene import Scene
-from verify.solvers.xfem_scene import background_mesh
+from verify.solvers.body_of_scene import background_mesh
 from verify.study.budget.budget import Budget, Part, error_budget
 from verify.study.budget.candidates import find_candidates
 from verify.study.budget.chain import make_chain

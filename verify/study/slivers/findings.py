@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from verify.assess.system_numbers import CONDITION, SCALED, STEP
 from verify.result import Verdict
 from verify.study.energy import account_findings
 from verify.study.finding import Finding
 from verify.study.measured_scenes import Measurement, missing_solutions
-from verify.study.slivers.system_numbers import CONDITION, SCALED, STEP
 
 __all__ = ["NEAR", "findings"]
 

@@ -7,6 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from verify.assess.system_numbers import (
+    CONDITION,
+    SCALED,
+    STEP,
+    condition_numbers,
+    critical_step,
+)
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
 from verify.scene import Box, Rectangle, Scene, scene_content
@@ -16,13 +23,6 @@ from verify.study.measured_scenes import Measurement, measured_families, measure
 from verify.study.slivers.findings import findings
 from verify.study.slivers.growth import growth
 from verify.study.slivers.step_by_running import step_by_running
-from verify.study.slivers.system_numbers import (
-    CONDITION,
-    SCALED,
-    STEP,
-    condition_numbers,
-    critical_step,
-)
 from verify.study.variants import Variant
 from verify.system import checked_system
 

@@ -2,14 +2,12 @@
 
 from dataclasses import dataclass
 
-from verify.study.thesis.delays import Delay, Frames
+from verify.simulator.thesis.added_nodes import FaceCount, StripCount
+from verify.simulator.thesis.delays import Delay, Frames
+from verify.simulator.thesis.real_time import RealTime
+from verify.simulator.thesis.step_times import StepTime
 from verify.study.thesis.methods_compared import MethodOnCase
-from verify.study.thesis.real_time import RealTime
-from verify.study.thesis.sliver_steps import SliverStep
-from verify.study.thesis.small_pieces import SmallPiece
-from verify.study.thesis.step_times import StepTime
-from verify.study.thesis.thin_skin import SkinBending
-from verify.study.thesis.unknowns import FaceCount, StripCount
+from verify.study.thesis.sliver_systems import SliverSystem
 
 __all__ = ["Measured"]
 
@@ -25,7 +23,7 @@ class Measured:
     delays, frames : Table 4.6, Figure 4.26
     hand : real time
     methods : accuracy
-    slivers, pieces, skin : stability, and what goes wrong
+    slivers : stability, and what goes wrong
     contended : str
         Why times may be too long, if they may.
     """
@@ -37,7 +35,5 @@ class Measured:
     frames: list[Frames]
     hand: RealTime
     methods: list[MethodOnCase]
-    slivers: list[SliverStep]
-    pieces: list[SmallPiece]
-    skin: list[SkinBending]
+    slivers: list[SliverSystem]
     contended: str = ""

@@ -1,16 +1,16 @@
 """All methods against one conforming reference or exact answer: error, energy, step, time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
+from typing import Any
 
-from verify.methods.catalogue import METHODS
+from verify.assess.system_numbers import critical_step
+from verify.errors import InputError, UnsupportedSceneError
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import Scene
-from verify.solvers.xfem_cuts import cuts_of
-from verify.solvers.xfem_scene import background_mesh, material_of
+from verify.solvers import find_solver
 from verify.study.cost.work import work_points
-from verify.study.thesis.sliver_steps import explicit_step
-from verify.xfem.errors import XfemError
+from verify.system import checked_system
 
 __all__ = ["MethodOnCase", "compare_methods"]
 
@@ -60,7 +60,7 @@ def compare_methods(scenes: Sequence[Scene], results: Sequence[CaseResult]) -> l
     """Sum up what the runner has solved and measured, and add critical steps."""
     found = []
     for scene, result in zip(scenes, results, strict=True):
-        steps = _critical_steps(scene)
+        steps = _critical_steps(scene, {record.solver for record in result.solves})
         times = {
             (point.solver, point.level): point.seconds
             for metric in ("displacement_l2", "energy_norm")
@@ -110,18 +110,19 @@ def _relative(metric: Metric | None) -> float | None:
     return metric.value / metric.reference - 1.0
 
 
-def _critical_steps(scene: Scene) -> Mapping[tuple[str, int], float]:
-    """Over that of the uncut mesh, by method and level."""
+def _critical_steps(scene: Scene, solvers: Set[str]) -> Mapping[tuple[str, int], float]:
+    """Over that of the uncut mesh, by solver and level, of those that hand over their system."""
+    # the step does not depend on the density when it is one over another
+    heavy = scene.material.model_copy(update={"density": scene.material.density or 1.0})
+    scene = scene.model_copy(update={"material": heavy})
+    whole = scene.model_copy(update={"cuts": [], "quantities": [], "acceptance": []})
     found = {}
-    for level in range(scene.mesh.count):
-        mesh, size = background_mesh(scene, level)
-        material = material_of(scene, mesh)
-        cuts = cuts_of(scene, size)
-        uncut = explicit_step(mesh, [], "xfem", material)[0]
-        for method in ("xfem", *METHODS):
+    for name in sorted(solvers - {"reference"}):
+        system: Any = getattr(find_solver(name), "system", None)
+        for level in range(scene.mesh.count) if system is not None else ():
             try:
-                step, _ = explicit_step(mesh, cuts, method, material)
-            except XfemError:
+                own, bare = (checked_system(system(one, level)) for one in (scene, whole))
+                found[name, level] = critical_step(own) / critical_step(bare)
+            except (UnsupportedSceneError, InputError):
                 continue  # the solver has said why
-            found[method, level] = step / uncut
     return found

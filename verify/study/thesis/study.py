@@ -7,18 +7,16 @@ from time import perf_counter
 from typing import Any
 
 from verify.result import CaseResult
-from verify.scene import Scene
+from verify.scene import Scene, load_scenes
+from verify.simulator.thesis.added_nodes import count_face, count_strips
+from verify.simulator.thesis.delays import SPEEDS, delays, with_other_frames
+from verify.simulator.thesis.published import published_rows, published_source
+from verify.simulator.thesis.real_time import real_time
+from verify.simulator.thesis.step_times import CUTS, TETRAHEDRA, step_times
 from verify.study.finding import Finding
-from verify.study.thesis.delays import SPEEDS, delays, with_other_frames
 from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import compare_methods
-from verify.study.thesis.published import published_rows, published_source
-from verify.study.thesis.real_time import real_time
-from verify.study.thesis.sliver_steps import sliver_steps
-from verify.study.thesis.small_pieces import small_pieces
-from verify.study.thesis.step_times import CUTS, TETRAHEDRA, step_times
-from verify.study.thesis.thin_skin import skin_bending
-from verify.study.thesis.unknowns import count_face, count_strips
+from verify.study.thesis.sliver_systems import sliver_systems
 from verify.study.thesis.verdicts_on_cost import verdicts_on_cost
 from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
 
@@ -27,12 +25,13 @@ __all__ = ["CASES", "SOLVERS", "ThesisStudy", "thesis_study"]
 # exact without tips, exact with tips inside elements, and references in the plane and in space
 CASES = (
     "statics/f3_inclined", "statics/griffith_inside", "statics/tissue_strip",
-    "statics/buried_cut",
+    "statics/buried_cut", "controls/thin_skin",
 )  # fmt: skip
 SOLVERS = (
     "xfem", "conforming", "subdivision", "snapping", "snapping_subdivision", "removal",
     "removal_refined", "virtual_node", "virtual_node_arbitrary", "mass_spring", "uncut",
 )  # fmt: skip
+_FAMILIES = ("slivers/plane_edges", "slivers/space_faces")
 _ROWS = (10, 50, 100, 500, 1000)  # of Table 4.3
 
 
@@ -133,7 +132,7 @@ def thesis_study(
     fast = next(row.speed for row in waited if row.speed_name == SPEEDS[-1])
     frames = with_other_frames(TETRAHEDRA[0 if quick else -1], fast, (1 / 240, 1 / 15, 0.5))
     announce("slivers and limits")
-    sizes = (1e-1, 1e-3, 1e-4, 1e-5)
+    families = _FAMILIES[:1] if quick else _FAMILIES
     measured = Measured(
         strips=strips,
         face=face,
@@ -142,13 +141,7 @@ def thesis_study(
         frames=frames,
         hand=hand,
         methods=compare_methods(scenes, results),
-        slivers=sliver_steps((2, 3), sizes[:3] if quick else sizes),
-        pieces=small_pieces((1e-3, 1e-6) if quick else (1e-2, 1e-4, 1e-6)),
-        skin=skin_bending(
-            ((8e-3, 1), (4e-3, 1))
-            if quick
-            else ((8e-3, 1), (4e-3, 1), (2e-3, 1), (2e-3, 2), (1e-3, 2))
-        ),
+        slivers=sliver_systems([one for name in families for one in load_scenes(name)]),
         contended=contended,
     )
     findings = [*verdicts_on_cost(measured), *verdicts_on_mechanics(measured)]

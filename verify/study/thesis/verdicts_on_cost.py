@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Sequence
 
 from verify.result import Verdict
+from verify.simulator.thesis.added_nodes import FaceCount, StripCount
+from verify.simulator.thesis.delays import SPEEDS, Delay, Frames
+from verify.simulator.thesis.real_time import LIMITS, RealTime
+from verify.simulator.thesis.step_times import StepTime
 from verify.study.finding import Finding
-from verify.study.thesis.delays import SPEEDS, Delay, Frames
 from verify.study.thesis.measured import Measured
-from verify.study.thesis.real_time import LIMITS, RealTime
-from verify.study.thesis.step_times import StepTime
-from verify.study.thesis.unknowns import FaceCount, StripCount
 
 __all__ = ["verdicts_on_cost"]
 

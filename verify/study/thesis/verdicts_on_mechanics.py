@@ -3,18 +3,15 @@
 from collections.abc import Iterator, Sequence
 
 from verify.result import Verdict
+from verify.simulator.thesis.added_nodes import FaceCount
 from verify.study.finding import Finding
 from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import MethodOnCase
-from verify.study.thesis.sliver_steps import SliverStep, exponent
-from verify.study.thesis.small_pieces import SmallPiece
-from verify.study.thesis.thin_skin import SkinBending
-from verify.study.thesis.unknowns import FaceCount
+from verify.study.thesis.sliver_systems import SliverSystem, exponent
 
 __all__ = ["verdicts_on_mechanics"]
 
 _FLAT, _KEPT = 0.02, 0.9  # exponent of a step that slivers leave alone; share of the uncut one
-_BEAM = 0.1  # of the deflection: what an engineer would accept of a plate
 _AS_GOOD = 1.05
 _TIPS = 3.0
 # L² and energy norm against a conforming mesh: what the cases themselves demand (squared in L²)
@@ -33,12 +30,11 @@ def verdicts_on_mechanics(measured: Measured) -> list[Finding]:
         _face(measured.face[-1]),
         *_accuracy(measured.methods),
         *_wrong(measured.methods),
-        *_thin(measured.skin),
-        *_small(measured.pieces),
+        *_small([row for row in measured.slivers if row.method == "xfem"]),
     ]
 
 
-def _slivers(steps: Sequence[SliverStep]) -> Iterator[Finding]:
+def _slivers(steps: Sequence[SliverSystem]) -> Iterator[Finding]:
     for method in dict.fromkeys(step.method for step in steps):
         own = [step for step in steps if step.method == method]
         slopes = {
@@ -167,34 +163,15 @@ def _tips(methods: Sequence[MethodOnCase], case: str) -> Iterator[Finding]:
     )
 
 
-def _thin(skin: Sequence[SkinBending]) -> Iterator[Finding]:
-    coarse = skin[0]
-    words = ", ".join(f"{row.deflection:.2f} ({1e3 * row.edge:g} mm, {row.layers})" for row in skin)
-    kept = all(abs(r.deflection - 1.0) <= _BEAM for r in skin)
-    others = (
-        " So is every method on linear tetrahedra, cut or not: a cut flap of skin curls too little"
-    )
-    yield Finding(
-        "what goes wrong: thin skin",
-        f"a clamped strip of 2 mm skin sinks by {words} of what a beam does (element, layers): "
-        f"on the hand's elements it is {1.0 / coarse.deflection:.2g} times as stiff in bending. "
-        f"Stretched it is right to {max(abs(row.stretch - 1.0) for row in skin):.1e}."
-        + ("" if coarse.deflection > 1.0 - _BEAM else others),
-        f"within {_BEAM:.0%} of the beam",
-        Verdict.PASS if kept else Verdict.FAIL,
-    )
-
-
-def _small(pieces: Sequence[SmallPiece]) -> Iterator[Finding]:
-    first, last = pieces[0], pieces[-1]
-    yield Finding(
-        "what goes wrong: small pieces",
-        f"from ε = {first.size:g} to {last.size:g} the condition of XFEM's stiffness grows from "
-        f"{first.condition:.1e} to {last.condition:.1e}; scaled by its diagonal it is "
-        f"{last.scaled:.0f} and a force on a smallest piece moves it "
-        f"{last.compliance:.2f} times as far. More placements: verify study slivers",
-        "condition after scaling, and compliance, less than twice those at the first ε",
-        Verdict.PASS
-        if last.scaled <= 2.0 * first.scaled and last.compliance <= 2.0
-        else Verdict.FAIL,
-    )
+def _small(pieces: Sequence[SliverSystem]) -> Iterator[Finding]:
+    for dim in dict.fromkeys(row.dimension for row in pieces):
+        own = sorted((row for row in pieces if row.dimension == dim), key=lambda row: -row.size)
+        first, last = own[0], own[-1]
+        yield Finding(
+            f"what goes wrong: small pieces, {dim}D",
+            f"from ε = {first.size:g} to {last.size:g} the condition number of XFEM's stiffness "
+            f"goes from {first.condition:.1e} to {last.condition:.1e}; scaled by its diagonal it "
+            f"goes from {first.scaled:.0f} to {last.scaled:.0f}",
+            "condition number after scaling less than twice that at the first ε",
+            Verdict.PASS if last.scaled <= 2.0 * first.scaled else Verdict.FAIL,
+        )

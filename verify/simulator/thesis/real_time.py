@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from verify.calibration import kernel_seconds
 from verify.simulator import PHASES, Session, Stage, quality_of
-from verify.study.thesis.strokes import hand, stroke_along
+from verify.simulator.thesis.strokes import hand, stroke_along
 
 __all__ = ["LIMITS", "RealTime", "real_time"]
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from verify.simulator import Stage
 from verify.simulator.cutting.semi_progressive import Crossings, SemiProgressiveCutter
-from verify.study.thesis.published import published_rows
-from verify.study.thesis.strokes import hand, stroke_along
+from verify.simulator.thesis.published import published_rows
+from verify.simulator.thesis.strokes import hand, stroke_along
 
 __all__ = ["SPEEDS", "Delay", "Frames", "delays", "with_other_frames"]
 

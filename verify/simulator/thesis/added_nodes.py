@@ -5,15 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from verify.methods.catalogue import cut_by
+from verify.methods.cut_body import CutBody
 from verify.scene import load_scene
 from verify.simulator import Stage, stage_of
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.study.thesis.published import published_rows
-from verify.study.thesis.sliver_steps import step_of_body
+from verify.simulator.thesis.published import published_rows
+from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Polyline, ToolPath
+from verify.xfem.elasticity import isotropic
+from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.block_pattern import block_pattern
+from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -100,7 +106,7 @@ def count_face(rows: Sequence[int]) -> list[FaceCount]:
     stage = stage_of(load_scene("thesis/face_thousand_cuts"))
     # the positive direction of the plan is that of the membrane: it is a graph over x and y
     plan = SimplexMesh(stage.mesh.points[:, :2], stage.mesh.cells)
-    uncut = step_of_body(cut_by("uncut", plan, []))
+    uncut = _step_of_body(cut_by("uncut", plan, []))
     thesis = {int(row[0]): row for row in published_rows("4.3")}
     counts = []
     for asked, (cuts, played, time) in zip(rows, _growth(stage, rows), strict=True):
@@ -116,7 +122,7 @@ def count_face(rows: Sequence[int]) -> list[FaceCount]:
         sizes = {name: body.counts for name, body in bodies.items()}
         added = {"xfem played": played}
         added |= {name: size.nodes - size.nodes_before for name, size in sizes.items()}
-        step = {name: step_of_body(body) / uncut for name, body in bodies.items()}
+        step = {name: _step_of_body(body) / uncut for name, body in bodies.items()}
         smallest = {name: body.smallest_fraction for name, body in bodies.items()}
         own = thesis[asked]
         said = {"xfem": int(own[3]), "snapping_subdivision": int(own[4])}
@@ -154,3 +160,11 @@ def _tips_until(strokes: Sequence[ToolPath], time: float) -> list[NDArray[np.flo
         before = path.times < min(time, path.times[-1])
         tips.append(np.concatenate([path.blades[before, 0, :2], [last]]))
     return tips
+
+
+def _step_of_body(body: CutBody) -> float:
+    """Critical step 2/ω_max of a free sheet of Table 4.1 that has been cut, in s."""
+    material = body.material(isotropic(1.0e4, 0.3, "plane stress"))
+    pattern = block_pattern(body.resisting.cells, body.resisting.node_count)
+    blocks = LinearStiffness(body.resisting, material).assemble(pattern)
+    return critical_step(csr_array(pattern.matrix(blocks)), side_wise_mass(body.virtual, 1000.0))

@@ -9,7 +9,7 @@ __all__ = ["published_rows", "published_source"]
 
 @cache
 def _tables() -> dict[str, dict[str, list[list[float]]]]:
-    text = files("verify.study.thesis").joinpath("published.json").read_text(encoding="utf-8")
+    text = files("verify.simulator.thesis").joinpath("published.json").read_text(encoding="utf-8")
     tables: dict[str, dict[str, list[list[float]]]] = json.loads(text)
     return tables
 

@@ -1,4 +1,4 @@
-"""The body of a scene in the terms of the compact XFEM solver: mesh, elasticity, density."""
+"""Body of a scene as arrays: background mesh, elasticity, density."""
 
 from typing import Any
 

@@ -7,8 +7,8 @@ from time import thread_time
 import numpy as np
 
 from verify.simulator import Session, Stage
-from verify.study.thesis.published import published_rows
-from verify.study.thesis.strokes import CutHand, cut_hand, hand
+from verify.simulator.thesis.published import published_rows
+from verify.simulator.thesis.strokes import CutHand, cut_hand, hand
 
 __all__ = ["CUTS", "TETRAHEDRA", "StepTime", "step_times"]
 

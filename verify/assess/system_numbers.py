@@ -1,4 +1,4 @@
-"""Condition number and critical explicit step of a small linear system, to round-off.
+"""Condition number and critical explicit step of a linear system.
 
 Slivers of ε = 1e-12 make the raw condition number 1e24: its smallest eigenvalue comes from the
 inverse of the matrix scaled by its diagonal, whose own condition number is small.
@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from verify.errors import InputError
 from verify.system import System
@@ -20,6 +22,8 @@ STEP = "critical explicit step"
 _TRUSTED = 1e13  # condition number up to which the smallest eigenvalue has two digits and more
 _LEAST_MASS = 1e-13  # eigenvalue of the scaled mass: below, its inverse has no three digits
 _LARGEST = 6000  # unknowns of a dense matrix
+_DENSE = 500  # unknowns up to which all eigenvalues cost less than a Lanczos iteration
+_LANCZOS = 1e-8  # relative tolerance of an eigenvalue
 _Floats = NDArray[np.float64]
 
 
@@ -51,6 +55,9 @@ def condition_numbers(system: System) -> tuple[float, float]:
 def critical_step(system: System) -> float:
     """Largest stable step 2/ω_max of central differences on the free unknowns, s.
 
+    By a Lanczos iteration where the unknowns are many; the mass is scaled to a unit diagonal
+    before, because mass and stiffness of slivers go to zero together.
+
     Raises
     ------
     InputError
@@ -59,24 +66,57 @@ def critical_step(system: System) -> float:
     """
     if system.mass is None:
         raise InputError("the scene states no density")
-    stiffness, mass = _free(system.stiffness, system), _free(system.mass, system)
-    diagonal = np.diag(mass)
+    free = _unknowns(system)
+    stiffness, mass = (csc_array(m)[free][:, free] for m in (system.stiffness, system.mass))
+    diagonal = mass.diagonal()
     if not (diagonal > 0.0).all():
         raise InputError("an unknown without mass: every step is too large")
-    scale = 1.0 / np.sqrt(diagonal)
-    mass, stiffness = (scale[:, None] * one * scale for one in (mass, stiffness))
-    if np.linalg.eigvalsh(mass)[0] < _LEAST_MASS:
+    scale = diags_array(1.0 / np.sqrt(diagonal))
+    mass, stiffness = (csc_array(scale @ one @ scale) for one in (mass, stiffness))
+    lumped = np.abs((mass - diags_array(mass.diagonal())).data).max(initial=0.0) == 0.0
+    if len(free) > _DENSE:
+        largest = _largest_eigenvalue(stiffness, None if lumped else mass)
+    else:
+        dense = mass.toarray()
+        _check_mass(float(np.linalg.eigvalsh(dense)[0]))
+        factor = np.linalg.inv(np.linalg.cholesky(dense))
+        largest = float(np.linalg.eigvalsh(factor @ stiffness.toarray() @ factor.T)[-1])
+    if not largest > 0.0:
+        raise InputError("nothing resists: no step is critical")
+    return float(2.0 / np.sqrt(largest))
+
+
+def _largest_eigenvalue(stiffness: csc_array, mass: csc_array | None) -> float:
+    """Of K x = λ M x, by a Lanczos iteration; M is the identity where it is not given."""
+    start = np.random.default_rng(0).standard_normal(stiffness.shape[0])
+    common: dict[str, Any] = {"k": 1, "which": "LA", "return_eigenvectors": False, "v0": start}
+    if mass is None:
+        return float(eigsh(stiffness, tol=_LANCZOS, **common)[0])
+    try:
+        inverse = LinearOperator(mass.shape, splu(mass).solve)
+    except RuntimeError:
+        _check_mass(0.0)
+        raise
+    _check_mass(1.0 / float(eigsh(inverse, tol=0.1, **common)[0]))
+    return float(eigsh(stiffness, M=mass, Minv=inverse, tol=_LANCZOS, **common)[0])
+
+
+def _check_mass(least: float) -> None:
+    if least < _LEAST_MASS:
         raise InputError(
             f"mass singular to round-off, though scaled: least eigenvalue below {_LEAST_MASS:.0e}"
         )
-    factor = np.linalg.inv(np.linalg.cholesky(mass))
-    return float(2.0 / np.sqrt(np.linalg.eigvalsh(factor @ stiffness @ factor.T)[-1]))
 
 
-def _free(matrix: Any, system: System) -> _Floats:
+def _unknowns(system: System) -> NDArray[np.int64]:
     free = np.flatnonzero(~system.fixed)
     if not len(free):
         raise InputError("every unknown is held")
+    return free
+
+
+def _free(matrix: Any, system: System) -> _Floats:
+    free = _unknowns(system)
     if len(free) > _LARGEST:
         raise InputError(f"{len(free)} free unknowns; at most {_LARGEST} for a dense matrix")
     dense: _Floats = matrix[free][:, free].toarray()

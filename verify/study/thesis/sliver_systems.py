@@ -1,0 +1,74 @@
+"""Slivers: the explicit step and the condition of bodies whose cut comes ever nearer to nodes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from verify.assess.system_numbers import condition_numbers, critical_step
+from verify.errors import UnsupportedSceneError
+from verify.scene import Scene
+from verify.study.variants import variant_of
+from verify.system import System, checked_system
+
+__all__ = ["METHODS", "SliverSystem", "exponent", "sliver_systems"]
+
+METHODS = (
+    "xfem", "xfem mass=consistent", "virtual_node", "subdivision", "snapping_subdivision",
+    "snapping",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SliverSystem:
+    """One method with slivers of one size.
+
+    Attributes
+    ----------
+    dimension : int
+    method : str
+        As a study of slivers takes it.
+    size : float
+        Distance of the cut from a layer of nodes, in element sizes.
+    ratio : float
+        Critical explicit step over that of the uncut body.
+    condition, scaled : float
+        Condition number of the stiffness, and of the stiffness scaled by its diagonal.
+    """
+
+    dimension: int
+    method: str
+    size: float
+    ratio: float
+    condition: float
+    scaled: float
+
+
+def sliver_systems(scenes: Sequence[Scene], methods: Sequence[str] = METHODS) -> list[SliverSystem]:
+    """Measure the systems of rows of families of slivers, those of ε = 0 left out."""
+    found = []
+    for method in methods:
+        variant = variant_of(method)
+        solver = variant.found()
+
+        def system(scene: Scene, solver=solver, given=variant.parameters) -> System:  # type: ignore[no-untyped-def]
+            return checked_system(solver.system(scene, 0, **given))
+
+        for scene in scenes:
+            if scene.row is None or not 0.0 < scene.row.value < 0.5:
+                continue
+            try:
+                own = system(scene)
+                whole = scene.model_copy(update={"cuts": [], "quantities": [], "acceptance": []})
+                ratio = critical_step(own) / critical_step(system(whole))
+            except UnsupportedSceneError:
+                continue
+            raw, scaled = condition_numbers(own)
+            found.append(SliverSystem(scene.dimension, method, scene.row.value, ratio, raw, scaled))
+    return found
+
+
+def exponent(steps: Sequence[SliverSystem]) -> float:
+    """Slope of log(critical step) over log(size) between the two smallest sizes."""
+    two = sorted(steps, key=lambda step: step.size)[:2]
+    return float(np.log(two[1].ratio / two[0].ratio) / np.log(two[1].size / two[0].size))
