@@ -13,13 +13,13 @@ from verify.scene import load_scene
 from verify.simulator import Stage, stage_of
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.thesis.published import published_rows
+from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Polyline, ToolPath
 from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.block_pattern import block_pattern
-from verify.xfem.stiffness import LinearStiffness
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -166,5 +166,5 @@ def _step_of_body(body: CutBody) -> float:
     """Critical step 2/ω_max of a free sheet of Table 4.1 that has been cut, in s."""
     material = body.material(isotropic(1.0e4, 0.3, "plane stress"))
     pattern = block_pattern(body.resisting.cells, body.resisting.node_count)
-    blocks = LinearStiffness(body.resisting, material).assemble(pattern)
+    blocks = InternalForce(body.resisting, material, "linear").stiffness(pattern)
     return critical_step(csr_array(pattern.matrix(blocks)), side_wise_mass(body.virtual, 1000.0))
