@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from verify.accelerated.resumable import finished
 from verify.simulator import Session, quality_of
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
-from verify.xfem.in_pieces import in_one_go
 
 ROUND_OFF = 1e-12
 
@@ -147,7 +147,7 @@ def test_a_path_led_elsewhere_after_a_look_does_not_change_what_was_found(hand) 
     turned = 0.5 * (halfway + end) + np.array([0.01, 0.0, 0.0])
     bent.extend(turned[None], [0.3])
     assert bent.strokes[0].path is live  # not while it is looked at
-    division = in_one_go(looking)
+    division = finished(looking)
     assert bent.strokes[0].path.times[-1] == bent.strokes[0].led.times[-1] == 0.3
     assert bent.body.node_count == before
     assert not bent.body.split_cells.any()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xfem_exact_fields as exact
 from scipy.sparse import csr_array
+from thesis_blocks import shifted_stiffness
 from xfem_bodies import boundary_nodes, sparse_stiffness
 
 from verify.xfem.bases import (
@@ -19,7 +20,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.thesis_blocks import shifted_stiffness
 from verify.xfem.virtual import cut_mesh
 
 CASES = {

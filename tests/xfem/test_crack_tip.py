@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xfem_exact_fields as exact
+from thesis_blocks import shifted_stiffness
 from xfem_bodies import boundary_nodes
 
 from verify.xfem.cuts import Polyline
@@ -12,7 +13,6 @@ from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
-from verify.xfem.thesis_blocks import shifted_stiffness
 from verify.xfem.virtual import cut_mesh
 
 KOLOSOV = 3.0 - 4.0 * exact.POISSON

@@ -16,10 +16,10 @@ from verify.accelerated.dense_tiles import COLUMNS, ROWS
 from verify.accelerated.front_plan_kernels import assembly_lists, front_rows
 from verify.accelerated.front_tree import levels, merge_and_order
 from verify.accelerated.minimum_degree import minimum_degree
+from verify.accelerated.resumable import Resumable, finished
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.given_arrays import check_floats
-from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
 __all__ = ["Cholesky"]
@@ -58,7 +58,7 @@ class Cholesky(LinearSolver):
         self._stacks = (np.empty(0), np.empty(0))
         self._runs = np.empty((3, 0), dtype=np.int64)
         self._tile = np.empty(COLUMNS * (COLUMNS + 1) // 2)
-        in_one_go(self._finding_order(pattern))
+        finished(self._finding_order(pattern))
 
     def _take(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> None:
         nodes = pattern.node_count
@@ -74,7 +74,7 @@ class Cholesky(LinearSolver):
     def _free(self) -> int:
         return max(1, int(np.count_nonzero(~self._held)))
 
-    def _finding_order(self, pattern: BlockPattern) -> InPieces[None]:
+    def _finding_order(self, pattern: BlockPattern) -> Resumable[None]:
         starts, columns, _ = coupled = _coupled(pattern.starts, pattern.columns, self._held)
         order, bounds = minimum_degree(starts, columns)
         yield
@@ -105,7 +105,7 @@ class Cholesky(LinearSolver):
         other = self._with_held(pattern, held)
         was_held = np.concatenate([self._held, self._held[source]])
         if (was_held & ~other._held).any():
-            in_one_go(other._finding_order(pattern))
+            finished(other._finding_order(pattern))
             return other
         order, bounds = _insert(self._order, self._bounds, source)
         coupled = _coupled(pattern.starts, pattern.columns, other._held)
@@ -114,7 +114,7 @@ class Cholesky(LinearSolver):
 
     def renewing(
         self, pattern: BlockPattern, held: NDArray[np.bool_] | None = None
-    ) -> "InPieces[Cholesky]":
+    ) -> "Resumable[Cholesky]":
         """Make a solver for any pattern, in an order found anew, with the memory of this one."""
         other = self._with_held(pattern, held)
         yield from other._finding_order(pattern)

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from verify.accelerated.cholesky import Cholesky
+from verify.accelerated.resumable import MANY, Resumable
 from verify.simulator.body_parts import BodyParts, held_nodes
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.grips import Grips
 from verify.simulator.surfaces import Surfaces
 from verify.xfem.dynamics import DynamicBody
-from verify.xfem.in_pieces import MANY, InPieces
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]
@@ -110,7 +110,7 @@ class StagedCut:
         return Followed(increment, body, parts.grips, other)
 
     def _each[Made](
-        self, phase: str, work: InPieces[Made], known: Increment | None
+        self, phase: str, work: Resumable[Made], known: Increment | None
     ) -> Generator[Increment | None, None, Made]:
         """Do some work in its own pieces, each of them timed."""
         while True:

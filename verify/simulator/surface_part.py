@@ -7,10 +7,10 @@ the number of goes is what costs.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.collision.bounding_tree import BoundingTree
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
-from verify.xfem.arrays.growing_array import GrowingArray
 
 __all__ = ["SurfacePart", "embed_together"]
 

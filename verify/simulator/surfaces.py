@@ -6,13 +6,13 @@ Those of a solid can be separate meshes. A plane body and a membrane are their o
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated.resumable import Resumable
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.stage import Stage
 from verify.simulator.surface_part import SurfacePart, embed_together
-from verify.xfem.in_pieces import InPieces
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Picture", "Surfaces"]
@@ -67,7 +67,7 @@ class Surfaces:
         self._followers = [surface for surface in followers if surface is not None]
         self._positions = [np.empty((0, stage.mesh.space)) for _ in self._followers]
 
-    def following(self, increment: Increment) -> InPieces[None]:
+    def following(self, increment: Increment) -> Resumable[None]:
         """Let them follow a cut, in pieces; each is sound all along."""
         if self._embedded is not None:
             yield from self._embedded.following(increment)

@@ -14,7 +14,7 @@ lines of code, in an order of reading:
 `mass`
     consistent, row sum, weighted diagonal, side-wise (`mass_shifted`: as in the thesis)
 `elasticity`, `stiffness`, `loads`, `supports`
-    mechanics of small strains; `bases` and `thesis_blocks`: the other bases of the same space;
+    mechanics of small strains; `bases`: the other bases of the same space;
     `critical_step` of explicit schemes; `subdivision`: a conforming mesh of the cut body
 `corotation`
     one rotation per piece: `internal_force`, `corotational_kernels`, `polar_kernels`

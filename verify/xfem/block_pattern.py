@@ -8,8 +8,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
-from verify.xfem.arrays.short_sort import sort_short
 from verify.xfem.errors import XfemError
+from verify.xfem.short_sort import sort_short
 
 __all__ = ["BlockPattern", "block_pattern", "symmetric_product"]
 

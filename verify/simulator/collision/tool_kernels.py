@@ -6,12 +6,8 @@ In numbers, not rows: sums and copies of rows take numba five times as long to c
 import numpy as np
 from numba import njit
 
-from verify.xfem.nearest_points import (
-    foot_on_facet,
-    nearest_on_facet,
-    signed_volume,
-    squared_distance,
-)
+from verify.simulator.simplex_kernels import signed_volume
+from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_distance
 
 __all__ = ["capsule_contacts", "segment_hits"]
 

@@ -7,12 +7,8 @@ is one sort and refitting one backward sweep, without recursion and without allo
 import numpy as np
 from numba import njit
 
-from verify.xfem.nearest_points import (
-    box_gap,
-    foot_on_facet,
-    nearest_on_facet,
-    squared_distance,
-)
+from verify.simulator.simplex_kernels import box_gap
+from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_distance
 
 __all__ = [
     "as_array",

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.simulator.arrays.distinct import distinct
 from verify.simulator.cutting.patch import MeshPatch
-from verify.xfem.arrays.distinct import distinct
 from verify.xfem.partition import Partition
 
 __all__ = ["Division"]

@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated.resumable import Resumable, finished
+from verify.simulator.arrays.distinct import distinct
+from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.cutting.division import Division
 from verify.simulator.cutting.patch import MeshPatch, PatchCutter
 from verify.simulator.cutting.point_numbers import PointNumbers
@@ -25,11 +28,8 @@ from verify.simulator.cutting.renumber_kernels import (
     write_pieces,
 )
 from verify.simulator.cutting.tied_parts import TiedParts
-from verify.xfem.arrays.distinct import distinct
-from verify.xfem.arrays.growing_array import GrowingArray
 from verify.xfem.errors import XfemError
 from verify.xfem.flat_cuts import Cut
-from verify.xfem.in_pieces import InPieces, in_one_go
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.partition import Partition
@@ -171,10 +171,10 @@ class GrowingBody:
 
     def split(self, candidates: _Ints, cuts_near: CutsNear) -> Increment | None:
         """Bring some cells up to date with the cuts; None if nothing changes: see `looking`."""
-        division = in_one_go(self.looking(candidates, cuts_near))
+        division = finished(self.looking(candidates, cuts_near))
         return None if division is None else self.divide(division)
 
-    def looking(self, candidates: _Ints, cuts_near: CutsNear) -> InPieces[Division | None]:
+    def looking(self, candidates: _Ints, cuts_near: CutsNear) -> Resumable[Division | None]:
         """Find how some cells are to be divided, None if they are not; the body stays as it is.
 
         Done in pieces, between which neither the body nor the cuts may change.

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.distinct import distinct_in_lists, distinct_in_rows
+from verify.simulator.arrays.distinct import distinct_in_lists, distinct_in_rows
 from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["MeshPatch", "PatchCutter"]

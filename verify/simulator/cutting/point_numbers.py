@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.growing_array import GrowingArray
-from verify.xfem.arrays.row_numbers import RowNumbers, find_row, number_of_row
+from verify.simulator.arrays.growing_array import GrowingArray
+from verify.simulator.arrays.row_numbers import RowNumbers, find_row, number_of_row
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["FoundPoints", "PointNumbers", "runs_through", "spans"]

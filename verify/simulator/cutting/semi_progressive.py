@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from verify.accelerated.resumable import MANY, Resumable, finished
 from verify.simulator.collision.bounding_tree import BoundingTree
 from verify.simulator.cutting.division import Division
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
@@ -21,7 +22,6 @@ from verify.simulator.cutting.stroke import Stroke
 from verify.simulator.cutting.whole_mesh import whole_mesh
 from verify.xfem.errors import XfemError
 from verify.xfem.flat_cuts import Cut
-from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import ToolPath
 from verify.xfem.virtual import VirtualMesh
@@ -135,10 +135,10 @@ class SemiProgressiveCutter:
         XfemError
             If the time is no number.
         """
-        division = in_one_go(self.looking(time))
+        division = finished(self.looking(time))
         return None if division is None else self.divide(division, time)
 
-    def looking(self, time: float, most: int | None = None) -> InPieces[Division | None]:
+    def looking(self, time: float, most: int | None = None) -> Resumable[Division | None]:
         """Move all tools to where they are at that time, and find what they have crossed.
 
         Done in pieces. A path that is extended in between is followed afterwards.
@@ -173,7 +173,7 @@ class SemiProgressiveCutter:
             for stroke in self.strokes:
                 stroke.release()
 
-    def _looking(self, time: float, most: int | None) -> InPieces[Division | None]:
+    def _looking(self, time: float, most: int | None) -> Resumable[Division | None]:
         if self.waits:
             found = [stroke.waiting for stroke in self.strokes]
         else:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.arrays.growing_array import GrowingArray
+from verify.simulator.arrays.growing_array import GrowingArray
 
 __all__ = ["TiedParts"]
 

@@ -9,14 +9,14 @@ with two new rims along a cut instead of inner facets.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.accelerated.resumable import Resumable, finished
+from verify.simulator.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.mapping.corner_kernels import place_corners
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.exposed_kernels import exposed_facets
 from verify.simulator.mapping.membrane_facets import membrane_facets, rim_edges
 from verify.simulator.mapping.moving_surface import MovingSurface
-from verify.xfem.arrays.distinct import ranges
-from verify.xfem.in_pieces import InPieces, in_one_go
 
 __all__ = ["BodySurface"]
 
@@ -45,18 +45,18 @@ class BodySurface:
         self._facet_range = np.zeros((len(mesh.cells), 2), dtype=np.int64)
         split = np.flatnonzero(body.split_cells)
         if self._membrane:
-            in_one_go(self._covering(np.arange(len(mesh.cells)), split))
+            finished(self._covering(np.arange(len(mesh.cells)), split))
             return
         self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
         boundary = np.unique(mesh.boundary_facets[:, 0])
-        in_one_go(self._covering(np.union1d(boundary, split), split))
+        finished(self._covering(np.union1d(boundary, split), split))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
         if increment is not None:
-            in_one_go(self.following(increment))
+            finished(self.following(increment))
 
-    def following(self, increment: Increment) -> InPieces[None]:
+    def following(self, increment: Increment) -> Resumable[None]:
         """Follow a cut in pieces; the body must not be cut again in between."""
         return self._covering(increment.touched, increment.cells)
 
@@ -70,7 +70,7 @@ class BodySurface:
             return np.empty((0, 2), dtype=np.int64)
         return rim_edges(self._body, self.surface)
 
-    def _covering(self, cells: _Ints, split: _Ints) -> InPieces[None]:
+    def _covering(self, cells: _Ints, split: _Ints) -> Resumable[None]:
         """Make the facets of some cells anew; `split` are those with new sub-simplices."""
         body, mesh = self._body, self._body.mesh
         self._edges.add(body.sub_points.rows[ranges(body.sub_range[split])].ravel())

@@ -7,8 +7,8 @@ blade meets a hundred facets, and with so few only the number of calls costs.
 import numpy as np
 from numba import njit
 
+from verify.simulator.arrays.row_numbers import number_of_row
 from verify.simulator.mapping.locate_kernels import cut_at
-from verify.xfem.arrays.row_numbers import number_of_row
 
 __all__ = ["divide_facets"]
 

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from verify.simulator.arrays.row_numbers import find_row, number_of_row
 from verify.simulator.cutting.point_numbers import runs_through
-from verify.xfem.arrays.row_numbers import find_row, number_of_row
 
 __all__ = ["CUTS", "LINE", "EdgeRecord", "bisect_facets", "record_points", "unrecorded"]
 
@@ -38,7 +38,7 @@ class EdgeRecord(NamedTuple):
     supports : (z, 7) int array
         See `PointNumbers`.
     table, known : int arrays
-        Lines by their nodes and cut (`verify.xfem.arrays.row_numbers`).
+        Lines by their nodes and cut (`verify.simulator.arrays.row_numbers`).
     first, tally : (l,) int array
         First entry of each line, and how many it has.
     entries : (e, 2) int array

@@ -9,6 +9,8 @@ record is by these.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.simulator.arrays.growing_array import GrowingArray
+from verify.simulator.arrays.row_numbers import RowNumbers
 from verify.simulator.cutting.point_numbers import PointNumbers
 from verify.simulator.mapping.edge_kernels import (
     CUTS,
@@ -18,8 +20,6 @@ from verify.simulator.mapping.edge_kernels import (
     record_points,
     unrecorded,
 )
-from verify.xfem.arrays.growing_array import GrowingArray
-from verify.xfem.arrays.row_numbers import RowNumbers
 from verify.xfem.errors import XfemError
 
 __all__ = ["EdgePoints"]

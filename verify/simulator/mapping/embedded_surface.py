@@ -11,6 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from verify.accelerated.resumable import MANY, Resumable, finished
+from verify.simulator.arrays.distinct import (
+    distinct,
+    distinct_in_lists,
+    distinct_in_rows,
+    ranges,
+)
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.point_numbers import FoundPoints, PointNumbers
@@ -26,14 +33,7 @@ from verify.simulator.mapping.locate_kernels import (
 )
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.mapping.near_facet_kernels import concerned_facets, levels_at
-from verify.xfem.arrays.distinct import (
-    distinct,
-    distinct_in_lists,
-    distinct_in_rows,
-    ranges,
-)
 from verify.xfem.errors import XfemError
-from verify.xfem.in_pieces import MANY, InPieces, in_one_go
 from verify.xfem.pieces import ROUND_OFF, split_cells
 
 __all__ = ["EmbeddedSurface"]
@@ -132,14 +132,14 @@ class EmbeddedSurface:
         most = max(len(self.points), len(self.facets), len(mesh.points))
         self._place, self._is_moved = np.full(most, -1), np.zeros(len(mesh.cells), dtype=bool)
         nodes = distinct(self.facets)
-        in_one_go(self._replacing(every, nodes, *self._values(nodes), many=False))
+        finished(self._replacing(every, nodes, *self._values(nodes), many=False))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
         if increment is not None:
-            in_one_go(self.following(increment))
+            finished(self.following(increment))
 
-    def following(self, increment: Increment) -> InPieces[None]:
+    def following(self, increment: Increment) -> Resumable[None]:
         """Follow a cut in pieces; the body must not be cut again in between."""
         near = np.sort(distinct_in_lists(*self._near, increment.moved, self._place))
         if len(near) == 0:
@@ -193,7 +193,7 @@ class EmbeddedSurface:
 
     def _replacing(
         self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats, many: bool
-    ) -> InPieces[None]:
+    ) -> Resumable[None]:
         """Put the parts of some facets in the place of what there is of these.
 
         They are divided, given the cuts and their level sets (q, cuts) at the vertices; then it is

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.simulator.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.moving_surface import MovingSurface
-from verify.xfem.arrays.distinct import ranges
 
 __all__ = ["membrane_facets", "rim_edges"]
 

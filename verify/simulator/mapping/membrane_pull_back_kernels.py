@@ -5,11 +5,7 @@ from numba import njit
 
 from verify.simulator.mapping.material_share_kernels import is_material
 from verify.simulator.mapping.partner_kernels import partner
-from verify.xfem.nearest_points import (
-    foot_on_facet,
-    nearest_on_facet,
-    squared_distance,
-)
+from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_distance
 
 __all__ = ["pull_back_to_membrane"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.growing_array import GrowingArray
-from verify.xfem.arrays.row_numbers import RowNumbers, number_of_row
+from verify.simulator.arrays.growing_array import GrowingArray
+from verify.simulator.arrays.row_numbers import RowNumbers, number_of_row
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import check_floats
 

@@ -12,8 +12,8 @@ from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.material_share_kernels import is_material
 from verify.simulator.mapping.membrane_pull_back_kernels import pull_back_to_membrane
 from verify.simulator.mapping.partner_kernels import partner
+from verify.simulator.simplex_kernels import signed_volume
 from verify.xfem.errors import XfemError
-from verify.xfem.nearest_points import signed_volume
 
 __all__ = ["pull_back"]
 

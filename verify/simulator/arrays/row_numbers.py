@@ -1,14 +1,12 @@
 """Numbers for rows of integers: equal rows, equal numbers, in the order of their first coming."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.arrays.growing_array import GrowingArray
+from verify.simulator.arrays.growing_array import GrowingArray
 
-__all__ = ["EdgeTable", "RowNumbers", "find_row", "number_of_row", "point_on_edge"]
+__all__ = ["RowNumbers", "find_row", "number_of_row"]
 
 _Ints = NDArray[np.int64]
 
@@ -60,14 +58,6 @@ class RowNumbers:
         self._known.rows = self._known.rows[:count]
 
 
-class EdgeTable(NamedTuple):
-    """Points by the edge on which they lie: a table of rows (cut, plus, minus), and the points."""
-
-    table: _Ints
-    known: _Ints
-    point: _Ints
-
-
 @njit(cache=True)
 def _place(row, table, known):
     """Where in the table the row is, or belongs."""
@@ -91,14 +81,6 @@ def _place(row, table, known):
 def find_row(row, table, known):
     """Give the number of a row, -1 if it has none."""
     return table[_place(row, table, known)]
-
-
-@njit(cache=True)
-def point_on_edge(cut, plus, minus, edges, row):
-    """Give the zero point of a cut on an edge, -1 if nobody has asked for it; writes row (3,)."""
-    row[0], row[1], row[2] = cut, plus, minus
-    number = find_row(row, edges.table, edges.known)
-    return edges.point[number] if number >= 0 else -1
 
 
 @njit(cache=True)
