@@ -113,6 +113,7 @@ class ProgramSolver:
         )  # fmt: skip
         wall = perf_counter() - start
         if done.returncode:
-            said = (done.stderr or done.stdout).strip()[-_TAIL:] or "said nothing"
+            said = (done.stderr.strip() or done.stdout.strip() or "said nothing").splitlines()[-1]
+            said = said[-_TAIL:]
             raise RuntimeError(f"{words[0]} ended with {done.returncode}: {said}")
         return wall
