@@ -12,11 +12,12 @@ from verify.xfem.assembly import body_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.quadrature import simplex_rule
-from verify.xfem.slivers import GhostPenalty, treat_slivers
+from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static, static_equilibrium
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide

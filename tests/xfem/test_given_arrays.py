@@ -18,12 +18,12 @@ from verify.xfem.cuts import (
 )
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.slivers.ghost_penalty import GhostPenalty
-from verify.xfem.slivers.policies import treat_slivers
+from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports

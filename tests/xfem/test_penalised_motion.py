@@ -20,10 +20,10 @@ from verify.xfem.dynamics import (
 )
 from verify.xfem.dynamics.energy_ledger import run
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import inverted_cells
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.slivers import GhostPenalty
-from verify.xfem.slivers.penalised_force import PenalisedForce
+from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

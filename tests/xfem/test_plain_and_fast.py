@@ -18,11 +18,11 @@ from verify.xfem.dynamics import (
     Trapezoidal,
 )
 from verify.xfem.errors import SingularStiffnessError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN
 from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.slivers import GhostPenalty
 from verify.xfem.statics import solve_static, static_equilibrium
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports

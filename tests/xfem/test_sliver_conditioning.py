@@ -17,9 +17,9 @@ from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.slivers import GhostPenalty
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports

@@ -19,11 +19,11 @@ from verify.methods.opened_mesh import OpenedMesh, conforming_to
 from verify.methods.opening import OpenedCells, cut_so_far
 from verify.methods.refinement import bisect_cells
 from verify.methods.whole_cells import whole_cells
+from verify.xfem.contacts import face_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.slivers.piece_contacts import face_contacts
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["removal", "removal_refined"]

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from verify.methods.cut_body import Change, CutBody, make_body
 from verify.methods.opening import OpenedCells, cut_so_far
 from verify.methods.whole_cells import whole_cells
+from verify.xfem.absorption import absorb
+from verify.xfem.contacts import sibling_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.slivers.absorption import absorb
-from verify.xfem.slivers.piece_contacts import sibling_contacts
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["CopyWeights", "virtual_node", "virtual_node_arbitrary"]

@@ -22,8 +22,7 @@ from verify.system import System
 from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.kernels import PLAIN
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.slivers import treat_slivers
-from verify.xfem.specks import join_specks
+from verify.xfem.slivers import join_specks, treat_slivers
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["XfemSolver"]

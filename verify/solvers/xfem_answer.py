@@ -9,8 +9,8 @@ from verify.scene import Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import across_interfaces
-from verify.xfem.slivers import GhostPenalty, SliverReport
-from verify.xfem.specks import Specks
+from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.slivers import SliverReport, Specks
 from verify.xfem.subdivision import Subdivision, subdivide
 from verify.xfem.virtual import VirtualMesh
 

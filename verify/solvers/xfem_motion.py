@@ -34,11 +34,12 @@ from verify.xfem.dynamics import (
 from verify.xfem.dynamics.energy_ledger import EnergyLedger
 from verify.xfem.dynamics.newton import NewtonIntegrator
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import Kernels
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.slivers import GhostPenalty, SliverReport, treat_slivers
+from verify.xfem.slivers import SliverReport, treat_slivers
 from verify.xfem.statics import static_equilibrium
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh, cut_mesh

@@ -14,8 +14,8 @@ from verify.system import System
 from verify.xfem.assembly import body_pattern
 from verify.xfem.bases import transformed_matrix
 from verify.xfem.elasticity import Material
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.slivers import GhostPenalty
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["system_of"]

@@ -18,8 +18,8 @@ lines of code, in an order of reading:
     `critical_step` of explicit schemes; `subdivision`: a conforming mesh of the cut body
 `corotation`
     one rotation per piece: `internal_force`, `corotational_kernels`, `polar_kernels`
-`slivers`
-    policies for pieces with a small share of their element; ghost penalty
+`contacts`, `absorption`, `aggregation`, `slivers`, `ghost_penalty`, `penalised_force`
+    policies for parts with a small share of their element; ghost penalty
 `statics`, `dynamics`
     equilibrium, linear and at finite rotation; time integration, its energy ledger, inheritance of
     a state

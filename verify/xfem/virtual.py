@@ -82,7 +82,7 @@ class Aggregation:
 class VirtualMesh:
     """A cut mesh. "Unknown node" means: one displacement vector.
 
-    With cell aggregation (`verify.xfem.slivers.aggregation`) some corners of the pieces have no
+    With cell aggregation (`verify.xfem.aggregation`) some corners of the pieces have no
     unknown of their own but follow others: `cells` counts corners, and everything else here that
     has N rows is of the unknown nodes. `extend` and `restrict` lead from one to the other.
 

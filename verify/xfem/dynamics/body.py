@@ -11,7 +11,7 @@ from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
-from verify.xfem.slivers.penalised_force import PenalisedForce
+from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.supports import Supports
 
 __all__ = ["DynamicBody", "MotionState", "MovingSupports", "RayleighDamping"]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from verify.xfem.dynamics.body import DynamicBody, MotionState
 from verify.xfem.dynamics.integrator import Integrator, StepForces
 from verify.xfem.errors import XfemError
-from verify.xfem.slivers.penalised_force import PenalisedForce
+from verify.xfem.penalised_force import PenalisedForce
 
 __all__ = ["EnergyLedger", "Ledger", "run"]
 

@@ -13,7 +13,7 @@ from verify.xfem.element import add_moduli
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
-from verify.xfem.slivers.penalised_force import PenalisedForce
+from verify.xfem.penalised_force import PenalisedForce
 
 __all__ = ["EnergyMomentum", "ImplicitEuler", "Trapezoidal"]
 

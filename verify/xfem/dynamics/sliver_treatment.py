@@ -13,17 +13,12 @@ from numpy.typing import NDArray
 
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import DEFAULT_FACTOR, GhostPenalty
 from verify.xfem.internal_force import InternalForce, Kinematics
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.mass import Mass, side_wise_mass
-from verify.xfem.slivers.ghost_penalty import DEFAULT_FACTOR, GhostPenalty
-from verify.xfem.slivers.penalised_force import PenalisedForce
-from verify.xfem.slivers.policies import (
-    DEFAULT_POLICY,
-    DEFAULT_THRESHOLD,
-    SliverReport,
-    treat_slivers,
-)
+from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.slivers import DEFAULT_POLICY, DEFAULT_THRESHOLD, SliverReport, treat_slivers
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MotionPolicy", "TreatedBody", "treat_moving_body"]

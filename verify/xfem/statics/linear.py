@@ -11,10 +11,10 @@ from verify.xfem.assembly import body_pattern, constrain
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import NotConvergedError, XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.linear_solvers import LinearSolver
-from verify.xfem.slivers.ghost_penalty import GhostPenalty
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
@@ -73,7 +73,7 @@ def solve_static(
     Parameters
     ----------
     virtual : VirtualMesh
-        With slivers as a policy of `verify.xfem.slivers.policies` left them, or untreated.
+        With slivers as a policy of `verify.xfem.slivers` left them, or untreated.
     material : Material
     supports : Supports
     load : (N, d) float array, optional

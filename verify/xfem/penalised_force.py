@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.kernels import PLAIN, Kernels
-from verify.xfem.slivers.ghost_penalty import GhostPenalty
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["PenalisedForce"]

@@ -14,10 +14,10 @@ from scipy.sparse import coo_array, csr_array
 
 from verify.xfem.assembly import body_pattern, pattern_places
 from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.contacts import face_contacts
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, cell_densities
-from verify.xfem.slivers.piece_contacts import face_contacts
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["DEFAULT_FACTOR", "GhostPenalty"]

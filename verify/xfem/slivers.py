@@ -6,16 +6,20 @@ of an element (like 1/ε in space under a force on it) and that such a piece inv
 policies do:
 
 "drop"
-    Its sibling across the cut absorbs it (`verify.xfem.slivers.absorption`): the realised cut
+    Its sibling across the cut absorbs it (`verify.xfem.absorption`): the realised cut
     moves to the nearest element faces. The halves stay separate, because no unknowns are joined.
     A sliver that holds together parts of the body that nothing else does is kept.
 "merge"
-    Cell aggregation (`verify.xfem.slivers.aggregation`): nodes that only slivers use follow the
+    Cell aggregation (`verify.xfem.aggregation`): nodes that only slivers use follow the
     linear field of a root cell on their own side of the cut, u = C û. Everything stays in its
     place, every part of the body stays one of its own. A sliver that reaches no root is kept.
 
-Ghost penalties are another remedy, see `verify.xfem.slivers.ghost_penalty`; measurements in
+Ghost penalties are another remedy, see `verify.xfem.ghost_penalty`; measurements in
 ``docs/theory/slivers.md``.
+
+A speck is a loose part of a thousandth of an element across: cuts that should meet in a point miss
+it by a little, and enclose a part that nothing holds. That is no material that anybody meant to cut
+out: it moves with the largest piece of its element, and is counted (`join_specks`).
 """
 
 from dataclasses import dataclass
@@ -23,20 +27,34 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, identity
+from scipy.sparse import coo_array, csr_array, identity
+from scipy.sparse.csgraph import connected_components
 
+from verify.xfem.absorption import absorb
+from verify.xfem.aggregation import aggregate
+from verify.xfem.contacts import face_contacts, sibling_contacts
 from verify.xfem.errors import XfemError
-from verify.xfem.slivers.absorption import absorb
-from verify.xfem.slivers.aggregation import aggregate
-from verify.xfem.slivers.piece_contacts import Bridges, face_contacts, sibling_contacts
+from verify.xfem.supports import Supports, loose_bodies
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["DEFAULT_POLICY", "DEFAULT_THRESHOLD", "SliverPolicy", "SliverReport", "treat_slivers"]
+__all__ = [
+    "DEFAULT_POLICY",
+    "DEFAULT_THRESHOLD",
+    "SliverPolicy",
+    "SliverReport",
+    "Specks",
+    "join_specks",
+    "treat_slivers",
+]
 
 SliverPolicy = Literal["keep", "drop", "merge"]
 
 DEFAULT_POLICY: SliverPolicy = "merge"
 DEFAULT_THRESHOLD = 0.1
+
+# Size across over that of an element, below which a loose part is a speck. Its volume is below the
+# power d of this, which changes the energy of a body by less than a solution is accurate to.
+_ACROSS = 1e-3
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -125,7 +143,7 @@ def treat_slivers(
     treated, dropped, following, rootless = virtual, nothing, nothing, nothing
     extension, node = csr_array(identity(virtual.node_count)), np.arange(virtual.node_count)
     if policy == "drop" and small.any():
-        dropped = small & ~_bridges(virtual, face_contacts(virtual, near=True), small)
+        dropped = small & ~_bridges(virtual, small)
         treated, extension, node = absorb(virtual, _siblings(virtual, dropped))
     elif policy == "merge" and small.any():
         treated, roots = aggregate(virtual, small, kept_nodes)
@@ -147,12 +165,29 @@ def treat_slivers(
     )
 
 
-def _bridges(virtual: VirtualMesh, contacts: tuple[_Ints, _Ints], small: _Bools) -> _Bools:
+def _bridges(virtual: VirtualMesh, small: _Bools) -> _Bools:
     """Which small pieces hold parts of the body together; the whole body only if need be."""
-    suspects = Bridges(virtual, contacts).among(small)
-    if not suspects.any():
-        return suspects
-    return Bridges(virtual, face_contacts(virtual)).among(small)
+    suspects = _torn(face_contacts(virtual, near=True), small)
+    return _torn(face_contacts(virtual), small) if suspects.any() else suspects
+
+
+def _torn(contacts: tuple[_Ints, _Ints], removed: _Bools) -> _Bools:
+    """Which of the removed pieces (p,) hold together several remaining parts, across faces.
+
+    Removed pieces in contact count as one, and parts that touch in a node or an edge only as
+    apart: they could turn about it.
+    """
+    first, second = contacts
+    same = removed[first] == removed[second]
+    ones = np.ones(int(same.sum()), dtype=np.int8)
+    graph = coo_array((ones, (first[same], second[same])), shape=(len(removed), len(removed)))
+    part = connected_components(graph, directed=False)[1]
+    inner = np.where(removed[first], first, second)[~same]
+    outer = np.where(removed[first], second, first)[~same]
+    touched = np.unique(np.stack([part[inner], part[outer]]), axis=1)[0]
+    several = np.bincount(touched, minlength=part.max(initial=0) + 1) > 1
+    torn: _Bools = removed & several[part]
+    return torn
 
 
 def _largest_siblings(virtual: VirtualMesh) -> _Ints:
@@ -190,3 +225,51 @@ def _followed_to_the_end(into: _Ints) -> _Ints:
         if np.array_equal(further, into):
             return into
         into = further
+
+
+@dataclass(frozen=True)
+class Specks:
+    """Specks that were joined to their neighbours.
+
+    Attributes
+    ----------
+    count : int
+    largest : float
+        Volume of the largest over that of its elements.
+    """
+
+    count: int
+    largest: float
+
+
+def join_specks(virtual: VirtualMesh, supports: Supports) -> tuple[VirtualMesh, Specks]:
+    """Join loose parts of less than a thousandth of an element across to the pieces beside them.
+
+    Parameters
+    ----------
+    virtual : VirtualMesh
+        Before a sliver policy.
+    supports : Supports
+        Of its unknowns: a part that they hold is left alone.
+
+    Returns
+    -------
+    virtual : VirtualMesh
+        The same object if there is no speck.
+    specks : Specks
+    """
+    body = virtual.bodies[virtual.cells[:, 0]]
+    share = np.bincount(body, virtual.fraction)
+    small = np.flatnonzero(share <= _ACROSS**virtual.mesh.dim)
+    specks = loose_bodies(virtual, supports, small)
+    if not len(specks):
+        return virtual, Specks(0, 0.0)
+    is_speck = np.isin(body, specks)
+    # the largest piece of each cell comes first; it is no speck, as fractions add up to one
+    order = np.lexsort([-virtual.fraction, virtual.parent])
+    first = order[np.diff(virtual.parent[order], prepend=-1) != 0]
+    largest = np.empty(len(virtual.mesh.cells), dtype=np.int64)
+    largest[virtual.parent[first]] = first
+    into = np.arange(len(body))
+    into[is_speck] = largest[virtual.parent[is_speck]]
+    return absorb(virtual, into)[0], Specks(len(specks), float(share[specks].max()))

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from verify.xfem.slivers.absorption import renumber
-from verify.xfem.slivers.piece_contacts import face_contacts
+from verify.xfem.absorption import renumber
+from verify.xfem.contacts import face_contacts
 from verify.xfem.virtual import Aggregation, VirtualMesh
 
 __all__ = ["Roots", "aggregate"]

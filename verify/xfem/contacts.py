@@ -2,12 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["Bridges", "face_contacts", "sibling_contacts"]
+__all__ = ["face_contacts", "sibling_contacts"]
 
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]
@@ -80,38 +78,3 @@ def sibling_contacts(virtual: VirtualMesh, cells: _Ints) -> tuple[_Ints, _Ints, 
     edges = at[:, 1:] - at[:, :1]
     area = np.sqrt(np.maximum(np.linalg.det(edges @ edges.transpose(0, 2, 1)), 0.0))
     return np.concatenate([first, second]), np.concatenate([second, first]), np.tile(area, 2)
-
-
-class Bridges:
-    """Pieces whose removal would tear apart what they join, across faces.
-
-    Parameters
-    ----------
-    virtual : VirtualMesh
-    contacts : pair of (k,) int arrays
-        As `face_contacts` gives them.
-    """
-
-    def __init__(self, virtual: VirtualMesh, contacts: tuple[_Ints, _Ints]) -> None:
-        self._count = len(virtual.cells)
-        self._first, self._second = contacts
-
-    def among(self, removed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(p,) which of the removed pieces (p,) hold together several remaining parts.
-
-        Removed pieces in contact count as one, and parts that touch in a node or an edge only as
-        apart: they could turn about it.
-        """
-        first, second = self._first, self._second
-        same = removed[first] == removed[second]
-        graph = coo_array(
-            (np.ones(int(same.sum()), dtype=np.int8), (first[same], second[same])),
-            shape=(self._count, self._count),
-        )
-        part = connected_components(graph, directed=False)[1]
-        inner = np.where(removed[first], first, second)[~same]
-        outer = np.where(removed[first], second, first)[~same]
-        touched = np.unique(np.stack([part[inner], part[outer]]), axis=1)[0]
-        several = np.bincount(touched, minlength=part.max(initial=0) + 1) > 1
-        bridges: NDArray[np.bool_] = removed & several[part]
-        return bridges
