@@ -25,7 +25,8 @@ import importlib, importlib.metadata, json, platform, sys
 module, of = sys.argv[1:]
 importlib.import_module(module)
 if ":" in of:
-    version = str(getattr(importlib.import_module(of.split(":")[0]), of.split(":")[1]))
+    found = getattr(importlib.import_module(of.split(":")[0]), of.split(":")[1])
+    version = str(found("version") if callable(found) else found)
 else:
     version = importlib.metadata.version(of)
 print(json.dumps({"version": version, "python": platform.python_version()}))

@@ -1,0 +1,152 @@
+"""XFEM in GetFEM: level sets with tips, values of both sides.
+
+A cut is a level set that ends where a second one is positive. Elements that it divides wholly have
+values of each side; those where it ends have none, so that it ends at the facet before.
+"""
+
+import getfem as gf
+import numpy as np
+from cut_body import CutBody, forces, prescribed
+from exchange_files import RefusedError, loose_parts, run
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import splu
+from split_cells import SplitMesh
+
+PULLED = 1e-3  # share by which points of evaluation are drawn into their own cell
+
+
+class Space:
+    """The enriched space on the scene's mesh, scalar and of displacements."""
+
+    def __init__(self, case, body):
+        d = case.dimension
+        name = {2: "TRIANGLE", 3: "TETRAHEDRON"}[d]
+        self.mesh = gf.Mesh("empty", d)
+        linear = gf.GeoTrans(f"GT_PK({d},1)")
+        self.mesh.add_convex(linear, np.asfortranarray(case.points[case.cells].transpose(2, 1, 0)))
+        element = gf.Fem(f"FEM_PK({d},1)")
+        rule = gf.Integ(f"IM_{name}(2)")
+        self.cuts = gf.MeshLevelSet(self.mesh)
+        self.levels = []
+        for cut in body.cuts:
+            level = gf.LevelSet(self.mesh, 1, "ws")
+            at = level.mf().basic_dof_nodes().T
+            level.set_values(cut.level(at)[0], cut.beyond(at))
+            self.cuts.add(level)
+            self.levels.append(level)
+        if self.levels:
+            self.cuts.adapt()
+            self.rule = gf.MeshIm("levelset", self.cuts, "all", rule)
+            self.rule.set_integ(rule)
+        else:
+            self.rule = gf.MeshIm(self.mesh, rule)
+        self.scalar, self.vector = (self._enriched(element, size) for size in (1, d))
+
+    def _enriched(self, element, size):
+        plain = gf.MeshFem(self.mesh, 1)
+        plain.set_fem(element)
+        whole = plain
+        if self.levels:
+            whole = gf.MeshFem("sum", gf.MeshFem("levelset", self.cuts, plain))
+        whole.set_qdim(size)
+        return whole
+
+
+def matrix_of(found):
+    """Return a matrix of GetFEM as SciPy has it."""
+    found.to_csc()
+    starts, rows = found.csc_ind()
+    values, size = found.csc_val(), found.size()
+    return csr_matrix((values, rows, starts), shape=(size[1], size[0])).T.tocsr()
+
+
+def evaluation(space, answer):
+    """Values at the nodes of the answer of the scalar space, as a matrix.
+
+    Each is that of one of its cells, from within: on a cut a point belongs to both sides. With
+    them come the values at the middles of the cells.
+    """
+    cell = np.zeros(len(answer.points), dtype=int)
+    cell[answer.cells] = np.arange(len(answer.cells))[:, None]
+    middles = answer.points[answer.cells].mean(axis=1)
+    inside = answer.points + PULLED * (middles[cell] - answer.points)
+    near, middle = (
+        matrix_of(gf.asm_interpolation_matrix(space.scalar, np.asfortranarray(at.T)))
+        for at in (inside, middles)
+    )
+    return ((near - PULLED * middle[cell]) / (1 - PULLED)).tocsr(), middle
+
+
+def unknown_of_groups(case, body, answer, space, middle):
+    """Return the scalar unknown (groups,) that is the value of each group, -1 for none."""
+    at = space.scalar.basic_dof_nodes().T
+    order = {tuple(p): k for k, p in enumerate(case.points.round(9))}
+    node = np.array([order.get(tuple(p), -1) for p in at.round(9)])
+    row, column = middle.nonzero()
+    keep = np.abs(np.asarray(middle[row, column]).ravel()) > 1e-12
+    row, column = row[keep], column[keep]
+    found = np.full(body.count, -1)
+    found[body.group[answer.side[row], node[column]]] = column
+    return found
+
+
+def solve(case):
+    """Solve linear statics and write the answer."""
+    d, body = case.dimension, CutBody(case, wholly=True)
+    held, value = prescribed(case, body)
+    side = np.where(body.side == 0, 2, (body.side + 1) // 2)
+    answer = SplitMesh(case.points, case.cells, body.phi, body.cut, side, body.group)
+    loose = loose_parts(answer.points, answer.cells, answer.held(held))
+    if len(loose):
+        raise RuntimeError(f"nothing holds the part around {loose[0]}")
+    outer = forces(case, body)
+    weight = np.zeros(d)
+    for load in case.problem["loads"]:
+        if load["kind"] == "body_force":
+            if "uniform" not in load:
+                raise RefusedError("body forces in formulas are not offered")
+            weight += load["uniform"]
+
+    space = Space(case, body)
+    count = space.scalar.nbdof()
+    if space.vector.nbdof() != d * count:
+        raise RuntimeError("the displacement has another space than its components")
+    values, middle = evaluation(space, answer)
+    unknown = unknown_of_groups(case, body, answer, space, middle)
+
+    lame, shear = float(case.constant("lame")[0]), float(case.constant("shear")[0])
+    data = gf.MeshFem(space.mesh, 1)
+    data.set_classical_fem(0)
+    ones = np.ones(data.nbdof())
+
+    def assembled():
+        found = gf.asm_linear_elasticity(space.rule, space.vector, data, lame * ones, shear * ones)
+        load = gf.asm_volumic_source(space.rule, space.vector, data, np.outer(weight, ones))
+        return matrix_of(found), np.asarray(load).ravel()
+
+    stiffness, load = case.timed("assembly", assembled)
+    load = load.reshape(count, d).copy()
+    np.add.at(load, unknown, outer * (unknown >= 0)[:, None])
+    load = load.ravel()
+    u, free = np.zeros((count, d)), np.ones((count, d), dtype=bool)
+    there = unknown >= 0
+    free[unknown[there]] = ~held[there]
+    u[unknown[there]] = np.where(held[there], value[there], 0.0)
+    free, u = free.ravel(), u.ravel()
+
+    def solved():
+        rest = load - stiffness @ u
+        found = u.copy()
+        found[free] += splu(stiffness[free][:, free].tocsc()).solve(rest[free])
+        return found
+
+    u = case.timed("solve", solved)
+    case.answer(
+        answer.points, answer.cells, values @ u.reshape(count, d), unknowns=count * d,
+        cut_facets=answer.facets(body.on_a_cut),
+        notes={"method": "XFEM, values of both sides", "getfem": gf.getfem_env("version")},
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    run(solve)
