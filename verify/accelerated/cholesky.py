@@ -11,8 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from verify.accelerated.cholesky_kernels import factorise_fronts, solve_fronts
-from verify.accelerated.dense_tiles import COLUMNS, ROWS
+from verify.accelerated.cholesky_kernels import BAND, factorise_fronts, solve_fronts
 from verify.accelerated.front_plan_kernels import assembly_lists, front_rows
 from verify.accelerated.front_tree import levels, merge_and_order
 from verify.accelerated.minimum_degree import minimum_degree
@@ -54,10 +53,9 @@ class Cholesky(LinearSolver):
     ) -> None:
         self._block = block
         self._take(pattern, held)
-        self._factor = self._diagonal = self._gathered = np.empty(0)
+        self._factor = self._diagonal = self._gathered = self._products = np.empty(0)
         self._stacks = (np.empty(0), np.empty(0))
-        self._runs = np.empty((3, 0), dtype=np.int64)
-        self._tile = np.empty(COLUMNS * (COLUMNS + 1) // 2)
+        self._place = np.empty(0, dtype=np.uint64)
         finished(self._finding_order(pattern))
 
     def _take(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> None:
@@ -148,17 +146,20 @@ class Cholesky(LinearSolver):
         below = np.diff(row_start) * self._block
         self._work = float(width @ (width + below) ** 2)
         self._entries = int((width * (width + below) - width * (width - 1) // 2).sum())
-        below = _full(below, ROWS)
-        height = _full(width, ROWS) + below
-        self._offset = np.concatenate([[0], np.cumsum(_full(width, COLUMNS) * height)])
+        height = width + below
+        self._offset = np.concatenate([[0], np.cumsum(width * height)])
         self._level, depths = levels(parent, below**2)
         self._factor = _room(self._factor, int(self._offset[-1]))
         even, odd = self._stacks
         self._stacks = (_room(even, depths[0]), _room(odd, depths[1]))
         most = int(height.max(initial=0))
         self._diagonal, self._gathered = _room(self._diagonal, most), _room(self._gathered, most)
-        if self._runs.shape[1] < most:
-            self._runs = np.empty((3, most), dtype=np.int64)
+        if len(self._place) < most:
+            self._place = np.empty(most, dtype=np.uint64)
+        products = np.maximum(
+            (2 * width + below) * below, BAND * (width + height) + (width - BAND) * (height - BAND)
+        )
+        self._products = _room(self._products, int(products.max(initial=0)))
         self._permuted = np.empty((len(order), self._block))
 
     @property
@@ -188,9 +189,9 @@ class Cholesky(LinearSolver):
             self._offset,
             self._factor,
             self._stacks,
-            self._runs,
+            self._place,
             self._diagonal,
-            self._tile,
+            self._products,
         )
         if failed >= 0:
             raise SingularStiffnessError(int(self._order[failed // self._block]))
@@ -211,7 +212,6 @@ class Cholesky(LinearSolver):
             self._factor,
             self._block,
             self._gathered,
-            self._tile,
             self._permuted.reshape(-1),
         )
         solution[self._order] = self._permuted
@@ -219,20 +219,8 @@ class Cholesky(LinearSolver):
 
 
 def _room(store: _Floats, size: int) -> _Floats:
-    """Array of at least that size: the given one, or a larger one with room to grow.
-
-    It begins with a line of the cache, so that no vector in it spans two.
-    """
-    if len(store) >= size:
-        return store
-    size += size // 4
-    room = np.empty(size + ROWS)
-    skipped = -room.ctypes.data % (8 * ROWS) // 8
-    return room[skipped : skipped + size]
-
-
-def _full(lengths: _Ints, multiple: int) -> _Ints:
-    return -(-lengths // multiple) * multiple
+    """Array of at least that size: the given one, or a larger one with room to grow."""
+    return store if len(store) >= size else np.empty(size + size // 4)
 
 
 @njit(cache=True)

@@ -1,178 +1,117 @@
 """Compiled loops of the multifrontal Cholesky factorisation.
 
 A front has the columns of its supernode and, below them, the rows that these columns reach. Its
-factor columns are stored one after the other (column j of front s starts at
-``offset[s] + j·height``), in fours; the rows of the columns and those below them each fill
-vectors (`dense_tiles`), zeros after them. The update matrix of a front, as padded, waits on a stack
-until the parent front adds it.
+factor columns are stored one after the other: a panel (width, height) of which row j is column j
+of the factor, from its diagonal on. What is before the diagonal is never read. The update matrix of
+a front waits on a stack until the parent front adds it. Products of many columns are those of BLAS.
 """
 
 import numpy as np
 from numba import njit
 
-from verify.accelerated.dense_tiles import (
-    COLUMNS,
-    ROWS,
-    add_run,
-    padded,
-    project_columns,
-    substitute,
-    subtract_columns,
-    subtract_product,
-)
-from verify.xfem.lanes.shuffles import address
-
-__all__ = ["factorise_fronts", "solve_fronts"]
+__all__ = ["BAND", "factorise_fronts", "solve_fronts"]
 
 # a pivot below this share of the diagonal entry that it came from is round-off
 _TINY = 1e-14
-_BAND = 96  # columns that a product takes at a time: more do not stay in the first cache
-_STRIP = 16  # rows: what they hold above the diagonal is for nothing
+BAND = 32  #: columns that are eliminated one by one before the others take their product
+_FUSED = {"contract"}  # multiply and add in one, rounded once
+_SUMS = {"contract", "reassoc", "nsz"}  # and sums in any order
 
 
 @njit(cache=True)
-def _write_block(blocks, at, block, panel, into, height):
-    """Write the block whose first number is at `at`, transposed."""
-    if block == 3:  # written out: a third of the time
-        for _ in range(3):
-            panel[into], panel[into + 1] = blocks[at], blocks[at + 1]
-            panel[into + 2] = blocks[at + 2]
-            at, into = at + 3, into + height
-        return
-    for a in range(block):
-        for b in range(block):
-            panel[into + a * height + b] = blocks[at + a * block + b]
-
-
-@njit(cache=True)
-def _factorise_group(panel, at, step, width, diagonal, factor):
-    """Factorise the square of `COLUMNS` columns whose first number is at `at`.
-
-    Only the first `width` are there. Writes the factor row by row, with the inverses of its
-    diagonal; returns the failing column or -1.
-    """
-    for i in range(COLUMNS):
-        for j in range(i + 1):
-            entry = i * (i + 1) // 2 + j
-            if i >= width:
-                factor[entry] = 1.0 if i == j else 0.0
-                continue
-            value = panel[at + j * step + i]
-            for k in range(j):
-                value -= factor[i * (i + 1) // 2 + k] * factor[j * (j + 1) // 2 + k]
-            if i > j:
-                factor[entry] = value * factor[j * (j + 1) // 2 + j]
-            elif value > _TINY * diagonal[i]:
-                factor[entry] = 1.0 / np.sqrt(value)
-            else:
-                return i
-    return -1
-
-
-@njit(cache=True)
-def _eliminate(panel, at, width, height, diagonal, factor):
-    """Factorise the columns of a panel in place, `height` numbers each; the failing one or -1."""
-    numbers, coefficients = address(panel), address(factor)
-    begin = 0
-    while begin < width:
-        end = min(width, begin + _BAND)
-        for j in range(begin, end, COLUMNS):
-            row = j // ROWS * ROWS  # what is above the diagonal is never read
-            top = at + j * height
-            if j > begin:
-                subtract_product(
-                    numbers, top + row, height, numbers, at + begin * height + row,
-                    at + begin * height + j, height, height - row, COLUMNS, j - begin,
-                )  # fmt: skip
-            failed = _factorise_group(panel, top + j, height, width - j, diagonal[j:], factor)
-            if failed >= 0:
-                return j + failed
-            substitute(numbers, top + row, height, height - row, coefficients)
-            for k in range(COLUMNS):
-                column = top + k * height
-                for i in range(column + row, column + j + k):
-                    panel[i] = 0.0
-                panel[column + j + k] = factor[k * (k + 1) // 2 + k] if j + k < width else 0.0
-        for j in range(end, width, COLUMNS):
-            row = j // ROWS * ROWS
-            subtract_product(
-                numbers, at + j * height + row, height, numbers, at + begin * height + row,
-                at + begin * height + j, height, height - row, COLUMNS, end - begin,
-            )  # fmt: skip
-        begin = end
-    return -1
-
-
-@njit(cache=True)
-def _complement(panel, at, width, height, update, into, below):
-    """Subtract L Lᵀ of the last `below` rows from an update matrix (lower part)."""
-    numbers, others = address(panel), address(update)
-    first = height - below
-    for begin in range(0, width, _BAND):
-        left, depth = at + begin * height + first, min(_BAND, width - begin)
-        for row in range(0, below, _STRIP):
-            rows = min(_STRIP, below - row)
-            subtract_product(
-                others, into + row, below, numbers, left + row, left, height, rows, row + rows,
-                depth,
-            )  # fmt: skip
-
-
-@njit(cache=True)
-def _extend_add(waiting, at, count, runs, first, length, row, panel, panel_at, width, height,
-                update, update_at, below):  # fmt: skip
-    """Add the update matrix of a child, in runs of rows that follow each other in this front too.
-
-    Row first[r] + i of the child is row row[r] + i of this front, i < length[r].
-    """
-    top = height - below
-    source, own, other = address(waiting), address(panel), address(update)
-    for r in range(runs):
-        for k in range(length[r]):
-            column = row[r] + k
-            j = first[r] + k
-            begin = at + j * count
-            if column < width:
-                into = panel_at + column * height
-                add_run(own, into + column, source, begin + j, length[r] - k)
-                for q in range(r + 1, runs):
-                    add_run(own, into + row[q], source, begin + first[q], length[q])
-            else:
-                into = update_at + (column - top) * below - top
-                add_run(other, into + column, source, begin + j, length[r] - k)
-                for q in range(r + 1, runs):
-                    add_run(other, into + row[q], source, begin + first[q], length[q])
-
-
-@njit(cache=True)
-def _find_runs(relative, columns, top, block, first, length, row):
-    """Write the runs of a child's rows, given its places among columns and rows; their number."""
-    runs, k = 0, 0
-    while k < len(relative):
-        begin = k
-        k += 1
-        while k < len(relative) and relative[k] == relative[k - 1] + 1 and relative[k] != columns:
-            k += 1
-        first[runs], length[runs] = begin * block, (k - begin) * block
-        place = relative[begin]
-        row[runs] = place * block if place < columns else top + (place - columns) * block
-        runs += 1
-    return runs
-
-
-@njit(cache=True)
-def _write_entries(blocks, block, begin, end, entry_start, entry_block, entry_row, panel, at,
-                   height):  # fmt: skip
+def _write_entries(blocks, begin, end, entry_start, entry_block, entry_row, panel):
     """Write the blocks of the columns of a front, nodes `begin` to `end` in the order."""
-    columns = end - begin
-    shift = padded(columns * block) - columns * block  # of rows below the columns
-    for k in range(columns):
-        column = at + k * block * height
+    size = blocks.shape[1]
+    for k in range(end - begin):
         for entry in range(entry_start[begin + k], entry_start[begin + k + 1]):
-            into = column + entry_row[entry] * block
-            if entry_row[entry] >= columns:
-                into += shift
-            _write_block(blocks, entry_block[entry] * block * block, block, panel, into, height)
+            block, row = blocks[entry_block[entry]], entry_row[entry] * size
+            for a in range(size):
+                for b in range(size):
+                    panel[k * size + a, row + b] = block[a, b]
+
+
+@njit(cache=True)
+def _extend_add(child, relative, size, place, panel, update):
+    """Add the update matrix of a child, whose nodes are at `relative` in this front."""
+    width, count = len(panel), len(child)
+    for k in range(len(relative)):
+        for a in range(size):
+            place[k * size + a] = relative[k] * size + a
+    split = 0  # rows of the child that are columns here
+    while split < count and place[split] < width:
+        split += 1
+    for j in range(split):
+        own, more = panel[place[j]], child[j]
+        for i in range(j, count):
+            own[place[i]] += more[i]
+    for j in range(split, count):
+        place[j] -= np.uint64(width)
+    for j in range(split, count):
+        own, more = update[place[j]], child[j]
+        for i in range(j, count):
+            own[place[i]] += more[i]
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _eliminate_band(panel, begin, end, diagonal):
+    """Factorise columns `begin` to `end` of a panel in place; the failing one or -1."""
+    for j in range(begin, end):
+        own = panel[j, j:]
+        k = begin
+        while k + 4 <= j:
+            a, b, c, d = panel[k, j:], panel[k + 1, j:], panel[k + 2, j:], panel[k + 3, j:]
+            s, t, u, v = a[0], b[0], c[0], d[0]
+            for i in range(len(own)):
+                own[i] -= s * a[i] + t * b[i] + u * c[i] + v * d[i]
+            k += 4
+        for rest in range(k, j):
+            a = panel[rest, j:]
+            s = a[0]
+            for i in range(len(own)):
+                own[i] -= s * a[i]
+        if not own[0] > _TINY * diagonal[j]:
+            return j
+        inverse = 1.0 / np.sqrt(own[0])
+        for i in range(len(own)):
+            own[i] *= inverse
+    return -1
+
+
+@njit(cache=True)
+def _subtract_product(panel, begin, end, first, into, room):
+    """Take from `into` the product of columns `begin` to `end` of a panel, rows from `first` on."""
+    depth, rows, columns = end - begin, panel.shape[1] - first, len(into)
+    numbers = room[: depth * rows].reshape(depth, rows)
+    for k in range(depth):
+        for i in range(rows):
+            numbers[k, i] = panel[begin + k, first + i]
+    left = numbers
+    if columns < rows:
+        left = room[depth * rows : depth * (rows + columns)].reshape(depth, columns)
+        for k in range(depth):
+            for i in range(columns):
+                left[k, i] = numbers[k, i]
+    used = depth * (rows + columns)
+    product = room[used : used + columns * rows].reshape(columns, rows)
+    np.dot(left.T, numbers, product)
+    for j in range(columns):
+        own, taken = into[j], product[j]
+        for i in range(j, rows):
+            own[i] -= taken[i]
+
+
+@njit(cache=True)
+def _eliminate(panel, diagonal, room):
+    """Factorise the columns of a panel in place; the failing one or -1."""
+    width = len(panel)
+    for begin in range(0, width, BAND):
+        end = min(begin + BAND, width)
+        failed = _eliminate_band(panel, begin, end, diagonal)
+        if failed >= 0:
+            return failed
+        if end < width:
+            _subtract_product(panel, begin, end, end, panel[end:, end:], room)
+    return -1
 
 
 @njit(cache=True)
@@ -191,109 +130,96 @@ def factorise_fronts(
     stacks,
     place,
     diagonal,
-    square,
+    room,
 ):
     """Factorise; return the scalar column (in the order) whose pivot failed, or -1.
 
     The update matrices of fronts wait on one of two stacks, by the parity of their level: fronts
     are in postorder, so those of the children are the last ones on the other.
     """
-    block = blocks.shape[1]
-    fronts = len(bounds) - 1
-    waiting_front = np.empty(fronts, dtype=np.int64)
-    waiting = 0
+    size = blocks.shape[1]
+    waiting_front, waiting = np.empty(len(parent), dtype=np.int64), 0
     tops = np.zeros(2, dtype=np.int64)
-    first, length, row = place[0], place[1], place[2]
-    numbers = blocks.reshape(-1)
-    for s in range(fronts):
+    for s in range(len(parent)):
         columns = bounds[s + 1] - bounds[s]
-        width = columns * block
-        below = padded((row_start[s + 1] - row_start[s]) * block)
-        height, at = padded(width) + below, offset[s]
-        for entry in range(at, offset[s + 1]):
-            factor[entry] = 0.0
+        width, below = columns * size, (row_start[s + 1] - row_start[s]) * size
+        panel = factor[offset[s] : offset[s + 1]].reshape(width, width + below)
         mine = level[s] & 1
-        update, other, into = stacks[mine], stacks[1 - mine], tops[mine]
-        for j in range(below):
-            for i in range(into + j * below + j // ROWS * ROWS, into + (j + 1) * below):
-                update[i] = 0.0
+        end = tops[mine] + below * below
+        update = stacks[mine][tops[mine] : end].reshape(below, below)
+        panel[:] = 0.0
+        update[:] = 0.0
         _write_entries(
-            numbers, block, bounds[s], bounds[s + 1], entry_start, entry_block, entry_row, factor,
-            at, height,
+            blocks, bounds[s], bounds[s + 1], entry_start, entry_block, entry_row, panel
         )  # fmt: skip
         for j in range(width):
-            diagonal[j] = factor[at + j * height + j]
+            diagonal[j] = panel[j, j]
         while waiting > 0 and parent[waiting_front[waiting - 1]] == s:
             waiting -= 1
             child = waiting_front[waiting]
-            mine_too = relative[row_start[child] : row_start[child + 1]]
-            count = padded(len(mine_too) * block)
-            tops[1 - mine] -= count * count
-            runs = _find_runs(mine_too, columns, padded(width), block, first, length, row)
-            _extend_add(
-                other, tops[1 - mine], count, runs, first, length, row, factor, at, width, height,
-                update, into, below,
-            )  # fmt: skip
-        failed = _eliminate(factor, at, width, height, diagonal, square)
+            places = relative[row_start[child] : row_start[child + 1]]
+            count, other = len(places) * size, 1 - mine
+            tops[other] -= count * count
+            its = stacks[other][tops[other] : tops[other] + count * count].reshape(count, count)
+            _extend_add(its, places, size, place, panel, update)
+        failed = _eliminate(panel, diagonal, room)
         if failed >= 0:
-            return bounds[s] * block + failed
+            return bounds[s] * size + failed
         if below > 0:
-            _complement(factor, at, width, height, update, into, below)
-            tops[mine] += below * below
+            _subtract_product(panel, 0, width, width, update, room)
+            tops[mine] = end
             waiting_front[waiting] = s
             waiting += 1
     return -1
 
 
-@njit(cache=True, fastmath={"contract"})
-def solve_fronts(bounds, row_start, rows, offset, factor, block, gathered, four, x):
-    """Solve L Lᵀ x = b in place; x (N·block,) is in the order of elimination.
+@njit(cache=True, fastmath=_SUMS)
+def _solve_front(panel, x, own, rows, size, gathered):
+    """Find a front's values, forwards and in place, and what they leave of its rows."""
+    width, height = panel.shape
+    for i in range(width):
+        gathered[i] = x[own + i]
+    for i in range(width, height):
+        gathered[i] = 0.0
+    for j in range(width):
+        column, left = panel[j, j:], gathered[j:height]
+        value = left[0] / column[0]
+        x[own + j] = value
+        for i in range(len(column)):
+            left[i] -= value * column[i]
+    for k in range(len(rows)):
+        for a in range(size):
+            x[rows[k] * size + a] += gathered[width + k * size + a]
 
-    Diagonals of the factor are inverted. `gathered` has room for the rows of any front, `four`
-    for `COLUMNS` numbers.
+
+@njit(cache=True, fastmath=_SUMS)
+def _solve_front_back(panel, x, own, rows, size, gathered):
+    """Find a front's values, backwards and in place, from those of its rows."""
+    width, height = panel.shape
+    for k in range(len(rows)):
+        for a in range(size):
+            gathered[width + k * size + a] = x[rows[k] * size + a]
+    for j in range(width - 1, -1, -1):
+        column, known = panel[j, j + 1 :], gathered[j + 1 : height]
+        total = 0.0
+        for i in range(len(column)):
+            total += column[i] * known[i]
+        gathered[j] = x[own + j] = (x[own + j] - total) / panel[j, j]
+
+
+@njit(cache=True)
+def solve_fronts(bounds, row_start, rows, offset, factor, size, gathered, x):
+    """Solve L Lᵀ x = b in place; x (N·size,) is in the order of elimination.
+
+    `gathered` has room for the columns and rows of any front.
     """
     fronts = len(bounds) - 1
-    panels, local, few = address(factor), address(gathered), address(four)
-    for s in range(fronts):
-        own, width = bounds[s] * block, (bounds[s + 1] - bounds[s]) * block
-        top, below = padded(width), padded((row_start[s + 1] - row_start[s]) * block)
-        height = top + below
-        for i in range(width):
-            gathered[i] = x[own + i]
-        for i in range(width, height):
-            gathered[i] = 0.0
-        for j in range(0, width, COLUMNS):
-            column = offset[s] + j * height
-            for k in range(COLUMNS):
-                value = gathered[j + k]
-                for l in range(k):
-                    value -= factor[column + l * height + j + k] * four[l]
-                four[k] = value * factor[column + k * height + j + k]
-            for k in range(min(COLUMNS, width - j)):
-                x[own + j + k] = four[k]
-            row = j // ROWS * ROWS
-            subtract_columns(local, row, panels, column + row, height, height - row, few)
-        for k in range(row_start[s + 1] - row_start[s]):
-            into, source = rows[row_start[s] + k] * block, top + k * block
-            for a in range(block):
-                x[into + a] += gathered[source + a]
-    for s in range(fronts - 1, -1, -1):
-        own, width = bounds[s] * block, (bounds[s + 1] - bounds[s]) * block
-        top, below = padded(width), padded((row_start[s + 1] - row_start[s]) * block)
-        height = top + below
-        for i in range(height):
-            gathered[i] = 0.0
-        for k in range(row_start[s + 1] - row_start[s]):
-            source, into = rows[row_start[s] + k] * block, top + k * block
-            for a in range(block):
-                gathered[into + a] = x[source + a]
-        for j in range((width - 1) // COLUMNS * COLUMNS, -1, -COLUMNS):
-            column, row = offset[s] + j * height, j // ROWS * ROWS
-            project_columns(local, row, panels, column + row, height, height - row, few)
-            for k in range(min(COLUMNS, width - j) - 1, -1, -1):
-                value = x[own + j + k] - four[k]
-                for l in range(k + 1, min(COLUMNS, width - j)):
-                    value -= factor[column + k * height + j + l] * x[own + j + l]
-                x[own + j + k] = value * factor[column + k * height + j + k]
-            for k in range(min(COLUMNS, width - j)):
-                gathered[j + k] = x[own + j + k]
+    for step in range(2 * fronts):
+        s = step if step < fronts else 2 * fronts - 1 - step
+        width = (bounds[s + 1] - bounds[s]) * size
+        below = rows[row_start[s] : row_start[s + 1]]
+        panel = factor[offset[s] : offset[s + 1]].reshape(width, width + len(below) * size)
+        if step < fronts:
+            _solve_front(panel, x, bounds[s] * size, below, size, gathered)
+        else:
+            _solve_front_back(panel, x, bounds[s] * size, below, size, gathered)

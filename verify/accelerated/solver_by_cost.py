@@ -20,7 +20,7 @@ _Floats = NDArray[np.float64]
 
 # measured, docs/theory/linear-solvers.md: in ns, per operation and entry of the factor of a
 # factorisation with its solution, and per node and iteration of conjugate gradients
-_OPERATION, _ENTRY, _ITERATION = 0.020, 6.0, 50.0
+_OPERATION, _ENTRY, _ITERATION = 0.035, 6.0, 50.0
 _SMALL = 500  # nodes, up to which a factorisation takes less than a millisecond
 _LARGE = 2000  # nodes of a solid, from which it is not even analysed ...
 _MANY = 100  # ... before so many iterations were not enough

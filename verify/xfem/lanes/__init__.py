@@ -1,1 +1,0 @@
-"""Vectors as wide as those of the machine, in kernels: eight numbers, nodes of four, records."""
