@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["face_contacts", "sibling_contacts"]
@@ -65,16 +66,12 @@ def sibling_contacts(virtual: VirtualMesh, cells: _Ints) -> tuple[_Ints, _Ints, 
     wanted = np.zeros(len(virtual.mesh.cells), dtype=bool)
     wanted[cells] = True
     rows = np.flatnonzero(wanted[virtual.parent[sub.piece]])
-    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
-    facets = np.sort(sub.points[rows][:, keep].reshape(-1, corners - 1), axis=1)
+    facets = np.sort(facets_of(sub.points[rows]), axis=1)
     piece = np.repeat(sub.piece[rows], corners)
-    parent = virtual.parent[piece]
-    order = np.lexsort([*facets.T[::-1], parent])
-    facets, piece, parent = facets[order], piece[order], parent[order]
-    met = (facets[1:] == facets[:-1]).all(axis=1) & (parent[1:] == parent[:-1])
-    met &= piece[1:] != piece[:-1]
-    first, second = piece[:-1][met], piece[1:][met]
-    at = sub.zero_points.positions[facets[:-1][met]]
+    one, other = equal_rows(np.column_stack([virtual.parent[piece], facets]))
+    apart = piece[one] != piece[other]
+    first, second = piece[one][apart], piece[other][apart]
+    at = sub.zero_points.positions[facets[one][apart]]
     edges = at[:, 1:] - at[:, :1]
     area = np.sqrt(np.maximum(np.linalg.det(edges @ edges.transpose(0, 2, 1)), 0.0))
     return np.concatenate([first, second]), np.concatenate([second, first]), np.tile(area, 2)

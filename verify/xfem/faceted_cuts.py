@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import index_array, places, real_array
-from verify.xfem.mesh import neighbours_across
+from verify.xfem.mesh import facets_of, neighbours_across
 from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_distance
 
 __all__ = [
@@ -81,8 +81,7 @@ def facet_arrays(points: _Floats, facets: _Ints, travel: _Floats | None = None) 
     total = np.zeros_like(points)
     np.add.at(total, facets, angles[:, :, None] * normals[:, None])
     facet, k = np.nonzero(rim)
-    others = np.array([[j for j in range(count) if j != k] for k in range(count)])
-    rim_facets = facets[facet[:, None], others[k]]
+    rim_facets = facets[facet[:, None], facets_of(np.arange(count)[None])[k]]
     on_rim = np.zeros(len(points), dtype=bool)
     on_rim[rim_facets] = True
     return FacetArrays(

@@ -16,7 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.clip import staircase, staircase_entries
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, facets_of
 from verify.xfem.partition import Partition
 from verify.xfem.zero_points import ZeroPoints
 
@@ -75,7 +75,7 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: _Bools) -> PatchN
     there = place[across[here, opposite]]
     here, opposite, there = here[there >= 0], opposite[there >= 0], there[there >= 0]
     corners = mesh.dim + 1
-    on_face = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
+    on_face = facets_of(np.arange(corners)[None])
     nodes = mesh.cells[patch[here, None], on_face[opposite]]
 
     dividing = np.zeros((len(patch), label.shape[1]), dtype=bool)

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.crossing import AT_END, REACH, level_and_depth
 from verify.xfem.flat_cuts import Cut
+from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.partition import Partition
 from verify.xfem.zero_points import ZeroPoints
 
@@ -133,15 +134,11 @@ def _inner_facets(partition: Partition, cells: _Bools) -> _Facets:
     """Facets between sub-simplices with a volume, in different pieces of one of some cells (m,)."""
     sub, corners = partition.simplices, partition.simplices.points.shape[1]
     sub = sub[cells[partition.parent[sub.piece]] & (sub.fraction > 0.0)]
-    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
-    points = np.sort(sub.points[:, keep].reshape(-1, corners - 1), axis=1)
+    points = np.sort(facets_of(sub.points), axis=1)
     piece = np.repeat(sub.piece, corners)
-    cell = partition.parent[piece]
-    order = np.lexsort([*points.T[::-1], cell])
-    points, piece, cell = points[order], piece[order], cell[order]
-    met = (points[1:] == points[:-1]).all(axis=1) & (cell[1:] == cell[:-1])
-    met &= piece[1:] != piece[:-1]
-    return _Facets(points[1:][met], piece[:-1][met], piece[1:][met])
+    first, second = equal_rows(np.column_stack([partition.parent[piece], points]))
+    met = piece[first] != piece[second]
+    return _Facets(points[first][met], piece[first][met], piece[second][met])
 
 
 def _borne(partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: _Floats) -> _Bools:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
@@ -218,31 +217,6 @@ def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> _Floats:
     return np.broadcast_to(values, count)
 
 
-class _SideWiseMass(Mass):
-    """A diagonal mass, of which the matrices are made only if somebody asks for them."""
-
-    def __init__(self, weights: _Floats) -> None:
-        # a body is cut often, and to make a sparse matrix takes longer than all else here
-        self.__dict__["weights"] = weights
-
-    @cached_property
-    def matrix(self) -> csr_array:
-        return _diagonal_matrix(self.weights)
-
-    @cached_property
-    def root(self) -> csr_array:
-        return _diagonal_matrix(1.0 / np.sqrt(self.weights))
-
-    @cached_property
-    def diagonal(self) -> _Floats:
-        return self.weights
-
-    @cached_property
-    def entries(self) -> tuple[_Ints, _Ints, _Floats]:
-        rows = np.arange(len(self.weights))
-        return rows, rows, self.weights
-
-
 def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     """Side-wise lumped mass: diag(ρ V_piece/n) in side-wise unknowns.
 
@@ -254,18 +228,11 @@ def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
     """
     if virtual.aggregation is not None:
         return AggregatedMass.of(side_wise_mass(virtual.corners, density), virtual.aggregation)
-    densities = np.ascontiguousarray(cell_densities(virtual.mesh, density))
-    weights = np.zeros(virtual.node_count)
-    _add_shares(virtual.cells, virtual.parent, virtual.volumes, densities, weights)
-    return _SideWiseMass(weights)
-
-
-@njit(cache=True)
-def _add_shares(cells, parent, volumes, densities, weights):
-    for piece in range(len(cells)):
-        share = volumes[piece] * densities[parent[piece]] / cells.shape[1]
-        for corner in range(cells.shape[1]):
-            weights[cells[piece, corner]] += share
+    corners = virtual.cells.shape[1]
+    share = virtual.volumes * cell_densities(virtual.mesh, density)[virtual.parent] / corners
+    weights = np.bincount(virtual.cells.ravel(), np.repeat(share, corners))
+    root = _diagonal_matrix(1.0 / np.sqrt(weights))
+    return Mass(matrix=_diagonal_matrix(weights), root=root, weights=weights)
 
 
 def _diagonal_matrix(values: _Floats) -> csr_array:

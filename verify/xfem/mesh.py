@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import real_array
 
-__all__ = ["SimplexMesh", "neighbours_across"]
+__all__ = ["SimplexMesh", "equal_rows", "facets_of", "neighbours_across"]
 
 # A cell whose volume is below this fraction of (longest edge)^dim is called degenerate: its
 # gradients would lose all digits.
@@ -171,18 +171,28 @@ def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
         raise XfemError(f"point {int(np.argmin(used))} belongs to no cell")
 
 
+def facets_of(cells: NDArray) -> NDArray:
+    """(m·(d + 1), d) corners of all facets, of each cell (m, d + 1) that opposite to its first."""
+    corners = cells.shape[1]
+    others = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
+    return cells[:, others].reshape(-1, corners - 1)
+
+
+def equal_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs (q,), (q,) of equal rows, of those in ascending order the one and the next."""
+    order = np.lexsort(rows.T[::-1])
+    same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
+    return order[:-1][same], order[1:][same]
+
+
 def neighbours_across(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m, d + 1) cell across the facet opposite to each node, -1 on the boundary."""
     corners = cells.shape[1]
-    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
-    facets = np.sort(cells[:, keep].reshape(-1, corners - 1), axis=1)
-    order = np.lexsort(facets.T[::-1])
-    in_order = facets[order]
-    same = (in_order[1:] == in_order[:-1]).all(axis=1)
-    if (same[1:] & same[:-1]).any():
-        where = in_order[int(np.argmax(same[1:] & same[:-1]))]
-        raise XfemError(f"facet {where.tolist()} is shared by more than two cells")
-    first, second = order[:-1][same], order[1:][same]
+    facets = np.sort(facets_of(cells), axis=1)
+    first, second = equal_rows(facets)
+    thrice = np.intersect1d(first, second)
+    if len(thrice):
+        raise XfemError(f"facet {facets[thrice[0]].tolist()} is shared by more than two cells")
     across = np.full(len(facets), -1, dtype=np.int64)
     across[first], across[second] = second // corners, first // corners
     neighbours = across.reshape(cells.shape)

@@ -54,18 +54,6 @@ class Partition:
         sub = self.simplices
         return np.bincount(sub.piece, sub.fraction, minlength=len(self.parent))
 
-    @property
-    def sides(self) -> NDArray[np.int8]:
-        """(p, cuts) side of each cut on which a piece lies, 0 if it lies on both."""
-        side, piece = self.label.copy(), self.simplices.piece
-        plus = self.points.values[self.simplices.points] >= 0.0
-        for cut in range(side.shape[1]):
-            above = np.bincount(piece, plus[:, :, cut].any(axis=1), len(side)) > 0
-            below = np.bincount(piece, ~plus[:, :, cut].all(axis=1), len(side)) > 0
-            whole = self.label[:, cut] == 0
-            side[whole, cut] = above[whole].astype(np.int8) - below[whole].astype(np.int8)
-        return side
-
     def crossed_edges(self, cut: int) -> tuple[_Ints, _Ints]:
         """Edges (q, 2) from plus to minus that a cut crosses, and the piece (q,) of each.
 

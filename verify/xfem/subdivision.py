@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from verify.xfem.clip import Simplices, bisected
+from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Subdivision", "subdivide"]
@@ -122,20 +123,16 @@ def _oriented(points: _Floats, cells: _Ints) -> _Ints:
 
 def _cut_facets(points: _Floats, cells: _Ints, ids: _Ints) -> _Floats:
     """Facets where two cells meet in space but do not share their nodes."""
-    corners = ids.shape[1]
-    keep = np.array([[j for j in range(corners) if j != k] for k in range(corners)])
     # a point is doubled when it has several nodes: its first one is not the only one
     some = np.zeros(ids.max() + 1, dtype=np.int64)
     some[ids] = cells
     doubled = np.zeros(len(some), dtype=bool)
     doubled[ids[some[ids] != cells]] = True
     rows = np.flatnonzero(doubled[ids].any(axis=1))
-    facets, nodes = ids[rows][:, keep].reshape(-1, corners - 1), cells[rows][:, keep]
+    facets, nodes = facets_of(ids[rows]), facets_of(cells[rows])
     order = np.argsort(facets, axis=1)
     facets = np.take_along_axis(facets, order, axis=1)
-    nodes = np.take_along_axis(nodes.reshape(-1, corners - 1), order, axis=1)
-    sequence = np.lexsort(facets.T[::-1])
-    facets, nodes = facets[sequence], nodes[sequence]
-    met = (facets[1:] == facets[:-1]).all(axis=1)
-    torn = met & (nodes[1:] != nodes[:-1]).any(axis=1)
-    return points[nodes[1:][torn]]
+    nodes = np.take_along_axis(nodes, order, axis=1)
+    first, second = equal_rows(facets)
+    torn = (nodes[first] != nodes[second]).any(axis=1)
+    return points[nodes[second][torn]]

@@ -261,7 +261,7 @@ class GrowingBody:
         if orphan >= 0:
             # a piece on one side of a cut that does not split it is part of what is on that side
             side = label.copy()
-            side[:, numbers] = partition.sides
+            side[:, numbers] = _sides(partition)
             orphan = match_pieces(cell, label, side, solid, *store, old, changed)
         if orphan >= 0:
             # what had no volume was left out, and rounded otherwise it must not come back
@@ -382,6 +382,18 @@ class GrowingBody:
         self.sub_fraction.append(partition.simplices.fraction[rows])
         self.sub_sign.append(partition.simplices.sign[rows])
         self.sub_range[cells] = begin + bounds
+
+
+def _sides(partition: Partition) -> NDArray[np.int8]:
+    """(p, cuts) side of each cut on which a piece lies, 0 if it lies on both."""
+    side, piece = partition.label.copy(), partition.simplices.piece
+    plus = partition.points.values[partition.simplices.points] >= 0.0
+    for cut in range(side.shape[1]):
+        above = np.bincount(piece, plus[:, :, cut].any(axis=1), len(side)) > 0
+        below = np.bincount(piece, ~plus[:, :, cut].all(axis=1), len(side)) > 0
+        whole = partition.label[:, cut] == 0
+        side[whole, cut] = above[whole].astype(np.int8) - below[whole].astype(np.int8)
+    return side
 
 
 def _among(values: _Ints, ascending: _Ints) -> NDArray[np.bool_]:
