@@ -177,3 +177,8 @@ def test_the_reader_reads_what_meshio_writes(values, compressed, tmp_path):
     np.testing.assert_array_equal(back.cells_dict["triangle"], cells)
     np.testing.assert_array_equal(back.points[:, :2], points[:, :2])
     np.testing.assert_array_equal(back.point_data["displacement"][:, :2], points[:, :2])
+
+
+def test_the_page_on_foreign_solvers_names_each():
+    page = (PROGRAMS.parents[2] / "docs/guide/foreign-solvers.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `(\w+)`", page, re.MULTILINE)) == set(foreign_solvers())
