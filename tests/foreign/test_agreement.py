@@ -1,4 +1,4 @@
-"""Answers of ngsxfem and GetFEM, recorded: `xfem` gives the same where the realised cut is the same.
+"""Recorded answers of ngsxfem and GetFEM: `xfem` gives them where the realised cut is the same.
 
 Without a ghost penalty all three are the method of Hansbo and Hansbo with linear elements. What is
 recorded is the strain energy and the L2 norm of the displacement, so that the errors against any
