@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from verify.solution import Solution
     from verify.study.budget import BudgetStudy, Solved
     from verify.study.cost import CostStudy
+    from verify.study.iterations import IterationsStudy
     from verify.study.thesis import ThesisStudy
 
-__all__ = ["budget", "cost", "thesis"]
+__all__ = ["budget", "cost", "iterations", "thesis"]
 
 Announce = Callable[[str], None]
 
@@ -82,6 +83,20 @@ def thesis(arguments: argparse.Namespace, announce: Announce) -> "ThesisStudy":
     start = perf_counter()
     results = _run(scenes, folder, solvers, 1 if quick else 3)
     return thesis_study(scenes, results, quick, announce, perf_counter() - start)
+
+
+def iterations(arguments: argparse.Namespace, announce: Announce) -> "IterationsStudy":
+    """Solve a motion by every number of iterations and substeps."""
+    from verify.scene import load_scene
+    from verify.study.iterations import Grid, iterations_study
+    from verify.study.variants import variant_of
+
+    truth = arguments.truth or f"{arguments.solver} step=solved"
+    grid = Grid(arguments.iterations, arguments.substeps, tuple(arguments.names), arguments.most)
+    return iterations_study(
+        load_scene(arguments.case), variant_of(arguments.solver), variant_of(truth), grid,
+        arguments.tolerance, announce,
+    )  # fmt: skip
 
 
 def _coarsest(scene: "Scene", levels: int) -> "Scene":

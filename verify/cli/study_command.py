@@ -37,7 +37,7 @@ def _study(arguments: argparse.Namespace) -> int:
         print(text, file=sys.stderr, flush=True)
 
     command = shlex.join(["verify", *sys.argv[1:]])
-    if arguments.study in ("cost", "budget", "thesis"):
+    if arguments.study in ("cost", "budget", "thesis", "iterations"):
         from verify.cli import case_studies
 
         study = getattr(case_studies, arguments.study)(arguments, announce)

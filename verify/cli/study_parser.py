@@ -61,6 +61,7 @@ def add_study_command(add: Add) -> None:
         add_json(kind, "print the findings as JSON")
     _add_cost(kinds.add_parser)
     _add_budget(kinds.add_parser)
+    _add_iterations(kinds.add_parser)
 
 
 def _add_cost(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -107,5 +108,39 @@ def _add_budget(add: Callable[..., argparse.ArgumentParser]) -> None:
     kind.add_argument(
         "--quick", action="store_true", help="the two coarsest mesh levels, fewer models"
     )
+    add_out(kind)
+    add_json(kind, "print the findings as JSON")
+
+
+def _add_iterations(add: Callable[..., argparse.ArgumentParser]) -> None:
+    kind = add_action(
+        add, "iterations", "a solver of motion that stops by a count: its error, energy and cost"
+    )
+    add_case(kind)
+    kind.add_argument(
+        "--solver", metavar="'NAME [PARAMETER=VALUE …]'", default="vbd",
+        help="solver, with parameters of its solves (default: vbd)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--truth", metavar="'NAME [PARAMETER=VALUE …]'",
+        help="who solves the same steps (default: the solver with step=solved)",
+    )  # fmt: skip
+    for name, counts in (("iterations", [10, 40, 160]), ("substeps", [1, 4])):
+        kind.add_argument(
+            f"--{name}", metavar="N", type=count, nargs="+", default=counts,
+            help=f"values of the parameter '{name}' (default: {' '.join(map(str, counts))})",
+        )  # fmt: skip
+    kind.add_argument(
+        "--most", metavar="N", type=count,
+        help="leave out settings with more iterations than this in a step of the case",
+    )  # fmt: skip
+    kind.add_argument(
+        "--names", nargs=2, metavar="PARAMETER", default=["iterations", "substeps"],
+        help="what the solver calls them (default: iterations substeps)",
+    )  # fmt: skip
+    kind.add_argument(
+        "--tolerance", metavar="T", type=positive, default=0.01,
+        help="relative error that is good enough (default: 0.01)",
+    )  # fmt: skip
     add_out(kind)
     add_json(kind, "print the findings as JSON")

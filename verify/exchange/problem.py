@@ -210,7 +210,7 @@ def problem_of(scene: Scene, level: int, conforming: bool = False) -> Problem:
     background, size = background_mesh(scene, level)
     points, cells, facet_cell = background.points, background.cells, background.boundary_facets
     cut_facets = np.zeros((0, scene.cell_dimension, scene.dimension))
-    if conforming:
+    if conforming and scene.cuts:
         points, cells, facet_cell, cut_facets = _opened(scene, level, points, cells)
     corners = np.ones((len(facet_cell), cells.shape[1]), dtype=bool)
     corners[np.arange(len(facet_cell)), facet_cell[:, 1]] = False

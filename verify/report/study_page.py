@@ -17,7 +17,7 @@ from verify.whole_files import write_whole
 
 __all__ = ["render_study", "studies_in"]
 
-_STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration")
+_STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations")
 _SCHEMA = 1
 _FOLDED = 30  # findings beyond which those that came out as expected fold
 

@@ -24,6 +24,7 @@ def study_view(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
         "budget": lambda: {"bars": [_bars(budget) for budget in record["budgets"]]},
         "calibration": lambda: {"scatters": _scatters(record["trials"])},
         "thesis": lambda: _thesis(record),
+        "iterations": lambda: _iterations(record),
     }
     return views[kind]()
 
@@ -43,6 +44,34 @@ def _energy_tables(measurements: Sequence[Mapping[str, Any]]) -> list[Table]:
         head = ["solver", "ε", *map(metric_title, names)]
         tables.append(plain_table(family, head, rows, named=True))
     return tables
+
+
+def _iterations(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row per setting, and both errors over the time."""
+    settings, palette, panels = record["settings"], Palette(), []
+    names = list(dict.fromkeys(name for one in settings for name in one["quantities"]))
+    rows = [
+        ["–" if one["time_step"] is None else f"{one['time_step']:.4g}",
+         "solved" if one["iterations"] is None else str(one["iterations"]),
+         *(number(one[key], 3) for key in ("iteration_error", "whole_error", "energy_drift")),
+         *(number(one["quantities"].get(name), 5) for name in names),
+         number(one["seconds"], 3), one["reason"]]
+        for one in settings
+    ]  # fmt: skip
+    head = ["time step, s", "iterations", "error of the iterations", "error of the whole"]
+    head += [metric_title("energy_drift"), *map(metric_title, names), "seconds", "why not"]
+    for key, title in (
+        ("iteration_error", "error of the iterations"),
+        ("whole_error", "error of the whole"),
+    ):
+        series = []
+        for substeps in dict.fromkeys(one["substeps"] for one in settings):
+            own = [one for one in settings if one["substeps"] == substeps and one["iterations"]]
+            places = [(one["seconds"], one[key]) for one in own if one["seconds"] and one[key]]
+            series.append(Series(f"{substeps} per step", places))
+        panels.append(loglog(title, "seconds", series, palette))
+    tables = [plain_table(f"{record['solver']} on {record['case']}", head, rows, named=True)]
+    return {"tables": tables, "panels": [panel for panel in panels if panel is not None]}
 
 
 def _running(record: Mapping[str, Any]) -> list[Drawing]:

@@ -1,0 +1,106 @@
+"""The program for SOFA, where SOFA is not: a stand-in moves the graph that the program builds.
+
+The stand-in integrates with the compact solver's own scheme, which moves the beams of SOFA's record
+to 1e-12 (`tests/xfem/test_time_sofa.py`). What is tested is the program: mesh, material, mass,
+forces, supports and steps that it hands to SOFA, and the answer that it writes.
+"""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import meshio
+import numpy as np
+import pytest
+
+from verify.exchange import export_case, read_answers
+from verify.foreign.records import PROGRAMS
+from verify.scene import load_scene
+from verify.xfem.dynamics import DynamicBody, RealTimeEuler
+from verify.xfem.elasticity import isotropic
+from verify.xfem.internal_force import InternalForce
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.supports import Supports
+from verify.xfem.virtual import cut_mesh
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Node:
+    """A node of the graph: what was added to it, by the name of the component."""
+
+    def __init__(self, name):
+        self.name, self.objects, self.children = name, {}, []
+        self.dt = SimpleNamespace(value=None)
+
+    def addObject(self, kind, **data):
+        values = {key: SimpleNamespace(value=value) for key, value in data.items()}
+        self.objects[kind] = SimpleNamespace(**values)
+        return self.objects[kind]
+
+    def addChild(self, name):
+        self.children.append(Node(name))
+        return self.children[-1]
+
+
+def init(root):
+    parts = root.children[0].objects
+    topology, force = parts["TetrahedronSetTopologyContainer"], parts["ConstantForceField"]
+    law = parts["FastTetrahedralCorotationalForceField"]
+    assert law.method.value == "polar"
+    assert force.indices.value == list(range(len(topology.position.value)))
+    mesh = cut_mesh(SimplexMesh(np.array(topology.position.value), topology.tetrahedra.value), [])
+    mass = side_wise_mass(mesh, parts["DiagonalMass"].massDensity.value)
+    body = DynamicBody(
+        InternalForce(mesh, isotropic(law.youngModulus.value, law.poissonRatio.value, "solid")),
+        mass,
+        weight=np.array(force.forces.value),
+        supports=Supports.none(mesh).prescribe(
+            mesh, np.array(parts["FixedProjectiveConstraint"].indices.value)
+        ),
+    )
+    root.body, root.moved = body, body.rest()
+
+
+def animate(root, dt):
+    state = root.children[0].objects["MechanicalObject"]
+    RealTimeEuler(root.body, dt).advance(root.moved)
+    state.position.value = np.array(state.rest_position.value) + root.moved.displacement
+    state.velocity.value = root.moved.velocity
+
+
+@pytest.fixture
+def program(monkeypatch):
+    sofa, runtime = ModuleType("Sofa"), ModuleType("SofaRuntime")
+    sofa.__version__, sofa.Core = "stand-in", SimpleNamespace(Node=Node)
+    sofa.Simulation = SimpleNamespace(initRoot=init, animate=animate, unload=lambda root: None)
+    runtime.importPlugin = lambda name: None
+    monkeypatch.setitem(sys.modules, "Sofa", sofa)
+    monkeypatch.setitem(sys.modules, "SofaRuntime", runtime)
+    monkeypatch.syspath_prepend(PROGRAMS)
+    spec = importlib.util.spec_from_file_location("sofa_program", PROGRAMS / "sofa/program.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    for name in ("exchange_files", "motion"):
+        sys.modules.pop(name, None)
+
+
+def test_the_program_moves_the_beam_of_the_record_as_sofa_did(program, tmp_path):
+    with np.load(ROOT / "tests/xfem/sofa/beam200.npz") as beam:
+        nodes, tetrahedra, tip = beam["nodes"], beam["tets"], beam["tip"]
+    meshio.Mesh(nodes, [("tetra", tetrahedra)]).write(tmp_path / "soft_beam.mesh")
+    text = (ROOT / "docs/examples/soft_beam.toml").read_text().replace("1.0e5", "1.0e4")
+    (tmp_path / "beam.toml").write_text(text)
+    scene = load_scene(str(tmp_path / "beam.toml"))
+    export_case(scene, tmp_path / "out", conforming=True)
+    case = program.run.__globals__["Case"](tmp_path / "out", 0, conforming=True)
+    case.parameters = {"method": "polar"}
+    program.solve(case)
+    found = read_answers(scene, tmp_path / "out").solutions[0]
+    assert found.displacement[-1][tip, 1].mean() == pytest.approx(-0.0619945794431326, abs=1e-11)
+    answer = json.loads((tmp_path / "out/level-0/solution.json").read_text())
+    assert answer["iterations"] == {"steps": 100}

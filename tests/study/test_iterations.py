@@ -1,0 +1,79 @@
+"""The study of iterations against error, by a solver whose errors are known."""
+
+import csv
+import sys
+import textwrap
+
+import pytest
+
+from verify.cli import main
+
+# nodes of the field u = t (1 + 2^-iterations + 0.01 / substeps) x; solved: without the middle part
+SOLVER = """
+import numpy as np
+from verify.exchange import problem_of
+from verify.solution import Solution
+
+class Halving:
+    name = "halving"
+    parameters = {"iterations": 1, "substeps": 1, "step": "descent"}
+    def refuses(self, scene): return None
+    def levels(self, scene): return 1
+    def solve(self, scene, level, repetitions=1, iterations=1, substeps=1, step="descent"):
+        if iterations == 7:
+            raise RuntimeError("seven is too many")
+        problem, times = problem_of(scene, level), np.array(scene.analysis.output_times)
+        late = 0.0 if step == "solved" else 0.5**iterations
+        u = 1e-3 * times[:, None, None] * (1.0 + late + 0.01 / substeps) * problem.points
+        v = np.gradient(u, times, axis=0)
+        return Solution(problem.points, problem.cells, u, times, velocity=v, unknowns=u[0].size,
+                        size=problem.size, timings={"motion": [iterations * substeps * 1.0]})
+"""
+
+
+@pytest.fixture
+def found(tmp_path, monkeypatch, capsys):
+    (tmp_path / "halving.py").write_text(textwrap.dedent(SOLVER))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    words = ["study", "iterations", "dynamics/block_falls_apart", "--solver", "halving:Halving"]
+    words += ["--iterations", "2", "4", "7", "8", "--substeps", "1", "2", "--most", "14"]
+    words += ["--tolerance", "0.02", "--out", "studies"]
+    assert main(words) == 0
+    sys.modules.pop("halving")
+    with open("studies/iterations.csv", newline="") as file:
+        return list(csv.DictReader(file)), capsys.readouterr().out
+
+
+def test_both_errors_are_those_of_the_solver(found):
+    rows = {(row["iterations"], row["substeps"]): row for row in found[0]}
+    assert ("8", "2") not in rows  # sixteen in a step
+    for (count, parts), row in rows.items():
+        if count == "7":
+            assert "seven is too many" in row["reason"]
+            continue
+        late = 0.5 ** int(count) if count else 0.0
+        assert float(row["iteration_error"]) == pytest.approx(late / 1.005, abs=1e-12)
+        whole = abs(late + 0.01 / int(parts) - 0.005) / 1.005
+        assert float(row["whole_error"]) == pytest.approx(whole, abs=1e-12)
+        assert float(row["time_step"]) == pytest.approx(0.005 / int(parts))
+
+
+def test_the_findings_say_from_which_setting_on(found):
+    out = found[1]
+    assert "From 8 iterations on" in out  # the one of 7 has no answer
+    assert "No number of iterations up to 7" in out
+    assert "has 8 iterations and substeps 1: 8 s" in out
+
+
+def test_the_page_shows_every_setting(found):
+    with open("studies/iterations.html") as page:
+        text = page.read()
+    assert text.count("seven is too many") >= 2
+    assert "Iterations against error" in text
+
+
+def test_what_does_not_move_is_bad_input(tmp_path, capsys):
+    words = ["study", "iterations", "statics/f1_patch", "--solver", "xfem", "--truth", "xfem"]
+    assert main([*words, "--out", str(tmp_path / "studies")]) == 2
+    assert "does not move" in capsys.readouterr().err

@@ -1,0 +1,241 @@
+"""Iterations against error: solvers of motion that stop by a count, over iterations and substeps.
+
+Two errors are told apart. That of the iterations is the distance from the same steps, solved; that
+of the whole is the distance from the smallest steps, solved. Who solves them is a solver too, by
+default the same one with ``step=solved``; both answer on one mesh, and nodes are compared.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.assess.accuracy import assess_accuracy
+from verify.errors import InputError
+from verify.result import SolveRecord, Status
+from verify.scene import Scene
+from verify.solution import Solution, handed_over
+from verify.study.finding import Finding
+from verify.study.variants import Variant
+
+__all__ = ["Grid", "IterationsStudy", "Setting", "iterations_study"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What is varied.
+
+    Attributes
+    ----------
+    iterations, substeps : sequence of int
+    names : (str, str)
+        Parameters of the solver that they are.
+    most : int, optional
+        Iterations in a step of the case beyond which a setting is left out.
+    """
+
+    iterations: Sequence[int]
+    substeps: Sequence[int]
+    names: tuple[str, str] = ("iterations", "substeps")
+    most: int | None = None
+
+    def counts(self, substeps: int) -> list[int]:
+        """Return the numbers of iterations of a number of substeps."""
+        most = np.inf if self.most is None else self.most
+        return [count for count in sorted(self.iterations) if count * substeps <= most]
+
+    def set(self, variant: Variant, iterations: int | None, substeps: int) -> Variant:
+        """Return the variant with a setting; without iterations those that it has."""
+        given = {**variant.parameters, self.names[1]: substeps}
+        if iterations is not None:
+            given[self.names[0]] = iterations
+        return replace(variant, parameters=given)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting and what came out.
+
+    Attributes
+    ----------
+    iterations : int or None
+        None of the steps that are solved.
+    substeps : int
+    time_step : float or None
+        s, if the case states one.
+    iteration_error, whole_error : float or None
+        Largest distance (RMS over nodes) at an output, over the largest displacement (RMS) of the
+        solved steps: of the same, and of the smallest size. None if there is no answer.
+    energy_drift : float or None
+        Of the energy in play, by the energies of the scene's law.
+    quantities : dict of str to float
+        Those of the scene.
+    seconds : float or None
+        As the solver measures itself, first call apart.
+    reason : str
+        Why there is no answer.
+    """
+
+    iterations: int | None
+    substeps: int
+    time_step: float | None
+    iteration_error: float | None = None
+    whole_error: float | None = None
+    energy_drift: float | None = None
+    quantities: dict[str, float] = field(default_factory=dict)
+    seconds: float | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class IterationsStudy:
+    """What the study found."""
+
+    case: str
+    solver: str
+    truth: str
+    tolerance: float
+    settings: list[Setting]
+    findings: list[Finding]
+    seconds: float
+
+    def as_record(self) -> dict[str, Any]:
+        """Return all of it as plain data."""
+        return asdict(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the lines of its table."""
+        lines = [asdict(one) for one in self.settings]
+        return [{**line.pop("quantities"), **line} for line in lines]
+
+
+def iterations_study(
+    scene: Scene,
+    variant: Variant,
+    truth: Variant,
+    grid: Grid,
+    tolerance: float,
+    announce: Callable[[str], None] = lambda text: None,
+) -> IterationsStudy:
+    """Solve the scene's coarsest level by every setting, one after the other.
+
+    Parameters
+    ----------
+    scene : Scene
+        Dynamic.
+    variant, truth : Variant
+        The solver, and who solves the same steps.
+    grid : Grid
+    tolerance : float
+        Relative error that is good enough.
+    announce : callable
+
+    Raises
+    ------
+    InputError
+        If the scene does not move, or the truth has no answer on the nodes of the solver.
+    """
+    if scene.analysis.kind != "dynamic":
+        raise InputError(f"{scene.name} does not move; a dynamic analysis is needed")
+    clock, solved = perf_counter(), dict[int, Solution]()
+    for count in sorted(grid.substeps):
+        announce(f"{truth.label}: {grid.names[1]} {count}, solved")
+        found = _answer(scene, grid.set(truth, None, count))
+        if isinstance(found, str):
+            raise InputError(f"'{truth.label}' has no answer: {found}", "--truth")
+        solved[count] = found
+    finest = solved[max(solved)]
+    scale = max(_rms(frame) for frame in finest.displacement)
+    settings = []
+    for count in sorted(grid.substeps):
+        step = scene.analysis.time_step
+        for iterations in [*grid.counts(count), None]:
+            answer: Solution | str = solved[count]
+            if iterations is not None:
+                announce(f"{variant.label}: {iterations} {grid.names[0]}, {grid.names[1]} {count}")
+                answer = _answer(scene, grid.set(variant, iterations, count))
+            one = Setting(iterations, count, None if step is None else step / count)
+            if isinstance(answer, str):
+                one = replace(one, reason=answer)
+            else:
+                errors = [_distance(answer, other) / scale for other in (solved[count], finest)]
+                one = replace(one, iteration_error=errors[0], whole_error=errors[1])
+                one = _measured(scene, answer, one)
+            settings.append(one)
+    return IterationsStudy(
+        scene.name, variant.label, truth.label, tolerance, settings,
+        _findings(variant.label, settings, tolerance, grid.names), perf_counter() - clock,
+    )  # fmt: skip
+
+
+def _answer(scene: Scene, variant: Variant) -> Solution | str:
+    try:
+        return handed_over(variant.found().solve(scene, 0, repetitions=1, **variant.parameters))
+    except Exception as problem:  # a guest may raise anything
+        return f"{type(problem).__name__}: {problem}"
+
+
+def _rms(field: Array) -> float:
+    return float(np.sqrt((field**2).sum(axis=1).mean()))
+
+
+def _distance(answer: Solution, other: Solution) -> float:
+    if other.displacement.shape != answer.displacement.shape:
+        raise InputError(f"{len(other.points)} nodes; the solver has others", "--truth")
+    return max(_rms(a - b) for a, b in zip(answer.displacement, other.displacement, strict=True))
+
+
+def _measured(scene: Scene, answer: Solution, one: Setting) -> Setting:
+    record = SolveRecord(scene.name, "solver", 0, Status.SOLVED, size=answer.size)
+    (measured,) = assess_accuracy(scene, [record], {"solver": {0: answer}}, None).solves
+    names = [asked.name for asked in scene.quantities]
+    found = {name: m.value for name in names if (m := measured.metric(name)) is not None}
+    drift = measured.metric("energy_drift")
+    return replace(
+        one,
+        energy_drift=None if drift is None else drift.value,
+        quantities=found,
+        seconds=sum(min(phase) for phase in answer.timings.values() if phase),
+    )
+
+
+def _findings(
+    label: str, settings: Sequence[Setting], tolerance: float, names: tuple[str, str]
+) -> list[Finding]:
+    counted = [one for one in settings if one.iterations is not None]
+    found = []
+    for substeps in dict.fromkeys(one.substeps for one in counted):
+        own = [one for one in counted if one.substeps == substeps]
+        late = [one for one in own if not _inside(one.iteration_error, tolerance)]
+        rest = own[own.index(late[-1]) + 1 :] if late else own
+        step = "" if own[0].time_step is None else f" of {own[0].time_step:.4g} s"
+        text = f"No number of {names[0]} up to {own[-1].iterations} is"
+        if rest:
+            text = f"From {rest[0].iterations} {names[0]} on the answer is"
+        text += f" within {tolerance:.2g} of the same steps{step}, solved"
+        text += f"; {own[0].iterations} are off by {_percent(own[0].iteration_error)}"
+        text += f", {own[-1].iterations} by {_percent(own[-1].iteration_error)}."
+        about = f"{label}, {names[1]} {substeps}"
+        found.append(Finding(about, text, f"{tolerance:.2g}; shown, not judged", None))
+    good = [one for one in counted if one.seconds and _inside(one.whole_error, tolerance)]
+    text = f"No setting is within {tolerance:.2g} of the smallest steps, solved."
+    if good:
+        best = min(good, key=lambda one: one.seconds or 0.0)
+        text = (
+            f"The cheapest setting within {tolerance:.2g} of the smallest steps, solved, has "
+            f"{best.iterations} {names[0]} and {names[1]} {best.substeps}: {best.seconds:.3g} s."
+        )
+    return [*found, Finding(f"{label}, all in all", text, "shown, not judged", None)]
+
+
+def _inside(error: float | None, tolerance: float) -> bool:
+    return error is not None and error <= tolerance
+
+
+def _percent(error: float | None) -> str:
+    return "an unknown part" if error is None else f"{100 * error:.3g} %"
