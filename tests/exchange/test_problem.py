@@ -121,7 +121,7 @@ def test_the_rule_is_exact_to_degree_seven(dimension, volume):
         assert volume * weights @ term == pytest.approx(exact, rel=1e-13)
 
 
-def test_a_conforming_mesh_of_a_given_one_in_space_is_refused(tmp_path):
+def test_a_given_mesh_in_space_conforms_without_a_cut_and_is_refused_with_one(tmp_path):
     import meshio
 
     from verify.xfem.structured_meshes import box_mesh
@@ -132,6 +132,10 @@ def test_a_conforming_mesh_of_a_given_one_in_space_is_refused(tmp_path):
     held = [{"where": "x < 1e-9", "displacement": [0.0, 0.0, 0.0]}]
     parts = {**BOX, "geometry": given, "mesh": {"pattern": "given"}, "supports": held}
     assert len(problem_of(scene(**parts), 0).points) == 27
+    uncut = problem_of(scene(**parts), 0, conforming=True)
+    np.testing.assert_array_equal(uncut.points, problem_of(scene(**parts), 0).points)
+    plane = [[-1, -1, 0.45], [2, -1, 0.45], [2, 2, 0.55], [-1, 2, 0.55]]
+    parts["cuts"] = [{"kind": "polygon", "points": plane}]
     with pytest.raises(UnsupportedSceneError, match="plane scenes with polyline cuts only"):
         problem_of(scene(**parts), 0, conforming=True)
 
