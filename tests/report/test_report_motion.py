@@ -89,7 +89,7 @@ def test_twelve_solvers_are_in_one_panel_each_with_a_line_of_its_own(tmp_path):
 
 def test_energy_verdicts_stand_beside_what_is_kept(tmp_path):
     page, _ = panels(moving_run(tmp_path / "run"))
-    kept = page.text.partition("What is kept of energy and momenta")[2]
+    kept = page.text.partition("Drifts of energy and momenta")[2]
     assert "FAIL" in kept[:700]
     assert "at most 0" in kept[:700]
 

@@ -12,14 +12,14 @@ from verify.report.notation import metric_title, number, solver_title, with_inte
 from verify.report.released_line import released_line
 from verify.result import CaseResult, SolveRecord, Status
 
-__all__ = ["ACCOUNT_METRICS", "MotionView", "motion_view"]
+__all__ = ["BALANCE_METRICS", "MotionView", "motion_view"]
 
-ACCOUNT_METRICS = (
+BALANCE_METRICS = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
     "linear_momentum_drift", "angular_momentum_drift",
     "part_linear_momentum_drift", "part_angular_momentum_drift", "released_mismatch",
 )  # fmt: skip
-# parts of a ledger, the ones that tell most first; a panel shows the first four that are not zero
+# parts of an energy balance, the ones that tell most first; a panel shows the first four that are not zero
 _PARTS = ("kinetic", "strain", "total", "algorithmic", "gravity", "work_of_loads",
           "work_of_supports", "damping")  # fmt: skip
 _PER_PANEL = 4
@@ -33,7 +33,7 @@ class MotionView:
     panels: list[Drawing]
     cuts: str
     released: list[str]
-    kept: Table | None
+    drifts: Table | None
     parts: Table | None
 
 
@@ -50,7 +50,7 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
         return None
     released = [line for solve in moving if (line := released_line(solve))]
     shown = ", ".join(f"{time:.4g} s" for time in cuts)
-    return MotionView(panels, shown, released, _kept_table(result, moving), _parts_table(moving))
+    return MotionView(panels, shown, released, _drifts_table(result, moving), _parts_table(moving))
 
 
 def _finest(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
@@ -137,12 +137,12 @@ def _panel(
     return profile_panel(title, time, curves, palette, inside)
 
 
-def _kept_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | None:
-    """Return what is kept of energy and momenta, and what the case says about it."""
-    names = [n for n in ACCOUNT_METRICS if any(s.metric(n) for s in solves)]
+def _drifts_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | None:
+    """Return the drifts of energy and momenta, and what the case says about them."""
+    names = [n for n in BALANCE_METRICS if any(s.metric(n) for s in solves)]
     if not names:
         return None
-    judged = {(v.solver, v.metric): v for v in result.verdicts if v.metric in ACCOUNT_METRICS}
+    judged = {(v.solver, v.metric): v for v in result.verdicts if v.metric in BALANCE_METRICS}
     rows = []
     for solve in solves:
         row: list[str | Cell] = [solver_title(solve.solver), str(solve.level)]
@@ -156,12 +156,12 @@ def _kept_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | No
             row.append(Cell(value, limit, verdict=said))
         rows.append(row)
     head = ["solver", "level", *(metric_title(name) for name in names)]
-    caption = "What is kept of energy and momenta, with the verdicts of the case"
+    caption = "Drifts of energy and momenta, with the verdicts of the case"
     return plain_table(caption, head, rows, "prose")
 
 
 def _parts_table(solves: Sequence[SolveRecord]) -> Table | None:
-    """Return the separated parts of every solver, with what each keeps once it is free."""
+    """Return the separated parts of every solver, with the drifts of each once it is free."""
     rows = []
     for solve in solves:
         for k, part in enumerate(solve.parts):

@@ -43,7 +43,7 @@ _METRICS = {
     "energy_slope": "secular change of the energy, relative",
     "energy_oscillation": "oscillation of the energy, relative",
     "energy_jump": "relative jump of the energy at a cut",
-    "ledger_mismatch": "relative mismatch of the energy ledger",
+    "ledger_mismatch": "relative mismatch of the energy balance",
     "linear_momentum_drift": "relative change of the momentum",
     "angular_momentum_drift": "relative change of the angular momentum",
     "released_mismatch": "share of the energy released at the blade that is not found",

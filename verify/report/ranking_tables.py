@@ -19,7 +19,7 @@ _ENDS = (
 
 
 def conformance_table(ranking: Mapping[str, Any]) -> Table | None:
-    """Return what each solver keeps of what every right solver keeps; None if nobody was asked."""
+    """Return how many conformance checks each solver passes; None if nobody was asked."""
     found = ranking["conformance"]
     if not any(own.get("checks") for own in found.values()):
         return None
@@ -38,8 +38,8 @@ def conformance_table(ranking: Mapping[str, Any]) -> Table | None:
         counts = [len(named[state]) for state in _STATES]
         rows.append([solver_title(solver), str(counts[0]), str(counts[1] + counts[2]),
                      str(counts[3]), "; ".join(bad) or "–"])  # fmt: skip
-    head = ["solver", "kept", "broken or failed", "refused", "what it does not keep"]
-    return plain_table("Conformance: what every right solver keeps", head, rows, "prose")
+    head = ["solver", "passed", "failed", "refused", "what fails"]
+    return plain_table("Conformance: claims that hold for every right solver", head, rows, "prose")
 
 
 def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Table]:
@@ -87,7 +87,7 @@ def left_out_table(ranking: Mapping[str, Any]) -> Table | None:
 
 
 def _marked(solver: str, ranking: Mapping[str, Any]) -> Cell:
-    """Return a solver's name, with a mark if it breaks what every right solver keeps."""
+    """Return a solver's name, with a mark if it fails a conformance check."""
     checks = ranking["conformance"].get(solver, {}).get("checks") or []
     broken = any(c["state"] in ("broken", "failed") for c in checks)
     mark, tip = ("†", "does not conform") if broken else ("", "")

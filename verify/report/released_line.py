@@ -1,4 +1,4 @@
-"""Account of the energy that a blade released: one line per solver."""
+"""Where the energy that a blade released went: one line per solver."""
 
 from verify.report.notation import number, solver_title
 from verify.result import SolveRecord
