@@ -2,24 +2,20 @@
 
 import io
 import json
-import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from page_parser import parsed
+from matplotlib import colormaps
 from PIL import Image
 from synthetic_run import cut_square, make_run, write_error_field
 
-from verify.report import draw_with_matplotlib, load_run, pictures, render
+from verify.report import load_run
 from verify.report.bodies import Body, deformed_body, error_body
-from verify.report.pictures import case_pictures, drawn
+from verify.report.drawn_bodies import draw
+from verify.report.pictures import case_pictures
 from verify.report.view import common_view
 from verify.solution import Solution, write_solution
-
-BY_SIGNAL = [sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"]
-BY_EXCEPTION = [sys.executable, "-c", "raise ImportError('libGL.so.1')"]
-WITHOUT_A_WORD = [sys.executable, "-c", ""]
-NOT_THERE = ["/no/such/interpreter"]
 
 
 def tetrahedra() -> Solution:
@@ -68,63 +64,33 @@ def ink(data: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float) < 250
 
 
-@pytest.mark.graphics
-def test_vtk_and_matplotlib_show_the_same_body(tmp_path):
+def test_a_plane_body_is_drawn_with_its_cut_open():
     body = deformed_body(cut_square(12, opening=0.05), 2.0)
     view = common_view([body], "cividis")
-    picture = pictures.Picture("", "", body, view)
-    by_vtk = tmp_path / "v.png"
-    assert pictures._by_vtk([picture], {id(picture): by_vtk}, tmp_path / "job.pickle") == ""
-    draw_with_matplotlib.draw(body, view, tmp_path / "m.png")
-    one, two = ink(by_vtk.read_bytes()), ink((tmp_path / "m.png").read_bytes())
-    assert one.shape == two.shape == view.size[::-1]
-    # lines are a little wider in one than in the other: below 1 % of the picture
-    assert np.mean(one != two) < 0.01
-    assert 0.5 < one.mean() < 0.95
-    # the opened cut is white in both, right through the middle of the body
-    middle = one[:, one.shape[1] // 2]
+    shown = ink(draw(body, view))
+    assert shown.shape == view.size[::-1]
+    assert 0.5 < shown.mean() < 0.95
+    # white right through the middle of the body
+    middle = shown[:, shown.shape[1] // 2]
     assert np.count_nonzero(np.diff(middle.astype(int)) == 1) == 2
 
 
-def test_a_solid_can_be_drawn_without_opengl(tmp_path):
-    body = deformed_body(tetrahedra(), 1.0)
-    draw_with_matplotlib.draw(body, common_view([body], "cividis"), tmp_path / "m.png")
-    assert ink((tmp_path / "m.png").read_bytes()).mean() > 0.1
-
-
-@pytest.mark.parametrize(
-    "command, reason",
-    [
-        (BY_SIGNAL, "ended by signal 11"),
-        (BY_EXCEPTION, "libGL.so.1"),
-        (WITHOUT_A_WORD, "drew nothing"),
-        (NOT_THERE, "could not be started"),
-    ],
-)
-def test_a_machine_without_opengl_gets_solids_by_matplotlib_and_a_reason(
-    monkeypatch, command, reason
-):
-    monkeypatch.setattr(pictures, "_VTK", command)
-    body = deformed_body(tetrahedra(), 1.0)
-    picture = pictures.Picture("", "", body, common_view([body], "cividis"))
-    assert reason in drawn([picture])
-    assert not picture.by_vtk
-    assert ink(picture.image).mean() > 0.1
-
-
-def test_plane_bodies_need_no_opengl(monkeypatch):
-    monkeypatch.setattr(pictures, "_VTK", NOT_THERE)
-    body = deformed_body(cut_square(4), 1.0)
-    picture = pictures.Picture("", "", body, common_view([body], "cividis"))
-    assert drawn([picture]) == ""
-    assert ink(picture.image).mean() > 0.1
-
-
-def test_the_page_says_why_solids_were_drawn_by_matplotlib(tmp_path, monkeypatch):
-    monkeypatch.setattr("verify.report.rendering.drawn", lambda pictures: "VTK ended by signal 11")
-    root = make_run(tmp_path / "run", pictures=False)
-    page = parsed(render(root).read_text(encoding="utf-8"))
-    assert "drawn by matplotlib because VTK ended by signal 11" in page.text
+@pytest.mark.parametrize("near", [0.0, 1.0])
+def test_what_is_near_hides_what_is_far(near):
+    """Two plates one behind the other, of other values, drawn in either order."""
+    still = common_view([deformed_body(tetrahedra(), 1.0)], "cividis")
+    right, up, towards = (np.array(axis) for axis in (still.right, still.up, still.towards))
+    plate = np.array([-right - up, right - up, right + up, up - right])
+    points = np.concatenate([plate, plate + (2 * near - 1) * towards])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    none = np.zeros((0, 2), dtype=int)
+    body = Body(points, triangles, none, np.repeat([0.0, 1.0], 4), none, points)
+    view = replace(common_view([body], "cividis"), limits=(0.0, 1.0))
+    image = np.asarray(Image.open(io.BytesIO(draw(body, view))).convert("RGB"), dtype=float)
+    middle = image[image.shape[0] // 2, image.shape[1] // 2]
+    assert middle == pytest.approx(
+        255 * np.array(colormaps["cividis"](near)[:3]), abs=12
+    )  # of 255: WebP
 
 
 def test_missing_and_damaged_solutions_become_notes(tmp_path):

@@ -1,12 +1,11 @@
 """Families of scenes: each error against the parameter, a curve per solver."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from verify.report.blocks import Figure, Table, plain_table
-from verify.report.curves import Curve, Point, error_curves, metric_names
-from verify.report.figures.convergence import convergence_panel, error_range
+from verify.report.curves import Point, error_curves, metric_names
+from verify.report.figures.studies import Series, loglog
 from verify.report.figures.style import Palette
 from verify.report.notation import error_title, number
 from verify.report.run_directory import Run
@@ -42,10 +41,19 @@ def _family(name: str, results: list[CaseResult], palette: Palette) -> FamilyVie
         solvers = list(dict.fromkeys(label for one in found.values() for label in one))
         if not solvers:
             continue
-        curves = [c for label in solvers if (c := _curve(label, found)).points]
         title = error_title(metric)
         table = _table(title, view.parameter, solvers, found)
-        view.parts.append((table, _figure(title, view.parameter, curves, palette)))
+        series = [
+            Series(label, [(x, one[label].value if label in one else None)
+                           for x, one in sorted(found.items())])
+            for label in solvers
+        ]  # fmt: skip
+        panel = (
+            loglog(title, view.parameter, series, palette)
+            if sum(x > 0 for x in found) > 1
+            else None
+        )
+        view.parts.append((table, Figure([panel]) if panel else None))
     return view
 
 
@@ -54,38 +62,16 @@ def _value(result: CaseResult) -> float:
     return float(result.row["value"])
 
 
-def _finest(result: CaseResult, metric: str) -> dict[str, tuple[str, Point]]:
-    """Return solver and last point of each curve of a row by its label."""
-    curves = error_curves(result, metric)
-    return {curve.label: (curve.solver, curve.points[-1]) for curve in curves}
-
-
-def _curve(label: str, found: dict[float, dict[str, tuple[str, Point]]]) -> Curve:
-    """Return one solver over the parameter, which stands where the mesh size does elsewhere."""
-    points, solver = [], label
-    for value in sorted(found):
-        if label in found[value] and value > 0.0:
-            solver, point = found[value][label]
-            if math.isfinite(point.value) and point.value > 0.0:
-                points.append(Point(point.level, value, None, point.value, 0.0, None))
-    return Curve(label, solver, [points] if points else [], [], None)
+def _finest(result: CaseResult, metric: str) -> dict[str, Point]:
+    """Return the last point of each curve of a row by its label."""
+    return {curve.label: curve.points[-1] for curve in error_curves(result, metric)}
 
 
 def _table(
-    title: str, parameter: str, solvers: Sequence[str],
-    found: dict[float, dict[str, tuple[str, Point]]],
-) -> Table:  # fmt: skip
+    title: str, parameter: str, solvers: Sequence[str], found: dict[float, dict[str, Point]]
+) -> Table:
     rows = [
-        [f"{value:g}", *(number(one[s][1].value) if s in one else "–" for s in solvers)]
+        [f"{value:g}", *(number(one[s].value) if s in one else "–" for s in solvers)]
         for value, one in found.items()
     ]
     return plain_table(title, [f"{parameter} =", *solvers], rows, named=True)
-
-
-def _figure(title: str, parameter: str, curves: Sequence[Curve], palette: Palette) -> Figure | None:
-    places = {point.size for curve in curves for point in curve.points}
-    y_range = error_range(curves, sloped=False)
-    if len(places) < 2 or y_range is None:
-        return None
-    panel = convergence_panel(title, curves, y_range, palette, x_title=parameter)
-    return Figure([panel]) if panel else None

@@ -19,7 +19,7 @@ BALANCE_METRICS = (
     "linear_momentum_drift", "angular_momentum_drift",
     "part_linear_momentum_drift", "part_angular_momentum_drift", "released_mismatch",
 )  # fmt: skip
-# parts of an energy balance, the ones that tell most first; a panel shows the first four that are not zero
+# parts of an energy balance, the ones that tell most first; a panel has the first four not zero
 _PARTS = ("kinetic", "strain", "total", "algorithmic", "gravity", "work_of_loads",
           "work_of_supports", "damping")  # fmt: skip
 _PER_PANEL = 4

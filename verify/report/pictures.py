@@ -1,22 +1,15 @@
 """Pictures of a run: the reference and the solvers with the cut open, and where each errs."""
 
-import io
 import math
-import pickle
-import subprocess
-import sys
-import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from verify.applied_checks import REFERENCE
 from verify.errors import InputError
-from verify.report import draw_with_matplotlib
 from verify.report.bodies import Body, deformed_body, error_body, read_stored
 from verify.report.notation import ROUND_OFF, number, number_text, solver_title
 from verify.report.run_directory import CaseEntry
@@ -25,12 +18,9 @@ from verify.report.view import View, common_view
 from verify.result import CaseResult, SolveRecord, Status, error_picture
 from verify.solution import Solution
 
-__all__ = ["CasePictures", "Picture", "case_pictures", "drawn"]
+__all__ = ["CasePictures", "Picture", "case_pictures"]
 
 DISPLACEMENT_COLOURS, ERROR_COLOURS = "cividis", "YlOrBr"
-_VTK = [sys.executable, "-m", "verify.report.draw_with_vtk"]
-_SECONDS = 60.0  # to start VTK
-_SECONDS_EACH = 20.0
 _MOST = 4  # bodies side by side
 _STILL = 1e-200  # of the body's diagonal: displacements below are none
 _WILD = 1e3  # times the smallest displacement beside it: what moves farther is not drawn
@@ -46,7 +36,6 @@ class Picture:
     body: Body
     view: View
     image: bytes = b""  # WebP
-    by_vtk: bool = True
     turnable: bool = True  # whether a body in space may be turned in the page
 
     @cached_property
@@ -58,11 +47,6 @@ class Picture:
     def turned(self) -> dict[str, str]:
         """The same if the page has room for it."""
         return self.solid if self.turnable else {}
-
-    @property
-    def flat(self) -> bool:
-        """Whether the body is plane."""
-        return bool(np.ptp(self.body.points[:, 2]) == 0)
 
 
 @dataclass
@@ -107,54 +91,6 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         pictures.notes.append("No pictures: no solution is stored.")
     _errors(pictures, root, entry.result)
     return pictures
-
-
-def drawn(pictures: Sequence[Picture]) -> str:
-    """Draw every picture: plane bodies by matplotlib, solids by VTK in a process of its own.
-
-    VTK takes seconds to start, and for plane bodies shows nothing that matplotlib does not.
-
-    Returns
-    -------
-    str
-        Why VTK did not draw some or all of the solids; empty if it did.
-    """
-    with tempfile.TemporaryDirectory(prefix="verify-report-") as name:
-        folder = Path(name)
-        files = {id(picture): folder / f"{i}.png" for i, picture in enumerate(pictures)}
-        solids = [picture for picture in pictures if not picture.flat]
-        reason = _by_vtk(solids, files, folder / "job.pickle") if solids else ""
-        for picture in pictures:
-            try:
-                picture.image = _as_webp(files[id(picture)])
-            except OSError:  # not asked of VTK, not there, or cut off when the process ended
-                picture.by_vtk = False
-                draw_with_matplotlib.draw(picture.body, picture.view, files[id(picture)])
-                picture.image = _as_webp(files[id(picture)])
-    return "" if all(picture.by_vtk for picture in solids) else reason or "VTK drew nothing"
-
-
-def _by_vtk(solids: Sequence[Picture], files: Mapping[int, Path], job: Path) -> str:
-    asked = [(picture.body, picture.view, files[id(picture)].name) for picture in solids]
-    job.write_bytes(pickle.dumps(asked))
-    seconds = _SECONDS + _SECONDS_EACH * len(solids)
-    try:
-        done = subprocess.run([*_VTK, str(job)], capture_output=True, text=True, timeout=seconds)
-    except subprocess.TimeoutExpired:
-        return f"VTK took longer than {seconds:g} s"
-    except OSError as error:
-        return f"VTK could not be started ({error.strerror})"
-    if done.returncode < 0:
-        return f"VTK ended by signal {-done.returncode}, as it does without OpenGL"
-    last = done.stderr.strip().splitlines()[-1:]
-    return f"VTK failed ({last[0][:200] if last else 'no message'})" if done.returncode else ""
-
-
-def _as_webp(path: Path) -> bytes:
-    buffer = io.BytesIO()
-    with Image.open(path) as image:
-        image.convert("RGB").save(buffer, "WEBP", quality=84, method=4)
-    return buffer.getvalue()
 
 
 def _finest_solves(result: CaseResult) -> list[SolveRecord]:

@@ -4,9 +4,10 @@ from pathlib import Path
 from typing import Any
 
 from verify.printable import words_of
+from verify.report.drawn_bodies import draw
 from verify.report.exports import csv_rows, json_document, junit_document
 from verify.report.page import page_view
-from verify.report.pictures import CasePictures, case_pictures, drawn
+from verify.report.pictures import CasePictures, case_pictures
 from verify.report.printing import print_page
 from verify.report.run_directory import CaseEntry, Run, load_run
 from verify.report.template_sets import as_html, as_markdown
@@ -41,9 +42,7 @@ def render(directory: Path) -> Path:
 def _written(run: Run, directory: Path) -> tuple[Path, dict[str, Any]]:
     """Write the page and the exports; return the page and what it shows."""
     pictures = [_pictures(run.root, entry) for entry in run.entries]
-    notes = []
-    if reason := drawn([picture for shown in pictures for picture in shown.all]):
-        notes.append(f"pictures were drawn by matplotlib because {reason}.")
+    notes: list[str] = []
     view = page_view(run, pictures, notes)
     text = as_html("report.j2", **view, turnable=_turnable(pictures))
     excess = len(text.encode("utf-8")) - _PAGE_BYTES
@@ -66,7 +65,10 @@ def _turnable(pictures: list[CasePictures]) -> bool:
 def _pictures(root: Path, entry: CaseEntry) -> CasePictures:
     """Prepare the pictures of a case; if that fails, nothing else of the report does."""
     try:
-        return case_pictures(root, entry)
+        pictures = case_pictures(root, entry)
+        for picture in pictures.all:
+            picture.image = draw(picture.body, picture.view)
+        return pictures
     except Exception as error:
         return CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
 

@@ -102,7 +102,7 @@ def _curves(measured: Records, growths: Records, palette: Palette) -> list[Drawi
         series = []
         for solver in dict.fromkeys(m["solver"] for m in measured):
             own = listed(measured, solver=solver, quantity=quantity)
-            places = sorted((m["size"], m["value"]) for m in own if m["value"])
+            places = sorted(((m["size"], m["value"]) for m in own), key=lambda place: place[0])
             law = next(iter(listed(growths, solver=solver, quantity=quantity)), {})
             series.append(Series(solver_title(solver), places, _law_text(law)))
         title = error_title(quantity) if is_error(quantity) else quantity

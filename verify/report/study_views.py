@@ -92,7 +92,7 @@ def _precision(record: Mapping[str, Any]) -> list[Drawing]:
         series = []
         for name in record["running"]:
             own = sorted((p for p in points if p["solver"] == name), key=lambda p: p["level"])
-            places = [(p[key], p["error"]) for p in own if p[key]]
+            places = [(p[key], p["error"]) for p in own]
             ringed = [(p[key], p["error"]) for p in own if (name, p["level"]) in front and p[key]]
             series.append(Series(solver_title(name), places, ringed=ringed))
         panels.append(loglog(metric_title(record["metric"]), x_title, series, palette))

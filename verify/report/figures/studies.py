@@ -1,8 +1,10 @@
 """Figures of studies: curves and scattered marks on logarithmic axes, bars of a budget."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import wrap
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -16,10 +18,13 @@ _TOTAL, _PART = "#4d4d4d", "#0067a5"
 
 @dataclass(frozen=True)
 class Series:
-    """A curve; `second` stands below its name, `ringed` are those of its places that stand out."""
+    """A curve, whose places that cannot be drawn are gaps.
+
+    `second` stands below its name; `ringed` are those of its places that stand out.
+    """
 
     name: str
-    places: Sequence[tuple[float, float]]
+    places: Sequence[tuple[Any, Any]]
     second: str = ""
     ringed: Sequence[tuple[float, float]] = ()
 
@@ -37,7 +42,7 @@ class Bar:
 
 def loglog(title: str, x_title: str, series: Sequence[Series], palette: Palette) -> Drawing | None:
     """Return curves on logarithmic axes, or None if there is nothing positive."""
-    drawn = [(s, [(x, y) for x, y in s.places if x > 0 and y > 0]) for s in series]
+    drawn = [(s, [place for place in s.places if _can_be_drawn(place)]) for s in series]
     drawn = [(s, places) for s, places in drawn if places]
     if not drawn:
         return None
@@ -46,7 +51,8 @@ def loglog(title: str, x_title: str, series: Sequence[Series], palette: Palette)
         said = [f"{title} against {x_title}."]
         for s, places in drawn:
             style = palette[s.name]
-            axes.plot(*zip(*places, strict=True), color=style.colour, marker=style.marker,
+            gaps = [place if _can_be_drawn(place) else (math.nan, math.nan) for place in s.places]
+            axes.plot(*zip(*gaps, strict=True), color=style.colour, marker=style.marker,
                       markerfacecolor="white" if style.hollow else style.colour,
                       label=f"{s.name}\n{s.second}".strip())  # fmt: skip
             if s.ringed:
@@ -106,6 +112,10 @@ def bars(title: str, parts: Sequence[Bar], said: str) -> Drawing:
                           textcoords="offset points", va="center", fontsize=8,
                           annotation_clip=False)  # fmt: skip
         return drawing(figure, said)
+
+
+def _can_be_drawn(place: tuple[Any, Any]) -> bool:
+    return all(isinstance(v, int | float) and 1e-200 < v < 1e200 for v in place)
 
 
 def _logarithmic(axes: Axes, x_title: str, places: Sequence[tuple[float, float]]) -> None:

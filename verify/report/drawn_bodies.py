@@ -1,0 +1,96 @@
+"""Draws bodies: the values of plane ones smoothly, solids facet by facet from back to front."""
+
+import io
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+from numpy.typing import NDArray
+from PIL import Image
+
+from verify.report.bodies import Body
+from verify.report.view import View
+
+__all__ = ["draw"]
+
+_DPI = 100
+_OUTLINE, _ELEMENTS = (0.1, 0.1, 0.1, 1.0), (0.0, 0.0, 0.0, 0.25)
+_FACETS = 12_000  # up to which those of solids are split
+
+
+def draw(body: Body, view: View) -> bytes:
+    """Return a picture of `body` as WebP."""
+    figure = Figure(figsize=(view.size[0] / _DPI, view.size[1] / _DPI), dpi=_DPI)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    places = view.projected(body.points)
+    if np.ptp(body.points[:, 2]) == 0 and len(body.values) == len(body.points):
+        axes.tripcolor(
+            Triangulation(places[:, 0], places[:, 1], body.triangles),
+            body.values,
+            shading="gouraud",
+            cmap=view.colours,
+            vmin=view.limits[0],
+            vmax=view.limits[1],
+        )
+        for edges, width, colour in (
+            (body.element_edges, 0.5, _ELEMENTS),
+            (body.edges, 1.6, _OUTLINE),
+        ):
+            segments = list(places[edges][:, :, :2])
+            axes.add_collection(LineCollection(segments, linewidths=width, colors=[colour]))
+    else:
+        axes.add_collection(_painted(body, view, places))
+    axes.set_xlim(view.window[0], view.window[1])
+    axes.set_ylim(view.window[2], view.window[3])
+    canvas.draw()
+    made = io.BytesIO()
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    image.save(made, "WEBP", quality=84, method=4)
+    return made.getvalue()
+
+
+def _painted(body: Body, view: View, places: NDArray[np.float64]) -> PolyCollection:
+    """Return facets and lines from the farthest to the nearest, so that the near hide the far."""
+    if len(body.values) == len(body.points):
+        values = body.values[body.triangles]
+    else:
+        values = np.repeat(body.values[:, None], 3, axis=1)
+    facets = np.concatenate([places[body.triangles], values[:, :, None]], axis=2)
+    lines = [(places[body.element_edges], _ELEMENTS, 0.5), (places[body.edges], _OUTLINE, 1.6)]
+    while 4 * len(facets) <= _FACETS:
+        facets = _quartered(facets)
+        lines = [(_halved(ends), colour, width) for ends, colour, width in lines]
+    low, high = view.limits
+    shades = (facets[:, :, 3].mean(axis=1) - low) / ((high - low) or 1.0)
+    lift = 0.005 * (view.window[1] - view.window[0])  # lines lie on the facets beside them
+    kinds = [(facets, colormaps[view.colours](shades), 0.4, 0.0)]
+    kinds += [(e, np.tile(colour, (len(e), 1)), width, lift) for e, colour, width in lines]
+    shapes = [shape for corners, *_ in kinds for shape in corners[:, :, :2]]
+    depth = np.concatenate([corners[:, :, 2].mean(axis=1) + up for corners, _, _, up in kinds])
+    colours = np.concatenate([colour for _, colour, _, _ in kinds])
+    widths = np.concatenate([np.full(len(corners), width) for corners, _, width, _ in kinds])
+    order = np.argsort(depth, kind="stable")
+    return PolyCollection(
+        [shapes[n] for n in order],
+        facecolors=colours[order],
+        edgecolors=colours[order],
+        linewidths=widths[order],
+    )
+
+
+def _quartered(facets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Split triangles at the middles of their sides: colours get smooth, and hiding exact."""
+    a, b, c = np.moveaxis(facets, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
+def _halved(edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    a, b = np.moveaxis(edges, 1, 0)
+    return np.concatenate([np.stack([a, (a + b) / 2], 1), np.stack([(a + b) / 2, b], 1)])
