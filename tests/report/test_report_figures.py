@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from synthetic_run import make_run
 
@@ -15,7 +16,15 @@ from verify.report.case_view import case_view, floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
 from verify.report.figures import convergence
 from verify.report.figures.convergence import convergence_panel, error_range, slope_triangle
-from verify.report.figures.style import Palette, drawing, log_range, log_ticks, panel, plain_axis
+from verify.report.figures.style import (
+    Palette,
+    drawing,
+    legend,
+    log_range,
+    log_ticks,
+    panel,
+    plain_axis,
+)
 from verify.report.pictures import CasePictures
 from verify.report.run_directory import CaseEntry
 from verify.result import Metric, SolveRecord, Status
@@ -69,6 +78,18 @@ def test_numbers_on_axes_and_names_of_curves_are_written_whole():
     assert "jump 0.000987654, m" in words
     assert {"0", "0.5", "1", "1.5", "2", "×10⁻⁴"} <= set(words)
     assert name.replace("<", "&lt;").replace(">", "&gt;") in words
+
+
+def test_a_legend_of_twelve_solvers_lies_inside_the_figure():
+    with panel("error") as (figure, axes):
+        for k in range(12):
+            axes.plot([0, 1], [0, k], label=f"solver {k}\norder 1.11 ± 0.02")
+        legend(axes)
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        box, room = axes.get_legend().get_window_extent(renderer), figure.bbox
+        assert room.x0 <= box.x0 < box.x1 <= room.x1
+        assert room.y0 <= box.y0 < box.y1 <= room.y1
+        assert axes.get_position().y1 * figure.get_figheight() < figure.get_figheight() - 0.25
 
 
 @pytest.mark.parametrize("slope", [0.5, 0.98, 1.95, 2.0])

@@ -17,10 +17,12 @@ from verify.report.pictures import CasePictures, Picture
 from verify.report.problem import problem_facts
 from verify.report.run_directory import CaseEntry
 from verify.report.tables import (
+    MANY,
     checks_table,
     failures_table,
     numbers_table,
     orders_table,
+    reasons_table,
     reference_facts,
     reference_tables,
     regularisations_table,
@@ -85,6 +87,7 @@ class CaseView:
     motion: MotionView | None = None
     orders: Table | None = None
     has_order: bool = False
+    reasons: Table | None = None
     numbers: Table | None = None
     times: Table | None = None
     regularisations: Table | None = None
@@ -140,7 +143,9 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     view.openings = opening_figures(result, palette)
     view.motion = motion_view(result, palette)
     view.orders, view.numbers = orders_table(result), numbers_table(result)
-    view.has_order = any(rate.order is not None for rate in result.rates)
+    few = len({rate.solver for rate in result.rates}) <= MANY
+    view.has_order = few and any(rate.order is not None for rate in result.rates)
+    view.reasons = reasons_table(result)
     view.times, view.regularisations = times_table(result), regularisations_table(result)
     view.reference = reference_facts(result.reference)
     view.reference_tables = reference_tables(result.reference)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from verify.report.blocks import Cell, Drawing, Table, plain_table
@@ -23,6 +23,7 @@ BALANCE_METRICS = (
 _PARTS = ("kinetic", "strain", "total", "algorithmic", "gravity", "work_of_loads",
           "work_of_supports", "damping")  # fmt: skip
 _PER_PANEL = 4
+_SHOWN = 4  # solvers whose energies are drawn
 _MOMENTA = (("linear_momentum", "N s"), ("angular_momentum", "N m s"))
 
 
@@ -35,6 +36,8 @@ class MotionView:
     released: list[str]
     drifts: Table | None
     parts: Table | None
+    shown: int = _SHOWN
+    left_out: list[str] = field(default_factory=list)
 
 
 def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
@@ -50,7 +53,9 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
         return None
     released = [line for solve in moving if (line := released_line(solve))]
     shown = ", ".join(f"{time:.4g} s" for time in cuts)
-    return MotionView(panels, shown, released, _drifts_table(result, moving), _parts_table(moving))
+    left_out = [solver_title(solve.solver) for solve in _with_energies(moving)[_SHOWN:]]
+    return MotionView(panels, shown, released, _drifts_table(result, moving), _parts_table(moving),
+                      left_out=left_out)  # fmt: skip
 
 
 def _finest(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
@@ -81,15 +86,18 @@ def _errors(
 
 
 def _energies(solves: Sequence[SolveRecord], cuts: list[float], unit: str) -> Iterator[Drawing]:
-    for solve in solves:
+    for solve in _with_energies(solves)[:_SHOWN]:
         found = [
             (name, solve.account[name])
             for name in _PARTS
             if any(value for value in solve.account.get(name, []))
         ][:_PER_PANEL]
-        if found:
-            title = f"{solver_title(solve.solver)}: energies, {unit}"
-            yield _panel(title, solve.account["time"], found, cuts, None)
+        title = f"{solver_title(solve.solver)}: energies, {unit}"
+        yield _panel(title, solve.account["time"], found, cuts, None)
+
+
+def _with_energies(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
+    return [s for s in solves if any(any(s.account.get(name, [])) for name in _PARTS)]
 
 
 def _totals(

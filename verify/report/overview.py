@@ -10,12 +10,13 @@ from verify.report.case_view import CaseView, PictureRow
 from verify.report.notation import bytes_text, number, solver_title
 from verify.report.pictures import Picture
 from verify.report.run_directory import CaseEntry, Run
-from verify.report.tables import check_text
+from verify.report.tables import MANY, check_text
 from verify.result import NoticeKind, Status, Verdict, VerdictRecord
 
 __all__ = ["Overview", "origin_facts", "overview"]
 
 _NAMED = 6  # entries of a list in the paragraph
+_PLACES = 2  # of what one solver fails
 _ORDER = ["FAIL", "ERROR", "UNDECIDED", "PASS"]
 
 
@@ -134,7 +135,9 @@ def _by_solver(
         for entry, record in failed:
             if record.solver == solver:
                 where.setdefault(entry.name, []).append(check_text(record, named=False))
-        places = "; ".join(f"{name} ({', '.join(whats)})" for name, whats in where.items())
+        found = [f"{name} ({', '.join(whats)})" for name, whats in where.items()]
+        places = "; ".join(found[:_PLACES])
+        places += f"; and {len(found) - _PLACES} more cases" if len(found) > _PLACES else ""
         checks = "1 check" if made == 1 else f"{made} checks"
         said.append(f"{solver_title(solver)}, {count} of its {checks}: {places}")
     return said
@@ -150,7 +153,8 @@ def _matrix(run: Run, cases: Sequence[CaseView], names: Sequence[str]) -> Table:
             marks[1] = Cell("", f"⚠ {n} warning{'s' * (n > 1)}", verdict=str(case.verdict))
         marks += [_mark(entry, name, case.by_solver.get(name, "")) for name in names]
         rows.append(marks)
-    return Table("Verdicts", [Cell("case"), Cell("whole"), *map(Cell, names)], rows, "matrix", True)
+    kind = "matrix many" if len(names) > MANY else "matrix"
+    return Table("Verdicts", [Cell("case"), Cell("whole"), *map(Cell, names)], rows, kind, True)
 
 
 def _mark(entry: CaseEntry, name: str, verdict: str) -> Cell:

@@ -23,22 +23,26 @@ from verify.result import (
     NoticeKind,
     SolveRecord,
     Status,
+    Verdict,
     VerdictRecord,
 )
 
 __all__ = [
+    "MANY",
     "check_row",
     "check_text",
     "checks_table",
     "failures_table",
     "numbers_table",
     "orders_table",
+    "reasons_table",
     "reference_facts",
     "reference_tables",
     "regularisations_table",
     "times_table",
 ]
 
+MANY = 4  # solvers beyond which they stand side by side
 _CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the", "value": ""}
 
 
@@ -66,12 +70,32 @@ def check_row(record: VerdictRecord) -> list[Cell]:
 
 
 def checks_table(result: CaseResult) -> Table | None:
-    """Return the verdicts of a case."""
+    """Return the verdicts of a case: a row for each, or, for many solvers, one for each check."""
     if not result.verdicts:
         return None
+    solvers = list(dict.fromkeys(record.solver for record in result.verdicts))
+    if len(solvers) <= MANY:
+        head = ["check", "observed [interval]", "limit", "verdict"]
+        rows = [check_row(record) for record in result.verdicts]
+        return plain_table("Verdicts", head, rows, "verdicts")
+    checks: dict[tuple[str, str], dict[str | None, Cell]] = {}
+    for record in result.verdicts:
+        observed = with_interval(record.observed, record.low, record.high)
+        cell = Cell(note=number(record.observed, 2), tip=f"{observed}: {record.reason}",
+                    verdict=str(record.verdict))  # fmt: skip
+        checks.setdefault((check_text(record, named=False), record.limit), {})[record.solver] = cell
+    across = [[Cell(what, limit), *(own.get(solver, "–") for solver in solvers)]
+              for (what, limit), own in checks.items()]  # fmt: skip
+    names = [solver_title(solver or "nobody") for solver in solvers]
+    return plain_table("Verdicts", ["check, limit", *names], across, "many", named=True)
+
+
+def reasons_table(result: CaseResult) -> Table | None:
+    """Return, for many solvers, why checks did not pass."""
+    few = len({record.solver for record in result.verdicts}) <= MANY
+    rows = [check_row(r) for r in result.verdicts if not few and r.verdict is not Verdict.PASS]
     head = ["check", "observed [interval]", "limit", "verdict"]
-    rows = [check_row(record) for record in result.verdicts]
-    return plain_table("Verdicts", head, rows, "verdicts")
+    return plain_table("Not passed", head, rows, "verdicts") if rows else None
 
 
 def numbers_table(result: CaseResult) -> Table | None:

@@ -79,11 +79,20 @@ def panel(title: str, width: float = 4.5, height: float = 2.75) -> Iterator[tupl
     with rc_context(_RC):  # type: ignore[arg-type]
         figure = Figure(figsize=(width, height))
         FigureCanvasSVG(figure)
-        axes = figure.add_axes((0.52 / width, 0.48 / height, across / width,
-                                (height - 0.78) / height))  # fmt: skip
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        _place(axes)
         axes.set_title(printable(title), loc="left", x=-0.42 / across, fontsize=9, pad=9)
         axes.grid(True, axis="y", color=_GRID, linewidth=0.7)
         yield figure, axes
+
+
+def _place(axes: Axes) -> None:
+    """Leave room for the labels of the axes and, on the right, for a legend."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    width, height = figure.get_size_inches()
+    axes.set_position((0.52 / width, 0.48 / height, (width - 2.0) / width,
+                       (height - 0.78) / height))  # fmt: skip
 
 
 def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
@@ -113,14 +122,21 @@ def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
 
 
 def legend(axes: Axes, title: str = "") -> None:
-    """Name the curves right of the axes, long names in several lines."""
+    """Name the curves right of the axes, long names in several lines; many make room for all."""
     handles, found = axes.get_legend_handles_labels()
     labels = ["\n".join(s for line in printable(label).split("\n") for s in wrap(line, 19) or [""])
               for label in found]  # fmt: skip
-    if handles:
-        axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.04), frameon=False,
-                    fontsize=8, handlelength=2.1, borderaxespad=0.4, labelspacing=0.45,
-                    handletextpad=0.5, title=title or None)  # fmt: skip
+    if not handles:
+        return
+    axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.04), frameon=False,
+                fontsize=8, handlelength=2.1, borderaxespad=0.4, labelspacing=0.45,
+                handletextpad=0.5, title=title or None)  # fmt: skip
+    lines = sum(label.count("\n") + 1 for label in labels)
+    needed = (9.8 * lines + 3.6 * len(labels)) / 72 + 0.45  # inches
+    figure = axes.get_figure(root=True)
+    if figure is not None and needed > figure.get_figheight():
+        figure.set_figheight(needed)
+        _place(axes)
 
 
 def log_range(values: Sequence[float], room: float = 0.08) -> tuple[float, float]:
