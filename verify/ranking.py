@@ -1,9 +1,9 @@
 """Form of ``ranking.json``, for who writes and who reads it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
-__all__ = ["Comparison", "LeftOut", "Ranking", "StabilityStanding", "Standing"]
+__all__ = ["Comparison", "LeftOut", "Profile", "Ranking", "StabilityStanding", "Standing"]
 
 
 @dataclass(frozen=True)
@@ -111,6 +111,25 @@ class StabilityStanding:
     regularisations: dict[str, int]
 
 
+@dataclass(frozen=True)
+class Profile:
+    """Share of items that each solver has done within a number, as a function of that number.
+
+    Parameters
+    ----------
+    quantity : str
+        What the number is.
+    items : int
+        All of them; a solver that has not done an item has one number less.
+    steps : dict of str to list of float
+        By solver, the numbers at which its share grows by one item; ascending.
+    """
+
+    quantity: str
+    items: int
+    steps: dict[str, list[float]]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ranking:
     """A table per question, and what was left out.
@@ -126,6 +145,8 @@ class Ranking:
         What no ranking counts.
     contended : list of str
         Why times may be off, if they may.
+    profiles : list of Profile
+        Performance and data profiles.
     """
 
     schema: Literal[1]
@@ -139,3 +160,4 @@ class Ranking:
     cost: list[Comparison]
     left_out: list[LeftOut]
     contended: list[str]
+    profiles: list[Profile] = field(default_factory=list)

@@ -227,3 +227,27 @@ def test_a_case_without_any_error_is_named_with_its_reason():
         "solver": "",
         "reason": f"no error is measured: {notes['comparison']}",
     }
+
+
+def test_profiles_count_what_a_solver_has_not_done_as_never_done():
+    """Dolan & Moré: y is best on a, twice as far off on b, refuses c; Moré & Wild: seconds."""
+    l2 = {"name": "displacement_l2", "unit": "1"}
+
+    def one(case, solver, error, seconds):
+        metric = Metric(value=error, source="exact", **l2)
+        return solve(case, solver, 0, seconds=seconds, metrics=[metric])
+
+    refused = solve("c", "y", 0, status=Status.REFUSED, reason="not in space")
+    results = [
+        case_of("a", [one("a", "x", 0.04, 1.0), one("a", "y", 0.02, 3.0)]),
+        case_of("b", [one("b", "x", 0.01, 1.0), one("b", "y", 0.02, 3.0)]),
+        case_of("c", [one("c", "x", 0.5, 1.0), refused, one("c", "z", 1e-15, 9.0)]),
+    ]
+    performance, coarse, fine = rank_solvers(results)["profiles"]
+    assert performance["items"] == 3
+    assert performance["steps"]["x"] == pytest.approx([1.0, 2.0, 0.5e11])
+    assert performance["steps"]["y"] == pytest.approx([1.0, 2.0])
+    assert coarse["items"] == 3
+    assert coarse["steps"] == {"x": [1.0, 1.0], "y": [3.0, 3.0], "z": [9.0]}
+    assert fine["steps"] == {"x": [1.0], "y": [], "z": [9.0]}
+    assert fine["items"] == 2

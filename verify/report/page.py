@@ -6,6 +6,7 @@ from verify.printable import words_of
 from verify.report.blocks import Table
 from verify.report.case_view import case_view
 from verify.report.family_view import FamilyView, family_views
+from verify.report.figures.solver_profiles import profiles_figure
 from verify.report.figures.style import Palette
 from verify.report.overview import origin_facts, overview
 from verify.report.pictures import CasePictures
@@ -71,6 +72,7 @@ def _ranking(ranking: dict[str, Any] | None) -> dict[str, Any] | None:
     return {
         "solvers": len(ranking["solvers"]),
         "cases": len(ranking["cases"]),
+        "profiles": profiles_figure(ranking.get("profiles") or []),
         "conformance": conformance_table(ranking),
         "stability": stability_table(ranking),
         "contended": "; ".join(ranking.get("contended") or []),

@@ -9,7 +9,9 @@ from verify.result import CaseResult
 from verify.study.ranking.finest import interval_of, item_on_finest
 from verify.study.ranking.standing import Item, compared_by_mean, compared_by_worst, is_exact
 
-__all__ = ["EQUAL_SIZE", "EXACT", "FINEST", "QUANTITIES", "accuracy_comparisons"]
+__all__ = [
+    "EQUAL_SIZE", "EXACT", "FINEST", "QUANTITIES", "accuracy_comparisons", "item_at_equal_size",
+]  # fmt: skip
 
 EQUAL_SIZE, FINEST = "equal size", "finest level"
 EXACT = "where a solver is exact"
@@ -38,7 +40,7 @@ def accuracy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) 
     metrics = [*_MAIN, *sorted(judged - {*_MAIN, *ACCOUNT}), QUANTITIES]
     comparisons = []
     for metric in metrics:
-        for view, item_of in ((EQUAL_SIZE, _at_equal_size), (FINEST, _on_finest)):
+        for view, item_of in ((EQUAL_SIZE, item_at_equal_size), (FINEST, _on_finest)):
             items, left_out = [], []
             for result in results:
                 for name in _names(result, metric, solvers):
@@ -74,7 +76,7 @@ def _on_finest(result: CaseResult, name: str, solvers: Sequence[str]) -> Item:
     return item_on_finest(result, name, solvers, _label(result, name))
 
 
-def _at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Item | LeftOut:
+def item_at_equal_size(result: CaseResult, name: str, solvers: Sequence[str]) -> Item | LeftOut:
     """Take the finest level that all have who have any, if their sizes agree there."""
     finest = _on_finest(result, name, solvers)
     errors = {

@@ -11,6 +11,7 @@ from verify.result import CaseResult, Status, Verdict
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
 from verify.study.ranking.energy import energy_comparisons
+from verify.study.ranking.profiles import data_profiles, performance_profile
 from verify.study.ranking.stability import stability_standings
 
 __all__ = ["rank_solvers", "ranked_solvers"]
@@ -52,6 +53,7 @@ def rank_solvers(
         cost=cost_comparisons(results, solvers),
         left_out=_left_out(results),
         contended=_why_times_may_be_off(results, solvers),
+        profiles=[performance_profile(results, solvers), *data_profiles(results, solvers)],
     )
     return asdict(found)
 
