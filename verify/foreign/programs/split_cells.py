@@ -94,6 +94,9 @@ class SplitMesh:
         self._ends, self._groups, self._phi = keys[:, :2], keys[:, 2:], phi
         self.points = place(self._ends, points, phi)
         self.cells = row.reshape(ends.shape[:2])
+        corners = self.points[self.cells]
+        turned = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+        self.cells[turned, :2] = self.cells[turned, 1::-1]
 
     def values(self, u):
         """Values (p, c) at the nodes of the answer, of those (groups, c) of the groups."""
