@@ -107,7 +107,7 @@ def solve(case):
                 raise RefusedError("body forces in formulas are not offered")
             weight += load["uniform"]
 
-    space = Space(case, body)
+    space = case.timed("enrichment", lambda: Space(case, body))
     count = space.scalar.nbdof()
     if space.vector.nbdof() != d * count:
         raise RuntimeError("the displacement has another space than its components")
@@ -141,9 +141,11 @@ def solve(case):
         return found
 
     u = case.timed("solve", solved)
+    energy = 0.5 * u @ (stiffness @ u)
     case.answer(
         answer.points, answer.cells, values @ u.reshape(count, d), unknowns=count * d,
         cut_facets=answer.facets(body.on_a_cut),
+        ledger={"strain": [energy]},
         notes={"method": "XFEM, values of both sides", "getfem": gf.getfem_env("version")},
     )  # fmt: skip
 
