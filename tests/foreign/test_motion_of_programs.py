@@ -199,3 +199,20 @@ def test_a_foreign_code_solves_as_the_conforming_solver_says(name, case):
     np.testing.assert_allclose(
         found.displacement, expected.displacement[:, rows], atol=1e-12 * scale
     )
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", [installed("vbd")])
+def test_vertex_block_descent_goes_towards_the_steps_that_newton_solves(name):
+    scene = load_scene("dynamics/block_falls_apart")
+    turned = scene.analysis.model_copy(update={"kinematics": "corotational"})
+    scene = scene.model_copy(update={"analysis": turned})
+    code = find_solver(name)
+    solved = code.solve(scene, 0, repetitions=1, step="solved").displacement
+    errors = [
+        np.abs(code.solve(scene, 0, repetitions=1, iterations=n).displacement - solved).max()
+        for n in (4, 40, 400)
+    ]
+    scale = np.abs(solved).max()
+    assert errors[0] > 5.0 * errors[1] > 10.0 * errors[2]
+    assert errors[2] < 1e-3 * scale  # 32 bits: 1e-7 of the body, summed over the steps
