@@ -18,28 +18,10 @@ __all__ = ["COLUMNS", "EXPORT_SCHEMA", "csv_rows", "json_document", "junit_docum
 
 EXPORT_SCHEMA = 1
 COLUMNS = (
-    "case",
-    "solver",
-    "level",
-    "parameters",
-    "status",
-    "reason",
-    "size",
-    "unknowns",
-    "metric",
-    "value",
-    "unit",
-    "reference",
-    "uncertainty",
-    "source",
-    "seconds_median",
-    "seconds_min",
-    "seconds_max",
-    "meshing_median",
-    "repetitions",
-    "wall",
-    "peak_memory",
-)
+    "case", "solver", "level", "parameters", "status", "reason", "size", "unknowns", "metric",
+    "value", "unit", "reference", "uncertainty", "source", "seconds_median", "seconds_min",
+    "seconds_max", "meshing_median", "repetitions", "wall", "peak_memory",
+)  # fmt: skip
 
 
 def json_document(run: Run) -> str:
