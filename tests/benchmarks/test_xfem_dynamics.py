@@ -12,11 +12,14 @@ import pytest
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import DynamicBody, EnergyMomentum, RealTimeEuler, Trapezoidal
 from verify.xfem.elasticity import isotropic
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

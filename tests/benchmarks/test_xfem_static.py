@@ -45,7 +45,7 @@ def prepare(name):
     first = mesh.points[:, 0]
     ends = (first == first.min()) | (first == first.max())
     supports = Supports.none(virtual).prescribe(virtual, ends)
-    constrain(pattern.starts, pattern.columns, supports.fixed, blocks)
+    constrain(pattern, supports.fixed, blocks)
     load = np.where(supports.fixed, 0.0, body_force(virtual, -np.ones(mesh.dim)))
     return virtual, stiffness, pattern, blocks, load
 

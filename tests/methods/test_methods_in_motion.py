@@ -6,12 +6,14 @@ from method_bodies import CUTTING, held_at
 
 from verify.methods.catalogue import cut_by
 from verify.methods.spring_force import SpringForce
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Polyline
-from verify.xfem.dynamics import CentralDifferences, DynamicBody, ImplicitEuler
 from verify.xfem.elasticity import isotropic
+from verify.xfem.equilibrium import static_equilibrium
+from verify.xfem.explicit import CentralDifferences
+from verify.xfem.implicit import ImplicitEuler
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.statics import static_equilibrium
 from verify.xfem.structured_meshes import rectangle_mesh
 
 MATERIAL = isotropic(1e4, 0.3, "plane strain")

@@ -10,9 +10,10 @@ from verify.methods.catalogue import cut_by
 from verify.methods.spring_fit import spring_stiffness
 from verify.methods.spring_force import SpringForce
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.dynamics import DynamicBody, EnergyMomentum
 from verify.xfem.elasticity import Material, isotropic
+from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.mass import side_wise_mass

@@ -7,8 +7,9 @@ from reference_scenes import needs_fenicsx, square
 from reference.meshing.imprint import structured_triangles
 from reference.meshing.opening import open_cut
 from verify.scene import Material
-from verify.xfem.dynamics import DynamicBody, GeneralisedAlpha, RayleighDamping
+from verify.xfem.body import DynamicBody, RayleighDamping
 from verify.xfem.elasticity import isotropic
+from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass
 from verify.xfem.mesh import SimplexMesh

@@ -7,7 +7,7 @@ import pytest
 from thesis_stages import stage
 
 from verify.simulator import Session, quality_of
-from verify.xfem.dynamics import RayleighDamping
+from verify.xfem.body import RayleighDamping
 
 FRAME = 1.0 / 60.0
 NONE, SOME = RayleighDamping(0.0, 0.0), RayleighDamping(4.0, 0.01)

@@ -3,7 +3,7 @@
 import pytest
 
 from verify.solvers import xfem_account
-from verify.xfem.dynamics.energy_ledger import EnergyLedger
+from verify.xfem.energy_balance import BalanceRecorder
 
 
 @pytest.fixture
@@ -15,7 +15,7 @@ def openings(monkeypatch):
     def opened(self, body, state, further, inherited):
         rows = []
         for of in ((body, state), (further, inherited)):
-            one = EnergyLedger(*of).close()
+            one = BalanceRecorder(*of).close()
             rows.append([[one.kinetic[0], one.strain[0]], one.momentum[0], one.angular_momentum[0]])
         found.append((state.time, rows))
         genuine(self, body, state, further, inherited)

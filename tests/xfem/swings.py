@@ -5,9 +5,10 @@ from cut_bodies import DENSITY, material
 from test_sliver_policies import shaken
 
 from verify.xfem.assembly import body_pattern
+from verify.xfem.body import DynamicBody
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import CentralDifferences, DynamicBody
+from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.slivers import treat_slivers

@@ -8,25 +8,19 @@ from test_sliver_policies import degenerate_cuts
 from time_schemes import SCHEMES
 
 from verify.xfem.assembly import body_pattern
+from verify.xfem.body import DynamicBody, MotionState, MovingSupports
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    DynamicBody,
-    EnergyMomentum,
-    ForwardEuler,
-    MotionState,
-    MovingSupports,
-    RealTimeEuler,
-    ancestors,
-    inherit_state,
-    treat_moving_body,
-)
-from verify.xfem.dynamics.energy_ledger import EnergyLedger, run
+from verify.xfem.energy_balance import BalanceRecorder, run
+from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences, ForwardEuler
+from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.moving_body import treat_moving_body
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -184,7 +178,7 @@ def test_a_cut_midway_keeps_momenta_and_loses_what_slivers_moved_otherwise(dim, 
     strain = treat_moving_body(new, material(dim), DENSITY, "keep").force.evaluate(
         state.displacement[source]
     )[1]
-    rows = EnergyLedger(body, after).close()
+    rows = BalanceRecorder(body, after).close()
     assert rows.kinetic[0] <= kinetic * (1.0 + 1e-12) or held
     assert rows.kinetic[0] == pytest.approx(kinetic, rel=0.02)
     assert rows.strain[0] == pytest.approx(strain, rel=0.02)

@@ -10,18 +10,16 @@ from scipy.sparse import kron
 from scipy.sparse.linalg import eigsh
 
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.body import DynamicBody
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    DynamicBody,
-    EnergyMomentum,
-    inherit_state,
-    treat_moving_body,
-)
-from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.energy_balance import run
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.explicit import CentralDifferences
+from verify.xfem.inherit import inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports

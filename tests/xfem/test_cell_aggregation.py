@@ -11,6 +11,7 @@ from xfem_bodies import boundary_nodes, relative_l2_error
 from verify.xfem.assembly import body_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
@@ -18,7 +19,7 @@ from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.slivers import treat_slivers
-from verify.xfem.statics import solve_static, static_equilibrium
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports

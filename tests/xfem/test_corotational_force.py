@@ -13,8 +13,8 @@ from cut_bodies import (
 )
 
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import DynamicBody
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, inverted_cells

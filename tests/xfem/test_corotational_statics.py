@@ -5,11 +5,13 @@ import pytest
 from cut_bodies import boundary_nodes, cut_cube, cut_square, material, rotation
 
 from verify.accelerated import FAST
+from verify.xfem import static_newton, statics
 from verify.xfem.cuts import Plane
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN
-from verify.xfem.statics import NotInEquilibriumError, newton, static_equilibrium
+from verify.xfem.static_newton import NotInEquilibriumError
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -156,8 +158,8 @@ def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(
     fixed = np.repeat(ends[:, None], 3, axis=1)
     force = InternalForce(v, material(3))
     direct = static_equilibrium(force, fixed, twisted, load_steps=2)
-    monkeypatch.setattr(newton, "ITERATE_FROM", 0)
-    monkeypatch.setattr(newton, "_MOST", limit)
+    monkeypatch.setattr(statics, "ITERATE_FROM", 0)
+    monkeypatch.setattr(static_newton, "_MOST", limit)
     iterated = static_equilibrium(
         InternalForce(v, material(3), kernels=kernels), fixed, twisted, load_steps=2
     )

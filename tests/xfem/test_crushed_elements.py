@@ -5,11 +5,9 @@ import pytest
 from cut_bodies import DENSITY, material
 from time_schemes import SCHEMES
 
-from verify.xfem.dynamics import (
-    DynamicBody,
-    ForwardEuler,
-)
-from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.body import DynamicBody
+from verify.xfem.energy_balance import run
+from verify.xfem.explicit import ForwardEuler
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh

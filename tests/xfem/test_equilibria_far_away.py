@@ -8,10 +8,10 @@ from scipy.special import ellipe, ellipk
 
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, collapsed_cells
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.statics import static_equilibrium
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 

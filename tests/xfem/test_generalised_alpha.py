@@ -7,16 +7,12 @@ import pytest
 from cut_bodies import DENSITY, cut_body, cut_square, material
 from time_schemes import SCHEMES
 
-from verify.xfem.dynamics import (
-    DynamicBody,
-    GeneralisedAlpha,
-    MovingSupports,
-    RayleighDamping,
-    Trapezoidal,
-    acceleration_of,
-)
-from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.body import DynamicBody, MovingSupports, RayleighDamping
+from verify.xfem.energy_balance import run
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import acceleration_of
+from verify.xfem.generalised_alpha import GeneralisedAlpha
+from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.structured_meshes import rectangle_mesh

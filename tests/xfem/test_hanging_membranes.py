@@ -6,10 +6,11 @@ from scipy.optimize import brentq
 
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.statics import NotInEquilibriumError, static_equilibrium
+from verify.xfem.static_newton import NotInEquilibriumError
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 

@@ -5,25 +5,17 @@ import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_body, cut_cube, cut_square, material, rotation
 from time_schemes import SCHEMES
 
+from verify.xfem.body import DynamicBody, MovingSupports, RayleighDamping, StepFailedError
 from verify.xfem.critical_step import critical_step
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    DynamicBody,
-    EnergyMomentum,
-    ForwardEuler,
-    GeneralisedAlpha,
-    ImplicitEuler,
-    MovingSupports,
-    RayleighDamping,
-    RealTimeEuler,
-    StepFailedError,
-    SymplecticEuler,
-    Trapezoidal,
-)
-from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.energy_balance import run
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
+from verify.xfem.generalised_alpha import GeneralisedAlpha
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 
 

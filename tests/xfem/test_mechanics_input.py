@@ -6,17 +6,13 @@ from cut_bodies import DENSITY, cut_body, cut_membrane, material
 from time_schemes import SCHEMES
 
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    DynamicBody,
-    ImplicitEuler,
-    MotionState,
-    MovingSupports,
-    inherit_state,
-)
-from verify.xfem.dynamics.energy_ledger import EnergyLedger, run
+from verify.xfem.body import DynamicBody, MotionState, MovingSupports
 from verify.xfem.elasticity import Material
+from verify.xfem.energy_balance import BalanceRecorder, run
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences
+from verify.xfem.implicit import ImplicitEuler
+from verify.xfem.inherit import inherit_state
 from verify.xfem.internal_force import InternalForce, collapsed_cells
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.supports import Supports
@@ -131,7 +127,7 @@ def test_accounts_and_inheritance_refuse_what_is_not_a_step_or_a_state():
     state, scheme = body.rest(), CentralDifferences(body, 1e-3)
     with pytest.raises(XfemError, match="-1 steps"):
         run(scheme, body, state, -1)
-    ledger = EnergyLedger(body, state)
+    ledger = BalanceRecorder(body, state)
     forces = scheme.step(state)
     ledger.record(state, forces)
     with pytest.raises(XfemError, match="no time has passed"):

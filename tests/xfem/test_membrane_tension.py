@@ -5,13 +5,14 @@ import pytest
 from cut_bodies import rotation
 
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import DynamicBody, RealTimeEuler
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

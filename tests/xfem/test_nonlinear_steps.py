@@ -6,9 +6,10 @@ from cut_bodies import DENSITY, isotropic, material, rotation
 from swings import aggregated, cube, let_go, plate, uniform
 
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.body import DynamicBody, StepFailedError
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
-from verify.xfem.dynamics import CentralDifferences, DynamicBody, StepFailedError
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh

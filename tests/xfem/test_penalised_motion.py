@@ -6,24 +6,20 @@ from cut_bodies import DENSITY, GRAVITY, cut_body, cut_membrane, material, rotat
 from swings import let_go, rest_step, stretched
 
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.body import DynamicBody
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    DynamicBody,
-    EnergyMomentum,
-    ImplicitEuler,
-    RealTimeEuler,
-    SymplecticEuler,
-    Trapezoidal,
-    treat_moving_body,
-)
-from verify.xfem.dynamics.energy_ledger import run
+from verify.xfem.energy_balance import run
+from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences, SymplecticEuler
 from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import inverted_cells
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

@@ -8,22 +8,20 @@ from cut_bodies import DENSITY, cut_membrane, isotropic
 from turned_bodies import random_mesh, turn, turned_body, turned_sheet
 
 from verify.accelerated import FAST
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import (
-    DynamicBody,
-    EnergyMomentum,
-    GeneralisedAlpha,
-    ImplicitEuler,
-    RealTimeEuler,
-    Trapezoidal,
-)
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import SingularStiffnessError
+from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN
 from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.statics import solve_static, static_equilibrium
+from verify.xfem.real_time import RealTimeEuler
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh

@@ -8,13 +8,11 @@ import pytest
 from cut_bodies import DENSITY, material
 from swings import aggregated, cube, let_go, plate, stretched
 
+from verify.xfem.body import DynamicBody
 from verify.xfem.critical_step import element_critical_steps
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import (
-    DynamicBody,
-    EnergyMomentum,
-    ImplicitEuler,
-)
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.implicit import ImplicitEuler
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.structured_meshes import box_mesh

@@ -56,7 +56,7 @@ def test_conjugate_gradients_need_no_more_iterations_with_slivers(dim):
         stiffness = InternalForce(virtual, isotropic(1e4, 0.3, "solid"), "linear")
         blocks = stiffness.stiffness(pattern)
         supports = clamped(virtual)
-        constrain(pattern.starts, pattern.columns, supports.fixed, blocks)
+        constrain(pattern, supports.fixed, blocks)
         solver = ConjugateGradients(pattern, dim, tolerance=1e-8)
         solver.factorize(blocks)
         load = body_force(virtual, np.full(dim, -1.0))

@@ -7,18 +7,15 @@ from cut_bodies import DENSITY, cut_membrane, material
 from verify.accelerated import FAST, solver_by_cost
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.solver_by_cost import SolverByCost
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.dynamics import (
-    DynamicBody,
-    EnergyMomentum,
-    GeneralisedAlpha,
-    ImplicitEuler,
-    RealTimeEuler,
-    Trapezoidal,
-)
+from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.errors import NotConvergedError
+from verify.xfem.generalised_alpha import GeneralisedAlpha
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -136,7 +133,7 @@ def test_small_bodies_are_always_factorised():
 
 
 def test_the_matrix_of_linear_motion_is_factorised_once_for_a_step_and_damping(monkeypatch):
-    from verify.xfem.dynamics import RayleighDamping
+    from verify.xfem.body import RayleighDamping
 
     body = _body((4, 4), kinematics="linear")
     counted = []

@@ -4,22 +4,21 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, material
 
-from verify.xfem.dynamics import (
-    CentralDifferences,
+from verify.xfem.body import (
     DynamicBody,
-    EnergyMomentum,
-    ImplicitEuler,
     MotionState,
     MovingSupports,
     RayleighDamping,
-    RealTimeEuler,
     StepFailedError,
-    Trapezoidal,
 )
+from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 
 SCHEMES = [CentralDifferences, RealTimeEuler, ImplicitEuler, Trapezoidal, EnergyMomentum]

@@ -4,22 +4,18 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, material, rotation
 
+from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.cuts import Plane, PolygonPatch, Polyline
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    DynamicBody,
-    EnergyMomentum,
-    MotionState,
-    RealTimeEuler,
-    Trapezoidal,
-    ancestors,
-    inherit_state,
-)
-from verify.xfem.dynamics.energy_ledger import EnergyLedger
+from verify.xfem.energy_balance import BalanceRecorder
+from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import CentralDifferences
+from verify.xfem.implicit import Trapezoidal
+from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
@@ -59,7 +55,7 @@ def test_energy_and_momenta_are_continuous_when_a_moving_body_is_cut(history, ma
         after = inherit_state(old, new, state)
         rows = []
         for v, s in ((old, state), (new, after)):
-            account = EnergyLedger(DynamicBody(InternalForce(v, material(dim)), mass(v, 1e3)), s)
+            account = BalanceRecorder(DynamicBody(InternalForce(v, material(dim)), mass(v, 1e3)), s)
             ledger = account.close()
             rows.append(
                 np.concatenate(

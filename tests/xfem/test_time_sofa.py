@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from verify.xfem.dynamics import DynamicBody, RealTimeEuler
+from verify.xfem.body import DynamicBody
 from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
 

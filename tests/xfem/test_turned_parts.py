@@ -5,10 +5,12 @@ import pytest
 from cut_bodies import cut_cube, isotropic, rotation
 from turned_bodies import YOUNG, random_mesh, turn, turned_body, turned_sheet
 
+from verify.xfem import equilibrium
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.statics import NotInEquilibriumError, load_path, static_equilibrium
-from verify.xfem.statics.rigid_motion import RigidMotions, nearest_rotation, part_of_rotation
+from verify.xfem.rigid_motion import RigidMotions, nearest_rotation, part_of_rotation
+from verify.xfem.static_newton import NotInEquilibriumError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.virtual import cut_mesh
 
@@ -85,7 +87,7 @@ def test_a_false_equilibrium_is_refused_with_both_energies_where_no_other_path_i
     monkeypatch,
 ) -> None:
     without_rigid_motions(monkeypatch)
-    monkeypatch.setattr(load_path, "_HALVINGS", 0)
+    monkeypatch.setattr(equilibrium, "_HALVINGS", 0)
     body = turned_body(0, 2, 7)
     with pytest.raises(NotInEquilibriumError, match=r"stores 362\.\d+ J, but .* account for"):
         static_equilibrium(body.force, body.fixed, turn(body, 255))

@@ -1,15 +1,10 @@
 """All time integration schemes of the compact solver, for claims that hold for each."""
 
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    EnergyMomentum,
-    ForwardEuler,
-    GeneralisedAlpha,
-    ImplicitEuler,
-    RealTimeEuler,
-    SymplecticEuler,
-    Trapezoidal,
-)
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
+from verify.xfem.generalised_alpha import GeneralisedAlpha
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
+from verify.xfem.real_time import RealTimeEuler
 
 SCHEMES = [
     CentralDifferences,

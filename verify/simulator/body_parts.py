@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from verify.accelerated import FAST
 from verify.simulator.grips import Grips
 from verify.simulator.stage import Stage
-from verify.xfem.dynamics import DynamicBody
+from verify.xfem.body import DynamicBody
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.virtual import VirtualMesh

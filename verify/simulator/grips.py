@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from verify.simulator.stage import Hold, Hook
-from verify.xfem.dynamics import MovingSupports
+from verify.xfem.body import MovingSupports
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.virtual import VirtualMesh
 

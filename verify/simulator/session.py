@@ -18,9 +18,10 @@ from verify.simulator.staged_cut import MOST, Followed, Pieces, StagedCut
 from verify.simulator.step_record import PHASES, StepRecord
 from verify.simulator.surfaces import Picture, Surfaces
 from verify.simulator.touched_memory import touch_memory
+from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import ToolPath
-from verify.xfem.dynamics import DynamicBody, RealTimeEuler
-from verify.xfem.dynamics.energy_ledger import EnergyLedger
+from verify.xfem.energy_balance import BalanceRecorder
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Session"]
@@ -97,7 +98,7 @@ class Session:
         self.virtual: VirtualMesh
         self._assemble()
         self.state = self.body.rest()
-        self._ledger = EnergyLedger(self.body, self.state)
+        self._ledger = BalanceRecorder(self.body, self.state)
 
     @property
     def time(self) -> float:
@@ -223,7 +224,7 @@ class Session:
     def _begin_account(self) -> None:
         if self._account:
             self._spent = self._spent_so_far()
-            self._ledger = EnergyLedger(self.body, self.state)
+            self._ledger = BalanceRecorder(self.body, self.state)
 
     def _inherit(self, increment: Increment) -> None:
         self.state.displacement = increment.inherit(self.state.displacement)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.body import RayleighDamping
 from verify.xfem.cuts import ToolPath
-from verify.xfem.dynamics import RayleighDamping
 from verify.xfem.elasticity import Material
 from verify.xfem.mesh import SimplexMesh
 

@@ -14,8 +14,8 @@ from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.stage import Hold, Hook, Stage
 from verify.solvers.body_of_scene import background_mesh
+from verify.xfem.body import RayleighDamping
 from verify.xfem.cuts import ToolPath
-from verify.xfem.dynamics import RayleighDamping
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh

@@ -17,7 +17,7 @@ from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.grips import Grips
 from verify.simulator.surfaces import Surfaces
-from verify.xfem.dynamics import DynamicBody
+from verify.xfem.body import DynamicBody
 from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]

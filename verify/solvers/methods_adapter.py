@@ -28,10 +28,11 @@ from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.solvers.xfem_system import system_of
 from verify.system import System
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.statics import solve_static, static_equilibrium
+from verify.xfem.statics import solve_static
 from verify.xfem.supports import check_bodies
 
 __all__ = ["MassSpringSolver", "MethodSolver"]

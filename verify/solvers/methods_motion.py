@@ -12,8 +12,9 @@ from verify.methods.opening import Seams, seams_of, welded
 from verify.solvers.xfem_answer import Answer
 from verify.solvers.xfem_motion import Mover
 from verify.solvers.xfem_openings import opening_times, seam_times
-from verify.xfem.dynamics import DynamicBody, MotionState, ancestors
+from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.errors import XfemError
+from verify.xfem.inherit import ancestors
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.virtual import VirtualMesh
 

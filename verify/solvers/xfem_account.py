@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics import DynamicBody, MotionState
-from verify.xfem.dynamics.energy_ledger import EnergyLedger, Ledger
+from verify.xfem.body import DynamicBody, MotionState
+from verify.xfem.energy_balance import BalanceRecorder, EnergyBalance
 
 __all__ = ["Account"]
 
@@ -34,7 +34,7 @@ class Account:
         self._done = dict.fromkeys(_DONE.values(), 0.0)
         self._removed = dict.fromkeys(_REMOVED if removal else (), 0.0)
 
-    def enter(self, ledger: Ledger, instants: list[int]) -> None:
+    def enter(self, ledger: EnergyBalance, instants: list[int]) -> None:
         """Enter the rows of a stage that are asked for, and keep what it has done in all."""
         for k in instants:
             row = {name: float(getattr(ledger, name)[k]) for name in _STATE}
@@ -66,7 +66,7 @@ class Account:
         What is removed takes its energy and its mass with it.
         """
         before, after = (
-            float(EnergyLedger(*of).close().mechanical[0])
+            float(BalanceRecorder(*of).close().mechanical[0])
             for of in ((body, state), (further, inherited))
         )
         if self._removed:

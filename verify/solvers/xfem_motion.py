@@ -21,26 +21,20 @@ from verify.solvers.xfem_loads import forces_of, is_moving, nodal_forces
 from verify.solvers.xfem_openings import opening_times, stops_of
 from verify.solvers.xfem_steps import MASSES, integrator_of, largest_step
 from verify.solvers.xfem_supports import initial_path, motion_of_supports
-from verify.xfem.dynamics import (
-    DynamicBody,
-    Integrator,
-    MotionState,
-    RayleighDamping,
-    acceleration_of,
-    ancestors,
-    inherit_state,
-    treat_moving_body,
-)
-from verify.xfem.dynamics.energy_ledger import EnergyLedger
-from verify.xfem.dynamics.newton import NewtonIntegrator
+from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
+from verify.xfem.energy_balance import BalanceRecorder
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
+from verify.xfem.explicit import acceleration_of
 from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.implicit import NewtonIntegrator
+from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import Kernels
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.slivers import SliverReport, treat_slivers
-from verify.xfem.statics import static_equilibrium
 from verify.xfem.supports import check_bodies
 from verify.xfem.virtual import VirtualMesh, cut_mesh
 
@@ -314,7 +308,7 @@ class Mover:
             choice.step_factor,
             scene.analysis.time_step,
         )
-        ledger = EnergyLedger(body, state)
+        ledger = BalanceRecorder(body, state)
         integrators: dict[float, Integrator] = {}
         outputs, instants, taken = [], [], 0
         for a, b in pairwise([state.time, *self.stops[self.stops > state.time + self.due]]):

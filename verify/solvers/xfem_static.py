@@ -15,10 +15,11 @@ from verify.solvers.xfem_answer import penalised
 from verify.solvers.xfem_bases import solve_in_basis
 from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_supports import path_of_supports, supports_of
+from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.kernels import Kernels
-from verify.xfem.statics import StaticEquilibrium, solve_static, static_equilibrium
+from verify.xfem.statics import solve_static
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 

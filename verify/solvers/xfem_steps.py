@@ -8,19 +8,13 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from verify.errors import InputError
+from verify.xfem.body import DynamicBody, Integrator
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
-from verify.xfem.dynamics import (
-    CentralDifferences,
-    DynamicBody,
-    EnergyMomentum,
-    ForwardEuler,
-    GeneralisedAlpha,
-    ImplicitEuler,
-    Integrator,
-    SymplecticEuler,
-    Trapezoidal,
-)
 from verify.xfem.elasticity import Material
+from verify.xfem.energy_momentum import EnergyMomentum
+from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
+from verify.xfem.generalised_alpha import GeneralisedAlpha
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.virtual import VirtualMesh

@@ -12,7 +12,7 @@ from verify.scene.history import factor_at, first_factor
 from verify.scene.parts import copies_on_part, lie_on_part
 from verify.scene.prescribed import PrescribedMotion
 from verify.solvers.xfem_boundary import boundary_nodes, facet_parts, own_corners
-from verify.xfem.dynamics import MovingSupports
+from verify.xfem.body import MovingSupports
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import VirtualMesh
 

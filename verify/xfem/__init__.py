@@ -1,8 +1,8 @@
 """Compact XFEM solver for cutting soft tissue: arrays in, arrays out.
 
 It knows no scene, no file format and no other solver, and needs numpy, scipy and numba only.
-Its parts are layers (`make check` tests that none imports one above it). The method, about 4800
-lines of code, in an order of reading:
+Its parts are layers (`make check` tests that none imports one above it). In an order of
+reading:
 
 `mesh`, `flat_cuts`, `faceted_cuts`, `tool_path`; `cuts` names them all
     simplices; what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
@@ -13,27 +13,21 @@ lines of code, in an order of reading:
     the result: standard finite elements with weights
 `mass`
     consistent, row sum, weighted diagonal, side-wise (`mass_shifted`: as in the thesis)
-`elasticity`, `stiffness`, `loads`, `supports`
-    mechanics of small strains; `bases`: the other bases of the same space;
-    `critical_step` of explicit schemes; `subdivision`: a conforming mesh of the cut body
-`corotation`
-    one rotation per piece: `internal_force`, `corotational_kernels`, `polar_kernels`
+`elasticity`, `loads`, `supports`
+    material, load vectors, prescribed displacements; `bases`: the other bases of the same
+    space; `critical_step` of explicit schemes; `subdivision`: a conforming mesh of the cut body
+`polar`, `element`, `assembly`, `internal_force`
+    nearest rotations; force and tangents of an element, linear elasticity being R = I; block
+    pattern and supports; force, energy and stiffness of a body
 `contacts`, `absorption`, `aggregation`, `slivers`, `ghost_penalty`, `penalised_force`
     policies for parts with a small share of their element; ghost penalty
-`statics`, `dynamics`
-    equilibrium, linear and at finite rotation; time integration, its energy ledger, inheritance of
-    a state
-
-The rest, 6900 lines, makes that fast, or carries a tool and surfaces:
-
-`arrays`, `lanes`, `sparse`
-    numbers for rows, vectors as wide as the machine's; matrices of nodal blocks: pattern, minimum
-    degree, fronts, Cholesky, conjugate gradients
-`corotation.linearisation` and what it imports
-    force and stiffness of tetrahedra in one sweep, eight at a time
-`collision`, `cutting`, `mapping`
-    trees of boxes and tools; semi-progressive cutting of a body that grows; surfaces that move with
-    it and are divided with it
+`linear_solvers`, `kernels`
+    SciPy behind one protocol; the operations that `verify.accelerated` replaces
+`statics`, `static_newton`, `rigid_motion`, `equilibrium`
+    linear statics; Newton's method on the potential energy and load steps at finite rotation
+`body`, `energy_balance`, `explicit`, `implicit`, `generalised_alpha`, `real_time`, `inherit`
+    a body in motion and its schemes; `averaged_stress`, `energy_momentum`: the conserving one;
+    `moving_body`: slivers in motion
 
 Example
 -------

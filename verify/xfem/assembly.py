@@ -6,7 +6,6 @@ all that it follows: the elements around such corners add to blocks of their own
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -14,7 +13,14 @@ from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
 from verify.xfem.virtual import Aggregation, VirtualMesh
 
-__all__ = ["body_pattern", "constrain", "find_places", "pattern_places"]
+__all__ = [
+    "add_mass",
+    "body_pattern",
+    "constrain",
+    "find_places",
+    "held_entries",
+    "pattern_places",
+]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -29,7 +35,7 @@ def body_pattern(virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockP
     ----------
     virtual : VirtualMesh
     couplings : (k, 2) int array, optional
-        Further pairs of unknown nodes that are to be coupled.
+        Further pairs of dof nodes that are to be coupled.
     """
     extra = np.empty((0, 2), dtype=np.int64) if couplings is None else couplings
     if virtual.aggregation is None:
@@ -58,7 +64,7 @@ def body_pattern(virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockP
 
 
 def _followed(aggregation: Aggregation, cells: _Ints) -> tuple[_Ints, _Floats]:
-    """Unknown nodes (q, c, m) and weights of the corners of some pieces, padded with weight 0."""
+    """Dof nodes (q, c, m) and weights of the corners of some pieces, padded with weight 0."""
     starts = aggregation.extension.indptr
     count = np.diff(starts)[cells]
     most = count.max(initial=1)
@@ -111,37 +117,42 @@ def find_places(
     return at, keys[at] == wanted
 
 
-@njit(cache=True)
-def constrain(starts, columns, fixed, blocks):
+def add_mass(blocks: _Floats, places: _Ints, values: _Floats, scale: float) -> None:
+    """Add `scale` times the mass to the diagonals of its nodal blocks."""
+    for component in range(blocks.shape[1]):
+        blocks[places, component, component] += scale * values
+
+
+def held_entries(pattern: BlockPattern, fixed: NDArray[np.bool_]) -> _Ints:
+    """Entries of the blocks, flat, in rows and columns of fixed components, but the diagonal's."""
+    rows = np.repeat(np.arange(len(fixed)), np.diff(pattern.starts))
+    some = fixed.any(axis=1)
+    at = np.flatnonzero(some[rows] | some[pattern.columns])
+    held = fixed[rows[at]][:, :, None] | fixed[pattern.columns[at]][:, None, :]
+    held[rows[at] == pattern.columns[at]] &= ~np.eye(fixed.shape[1], dtype=bool)
+    block, entry = np.nonzero(held.reshape(len(at), fixed.shape[1] ** 2))
+    return at[block] * fixed.shape[1] ** 2 + entry
+
+
+def constrain(
+    pattern: BlockPattern, fixed: NDArray[np.bool_], blocks: _Floats, held: _Ints | None = None
+) -> None:
     """Decouple the fixed components: zero their rows and columns but for the diagonal.
 
     Parameters
     ----------
-    starts, columns : int arrays
-        Pattern of the blocks.
+    pattern : BlockPattern
     fixed : (N, d) bool array
     blocks : (B, d, d) float array
         Changed in place; the diagonal entries stay, so that scaling stays meaningful, but for
         those that are not positive (zero or its round-off across a flat membrane, less than that
         across a compressed one), which become one.
+    held : (k,) int array, optional
+        From `held_entries`, if that is known.
     """
-    dim = fixed.shape[1]
-    constrained = np.zeros(len(fixed), dtype=np.bool_)
-    for node in range(len(fixed)):
-        for k in range(dim):
-            constrained[node] |= fixed[node, k]
-    for row in range(len(starts) - 1):
-        for at in range(starts[row], starts[row + 1]):
-            column = columns[at]
-            if not (constrained[row] or constrained[column]):
-                continue
-            least = 0.0
-            if row == column:
-                for k in range(dim):
-                    least = max(least, _ROUND_OFF * blocks[at, k, k])
-            for k in range(dim):
-                for l in range(dim):
-                    if (fixed[row, k] or fixed[column, l]) and not (row == column and k == l):
-                        blocks[at, k, l] = 0.0
-                    elif row == column and k == l and fixed[row, k] and blocks[at, k, k] <= least:
-                        blocks[at, k, k] = 1.0
+    blocks.reshape(-1)[held_entries(pattern, fixed) if held is None else held] = 0.0
+    nodes, axes = np.nonzero(fixed)
+    own = np.einsum("nkk->nk", blocks[pattern.diagonal[nodes]])
+    least = _ROUND_OFF * own.max(axis=1, initial=0.0)
+    none = own[np.arange(len(nodes)), axes] <= least
+    blocks[pattern.diagonal[nodes[none]], axes[none], axes[none]] = 1.0

@@ -60,7 +60,7 @@ def critical_step(
         raise XfemError("stiffness with an entry that is not finite")
     nodes = mass.matrix.shape[0]
     if K.shape[0] == 0 or K.shape[0] % nodes or K.shape[0] != K.shape[1]:
-        raise XfemError(f"stiffness of shape {K.shape} with a mass of {nodes} unknown nodes")
+        raise XfemError(f"stiffness of shape {K.shape} with a mass of {nodes} dof nodes")
     block = np.eye(K.shape[0] // nodes)
     free = np.arange(K.shape[0])
     if fixed is not None:
@@ -125,7 +125,7 @@ def element_critical_steps(
 
         s = RᵀδF − δFᵀR: the linear stiffness, turned, and a stiffness against rotation that
         grows with the stretch. Its largest value is added here, so that the bound holds for the
-        exact stiffness at any rotation, as long as no stretch exceeds 1 + strain.
+        consistent tangent at any rotation, as long as no stretch exceeds 1 + strain.
 
     Raises
     ------

@@ -365,6 +365,7 @@ class InternalForce:
         XfemError
             If an array is not of the body, or not of the pattern.
         """
+        rotational = rotational if self.is_corotational else 0.0
         if self.has_one_pass:
             self._check(displacement=displacement, velocity=velocity, force=force)
             self._check_blocks(pattern, blocks)

@@ -1,4 +1,4 @@
-"""Prescribed displacements on unknown nodes, each on its own side of the cuts."""
+"""Prescribed displacements on dof nodes, each on its own side of the cuts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class UnsupportedBodyError(XfemError):
 
 @dataclass(frozen=True)
 class Supports:
-    """Fixed components of the unknown nodes.
+    """Fixed components of the dof nodes.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Supports:
         ----------
         virtual : VirtualMesh
         nodes : (k,) array_like of int, or (n,) of bool
-            Nodes of the *uncut* mesh; every unknown node there is prescribed. None may follow a
+            Nodes of the *uncut* mesh; every dof node there is prescribed. None may follow a
             root cell (aggregation): its value would be what the root says.
         values : float, (d,) array_like, or callable
             A function is called with the positions (k, d) and the sides (k, cuts) of the unknown

@@ -17,18 +17,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics.body import DynamicBody, MotionState
-from verify.xfem.dynamics.integrator import Integrator, StepForces
+from verify.xfem.body import DynamicBody, Integrator, MotionState, StepForces
 from verify.xfem.errors import XfemError
 from verify.xfem.penalised_force import PenalisedForce
 
-__all__ = ["EnergyLedger", "Ledger", "run"]
+__all__ = ["BalanceRecorder", "EnergyBalance", "run"]
 
 _Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Ledger:
+class EnergyBalance:
     """Energies and momenta at the instants 0…n, all (n + 1,) or (n + 1, components).
 
     Attributes
@@ -81,14 +80,14 @@ class Ledger:
         return float(np.abs(self.mechanical - self.mechanical[0]).max() / scale)
 
 
-class EnergyLedger:
-    """Keeps the account of a body in motion.
+class BalanceRecorder:
+    """Record of the energy balance of a body in motion.
 
     Parameters
     ----------
     body : DynamicBody
     state : MotionState
-        Where the account starts.
+        Where the record starts.
     """
 
     def __init__(self, body: DynamicBody, state: MotionState) -> None:
@@ -147,28 +146,28 @@ class EnergyLedger:
             self._strain,
             -np.sum(body.weight * state.displacement),
         ]
-        turning = _cross(position, momenta)
-        vectors = (momenta.sum(axis=0), turning, self._impulse)
+        angular = _cross(position, momenta)
+        vectors = (momenta.sum(axis=0), angular, self._impulse)
         return np.concatenate([energies, self._work, *vectors, [self._penalty]])
 
-    def close(self) -> Ledger:
-        """Return the account so far."""
+    def close(self) -> EnergyBalance:
+        """Return the balance so far."""
         table = np.array(self._rows).T
         space = self.body.shape[1]
         turns = 1 if space == 2 else 3
-        momentum, turning, impulse = np.split(table[9:-1].T, [space, space + turns], axis=1)
-        return Ledger(*[*table[:9], momentum, turning, impulse, table[-1]])
+        momentum, angular, impulse = np.split(table[9:-1].T, [space, space + turns], axis=1)
+        return EnergyBalance(*[*table[:9], momentum, angular, impulse, table[-1]])
 
 
 def _cross(position: _Floats, momenta: _Floats) -> _Floats:
     if position.shape[1] == 2:
-        turning = position[:, 0] * momenta[:, 1] - position[:, 1] * momenta[:, 0]
-        return np.array([turning.sum()])
+        angular = position[:, 0] * momenta[:, 1] - position[:, 1] * momenta[:, 0]
+        return np.array([angular.sum()])
     return np.cross(position, momenta).sum(axis=0)
 
 
-def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: int) -> Ledger:
-    """Take a number of steps and return their account; the state is changed in place.
+def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: int) -> EnergyBalance:
+    """Take a number of steps and return their energy balance; the state is changed in place.
 
     Raises
     ------
@@ -179,8 +178,8 @@ def run(integrator: Integrator, body: DynamicBody, state: MotionState, steps: in
     """
     if steps < 0:
         raise XfemError(f"{steps} steps; expected none or more")
-    ledger = EnergyLedger(body, state)
+    recorder = BalanceRecorder(body, state)
     for _ in range(steps):
         forces = integrator.step(state)
-        ledger.record(state, forces)
-    return ledger.close()
+        recorder.record(state, forces)
+    return recorder.close()

@@ -1,20 +1,41 @@
-"""Body in motion: elasticity, mass, damping, supports and loads of a cut body, and its state."""
+"""Body in motion: elasticity, mass, damping, supports and loads of a cut body, and its state.
+
+Each time integration advances M (v₁ − v₀) = h (f_ext − f_int − f_visc + reactions) with forces of
+its own choice, or balances them with an inertia of its own. A step returns those forces, so that
+the energy balance closes for any scheme without knowing which one it was.
+"""
 
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_floats
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
 from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.supports import Supports
 
-__all__ = ["DynamicBody", "MotionState", "MovingSupports", "RayleighDamping"]
+__all__ = [
+    "DynamicBody",
+    "FreeMass",
+    "Integrator",
+    "MotionState",
+    "MovingSupports",
+    "RayleighDamping",
+    "StepFailedError",
+    "StepForces",
+    "check_state",
+    "check_step",
+    "couples_supports",
+]
 
 _Floats = NDArray[np.float64]
 
@@ -26,7 +47,7 @@ class MotionState:
     Attributes
     ----------
     displacement, velocity : (N, d) float array
-        Of the unknown nodes, in m and m/s.
+        Of the dof nodes, in m and m/s.
     time : float
         In seconds.
     """
@@ -42,7 +63,7 @@ class MotionState:
 
 @dataclass(frozen=True)
 class RayleighDamping:
-    """C = α M + β K, K with the rotations of the moment, so that turning is not damped by β.
+    """C = α M + β K, K with the rotations of the moment, so that β does not damp rotations.
 
     Attributes
     ----------
@@ -137,7 +158,7 @@ class DynamicBody:
         self.shape: tuple[int, int] = (virtual.node_count, virtual.mesh.space)
         if len(self.mass.weights) != self.shape[0]:
             raise XfemError(
-                f"mass of {len(self.mass.weights)} unknown nodes; the body has {self.shape[0]}"
+                f"mass of {len(self.mass.weights)} dof nodes; the body has {self.shape[0]}"
             )
         if self.weight is None:
             self.weight = np.zeros(self.shape)
@@ -246,3 +267,106 @@ class DynamicBody:
         if self.damping.stiffness > 0.0:
             self.force.add_tangent_product(velocity, self.damping.stiffness, force)
         return force
+
+
+class StepFailedError(RuntimeError):
+    """A step whose equation was not solved, or whose result is not finite."""
+
+
+@dataclass(frozen=True)
+class StepForces:
+    """Forces (N, d) that a step has put into the balance of momentum, in newtons.
+
+    Attributes
+    ----------
+    internal, external, viscous : (N, d) float array
+    inertia : (N, d) float array, optional
+        What the step has balanced with them, where that is not M (v₁ − v₀)/h.
+    """
+
+    internal: _Floats
+    external: _Floats
+    viscous: _Floats
+    inertia: _Floats | None = None
+
+
+class Integrator(Protocol):
+    """A time integration scheme for one body and one step size."""
+
+    step_size: float
+
+    def step(self, state: MotionState) -> StepForces:
+        """Advance the state in place by one step.
+
+        Raises
+        ------
+        StepFailedError
+            If the step's equation was not solved or the result is not finite; the state is then
+            left as it was.
+        """
+        ...
+
+
+def check_step(step_size: float) -> float:
+    """Return the step size, if it is one.
+
+    Raises
+    ------
+    XfemError
+        If it is not positive and finite.
+    """
+    if not (np.isfinite(step_size) and step_size > 0.0):
+        raise XfemError(f"time step {step_size!r} s; expected positive and finite")
+    return float(step_size)
+
+
+def check_state(state: MotionState, shape: tuple[int, int]) -> None:
+    """Check that a state fits a body, before a step is spoilt by broadcasting.
+
+    Raises
+    ------
+    XfemError
+        If it does not.
+    """
+    for name, value in (("displacement", state.displacement), ("velocity", state.velocity)):
+        check_floats(name, value, shape)
+    if not np.isfinite(state.time):
+        raise XfemError(f"time {state.time!r} s of a state; expected finite")
+
+
+class FreeMass:
+    """The mass of a body without rows and columns of held components.
+
+    Parameters
+    ----------
+    body : DynamicBody
+    """
+
+    def __init__(self, body: DynamicBody) -> None:
+        self._body = body
+        self._solvers: list[SuperLU] | None = None
+        if body.mass.diagonal is None and body.fixed.any():
+            self._solvers = [_supported(body, k) for k in range(body.shape[1])]
+
+    def solve(self, forces: _Floats) -> _Floats:
+        """Accelerations (N, d) of forces (N, d), zero where held; writes on the forces."""
+        forces[self._body.fixed] = 0.0
+        if self._solvers is None:
+            return self._body.mass.solve(forces)
+        columns = [solver.solve(forces[:, k]) for k, solver in enumerate(self._solvers)]
+        return np.stack(columns, axis=1)
+
+
+def couples_supports(body: DynamicBody) -> bool:
+    """Whether an acceleration of held components moves free ones through the mass."""
+    if body.mass.diagonal is not None:
+        return False
+    rows, columns, _ = body.mass.entries
+    return bool((body.fixed[rows] & ~body.fixed[columns]).any())
+
+
+def _supported(body: DynamicBody, component: int) -> SuperLU:
+    """Factor of the mass of the free nodes in one component."""
+    free = diags_array((~body.fixed[:, component]).astype(float))
+    held = diags_array(body.fixed[:, component].astype(float))
+    return splu(csc_array(free @ body.mass.matrix @ free + held))

@@ -1,16 +1,16 @@
 """Implicit Euler with one linearisation per step: the scheme of real-time simulation.
 
-(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v), K with frozen rotations, and for membranes
-with what their tension resists across their plane: symmetric positive definite, so that the step
-always has a solution. Nothing is allocated per step with the linear solvers of this package.
+(M + hC + h²K) Δv = h (f_ext − f_int − C v − h K v), K the rotation-fixed tangent, of membranes with
+the geometric stiffness: symmetric positive definite, so that the step always has a solution.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics.body import DynamicBody, MotionState
-from verify.xfem.dynamics.integrator import (
+from verify.xfem.assembly import add_mass, constrain, held_entries
+from verify.xfem.body import (
+    DynamicBody,
+    MotionState,
     StepFailedError,
     StepForces,
     check_state,
@@ -55,7 +55,7 @@ class RealTimeEuler:
         self._changes = [np.zeros(body.shape) for _ in range(3)]  # in the last ones, the last first
         self._supported = np.flatnonzero(body.fixed.any(axis=1))
         pattern = body.pattern
-        self._held = _held_entries(pattern.starts, pattern.columns, pattern.diagonal, body.fixed)
+        self._held = held_entries(pattern, body.fixed)
         row = np.repeat(np.arange(len(body.fixed)), np.diff(pattern.starts))
         self._held_above = self._held[(pattern.columns >= row)[self._held // space**2]]
         self._driven = np.zeros(body.shape)
@@ -95,11 +95,13 @@ class RealTimeEuler:
             raise StepFailedError(
                 f"RealTimeEuler at t = {state.time:.6g} s: {failure}"
             ) from failure
-        if not _advance(self._change, self.step_size, state.velocity, state.displacement):
+        if not np.isfinite(self._change).all():
             raise StepFailedError(
                 f"RealTimeEuler: not finite after t = {state.time:.6g} s with a step of "
                 f"{self.step_size:.6g} s"
             )
+        state.velocity += self._change
+        state.displacement += self.step_size * state.velocity
         state.time += self.step_size
 
     def _solve(self) -> None:
@@ -110,7 +112,7 @@ class RealTimeEuler:
         as it was (measured with the bodies of the benchmarks).
         """
         last, before, first = self._changes
-        _extrapolate(last, before, first, self._change)
+        self._change[:] = 3.0 * (last - before) + first
         self.solver.solve(self.load, self._change)
         self._changes.insert(0, self._changes.pop())
         self._changes[0][:] = self._change
@@ -129,7 +131,7 @@ class RealTimeEuler:
             at = state.displacement
             body.force.add_geometric_product(at, state.velocity, h, self._internal)
             body.force.add_geometric(body.pattern, at, self.blocks, h * h)
-        _add_mass(self.blocks, self._places, self._values, 1.0 + h * damping.mass)
+        add_mass(self.blocks, self._places, self._values, 1.0 + h * damping.mass)
         np.subtract(body.external(state.time + h), self._internal, out=self.load)
         if damping.mass > 0.0:
             self.load -= damping.mass * body.mass.apply(state.velocity)
@@ -137,101 +139,18 @@ class RealTimeEuler:
 
     def _support(self, state: MotionState) -> None:
         """Let fixed components move as prescribed; what that does to the others goes right."""
-        body = self.body
+        body, nodes = self.body, self._supported
         if isinstance(body.supports, Supports):
             where = body.supports.values
         else:
             where, _ = body.prescribed(state.time + self.step_size)
-        driven = _driven_change(
-            self._supported, body.fixed, where, state.displacement, state.velocity,
-            self.step_size, self._driven,
-        )  # fmt: skip
-        if driven:
-            pattern = body.pattern
-            pattern.symmetric_product(self.blocks, self._driven, self._resisted)
+        change = (where[nodes] - state.displacement[nodes]) / self.step_size - state.velocity[nodes]
+        self._driven[nodes] = np.where(body.fixed[nodes], change, 0.0)
+        if self._driven.any():
+            body.pattern.symmetric_product(self.blocks, self._driven, self._resisted)
             self.load -= self._resisted
-        _hold(
-            body.pattern.diagonal, self._supported, body.fixed,
-            self._held_above if self.solver.reads_half else self._held, self._driven, self.blocks,
-            self.load,
-        )  # fmt: skip
-
-
-@njit(cache=True)
-def _held_entries(starts, columns, diagonal, fixed):
-    """Entries of the blocks, flat, in a row or column of a fixed component, but the diagonal's."""
-    space = fixed.shape[1]
-    found, count = np.empty(len(columns) * space * space, dtype=np.int64), 0
-    some = np.zeros(len(fixed), dtype=np.bool_)
-    for i in range(len(fixed)):
-        for a in range(space):
-            some[i] |= fixed[i, a]
-    for i in range(len(starts) - 1):
-        for k in range(starts[i], starts[i + 1]):
-            if not (some[i] or some[columns[k]]):
-                continue
-            for a in range(space):
-                for b in range(space):
-                    held = fixed[i, a] or fixed[columns[k], b]
-                    if held and not (k == diagonal[i] and a == b):
-                        found[count] = (k * space + a) * space + b
-                        count += 1
-    return found[:count].copy()
-
-
-@njit(cache=True)
-def _driven_change(supported, fixed, where, displacement, velocity, step_size, change):
-    """Write the change of velocity that brings supported nodes to their place; whether any does."""
-    driven = False
-    for i in supported:
-        for k in range(fixed.shape[1]):
-            change[i, k] = 0.0
-            if fixed[i, k]:
-                change[i, k] = (where[i, k] - displacement[i, k]) / step_size - velocity[i, k]
-                driven |= change[i, k] != 0.0
-    return driven
-
-
-@njit(cache=True)
-def _hold(diagonal, supported, fixed, held, change, blocks, load):
-    """Decouple fixed components, and let their change be what it is to be."""
-    flat = blocks.reshape(-1)
-    for at in held:
-        flat[at] = 0.0
-    for i in supported:
-        for k in range(fixed.shape[1]):
-            if fixed[i, k]:
-                if blocks[diagonal[i], k, k] == 0.0:  # a flat membrane
-                    blocks[diagonal[i], k, k] = 1.0
-                load[i, k] = blocks[diagonal[i], k, k] * change[i, k]
-
-
-@njit(cache=True)
-def _extrapolate(last, before, first, guess):
-    """Write what a parabola through three of them (N, d) gives next."""
-    for i in range(guess.shape[0]):
-        for k in range(guess.shape[1]):
-            guess[i, k] = 3.0 * (last[i, k] - before[i, k]) + first[i, k]
-
-
-@njit(cache=True)
-def _add_mass(blocks, places, values, scale):
-    for entry in range(len(values)):
-        for k in range(blocks.shape[1]):
-            blocks[places[entry], k, k] += scale * values[entry]
-
-
-@njit(cache=True)
-def _advance(change, step_size, velocity, displacement):
-    """Apply the change of velocity unless it is not finite; whether it was."""
-    total = 0.0
-    for i in range(change.shape[0]):
-        for k in range(change.shape[1]):
-            total += abs(change[i, k])
-    if not np.isfinite(total):
-        return False
-    for i in range(change.shape[0]):
-        for k in range(change.shape[1]):
-            velocity[i, k] += change[i, k]
-            displacement[i, k] += step_size * velocity[i, k]
-    return True
+        held = self._held_above if self.solver.reads_half else self._held
+        constrain(body.pattern, body.fixed, self.blocks, held)
+        diagonal = np.einsum("nkk->nk", self.blocks[body.pattern.diagonal[nodes]])
+        own = diagonal * self._driven[nodes]
+        self.load[nodes] = np.where(body.fixed[nodes], own, self.load[nodes])

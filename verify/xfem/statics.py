@@ -14,16 +14,17 @@ from verify.xfem.errors import NotConvergedError, XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN, Kernels
-from verify.xfem.linear_solvers import LinearSolver
+from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.supports import Supports, check_bodies
 from verify.xfem.virtual import VirtualMesh
 
-__all__ = ["ITERATE_FROM", "StaticSolution", "solve_static"]
+__all__ = ["StaticSolution", "StaticSolver", "is_large", "solve_static"]
 
 _Floats = NDArray[np.float64]
 
 ITERATE_FROM = 2000  # nodes in space: docs/theory/linear-solvers.md has the measurement
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
+_PHASES = ("analysis", "assembly", "factorisation", "solve")
 _MOST = 2000  # iterations before a factorisation is the quicker way
 
 
@@ -34,7 +35,7 @@ class StaticSolution:
     Attributes
     ----------
     displacement : (N, d) float array
-        At the unknown nodes, in metres.
+        At the dof nodes, in metres.
     strain_energy : float
         ½ uᵀKu, in joules (per metre of thickness in 2D).
     reaction : (N, d) float array
@@ -104,89 +105,108 @@ def solve_static(
             f"load {force.shape} and supports {supports.fixed.shape}; expected finite {shape}"
         )
     check_bodies(virtual, supports)
-    method, limit = _method(solver, virtual, ghost)
-    stiffness = InternalForce(virtual, material, "linear", kernels)
+    if solver not in ("auto", "direct", "iterative"):
+        raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
+    stiffness = _stiffness(virtual, material, ghost, kernels)
     clock = [perf_counter()]
     pattern = ghost.pattern() if ghost else body_pattern(virtual)
-    inverse = _inverse(kernels, method, pattern, supports, limit)
+    iterates = solver == "iterative" or (solver == "auto" and not ghost and is_large(virtual))
+    limit = _MOST if solver == "auto" else 5 * _MOST
+    inverse = StaticSolver(stiffness, pattern, supports.fixed, _ROUNDING, limit if iterates else 0)
     clock.append(perf_counter())
-    blocks, right = _system(stiffness, ghost, pattern, supports, force)
+    blocks = stiffness.stiffness(pattern)
+    right = np.where(supports.fixed, 0.0, force - stiffness.evaluate(supports.values)[0])
+    constrain(pattern, supports.fixed, blocks)
     clock.append(perf_counter())
     inverse.factorize(blocks)
     clock.append(perf_counter())
-    try:
-        displacement = inverse.solve(right)
-    except NotConvergedError:
-        if solver != "auto":
-            raise
-        method = "direct"
-        inverse = _inverse(kernels, method, pattern, supports, limit)
-        inverse.factorize(blocks)
-        displacement = inverse.solve(right)
-    displacement += supports.values
+    displacement = inverse.solve(right, insists=solver == "iterative") + supports.values
     clock.append(perf_counter())
-    phases = ("analysis", "assembly", "factorisation", "solve")
-    timings = dict(zip(phases, np.diff(clock).tolist(), strict=True))
-    return _solution(stiffness, ghost, supports, force, displacement, timings, method)
-
-
-def _method(solver: str, virtual: VirtualMesh, ghost: GhostPenalty | None) -> tuple[str, int]:
-    """Direct or iterative, and how many iterations that may take."""
-    if solver not in ("auto", "direct", "iterative"):
-        raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
-    if solver != "auto":
-        return solver, 5 * _MOST
-    large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
-    return "iterative" if large and ghost is None else "direct", _MOST
-
-
-def _system(
-    stiffness: InternalForce,
-    ghost: GhostPenalty | None,
-    pattern: BlockPattern,
-    supports: Supports,
-    force: _Floats,
-) -> tuple[_Floats, _Floats]:
-    """Blocks of the matrix, and the right-hand side (N, d) for what is added to the supports."""
-    blocks = stiffness.stiffness(pattern)
-    internal, _ = stiffness.evaluate(supports.values)
-    if ghost:
-        ghost.add_stiffness(pattern, blocks)
-        internal += ghost.force(supports.values)[0]
-    constrain(pattern.starts, pattern.columns, supports.fixed, blocks)
-    return blocks, np.where(supports.fixed, 0.0, force - internal)
-
-
-def _inverse(
-    kernels: Kernels, solver: str, pattern: BlockPattern, supports: Supports, limit: int
-) -> LinearSolver:
-    block = supports.fixed.shape[1]
-    if solver == "iterative":
-        return kernels.iterative(pattern, block, _ROUNDING, limit)
-    return kernels.direct(pattern, block, supports.fixed.all(axis=1))
-
-
-def _solution(
-    stiffness: InternalForce,
-    ghost: GhostPenalty | None,
-    supports: Supports,
-    force: _Floats,
-    displacement: _Floats,
-    timings: dict[str, float],
-    solver: str,
-) -> StaticSolution:
-    """Energies, reactions (N) and residual of a displacement (N, d) under forces (N, d)."""
     internal, energy = stiffness.evaluate(displacement)
-    penalty, penalty_energy = ghost.force(displacement) if ghost else (0.0, 0.0)
-    internal += penalty
+    penalty = stiffness.penalty_energy if isinstance(stiffness, PenalisedForce) else 0.0
     unbalanced = internal - force
     scale = max(np.abs(internal).max(), np.abs(force).max(), np.finfo(float).tiny)
     return StaticSolution(
         displacement=displacement,
-        strain_energy=energy,
+        strain_energy=energy - penalty,
         reaction=np.where(supports.fixed, unbalanced, 0.0),
         residual=float(np.abs(unbalanced[~supports.fixed]).max(initial=0.0) / scale),
-        timings=timings,
-        penalty_energy=penalty_energy,
-        solver=solver,
+        timings=dict(zip(_PHASES, np.diff(clock).tolist(), strict=True)),
+        penalty_energy=penalty,
+        solver="direct" if "direct" in inverse.used else "iterative",
     )
+
+
+def _stiffness(
+    virtual: VirtualMesh, material: Material, ghost: GhostPenalty | None, kernels: Kernels
+) -> InternalForce:
+    if ghost is None:
+        return InternalForce(virtual, material, "linear", kernels)
+    return PenalisedForce(virtual, material, ghost, "linear", kernels)
+
+
+def is_large(virtual: VirtualMesh) -> bool:
+    """Whether iterations are quicker than a factorisation: of solids with many nodes."""
+    return virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
+
+
+class StaticSolver:
+    """Iterations for a large body, a factorisation where they do not converge.
+
+    Parameters
+    ----------
+    force : InternalForce
+        Whose kernels are taken.
+    pattern : BlockPattern
+    fixed : (N, d) bool array
+    tolerance : float
+        Of the residual that iterations leave.
+    limit : int
+        Most iterations; zero: factorise at once.
+
+    Attributes
+    ----------
+    used : set of {"direct", "iterative"}
+        What has solved systems so far.
+    """
+
+    def __init__(
+        self,
+        force: InternalForce,
+        pattern: BlockPattern,
+        fixed: NDArray[np.bool_],
+        tolerance: float,
+        limit: int,
+    ) -> None:
+        kernels, self._block = force.kernels, fixed.shape[1]
+        self._pattern, self._held, self._kernels = pattern, fixed.all(axis=1), kernels
+        self._iterative = self._direct = None
+        if limit > 0:
+            self._iterative = kernels.iterative(pattern, self._block, tolerance, limit)
+        else:
+            self._direct = kernels.direct(pattern, self._block, self._held)
+        self.used: set[str] = set()
+
+    def factorize(self, blocks: _Floats) -> None:
+        """Take the matrix with these nodal blocks; see `LinearSolver`."""
+        self._blocks = blocks
+        first = self._iterative or self._direct
+        assert first is not None
+        first.factorize(blocks)
+
+    def solve(self, load: _Floats, insists: bool = False) -> _Floats:
+        """Solve, by a factorisation if the iterations do not converge and none insists on them."""
+        if self._iterative is not None:
+            try:
+                found = self._iterative.solve(load)
+                self.used.add("iterative")
+                return found
+            except NotConvergedError:
+                if insists:
+                    raise
+            if self._direct is None:
+                self._direct = self._kernels.direct(self._pattern, self._block, self._held)
+            self._direct.factorize(self._blocks)
+        assert self._direct is not None
+        self.used.add("direct")
+        return self._direct.solve(load)

@@ -1,13 +1,15 @@
-"""Newton's method for one implicit step, shared by all schemes that solve theirs to the end."""
+"""Implicit schemes that solve their step to the end by Newton's method: Euler, trapezoidal."""
 
 from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly import constrain
-from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
-from verify.xfem.dynamics.integrator import (
+from verify.xfem.assembly import add_mass, constrain, held_entries
+from verify.xfem.body import (
+    DynamicBody,
+    MotionState,
+    RayleighDamping,
     StepFailedError,
     StepForces,
     check_state,
@@ -17,7 +19,7 @@ from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.internal_force import TangentKind, inverted_cells
 from verify.xfem.linear_solvers import LinearSolver
 
-__all__ = ["NewtonIntegrator"]
+__all__ = ["ImplicitEuler", "NewtonIntegrator", "Trapezoidal"]
 
 _Floats = NDArray[np.float64]
 
@@ -43,7 +45,7 @@ class NewtonIntegrator(ABC):
         mass of its node: what hangs on a sliver is solved for like the rest.
     iterations : int
         Allowed per step; if they do not suffice the step fails rather than go on unsolved. Most
-        take 2 to 4; where pieces that are inside out stand up, it may be 50.
+        take 2 to 4; where cells that are inside out stand up, it may be 50.
     solver : LinearSolver, optional
         For the sparsity of the body; by default the one that its kernels have for steps.
 
@@ -77,6 +79,7 @@ class NewtonIntegrator(ABC):
         space = body.shape[1]
         self._blocks = np.zeros((len(body.pattern.columns), space, space))
         self._solver = body.step_solver(_INEXACT) if solver is None else solver
+        self._held = held_entries(body.pattern, body.fixed)
         self._mass_places = body.mass.places(body.pattern)
         # a consistent mass has ε³ on the diagonal for a sliver whose weight is ε²: over the former
         # that weight alone, 1/ε, would be the scale, beside which nothing else is left to solve
@@ -106,7 +109,7 @@ class NewtonIntegrator(ABC):
         return self.body.external(time - _JUST * self.step_size)
 
     def _internal(self, displacement: _Floats) -> _Floats:
-        """Return the internal force (N, d); where it is swept, also find the stiffness."""
+        """Return the internal force (N, d); where one pass finds it, also the stiffness."""
         body = self.body
         if not (body.force.has_one_pass and body.force.is_corotational):
             return body.force.evaluate(displacement)[0]
@@ -123,7 +126,7 @@ class NewtonIntegrator(ABC):
 
     @property
     def _stiffness_share(self) -> float:
-        """Of the stiffness with frozen rotations, in the matrix of a correction."""
+        """Of the rotation-fixed tangent, in the matrix of a correction."""
         return self.share * (1.0 + self.rate / self.step_size * self.body.damping.stiffness)
 
     def _add_stiffness(self, displacement: _Floats, kind: TangentKind) -> None:
@@ -140,7 +143,7 @@ class NewtonIntegrator(ABC):
             try:
                 result = self._solve(state.displacement + self.step_size * state.velocity)
             except StepFailedError:
-                # where the predictor has turned pieces inside out, start from where they are
+                # where the predictor has turned cells inside out, start from where they are
                 result = self._solve(state.displacement.copy())
         displacement, velocity, forces = result
         state.displacement[:], state.velocity[:] = displacement, velocity
@@ -307,10 +310,44 @@ class NewtonIntegrator(ABC):
         self._is_linearised, self._at = False, np.empty(0)
         factor = self._weight / h**2 + per_velocity * body.damping.mass
         add_mass(self._blocks, self._mass_places, body.mass.entries[2], factor)
-        constrain(body.pattern.starts, body.pattern.columns, body.fixed, self._blocks)
+        constrain(body.pattern, body.fixed, self._blocks, self._held)
 
 
-def add_mass(blocks: _Floats, places: NDArray[np.int64], values: _Floats, scale: float) -> None:
-    """Add `scale` times the mass to the diagonals of its nodal blocks."""
-    for component in range(blocks.shape[1]):
-        blocks[places, component, component] += scale * values
+class ImplicitEuler(NewtonIntegrator):
+    """(2.45–46) solved to the end. Dissipates: a mode of frequency ω loses half of its energy in
+    about ln 2/(ω² h), whatever its amplitude.
+
+    Parameters are those of `NewtonIntegrator`.
+    """  # noqa: D205
+
+    rate = 1.0
+    share = 1.0
+
+    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+        internal = self._internal(displacement)
+        return StepForces(internal, self._load_at_end(time), self.body.viscous(velocity))
+
+
+class Trapezoidal(NewtonIntegrator):
+    """Newmark's method with β = ¼, γ = ½. Keeps the energy of linear motion exactly and that of
+    small nonlinear motion well; not unconditionally stable at large amplitudes.
+
+    Parameters are those of `NewtonIntegrator`.
+    """  # noqa: D205
+
+    rate = 2.0
+    share = 0.5
+
+    def _prepare(self) -> None:
+        start = self._start
+        internal = self._internal(start.displacement)
+        viscous = self.body.viscous(start.velocity)
+        self._before = StepForces(internal, self._load_at_start(), viscous)
+
+    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+        internal = self._internal(displacement)
+        return StepForces(
+            0.5 * (self._before.internal + internal),
+            0.5 * (self._before.external + self._load_at_end(time)),
+            0.5 * (self._before.viscous + self.body.viscous(velocity)),
+        )

@@ -92,7 +92,7 @@ def treat_moving_body(
         Of the ghost penalty; read by "penalise" alone.
     kinematics : {"corotational", "linear"}
     held : (N,) bool array, optional
-        Unknown nodes that a support is going to hold; see `treat_slivers`.
+        Dof nodes that a support is going to hold; see `treat_slivers`.
     kernels : Kernels
 
     Raises

@@ -1,16 +1,14 @@
 """Newton's method for the equilibrium of a cut body, on its potential energy."""
 
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly import body_pattern, constrain
-from verify.xfem.errors import NotConvergedError, SingularStiffnessError
+from verify.xfem.assembly import body_pattern, constrain, held_entries
+from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.internal_force import InternalForce, collapsed_cells
-from verify.xfem.linear_solvers import LinearSolver
-from verify.xfem.statics.linear import ITERATE_FROM
+from verify.xfem.statics import StaticSolver, is_large
 
 __all__ = ["Descent", "Newton", "NotInEquilibriumError", "Place"]
 
@@ -18,11 +16,11 @@ _Floats = NDArray[np.float64]
 
 _HALVINGS = 12
 _ROUND_OFF = 256.0 * np.finfo(float).eps
-# of membranes, tensions over μ: at first, below which the exact stiffness is tried, and the least
+# of membranes, tensions over μ: at first, below which the consistent tangent is tried, the least
 _TAUT, _SLACK, _LEAST, _FALL = 1.0, 1e-3, 1e-6, 0.1
 _ENOUGH = 1e-4  # of the fall of the energy that its slope promises
-# of what turning adds to the stiffness, the shares that are tried until it is positive definite
-_TURNS = (1.0, 0.5, 0.25, 0.125, 0.0)
+# of the rotational part of the tangent, the shares that are tried until it is positive definite
+_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0)
 _COLLAPSED = 1e-3  # of the largest stretch
 _UNSEEN = 1e-12  # of the energy
 _INVERSE_ITERATIONS = 12
@@ -56,11 +54,6 @@ class Newton:
         Of the residual, over the largest of load, reactions and internal force.
     iterations : int
         Allowed per load step.
-
-    Attributes
-    ----------
-    solvers : set of {"direct", "iterative"}
-        What has solved its linear systems.
     """
 
     def __init__(
@@ -68,26 +61,23 @@ class Newton:
     ) -> None:
         self._force, self._fixed = force, fixed
         self._tolerance, self._iterations = tolerance, iterations
-        virtual = force.virtual
-        space = virtual.mesh.space
-        self._pattern = body_pattern(virtual)
+        self._pattern = body_pattern(force.virtual)
+        space = fixed.shape[1]
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
-        large = virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
-        self.solvers: set[str] = set()
-        self._iterative: LinearSolver | None = None
-        if large:
-            self._iterative = force.kernels.iterative(self._pattern, space, _INEXACT, _MOST)
+        self._internal = np.empty(fixed.shape)
+        self._held = held_entries(self._pattern, fixed)
+        limit = _MOST if is_large(force.virtual) else 0
+        self._solver = StaticSolver(force, self._pattern, fixed, _INEXACT, limit)
+
+    @property
+    def solvers(self) -> frozenset[str]:
+        """What has solved the linear systems, of "direct" and "iterative"."""
+        return frozenset(self._solver.used)
 
     @property
     def largest_stiffness(self) -> float:
         """Largest entry of the stiffness that was assembled last."""
         return float(np.abs(self._blocks).max(initial=0.0))
-
-    @cached_property
-    def _direct(self) -> LinearSolver:
-        return self._force.kernels.direct(
-            self._pattern, self._blocks.shape[1], self._fixed.all(axis=1)
-        )
 
     def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took."""
@@ -125,13 +115,13 @@ class Newton:
         return Place(displacement, residual, float(np.linalg.norm(residual)), scale, potential)
 
     def is_stable(self, displacement: _Floats) -> bool:
-        """Whether the exact stiffness at a displacement (N, d) is positive definite.
+        """Whether the consistent tangent at a displacement (N, d) is positive definite.
 
         A factorisation without pivoting exists only then; conjugate gradients, from forces in all
         directions, meet a negative curvature among the first extreme ones that they find.
         """
         self._assemble(displacement, 1.0)
-        constrain(self._pattern.starts, self._pattern.columns, self._fixed, self._blocks)
+        constrain(self._pattern, self._fixed, self._blocks, self._held)
         try:
             self._solved(self._random_force())
         except SingularStiffnessError:
@@ -157,9 +147,9 @@ class Newton:
 
     def _softest_mode(self, displacement: _Floats) -> _Floats | None:
         """Mode (N, d) of negative curvature, its largest entry one; None if there is none."""
-        for turning in _TURNS[1:]:
-            self._assemble(displacement, turning)
-            constrain(self._pattern.starts, self._pattern.columns, self._fixed, self._blocks)
+        for rotational in _SHARES[1:]:
+            self._assemble(displacement, rotational)
+            constrain(self._pattern, self._fixed, self._blocks, self._held)
             mode = self._random_force()
             try:
                 for _ in range(_INVERSE_ITERATIONS):
@@ -185,14 +175,14 @@ class Newton:
     def _next(self, place: Place, load: _Floats) -> Place:
         """Place with a smaller residual; if that is not a correction away, one further down."""
         leap = place
-        for turning in _TURNS:
+        for rotational in _SHARES:
             try:
-                correction = self._solve(place.displacement, place.residual, None, turning)
+                correction = self._solve(place.displacement, place.residual, None, rotational)
             except SingularStiffnessError:
-                if turning == 0.0:
+                if rotational == 0.0:
                     raise
                 continue
-            if turning == 1.0:
+            if rotational == 1.0:
                 trial = self.place(place.displacement + correction, load)
                 if trial.norm < place.norm:
                     return trial
@@ -200,7 +190,7 @@ class Newton:
             share = self._share_downhill(place, correction, load)
             if share > 0.0:
                 return self.place(place.displacement + share * correction, load)
-        return leap  # beside a piece whose force jumps, or in round-off
+        return leap  # beside a cell whose force jumps, or in round-off
 
     def _share_downhill(self, place: Place, correction: _Floats, load: _Floats) -> float:
         """Share of a correction that lowers the potential energy as its slope says; 0 if none."""
@@ -232,62 +222,49 @@ class Newton:
         displacement: _Floats,
         residual: _Floats,
         change: _Floats | None,
-        turning: float,
+        rotational: float,
         least: float = 0.0,
     ) -> _Floats:
         """Solve for a change of the fixed components, or for the residual; see `_assemble`."""
         pattern, blocks = self._pattern, self._blocks
-        self._assemble(displacement, turning, least)
+        self._assemble(displacement, rotational, least)
         load = residual.copy()
         if change is not None:
             load -= (pattern.matrix(blocks) @ change.ravel()).reshape(change.shape)
             load[self._fixed] = 0.0
-        constrain(pattern.starts, pattern.columns, self._fixed, blocks)
+        constrain(pattern, self._fixed, blocks, self._held)
         correction = self._solved(load)
         return correction if change is None else correction + change
 
-    def _assemble(self, displacement: _Floats, turning: float, least: float = 0.0) -> None:
-        """Fill the blocks with the stiffness at a displacement.
+    def _assemble(self, displacement: _Floats, rotational: float, least: float = 0.0) -> None:
+        """Fill the blocks with the tangent at a displacement.
 
-        `turning` is the share of what turning pieces add to the stiffness. Without it membranes
-        have the stiffness of their tension, taken to be `least` at least.
+        `rotational` is the share of what the consistent tangent has beyond the rotation-fixed one.
+        Without it membranes have their geometric stiffness, the tension being `least` at least.
         """
-        pattern, blocks = self._pattern, self._blocks
-        blocks[:] = 0.0
-        self._force.evaluate(displacement)
-        if turning > 0.0:
-            self._force.add_stiffness(pattern, blocks, turning, "consistent", displacement)
-        if turning < 1.0:
-            self._force.add_stiffness(pattern, blocks, 1.0 - turning)
-        if turning == 0.0 and self._force.is_membrane:
-            self._force.add_geometric(pattern, displacement, blocks, 1.0, least)
+        force, pattern, blocks = self._force, self._pattern, self._blocks
+        at = displacement
+        force.linearise(pattern, at, at, 0.0, 1.0, self._internal, blocks, rotational=rotational)
+        if rotational == 0.0 and force.is_membrane:
+            force.add_geometric(pattern, displacement, blocks, 1.0, least)
 
     def _solved(self, load: _Floats) -> _Floats:
-        """Solve with the blocks; iterate if the body is large, factorise if that fails.
+        """Solve with the blocks.
 
         Raises
         ------
         SingularStiffnessError
-            If the stiffness is found not to be positive definite, by either.
+            If the tangent is found not to be positive definite.
         """
-        if self._iterative is not None:
-            self._iterative.factorize(self._blocks)
-            try:
-                correction = self._iterative.solve(load)
-                self.solvers.add("iterative")
-                return correction
-            except NotConvergedError:
-                pass
-        self._direct.factorize(self._blocks)
-        self.solvers.add("direct")
-        return self._direct.solve(load)
+        self._solver.factorize(self._blocks)
+        return self._solver.solve(load)
 
 
 class Descent(Newton):
     """Down the potential energy of a membrane, which has next to no stiffness where it is slack.
 
     Tangents, not forces, are those of a tension that is at least so much; it falls as long as full
-    steps lower the energy. The exact stiffness follows where it is positive definite.
+    steps lower the energy. The consistent tangent follows where it is positive definite.
     """
 
     _least = _TAUT

@@ -1,7 +1,7 @@
 """Inheritance of the state of a body that is cut while it moves.
 
-The parts of a piece start with the motion of that piece: every new unknown node takes over the
-value of the unknown node that the same corner had before (a = 0 and ȧ = 0 in the thesis' terms).
+The parts of a piece start with the motion of that piece: every new dof node takes over the
+value of the dof node that the same corner had before (a = 0 and ȧ = 0 in the thesis' terms).
 The field does not change, so energy and momenta do not either.
 
 Where cells are aggregated the inherited field is not in the space: nodes that follow a root cell
@@ -13,8 +13,7 @@ changes, both by what the field of the slivers was off the root's.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics.body import DynamicBody, MotionState
-from verify.xfem.dynamics.integrator import check_state
+from verify.xfem.body import DynamicBody, MotionState, check_state
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import AggregatedMass
 from verify.xfem.virtual import VirtualMesh
@@ -58,7 +57,7 @@ def inherit_state(
 def ancestors(old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
     """Corner of the old body from which each corner (N_corners,) of the new one comes.
 
-    Corners are unknown nodes where no cells are aggregated.
+    Corners are dof nodes where no cells are aggregated.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Implicit schemes that solve their step to the end: Euler, trapezoidal, energy–momentum."""
+"""Energy-momentum scheme: the stress is averaged over the step, `averaged_stress`."""
 
 from functools import cached_property
 
@@ -6,61 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.averaged_stress import StepEnds, averaged_moduli, averaged_stress
-from verify.xfem.dynamics.body import DynamicBody
-from verify.xfem.dynamics.integrator import StepForces
-from verify.xfem.dynamics.newton import NewtonIntegrator
+from verify.xfem.body import DynamicBody, StepForces
 from verify.xfem.element import add_moduli
 from verify.xfem.errors import XfemError
+from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.penalised_force import PenalisedForce
 
-__all__ = ["EnergyMomentum", "ImplicitEuler", "Trapezoidal"]
+__all__ = ["EnergyMomentum"]
 
 _Floats = NDArray[np.float64]
 
-# after so many evaluations in a step, pieces that have taken the substitute keep it
+# after so many evaluations in a step, cells that have taken the substitute keep it
 _FREE_EVALUATIONS = 8
-
-
-class ImplicitEuler(NewtonIntegrator):
-    """(2.45–46) solved to the end. Dissipates: a mode of frequency ω loses half of its energy in
-    about ln 2/(ω² h), whatever its amplitude.
-
-    Parameters are those of `NewtonIntegrator`.
-    """  # noqa: D205
-
-    rate = 1.0
-    share = 1.0
-
-    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
-        internal = self._internal(displacement)
-        return StepForces(internal, self._load_at_end(time), self.body.viscous(velocity))
-
-
-class Trapezoidal(NewtonIntegrator):
-    """Newmark's method with β = ¼, γ = ½. Keeps the energy of linear motion exactly and that of
-    small nonlinear motion well; not unconditionally stable at large amplitudes.
-
-    Parameters are those of `NewtonIntegrator`.
-    """  # noqa: D205
-
-    rate = 2.0
-    share = 0.5
-
-    def _prepare(self) -> None:
-        start = self._start
-        internal = self._internal(start.displacement)
-        viscous = self.body.viscous(start.velocity)
-        self._before = StepForces(internal, self._load_at_start(), viscous)
-
-    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
-        internal = self._internal(displacement)
-        return StepForces(
-            0.5 * (self._before.internal + internal),
-            0.5 * (self._before.external + self._load_at_end(time)),
-            0.5 * (self._before.viscous + self.body.viscous(velocity)),
-        )
 
 
 class EnergyMomentum(NewtonIntegrator):
@@ -135,7 +94,7 @@ class EnergyMomentum(NewtonIntegrator):
         return StepEnds(F0, force.deformation(displacement), self._first, force.rotations)
 
     def _average(self, displacement: _Floats, internal: _Floats) -> None:
-        """Write the force of a step that ends like this; substituted pieces are updated."""
+        """Write the force of a step that ends like this; substituted cells are updated."""
         force, before = self.body.force, self._start.displacement
         if force.has_one_pass:
             force.linearise_average(

@@ -9,11 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
-from verify.xfem.dynamics.free_mass import FreeMass
-from verify.xfem.dynamics.integrator import StepForces
-from verify.xfem.dynamics.newton import NewtonIntegrator
+from verify.xfem.body import DynamicBody, FreeMass, MotionState, RayleighDamping, StepForces
 from verify.xfem.errors import XfemError
+from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.linear_solvers import LinearSolver
 
 __all__ = ["GeneralisedAlpha"]

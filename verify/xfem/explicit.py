@@ -7,13 +7,16 @@ same instant. All of them are free of any linear solve if the mass is diagonal.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.dynamics.body import DynamicBody, MotionState, RayleighDamping
-from verify.xfem.dynamics.free_mass import FreeMass, couples_supports
-from verify.xfem.dynamics.integrator import (
+from verify.xfem.body import (
+    DynamicBody,
+    FreeMass,
+    MotionState,
+    RayleighDamping,
     StepFailedError,
     StepForces,
     check_state,
     check_step,
+    couples_supports,
 )
 from verify.xfem.errors import XfemError
 
