@@ -18,13 +18,12 @@ def printed_by(page, capsys):
     return capsys.readouterr().out.splitlines()
 
 
-def test_dynamics_cuts_a_moving_body_penalises_slivers_and_keeps_pace(capsys):
-    account, penalty, pace = printed_by("theory/dynamics.md", capsys)
+def test_dynamics_cuts_a_moving_body_and_penalises_slivers(capsys):
+    account, penalty = printed_by("theory/dynamics.md", capsys)
     off, size = re.findall(r"by (\S+) J of (\S+) J", account)[0]
     assert float(off) < 1e-10 * float(size)
     assert "faces penalised with factor 0.01" in penalty
     assert 0.0 < float(penalty.split()[-1]) < 0.1
-    assert 0.0 < float(re.findall(r"step of (\S+) s", pace)[0]) <= 0.02
 
 
 def test_slivers_are_aggregated_and_a_penalty_does_not_change_the_answer_much(capsys):
