@@ -18,11 +18,12 @@ import pytest
 from verify.exchange import export_case, read_answers
 from verify.foreign.records import PROGRAMS
 from verify.scene import load_scene
-from verify.xfem.dynamics import DynamicBody, RealTimeEuler
+from verify.xfem.body import DynamicBody
 from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 from verify.xfem.virtual import cut_mesh
 
