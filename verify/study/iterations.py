@@ -210,7 +210,9 @@ def _findings(
     counted = [one for one in settings if one.iterations is not None]
     found = []
     for substeps in dict.fromkeys(one.substeps for one in counted):
-        own = [one for one in counted if one.substeps == substeps]
+        own = [one for one in counted if one.substeps == substeps and not one.reason]
+        if not own:
+            continue
         late = [one for one in own if not _inside(one.iteration_error, tolerance)]
         rest = own[own.index(late[-1]) + 1 :] if late else own
         step = "" if own[0].time_step is None else f" of {own[0].time_step:.4g} s"
@@ -220,6 +222,9 @@ def _findings(
         text += f" within {tolerance:.2g} of the same steps{step}, solved"
         text += f"; {own[0].iterations} are off by {_percent(own[0].iteration_error)}"
         text += f", {own[-1].iterations} by {_percent(own[-1].iteration_error)}."
+        missing = [o.iterations for o in counted if o.substeps == substeps and o.reason]
+        if missing:
+            text += f" Without an answer: {', '.join(map(str, missing))}."
         about = f"{label}, {names[1]} {substeps}"
         found.append(Finding(about, text, f"{tolerance:.2g}; shown, not judged", None))
     good = [one for one in counted if one.seconds and _inside(one.whole_error, tolerance)]
