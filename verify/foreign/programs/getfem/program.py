@@ -113,6 +113,8 @@ def solve(case):
         raise RuntimeError("the displacement has another space than its components")
     values, middle = evaluation(space, answer)
     unknown = unknown_of_groups(case, body, answer, space, middle)
+    if not np.array_equal(np.sort(unknown[answer.used(body.count)]), np.arange(count)):
+        raise RuntimeError("GetFEM parts other elements than the answer would show")
 
     lame, shear = float(case.constant("lame")[0]), float(case.constant("shear")[0])
     data = gf.MeshFem(space.mesh, 1)
