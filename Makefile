@@ -7,7 +7,7 @@
 SHELL := /bin/bash
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test heavy bench check size clean lock
+.PHONY: help setup demo test heavy bench check results size clean lock
 
 BIN := $(or $(VERIFY_VENV),.venv)/bin
 JOBS ?= $(shell nproc)
@@ -28,7 +28,7 @@ help: ## print this help
 	@sed -n 's/^#   /  /p' $(MAKEFILE_LIST)
 	@echo
 	@sed -nE 's/^([a-z]+):.*## (.*)/\1|\2/p' $(MAKEFILE_LIST) \
-	    | while IFS='|' read -r name what; do printf '  make %-6s %s\n' "$$name" "$$what"; done
+	    | while IFS='|' read -r name what; do printf '  make %-7s %s\n' "$$name" "$$what"; done
 	@echo
 	@echo "  one thread per process: OMP_NUM_THREADS=$(OMP_NUM_THREADS) NUMBA_NUM_THREADS=$(NUMBA_NUM_THREADS); JOBS=$(JOBS)"
 
@@ -60,6 +60,10 @@ check: setup ## ruff, format, types, layers
 
 lock: ## resolve the lock files again from pyproject.toml (needs uv; UPGRADE=1 takes new versions)
 	@.ci/lock $(if $(UPGRADE),--upgrade)
+
+# One solve after the other, for their times are compared; JOBS=2 is faster, and no time is ranked.
+results: setup ## run the protocol of the method comparison and write docs/results (hours)
+	@$(BIN)/python .ci/results $(if $(findstring command,$(origin JOBS)),$(JOBS),1)
 
 size: setup ## print code lines per package, the longest functions, circles of imports
 	@$(BIN)/python .ci/size

@@ -159,7 +159,7 @@ def _add_reading_commands(add: Add) -> None:
         "directory", metavar="DIR", type=Path, help="directory of a run or of studies"
     )
     command.add_argument(
-        "--format", choices=("html", "markdown", "pdf"), default="html",
+        "--format", choices=("html", "markdown", "summary", "pdf"), default="html",
         help="a page (default); Markdown with pictures beside it; or PDF, which needs Chromium",
     )  # fmt: skip
 

@@ -23,7 +23,9 @@ __all__ = ["page_view"]
 _QUESTIONS = (("accuracy", "Accuracy"), ("energy", "Energy"), ("cost", "Cost"))
 
 
-def page_view(run: Run, pictures: list[CasePictures], notes: list[str]) -> dict[str, Any]:
+def page_view(
+    run: Run, pictures: list[CasePictures], notes: list[str], short: bool = False
+) -> dict[str, Any]:
     """Return what ``report.j2`` shows.
 
     Parameters
@@ -33,6 +35,8 @@ def page_view(run: Run, pictures: list[CasePictures], notes: list[str]) -> dict[
         One for each of the run's entries.
     notes : list of str
         What has to be said about the pictures of all cases.
+    short : bool
+        Whether cases, families and the reading aid are left out.
     """
     palette = Palette()
     cases = [
@@ -51,6 +55,7 @@ def page_view(run: Run, pictures: list[CasePictures], notes: list[str]) -> dict[
         notes = [*notes, f"the ranking cannot be shown: {words_of(error)}."]
     started = run.record.get("started")
     return {
+        "short": short,
         "when": f"Run of {started}" if started else "Run of unknown date",
         "command": run.record.get("command") or "",
         "top": overview(run, cases),

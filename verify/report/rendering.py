@@ -13,8 +13,12 @@ from verify.report.run_directory import CaseEntry, Run, load_run
 from verify.report.template_sets import as_html, as_markdown
 from verify.whole_files import write_whole
 
-__all__ = ["render", "render_markdown", "render_pdf"]
+__all__ = ["render", "render_markdown", "render_pdf", "render_summary"]
 
+# of the provenance, what says something to a reader elsewhere
+_PUBLISHED = (
+    "command", "finished", "commit", "memory", "cpu", "cores", "load", "threads", "versions",
+)  # fmt: skip
 _PAGE_BYTES = 14_500_000  # what a mail system or a code host still takes
 
 
@@ -84,6 +88,23 @@ def render_markdown(directory: Path) -> Path:
     _, view = _written(load_run(directory), directory)
     target = directory / "report.md"
     write_whole(target, as_markdown("report.j2", directory, **view))
+    return target
+
+
+def render_summary(directory: Path) -> Path:
+    """Write ``summary.md``: the verdicts, the rankings, where it comes from; no page per case.
+
+    Raises
+    ------
+    InputError, OSError
+        As `render`.
+    """
+    run = load_run(directory)
+    view = page_view(run, [CasePictures() for _ in run.entries], [], short=True)
+    view["origin"] = [fact for fact in view["origin"] if fact[0] in _PUBLISHED]
+    target = directory / "summary.md"
+    write_whole(target, as_markdown("report.j2", directory, **view))
+    write_whole(directory / "results.csv", csv_rows(run))
     return target
 
 
