@@ -45,12 +45,12 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["STAGES", "FirstUse", "FirstUseError", "compile_all", "compile_here"]
 
@@ -61,7 +61,7 @@ class FirstUseError(RuntimeError):
     """A kernel could not be compiled or run."""
 
 
-def _plane() -> tuple[VirtualMesh, State]:
+def _plane() -> tuple[PhantomMesh, State]:
     return cut_mesh(rectangle_mesh((3, 3)), [Plane([0.5, 0.45], [0.1, 1.0])]), "plane strain"
 
 
@@ -70,36 +70,36 @@ def _flat_membrane() -> SimplexMesh:
     return SimplexMesh(np.column_stack([flat.points, np.zeros(len(flat.points))]), flat.cells)
 
 
-def _membrane() -> tuple[VirtualMesh, State]:
+def _membrane() -> tuple[PhantomMesh, State]:
     cut = Plane([0.5, 0.45, 0.0], [0.1, 1.0, 0.2])
     return cut_mesh(_flat_membrane(), [cut]), "plane stress"
 
 
-def _solid() -> tuple[VirtualMesh, State]:
+def _solid() -> tuple[PhantomMesh, State]:
     return cut_mesh(box_mesh((2, 2, 2)), [Plane([0.5, 0.45, 0.5], [0.1, 1.0, 0.2])]), "solid"
 
 
-def _held(virtual: VirtualMesh) -> Supports:
-    held = Supports.none(virtual).prescribe(virtual, virtual.mesh.points[:, 1] % 1.0 == 0.0)
-    if virtual.mesh.dim < virtual.mesh.space:
-        whole = np.ones(len(virtual.mesh.points), dtype=bool)
-        held = held.prescribe(virtual, whole, components=(2,))
+def _held(phantom: PhantomMesh) -> Supports:
+    held = Supports.none(phantom).prescribe(phantom, phantom.mesh.points[:, 1] % 1.0 == 0.0)
+    if phantom.mesh.dim < phantom.mesh.space:
+        whole = np.ones(len(phantom.mesh.points), dtype=bool)
+        held = held.prescribe(phantom, whole, components=(2,))
     return held
 
 
-def _linear(virtual: VirtualMesh, kind: State) -> None:
-    material, load = isotropic(1.0, 0.3, kind), body_force(virtual, -np.ones(virtual.mesh.space))
+def _linear(phantom: PhantomMesh, kind: State) -> None:
+    material, load = isotropic(1.0, 0.3, kind), body_force(phantom, -np.ones(phantom.mesh.space))
     for solver in ("direct", "iterative"):
-        solve_static(virtual, material, _held(virtual), load, solver=solver, kernels=FAST)
+        solve_static(phantom, material, _held(phantom), load, solver=solver, kernels=FAST)
 
 
-def _turning(virtual: VirtualMesh, kind: State) -> None:
+def _turning(phantom: PhantomMesh, kind: State) -> None:
     """Finite rotation in statics, and every scheme in motion."""
-    force = InternalForce(virtual, isotropic(1.0, 0.3, kind), kernels=FAST)
-    held = _held(virtual)
-    load = body_force(virtual, -0.01 * np.ones(virtual.mesh.space))
+    force = InternalForce(phantom, isotropic(1.0, 0.3, kind), kernels=FAST)
+    held = _held(phantom)
+    load = body_force(phantom, -0.01 * np.ones(phantom.mesh.space))
     static_equilibrium(force, held.fixed, load=load)
-    body = DynamicBody(force, side_wise_mass(virtual, 1.0), supports=held)
+    body = DynamicBody(force, side_wise_mass(phantom, 1.0), supports=held)
     for scheme in (
         RealTimeEuler(body, 1e-3),
         RealTimeEuler(body, 1e-3, solver=ConjugateGradients(body.pattern, body.shape[1])),
@@ -108,17 +108,17 @@ def _turning(virtual: VirtualMesh, kind: State) -> None:
         CentralDifferences(body, 1e-3),
     ):
         state = body.rest()
-        state.velocity[:] = 0.01 * virtual.node_points
+        state.velocity[:] = 0.01 * phantom.node_points
         scheme.step(state)
 
 
 def _without_slivers(
-    body: Callable[[], tuple[VirtualMesh, State]], use: Callable[[VirtualMesh, State], None]
+    body: Callable[[], tuple[PhantomMesh, State]], use: Callable[[PhantomMesh, State], None]
 ) -> None:
     # what is aggregated assembles at corners, by the same loops: the untreated body has them all
-    virtual, kind = body()
-    treat_slivers(virtual)
-    use(virtual, kind)
+    phantom, kind = body()
+    treat_slivers(phantom)
+    use(phantom, kind)
 
 
 def _scalpel(mesh: SimplexMesh, kind: State) -> None:

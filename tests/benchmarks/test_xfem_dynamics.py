@@ -1,6 +1,6 @@
 """Cost of a real-time corotational step of a cut body, single thread, compilation excluded.
 
-The slab of the static benchmark: 1014 tetrahedra, about 200 of them cut, 524 unknown nodes. What
+The slab of the static benchmark: 1014 tetrahedra, about 200 of them cut, 524 dof nodes. What
 is asserted are ratios measured in the same run; absolute times are for the reader.
 """
 
@@ -19,10 +19,10 @@ from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 pytestmark = pytest.mark.timing
 
@@ -55,9 +55,9 @@ def _cut_box(divisions, step, solver=None):
 
 
 def _report(scheme):
-    v = scheme.body.force.virtual
+    v = scheme.body.force.phantom
     cut = int(np.unique(v.parent[v.split]).size)
-    return {"tetrahedra": len(v.mesh.cells), "cut": cut, "unknown nodes": v.node_count}
+    return {"tetrahedra": len(v.mesh.cells), "cut": cut, "dof nodes": v.node_count}
 
 
 @pytest.mark.parametrize("step", [1e-3, 1e-2, 0.5])

@@ -27,9 +27,9 @@ from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.virtual import cut_mesh
 
 pytestmark = [pytest.mark.timing, pytest.mark.benchmark(timer=process_time)]
 
@@ -69,17 +69,17 @@ def cube():
 @cache
 def system():
     """Body, pattern, internal force, and matrix and load of a step of 10 ms under gravity."""
-    virtual, _ = treat_slivers(cut_mesh(cube(), [CUT]), "keep")
-    pattern = block_pattern(virtual.cells, virtual.node_count)
-    force = InternalForce(virtual, MATERIAL, kernels=FAST)
-    force.evaluate(np.zeros_like(virtual.node_points))
+    phantom, _ = treat_slivers(cut_mesh(cube(), [CUT]), "keep")
+    pattern = block_pattern(phantom.cells, phantom.node_count)
+    force = InternalForce(phantom, MATERIAL, kernels=FAST)
+    force.evaluate(np.zeros_like(phantom.node_points))
     blocks = np.zeros((len(pattern.columns), 3, 3))
     force.add_stiffness(pattern, blocks)
-    mass = side_wise_mass(virtual, 1000.0)
+    mass = side_wise_mass(phantom, 1000.0)
     blocks[pattern.diagonal] += (mass.diagonal / STEP**2)[:, None, None] * np.eye(3)
     load = mass.weight([0.0, 0.0, -9.8])
-    load[virtual.node_points[:, 2] > 0.99] = 0.0
-    return virtual, pattern, force, blocks, load
+    load[phantom.node_points[:, 2] > 0.99] = 0.0
+    return phantom, pattern, force, blocks, load
 
 
 def test_cutting_takes_less_than_the_adjacency_of_the_mesh_three_times(benchmark):
@@ -92,9 +92,9 @@ def test_cutting_takes_less_than_the_adjacency_of_the_mesh_three_times(benchmark
 
 def test_treating_slivers_costs_no_more_than_one_and_a_half_times_cutting(benchmark):
     """0.94 on a quiet machine; both are arrays over all pieces."""
-    virtual = cut_mesh(cube(), [CUT])
+    phantom = cut_mesh(cube(), [CUT])
     cutting = median_seconds(lambda: cut_mesh(cube(), [CUT]), 3)
-    benchmark.pedantic(treat_slivers, (virtual,), rounds=5, warmup_rounds=1)
+    benchmark.pedantic(treat_slivers, (phantom,), rounds=5, warmup_rounds=1)
     assert benchmark.stats.stats.median < 1.5 * cutting
 
 
@@ -130,8 +130,8 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark)
     aim; seen are 0.17, 0.18, 0.19 and 0.23 on a quiet machine, and 0.14 to 0.19 when others use
     the memory too (docs/theory/linear-solvers.md).
     """
-    virtual, pattern, force, blocks, _ = system()
-    displacement = np.zeros_like(virtual.node_points)
+    phantom, pattern, force, blocks, _ = system()
+    displacement = np.zeros_like(phantom.node_points)
     out, blocks_now = np.empty_like(displacement), np.empty_like(blocks)
 
     def action():
@@ -144,15 +144,15 @@ def test_rotations_and_assembly_run_at_a_share_of_the_bandwidth_bound(benchmark)
 
 
 def test_linear_assembly(benchmark):
-    virtual, pattern, *_ = system()
-    stiffness = InternalForce(virtual, MATERIAL, "linear")
+    phantom, pattern, *_ = system()
+    stiffness = InternalForce(phantom, MATERIAL, "linear")
     benchmark(stiffness.stiffness, pattern)
 
 
 def test_a_step_of_ten_milliseconds_takes_less_than_150(benchmark):
     """Rotations, forces, assembly, mass, preconditioner and conjugate gradients from zero."""
-    virtual, pattern, force, blocks, load = system()
-    inertia = side_wise_mass(virtual, 1000.0).diagonal / STEP**2
+    phantom, pattern, force, blocks, load = system()
+    inertia = side_wise_mass(phantom, 1000.0).diagonal / STEP**2
     solver = ConjugateGradients(pattern, 3, tolerance=1e-8)
     now, out = np.empty_like(blocks), np.empty_like(load)
     displacement = np.zeros_like(load)
@@ -184,11 +184,11 @@ def peak():
     return next(int(x.split()[1]) for x in lines if x.startswith("VmHWM")) / 1024.0
 
 def solve():
-    virtual, pattern, force, blocks, load = scale.system()
+    phantom, pattern, force, blocks, load = scale.system()
     solver = ConjugateGradients(pattern, 3, tolerance=1e-8)
     solver.factorize(blocks)
     assert np.isfinite(solver.solve(load)).all()
-    return len(virtual.mesh.cells)
+    return len(phantom.mesh.cells)
 
 large, scale.cube = scale.cube, lambda: box_mesh((3, 3, 3))
 solve()

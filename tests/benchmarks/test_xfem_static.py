@@ -18,9 +18,9 @@ from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 pytestmark = pytest.mark.timing
 
@@ -38,16 +38,16 @@ BODIES = {
 
 def prepare(name):
     mesh, cut = BODIES[name]
-    virtual = cut_mesh(mesh, [cut])
-    stiffness = InternalForce(virtual, isotropic(1.0, 0.3, "solid"), "linear")
-    pattern = block_pattern(virtual.cells, virtual.node_count)
+    phantom = cut_mesh(mesh, [cut])
+    stiffness = InternalForce(phantom, isotropic(1.0, 0.3, "solid"), "linear")
+    pattern = block_pattern(phantom.cells, phantom.node_count)
     blocks = stiffness.stiffness(pattern)
     first = mesh.points[:, 0]
     ends = (first == first.min()) | (first == first.max())
-    supports = Supports.none(virtual).prescribe(virtual, ends)
+    supports = Supports.none(phantom).prescribe(phantom, ends)
     constrain(pattern, supports.fixed, blocks)
-    load = np.where(supports.fixed, 0.0, body_force(virtual, -np.ones(mesh.dim)))
-    return virtual, stiffness, pattern, blocks, load
+    load = np.where(supports.fixed, 0.0, body_force(phantom, -np.ones(mesh.dim)))
+    return phantom, stiffness, pattern, blocks, load
 
 
 def median_seconds(action, repetitions=15):
@@ -64,8 +64,8 @@ def median_seconds(action, repetitions=15):
 def test_cutting_a_mesh(benchmark, name):
     mesh, cut = BODIES[name]
     cut_mesh(mesh, [cut])  # adjacency of the uncut mesh is kept
-    virtual = benchmark(cut_mesh, mesh, [cut])
-    benchmark.extra_info["split cells"] = len(np.unique(virtual.parent[virtual.split]))
+    phantom = benchmark(cut_mesh, mesh, [cut])
+    benchmark.extra_info["split cells"] = len(np.unique(phantom.parent[phantom.split]))
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -12,9 +12,9 @@ from verify.scene.spatial import frame
 from verify.solution import Solution
 from verify.solvers.xfem_cuts import cuts_of
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 Array = NDArray[np.float64]
 
@@ -142,15 +142,15 @@ def moved_parts(scene: Scene, mesh: SimplexMesh, size: float) -> tuple[Solution,
 
     Which part a body is says the largest of its pieces: it is no sliver, and lies on one side.
     """
-    virtual: VirtualMesh = cut_mesh(mesh, cuts_of(scene, size))
-    of_piece = virtual.bodies[virtual.cells[:, 0]]
-    order = np.argsort(virtual.volumes, kind="stable")
+    phantom: PhantomMesh = cut_mesh(mesh, cuts_of(scene, size))
+    of_piece = phantom.bodies[phantom.cells[:, 0]]
+    order = np.argsort(phantom.volumes, kind="stable")
     largest = np.zeros(of_piece.max() + 1, dtype=np.int64)
     largest[of_piece[order]] = order
-    part = parts_of(scene, virtual.piece_centroids[largest])
-    u = np.zeros_like(virtual.node_points)
-    u[:, 0] = part[virtual.bodies]
-    shown = subdivide(virtual)
+    part = parts_of(scene, phantom.piece_centroids[largest])
+    u = np.zeros_like(phantom.node_points)
+    u[:, 0] = part[phantom.bodies]
+    shown = subdivide(phantom)
     solution = Solution(
         shown.points, shown.cells, (shown.interpolation @ u)[None], cut_facets=shown.cut_facets
     )

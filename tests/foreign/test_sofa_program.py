@@ -23,9 +23,9 @@ from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 

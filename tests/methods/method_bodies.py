@@ -13,20 +13,20 @@ CUTTING = [name for name in METHODS if name != "uncut"]
 MATERIAL = {2: isotropic(1.0, 0.3, "plane strain"), 3: isotropic(1.0, 0.3, "solid")}
 
 
-def held_at(virtual, where):
+def held_at(phantom, where):
     """Supports that hold all unknowns on the boundary of the body where a condition holds."""
-    facets = virtual.mesh.boundary_facets
-    local = np.arange(virtual.mesh.dim + 1) != facets[:, 1:]
-    boundary = np.unique(virtual.mesh.cells[facets[:, 0]][local])
-    return Supports.none(virtual).prescribe(virtual, boundary[where(virtual.mesh.points[boundary])])
+    facets = phantom.mesh.boundary_facets
+    local = np.arange(phantom.mesh.dim + 1) != facets[:, 1:]
+    boundary = np.unique(phantom.mesh.cells[facets[:, 0]][local])
+    return Supports.none(phantom).prescribe(phantom, boundary[where(phantom.mesh.points[boundary])])
 
 
 def hang(method, mesh, cuts, where, **parameters):
     """Cut a body, hold it, load it by a uniform force: body and its equilibrium."""
     body = cut_by(method, mesh, cuts, **parameters)
     force = np.array([0.3, -1.0, 0.2])[: mesh.dim]
-    load = body_force(body.virtual, force)
-    supports = held_at(body.virtual, where)
+    load = body_force(body.phantom, force)
+    supports = held_at(body.phantom, where)
     return body, solve_static(body.resisting, MATERIAL[mesh.dim], supports, load)
 
 

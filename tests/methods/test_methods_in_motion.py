@@ -27,9 +27,9 @@ def clamped(points):
 
 def moved(body, law, scheme, step, also_held=None):
     """Displacement after 20 steps under the weight."""
-    virtual = body.virtual
-    mass = side_wise_mass(virtual, 1000.0)
-    supports = held_at(virtual, clamped)
+    phantom = body.phantom
+    mass = side_wise_mass(phantom, 1000.0)
+    supports = held_at(phantom, clamped)
     if also_held is not None:
         supports.fixed[also_held] = True
     force = LAWS[law](body.resisting, MATERIAL)
@@ -46,8 +46,8 @@ def moved(body, law, scheme, step, also_held=None):
 @pytest.mark.parametrize("method", CUTTING)
 def test_the_freed_half_falls_with_g_and_the_clamped_half_does_not_notice(method, scheme, law):
     body = cut_by(method, rectangle_mesh((4, 4)), [CUT])
-    virtual, step = body.virtual, 1e-3
-    lower = virtual.bodies == virtual.bodies[np.argmin(virtual.node_points[:, 1])]
+    phantom, step = body.phantom, 1e-3
+    lower = phantom.bodies == phantom.bodies[np.argmin(phantom.node_points[:, 1])]
     displacement = moved(body, law, scheme, step)
     time = 20 * step
     # the discrete parabolas: t²/2 of central differences, t(t + h)/2 of implicit Euler
@@ -62,15 +62,15 @@ def test_the_freed_half_falls_with_g_and_the_clamped_half_does_not_notice(method
 @pytest.mark.parametrize("method", CUTTING)
 def test_a_half_that_is_turned_by_any_angle_stores_nothing(method):
     body = cut_by(method, rectangle_mesh((5, 5)), [CUT])
-    virtual = body.virtual
-    boundary = held_at(virtual, lambda points: np.ones(len(points), dtype=bool))
-    upper = virtual.bodies == virtual.bodies[np.argmax(virtual.node_points[:, 1])]
+    phantom = body.phantom
+    boundary = held_at(phantom, lambda points: np.ones(len(points), dtype=bool))
+    upper = phantom.bodies == phantom.bodies[np.argmax(phantom.node_points[:, 1])]
     centre = np.array([0.3, 0.8])
 
     def turned(share):
         angle = share * np.pi / 2
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        arm = virtual.node_points - centre
+        arm = phantom.node_points - centre
         moved = arm @ turn.T - arm
         return np.where(upper[:, None], moved, 0.0)
 

@@ -7,9 +7,9 @@ from method_bodies import CUTTING, MATERIAL, at_places, hang, held_at
 from verify.methods.opened_mesh import OpenedMesh
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.loads import body_force
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 AXIS = {2: 1, 3: 2}
 
@@ -26,11 +26,11 @@ def doubled_by_hand(mesh, on_cut):
     number[on_cut] = len(mesh.points) + np.arange(on_cut.sum())
     cells = np.where(above[:, None], number[mesh.cells], mesh.cells)
     points = np.concatenate([mesh.points, mesh.points[on_cut]])
-    virtual = cut_mesh(OpenedMesh(points, cells, mesh.boundary_facets), [])
+    phantom = cut_mesh(OpenedMesh(points, cells, mesh.boundary_facets), [])
     force = np.array([0.3, -1.0, 0.2])[: mesh.dim]
-    supports = held_at(virtual, ends(axis))
-    static = solve_static(virtual, MATERIAL[mesh.dim], supports, body_force(virtual, force))
-    return points, virtual, static
+    supports = held_at(phantom, ends(axis))
+    static = solve_static(phantom, MATERIAL[mesh.dim], supports, body_force(phantom, force))
+    return points, phantom, static
 
 
 @pytest.mark.parametrize("method", CUTTING)
@@ -46,9 +46,9 @@ def test_a_cut_along_mesh_lines_is_the_mesh_with_doubled_nodes(method, dim, thro
     else:
         cut = Plane([0, 0, 0.5], [0, 0, 1])
     body, static = hang(method, mesh, [cut], ends(axis))
-    points, virtual, expected = doubled_by_hand(mesh, on_cut)
+    points, phantom, expected = doubled_by_hand(mesh, on_cut)
     assert body.counts.nodes == len(points)
-    assert body.virtual.volumes.sum() == pytest.approx(1.0, rel=1e-14)
+    assert body.phantom.volumes.sum() == pytest.approx(1.0, rel=1e-14)
     assert static.strain_energy == pytest.approx(expected.strain_energy, rel=1e-11)
 
     def above(centres):
@@ -57,7 +57,7 @@ def test_a_cut_along_mesh_lines_is_the_mesh_with_doubled_nodes(method, dim, thro
     found = at_places(body, static.displacement, above)
     side = np.zeros(len(points))
     for k in range(dim + 1):
-        side[virtual.cells[:, k]] = above(points[virtual.cells].mean(axis=1))
+        side[phantom.cells[:, k]] = above(points[phantom.cells].mean(axis=1))
     rows = np.column_stack([np.round(points, 9), side, expected.displacement])
     wanted = rows[np.lexsort(rows[:, : dim + 1].T)]
     # round-off of two solves with other node numbers, condition number below 1e3

@@ -40,14 +40,14 @@ def test_removal_loses_exactly_the_volume_of_the_touched_cells_and_its_debris(
     gone = mesh.measures[touched].sum()
     assert lost["touched cell removed"].size == pytest.approx(gone, rel=1e-12)
     debris = lost["cell removed as debris"].size if "cell removed as debris" in lost else 0.0
-    assert body.virtual.volumes.sum() == pytest.approx(1.0 - gone - debris, rel=1e-12)
+    assert body.phantom.volumes.sum() == pytest.approx(1.0 - gone - debris, rel=1e-12)
 
 
 def test_a_part_that_hangs_on_a_node_only_is_apart():
     # the cut removes the lower left triangle's neighbour: what remains of the corner hangs on nodes
     mesh = rectangle_mesh((2, 1))
     body = cut_by("removal", mesh, [Polyline([[0.4, -1.0], [0.45, 2.0]])])
-    first = body.virtual.cells
+    first = body.phantom.cells
     shared = [len(np.intersect1d(first[a], first[b])) for a in range(len(first)) for b in range(a)]
     assert 1 not in shared
 
@@ -55,10 +55,10 @@ def test_a_part_that_hangs_on_a_node_only_is_apart():
 def test_refinement_brings_the_lost_volume_down_by_half_per_level():
     mesh, plane = box_mesh((3, 3, 3)), Plane([0.5, 0.5, 0.47], [0.1, 0.2, 1.0])
     lost = [
-        1.0 - cut_by("removal_refined", mesh, [plane], levels=k).virtual.volumes.sum()
+        1.0 - cut_by("removal_refined", mesh, [plane], levels=k).phantom.volumes.sum()
         for k in (0, 1, 2)
     ]
-    assert lost[0] == pytest.approx(1.0 - cut_by("removal", mesh, [plane]).virtual.volumes.sum())
+    assert lost[0] == pytest.approx(1.0 - cut_by("removal", mesh, [plane]).phantom.volumes.sum())
     # a band as wide as the cells: half as wide, within the spread of the shapes of few cells
     assert np.array(lost[1:]) / lost[:-1] == pytest.approx(0.5, abs=0.12)
 

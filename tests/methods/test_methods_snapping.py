@@ -58,9 +58,9 @@ def test_snapping_leaves_no_cell_split_and_both_sides_apart(dim, direction):
     mesh = random_mesh(dim)
     body = cut_by("snapping", mesh, [Plane(np.full(dim, 0.52), np.array(direction)[:dim] + 1e-3)])
     assert body.counts.elements == body.counts.elements_before
-    assert not body.virtual.split.any()
-    assert (body.virtual.fraction == 1.0).all()
-    assert body.virtual.bodies.max() == 1
+    assert not body.phantom.split.any()
+    assert (body.phantom.fraction == 1.0).all()
+    assert body.phantom.bodies.max() == 1
 
 
 def test_nodes_on_the_boundary_slide_along_it_and_corners_stay():
@@ -98,7 +98,7 @@ def test_a_snapped_circle_has_its_radius_up_to_the_facets():
     for n in (10, 20, 40):
         body = cut_by("snapping", rectangle_mesh((n, n)), [circle])
         inside = np.bincount(
-            body.virtual.bodies[body.virtual.cells[:, 0]], body.virtual.volumes
+            body.phantom.bodies[body.phantom.cells[:, 0]], body.phantom.volumes
         ).min()
         errors.append(abs(inside - np.pi * 0.31**2))
     # chords of length h: an area of h²/12 per radius is missing at least; nodes that cannot

@@ -18,8 +18,8 @@ from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 
 def sheet_of_equilateral_triangles(rows=6, columns=6, edge=0.2):
@@ -179,13 +179,13 @@ def test_the_kernels_are_what_numpy_says(dim):
     rng = np.random.default_rng(7)
     mesh = rectangle_mesh((2, 3)) if dim == 2 else box_mesh((2, 1, 2))
     cut = Plane(np.full(dim, 0.45), np.array([0.2, 1.0, 0.3])[:dim])
-    virtual = cut_by("virtual_node", mesh, [cut]).virtual
-    force = SpringForce(virtual, Material(np.array(0.4), np.array(0.7)))
-    u, v = 0.05 * rng.normal(size=(2, *virtual.node_points.shape))
+    phantom = cut_by("virtual_node", mesh, [cut]).phantom
+    force = SpringForce(phantom, Material(np.array(0.4), np.array(0.7)))
+    u, v = 0.05 * rng.normal(size=(2, *phantom.node_points.shape))
     pairs = [np.array(pair) for pair in combinations(range(dim + 1), 2)]
-    ends = np.stack([virtual.cells[:, pair] for pair in pairs], axis=1)
-    assert np.array_equal(ends[0], virtual.cells[0][np.array(pairs)])
-    rest = np.diff(virtual.node_points[ends], axis=2)[:, :, 0]
+    ends = np.stack([phantom.cells[:, pair] for pair in pairs], axis=1)
+    assert np.array_equal(ends[0], phantom.cells[0][np.array(pairs)])
+    rest = np.diff(phantom.node_points[ends], axis=2)[:, :, 0]
     now = rest + np.diff(u[ends], axis=2)[:, :, 0]
     stretch = np.linalg.norm(now, axis=2) - np.linalg.norm(rest, axis=2)
     t = now / np.linalg.norm(now, axis=2, keepdims=True)
@@ -201,18 +201,18 @@ def test_the_kernels_are_what_numpy_says(dim):
         assert np.abs(got - wanted).max() < 1e-13
     # pieces of cut cells bear their share only
     whole = SpringForce(cut_mesh(mesh, []), Material(np.array(0.4), np.array(0.7))).springs
-    shares = virtual.fraction[:, None] * whole[virtual.parent]
+    shares = phantom.fraction[:, None] * whole[phantom.parent]
     assert force.springs == pytest.approx(shares, rel=1e-14)
 
 
 def test_springs_of_a_body_that_turns_and_opens_rigidly_bear_nothing():
     mesh = rectangle_mesh((5, 5))
     body = cut_by("snapping", mesh, [Polyline([[-1.0, 0.31], [2.0, 0.55]])])
-    virtual = body.virtual
-    angle = np.where(virtual.bodies == virtual.bodies[0], 0.0, 2.1)
+    phantom = body.phantom
+    angle = np.where(phantom.bodies == phantom.bodies[0], 0.0, 2.1)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    u = np.einsum("ijn,nj->ni", turn, virtual.node_points) - virtual.node_points
-    force = SpringForce(virtual, isotropic(1e4, 0.3, "plane strain"))
+    u = np.einsum("ijn,nj->ni", turn, phantom.node_points) - phantom.node_points
+    force = SpringForce(phantom, isotropic(1e4, 0.3, "plane strain"))
     forces, energy = force.evaluate(u)
     assert energy < 1e-20 * 1e4
     assert np.abs(forces).max() < 1e-12 * 1e4
@@ -221,6 +221,6 @@ def test_springs_of_a_body_that_turns_and_opens_rigidly_bear_nothing():
 def test_springs_have_no_stress_and_say_so():
     force = SpringForce(cut_mesh(rectangle_mesh((2, 2)), []), isotropic(1.0, 0.3, "plane strain"))
     with pytest.raises(XfemError, match="no stress field"):
-        EnergyMomentum(DynamicBody(force, side_wise_mass(force.virtual, 1.0)), 1e-3)
+        EnergyMomentum(DynamicBody(force, side_wise_mass(force.phantom, 1.0)), 1e-3)
     with pytest.raises(XfemError, match="'best'; expected fitted or van_gelder"):
-        SpringForce(force.virtual, isotropic(1.0, 0.3, "plane strain"), fit="best")
+        SpringForce(force.phantom, isotropic(1.0, 0.3, "plane strain"), fit="best")

@@ -73,9 +73,9 @@ def test_the_critical_step_of_subdivision_vanishes_with_the_sliver_that_of_xfem_
         cut = Plane(0.5 + size * normal / (6 if dim == 2 else 2), normal)
         for method, found in steps.items():
             body = cut_by(method, mesh, [cut])
-            pattern = block_pattern(body.virtual.cells, body.virtual.node_count)
-            blocks = InternalForce(body.virtual, material, "linear").stiffness(pattern)
-            mass = side_wise_mass(body.virtual, 1.0)
+            pattern = block_pattern(body.phantom.cells, body.phantom.node_count)
+            blocks = InternalForce(body.phantom, material, "linear").stiffness(pattern)
+            mass = side_wise_mass(body.phantom, 1.0)
             found.append(critical_step(pattern.matrix(blocks), mass))
     slope = np.diff(np.log(steps["subdivision"])) / np.diff(np.log(sizes))
     # a height of ε h: exponent 1 once ε is small against one
@@ -99,8 +99,8 @@ def test_cuts_that_almost_pass_through_nodes_leave_valid_meshes(offset, dim):
     normal = np.array([0.3, 1.0, 0.7])[:dim]
     for method in ("subdivision", "snapping_subdivision", "snapping"):
         body = cut_by(method, mesh, [Plane(np.full(dim, 0.5) + offset * normal, normal)])
-        assert body.virtual.mesh.measures.sum() == pytest.approx(1.0, rel=1e-12)
-        assert body.virtual.bodies.max() == 1
+        assert body.phantom.mesh.measures.sum() == pytest.approx(1.0, rel=1e-12)
+        assert body.phantom.bodies.max() == 1
 
 
 def test_diagonals_do_not_depend_on_the_numbers_of_the_nodes():

@@ -8,8 +8,8 @@ from verify.methods.catalogue import cut_by
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
 TETRAHEDRON = SimplexMesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
@@ -25,7 +25,7 @@ def test_a_triangle_can_be_in_three_copies_but_not_in_four():
     smallest = cut_mesh(TRIANGLE, CROSS)
     assert merged.count == 1
     assert merged.size in smallest.fraction
-    assert body.virtual.volumes.sum() == pytest.approx(0.5, rel=1e-14)
+    assert body.phantom.volumes.sum() == pytest.approx(0.5, rel=1e-14)
 
 
 def test_a_tetrahedron_in_eight_parts_has_at_most_four_copies():
@@ -34,7 +34,7 @@ def test_a_tetrahedron_in_eight_parts_has_at_most_four_copies():
     assert arbitrary.counts.elements == 8
     body = cut_by("virtual_node", TETRAHEDRON, cuts)
     assert body.counts.elements <= 4
-    assert body.virtual.volumes.sum() == pytest.approx(1 / 6, rel=1e-13)
+    assert body.phantom.volumes.sum() == pytest.approx(1 / 6, rel=1e-13)
 
 
 def test_a_slab_between_two_cuts_without_a_node_is_no_copy_of_its_own():
@@ -42,15 +42,15 @@ def test_a_slab_between_two_cuts_without_a_node_is_no_copy_of_its_own():
     assert cut_by("virtual_node_arbitrary", TRIANGLE, cuts).counts.elements == 3
     body = cut_by("virtual_node", TRIANGLE, cuts)
     assert body.counts.elements == 2
-    assert body.virtual.bodies.max() == 1
+    assert body.phantom.bodies.max() == 1
 
 
 @pytest.mark.parametrize("method", ["virtual_node", "virtual_node_arbitrary"])
 def test_every_copy_has_a_node_of_its_own_part_or_is_counted(method):
     mesh = rectangle_mesh((6, 6))
     body = cut_by(method, mesh, [Polyline([[-0.1, 0.31], [0.62, 0.55]])])
-    virtual = body.virtual
-    first = virtual.cells < len(mesh.points)
+    phantom = body.phantom
+    first = phantom.cells < len(mesh.points)
     assert (first.sum(axis=1) >= 1).all()
 
 
@@ -65,17 +65,17 @@ def test_one_cut_makes_both_algorithms_the_same_as_xfem():
         for method in ("virtual_node", "virtual_node_arbitrary")
     ]
     assert energies[0] == energies[1]
-    virtual = cut_mesh(mesh, cuts)
+    phantom = cut_mesh(mesh, cuts)
     body = cut_by("virtual_node", mesh, cuts)
-    assert np.array_equal(body.virtual.cells, virtual.cells)
-    assert np.array_equal(body.virtual.fraction, virtual.fraction)
+    assert np.array_equal(body.phantom.cells, phantom.cells)
+    assert np.array_equal(body.phantom.fraction, phantom.fraction)
 
 
 def test_copies_that_resist_as_whole_cells_add_the_volume_of_the_cut_cells():
     mesh, cut = rectangle_mesh((6, 6)), Polyline([[-1.0, 0.31], [2.0, 0.55]])
     body = cut_by("virtual_node", mesh, [cut], weights="whole")
-    touched = np.bincount(body.virtual.parent, minlength=len(mesh.cells)) > 1
-    added = body.resisting.volumes.sum() - body.virtual.volumes.sum()
+    touched = np.bincount(body.phantom.parent, minlength=len(mesh.cells)) > 1
+    added = body.resisting.volumes.sum() - body.phantom.volumes.sum()
     assert added == pytest.approx(mesh.measures[touched].sum(), rel=1e-12)
     said = next(c for c in body.changes if "material added" in c.kind)
     assert said.size == pytest.approx(added, rel=1e-12)

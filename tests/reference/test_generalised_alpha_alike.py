@@ -13,8 +13,8 @@ from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 pytestmark = needs_fenicsx
 

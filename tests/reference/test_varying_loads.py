@@ -68,16 +68,16 @@ def test_a_varying_body_force_has_its_integral_on_both_sides_of_a_cut():
     from verify.solvers.body_of_scene import background_mesh
     from verify.solvers.xfem_cuts import cuts_of
     from verify.solvers.xfem_loads import loads_of
-    from verify.xfem.virtual import cut_mesh
+    from verify.xfem.phantom import cut_mesh
 
     scene = bar(True).model_copy(
         update={"loads": [BodyForce(kind="body_force", force=["x*y", "y**2"])]}
     )
     mesh, size = background_mesh(scene, 0)
-    virtual = cut_mesh(mesh, cuts_of(scene, size))
+    phantom = cut_mesh(mesh, cuts_of(scene, size))
     for total in (
         problem_of(scene, 0).nodal_forces().sum(axis=0),
-        loads_of(scene, virtual, None).sum(axis=0),
+        loads_of(scene, phantom, None).sum(axis=0),
     ):
         np.testing.assert_allclose(total, [1 / 4, 1 / 3], rtol=1e-13)
 

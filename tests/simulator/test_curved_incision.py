@@ -79,8 +79,8 @@ def test_the_cut_lies_on_the_arc_and_never_ahead_of_the_blade(curved) -> None:
 def test_the_arc_opens_by_as_much_as_it_is_pulled_and_gains_nothing(curved) -> None:
     session, _, _ = curved
     for hook in session.stage.hooks:
-        node = np.flatnonzero(session.virtual.node_side[:, 0] == hook.side)
-        away = np.linalg.norm(session.virtual.node_points[node] - hook.at, axis=1)
+        node = np.flatnonzero(session.phantom.node_side[:, 0] == hook.side)
+        away = np.linalg.norm(session.phantom.node_points[node] - hook.at, axis=1)
         nearest = node[np.argmin(away)]
         begun = session.state.displacement[nearest] - hook.vector
         np.testing.assert_allclose(begun, 0.0, atol=1e-6)  # nothing had moved before

@@ -58,8 +58,8 @@ def test_the_incision_opens_by_as_much_as_it_is_pulled(opened) -> None:
     session, _ = opened
     across = np.zeros(2)
     for k, (hook, side) in enumerate(zip(session.stage.hooks, (-1.0, 1.0), strict=True)):
-        node = np.flatnonzero(session.virtual.node_side[:, 0] == hook.side)
-        away = np.linalg.norm(session.virtual.node_points[node] - hook.at, axis=1)
+        node = np.flatnonzero(session.phantom.node_side[:, 0] == hook.side)
+        away = np.linalg.norm(session.phantom.node_points[node] - hook.at, axis=1)
         across[k] = side * session.state.displacement[node[np.argmin(away)], 0]
     np.testing.assert_allclose(across, 0.011, rtol=1e-9)  # 22 mm between the hooks
 

@@ -8,7 +8,7 @@ from verify.scene import load_scene
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_openings import opening_times
-from verify.xfem.virtual import cut_mesh
+from verify.xfem.phantom import cut_mesh
 
 
 @pytest.mark.parametrize(
@@ -23,8 +23,8 @@ def test_played_and_judged_open_the_same_elements_at_the_same_steps(name) -> Non
     """
     scene, played = load_scene(CASES / f"{name}.toml"), stage(name)
     cuts = cuts_of(scene, 0.1)
-    virtual = cut_mesh(played.mesh, cuts)
-    opening = opening_times(scene.cuts, virtual, [0.0] * len(cuts))
+    phantom = cut_mesh(played.mesh, cuts)
+    opening = opening_times(scene.cuts, phantom, [0.0] * len(cuts))
     alone = (~np.isnan(opening)).sum(axis=1) == 1
     cutter = SemiProgressiveCutter(played.mesh)
     for path in played.strokes:
@@ -39,6 +39,6 @@ def test_played_and_judged_open_the_same_elements_at_the_same_steps(name) -> Non
             np.testing.assert_array_equal(there[alone], here[alone])
             assert (there | ~here).all()
             behind = max(behind, (there & ~here).sum())
-    parts = [np.column_stack([one.parent, one.label]) for one in (virtual, cutter.virtual_mesh())]
+    parts = [np.column_stack([one.parent, one.label]) for one in (phantom, cutter.phantom_mesh())]
     np.testing.assert_array_equal(*(np.unique(rows, axis=0) for rows in parts))
     assert (behind > 0) == (name in ("block_cut_twice", "square_dissected"))

@@ -23,8 +23,8 @@ def incised(hand, **changes):
 
 def assert_cut_alike(mine, other) -> None:
     """The same elements are split, into as many pieces and unknowns."""
-    np.testing.assert_array_equal(np.sort(mine.virtual.parent), np.sort(other.virtual.parent))
-    assert mine.virtual.node_count == other.virtual.node_count
+    np.testing.assert_array_equal(np.sort(mine.phantom.parent), np.sort(other.phantom.parent))
+    assert mine.phantom.node_count == other.phantom.node_count
     cells = [np.sort(session.cutter.crossings.cell) for session in (mine, other)]
     np.testing.assert_array_equal(*cells)
 
@@ -121,7 +121,7 @@ def test_elements_beyond_the_most_of_a_cut_wait_and_are_split_like_the_others(
     assert max(record.newly_split for record in session.records) <= 5
     unhurried, _ = played
     assert_cut_alike(session, unhurried)
-    assert session.virtual.node_count == len(session.state.displacement)
+    assert session.phantom.node_count == len(session.state.displacement)
 
 
 def test_a_spread_replay_is_the_same_to_the_last_bit(hand, played) -> None:
@@ -154,14 +154,14 @@ def test_a_path_led_elsewhere_after_a_look_does_not_change_what_was_found(hand) 
     bent.extend((end + np.array([0.02, 0.0, 0.0]))[None], [0.4])
     bent.divide(division, 0.2)
     straight.advance(0.2)
-    mine, other = bent.virtual_mesh(), straight.virtual_mesh()
+    mine, other = bent.phantom_mesh(), straight.phantom_mesh()
     np.testing.assert_array_equal(mine.cells, other.cells)
     split = np.flatnonzero(bent.body.split_cells)
     nodes = np.unique(hand.mesh.cells[split])
     np.testing.assert_array_equal(bent.level_sets[nodes], straight.level_sets[nodes])
     bent.advance(0.4)
     assert bent.body.split_cells.sum() > len(split)
-    np.testing.assert_allclose(bent.virtual_mesh().volumes.sum(), hand.mesh.measures.sum())
+    np.testing.assert_allclose(bent.phantom_mesh().volumes.sum(), hand.mesh.measures.sum())
 
 
 def test_what_is_new_moves_as_that_from_which_it_comes_until_mechanics_follow(hand) -> None:

@@ -20,7 +20,7 @@ def played(name: str, **changes) -> Session:
 
 
 def bodies(session) -> list[np.ndarray]:
-    label = session.virtual.bodies
+    label = session.phantom.bodies
     return [np.flatnonzero(label == k) for k in range(label.max() + 1)]
 
 
@@ -83,8 +83,8 @@ def test_parts_of_the_block_come_apart(name, tips) -> None:
     assert quality.loose_edges == 0
     assert quality.inverted_facets == 0
     # seen from above, the hooked corners have moved outwards from each other
-    top = session.virtual.node_points[:, 2] > 0.1 - 1e-9
-    sides = np.unique(session.virtual.node_side[top], axis=0)
+    top = session.phantom.node_points[:, 2] > 0.1 - 1e-9
+    sides = np.unique(session.phantom.node_side[top], axis=0)
     assert len(sides) == tips
 
 
@@ -116,7 +116,7 @@ def test_a_thousand_cuts_into_the_face_cost_about_a_node_each() -> None:
     added = cutter.body.node_count - len(whole.mesh.points)
     assert split >= 1000
     assert 0.9 < added / split < 1.2  # 1100 for 1000 in the thesis
-    assert abs(cutter.virtual_mesh().volumes.sum() / whole.mesh.measures.sum() - 1.0) < 1e-12
+    assert abs(cutter.phantom_mesh().volumes.sum() / whole.mesh.measures.sum() - 1.0) < 1e-12
 
 
 @pytest.mark.parametrize(

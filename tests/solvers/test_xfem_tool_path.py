@@ -20,8 +20,8 @@ from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_openings import opening_times
 from verify.solvers.xfem_steps import SCHEMES
 from verify.xfem.cuts import Polyline
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 
 def solve(folder, text, **parameters):
@@ -90,14 +90,14 @@ def test_an_element_opens_when_the_blade_has_passed_all_edges_that_it_crosses(tm
     scene = load_scene(tmp_path / "rule.toml")
     mesh = rectangle_mesh((9, 6), (0, 0), (1.0, 0.7))
     start, end = np.array([-0.1, 0.21]), np.array([1.1, 0.52])
-    virtual = cut_mesh(mesh, [Polyline([start, end])])
-    times = opening_times(scene.cuts, virtual, [0.0])[:, 0]
+    phantom = cut_mesh(mesh, [Polyline([start, end])])
+    times = opening_times(scene.cuts, phantom, [0.0])[:, 0]
     along, length = (end - start) / np.linalg.norm(end - start), np.linalg.norm(end - start)
-    split = np.bincount(virtual.parent) > 1
+    split = np.bincount(phantom.parent) > 1
     assert (np.isnan(times) == ~split).all()
-    sub = virtual.sub_cells
+    sub = phantom.sub_cells
     for cell in np.flatnonzero(split):
-        corners = sub.points[np.isin(sub.piece, np.flatnonzero(virtual.parent == cell))]
+        corners = sub.points[np.isin(sub.piece, np.flatnonzero(phantom.parent == cell))]
         new = sub.zero_points.positions[np.unique(corners[corners >= len(mesh.points)])]
         expected = -0.05 + 0.3 * (((new - start) @ along) / length).max()
         assert abs(times[cell] - expected) < 1e-12

@@ -5,8 +5,8 @@ import numpy as np
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 SOFT = 1e4  # Pa, the thesis' material
 DENSITY = 1000.0  # kg/m³
@@ -46,10 +46,10 @@ def rotation(dim, angle, axis=(1.0, 2.0, -0.5)):
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
-def boundary_nodes(virtual):
-    """Unknown nodes on the boundary of the uncut mesh."""
-    mesh = virtual.mesh
+def boundary_nodes(phantom):
+    """Dof nodes on the boundary of the uncut mesh."""
+    mesh = phantom.mesh
     on_boundary = np.zeros(len(mesh.points), dtype=bool)
     for cell, opposite in mesh.boundary_facets:
         on_boundary[np.delete(mesh.cells[cell], opposite)] = True
-    return on_boundary[virtual.node_parent]
+    return on_boundary[phantom.node_parent]

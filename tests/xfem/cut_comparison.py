@@ -2,27 +2,27 @@
 
 import numpy as np
 
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["assert_same_cut"]
 
 
-def _parts(virtual: VirtualMesh):
+def _parts(phantom: PhantomMesh):
     """Cell, sides, volume fraction and unknowns of parts: pieces that no cut keeps apart are one.
 
     A cut that has gone on since may have ended in a cell, with others, and divided it further.
     """
-    first, number = np.unique(virtual.part, return_inverse=True)
-    least, most = (np.full((len(first), virtual.label.shape[1]), k, np.int8) for k in (9, -9))
-    np.minimum.at(least, number, virtual.label)
-    np.maximum.at(most, number, virtual.label)
+    first, number = np.unique(phantom.part, return_inverse=True)
+    least, most = (np.full((len(first), phantom.label.shape[1]), k, np.int8) for k in (9, -9))
+    np.minimum.at(least, number, phantom.label)
+    np.maximum.at(most, number, phantom.label)
     label = np.where(least == most, least, 0)
-    order = np.lexsort([*label.T, virtual.parent[first]])
-    share = virtual.part_fraction[first]
-    return virtual.parent[first][order], label[order], share[order], virtual.cells[first][order]
+    order = np.lexsort([*label.T, phantom.parent[first]])
+    share = phantom.part_fraction[first]
+    return phantom.parent[first][order], label[order], share[order], phantom.cells[first][order]
 
 
-def assert_same_cut(first: VirtualMesh, second: VirtualMesh) -> None:
+def assert_same_cut(first: PhantomMesh, second: PhantomMesh) -> None:
     """Same parts (cell and sides), same volumes, and a one-to-one map between the unknowns."""
     (parent, label, share, cells), other = _parts(first), _parts(second)
     np.testing.assert_array_equal(parent, other[0])

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.simulator.mapping.moving_surface import MovingSurface
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["enclosed_by_body", "loose_edges", "pinched_edges", "volume_by_body"]
 
@@ -33,7 +33,7 @@ def _directed(facets: NDArray[np.int64]) -> dict[tuple[int, int], int]:
     return uses
 
 
-def enclosed_by_body(surface: MovingSurface, virtual: VirtualMesh) -> NDArray[np.float64]:
+def enclosed_by_body(surface: MovingSurface, phantom: PhantomMesh) -> NDArray[np.float64]:
     """Area or volume that the facets of each free body enclose (divergence theorem)."""
     facets = surface.facets.rows[surface.used]
     corners = surface.material.rows[facets]
@@ -44,10 +44,10 @@ def enclosed_by_body(surface: MovingSurface, virtual: VirtualMesh) -> NDArray[np
     vertex = facets[:, 0]
     heaviest = np.abs(surface.weights.rows[vertex]).argmax(axis=1)
     node = surface.nodes.rows[vertex, heaviest]
-    return np.bincount(virtual.bodies[node], share, minlength=int(virtual.bodies.max()) + 1)
+    return np.bincount(phantom.bodies[node], share, minlength=int(phantom.bodies.max()) + 1)
 
 
-def volume_by_body(virtual: VirtualMesh) -> NDArray[np.float64]:
+def volume_by_body(phantom: PhantomMesh) -> NDArray[np.float64]:
     """Sum of the volumes of the pieces of each free body."""
-    body = virtual.bodies[virtual.cells[:, 0]]
-    return np.bincount(body, virtual.volumes, minlength=int(virtual.bodies.max()) + 1)
+    body = phantom.bodies[phantom.cells[:, 0]]
+    return np.bincount(body, phantom.volumes, minlength=int(phantom.bodies.max()) + 1)

@@ -11,18 +11,18 @@ from verify.xfem.cuts import Plane
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 STRAIN, POISSON = 0.15, 0.3
 
 
-def rest_step(virtual, mass, stuff):
-    force = InternalForce(virtual, stuff, "linear")
-    pattern = body_pattern(virtual)
-    blocks = force.stiffness(pattern, np.zeros_like(virtual.node_points), "rotation-fixed")
+def rest_step(phantom, mass, stuff):
+    force = InternalForce(phantom, stuff, "linear")
+    pattern = body_pattern(phantom)
+    blocks = force.stiffness(pattern, np.zeros_like(phantom.node_points), "rotation-fixed")
     return critical_step(pattern.matrix(blocks), mass)
 
 
@@ -45,22 +45,22 @@ def uniform(points):
     return 0.15 * points * np.eye(points.shape[1])[0]
 
 
-def aggregated(virtual):
+def aggregated(phantom):
     """The body and the report of the default sliver policy, held where `let_go` holds it."""
-    return treat_slivers(virtual, held=virtual.node_points[:, 0] < 1e-9)
+    return treat_slivers(phantom, held=phantom.node_points[:, 0] < 1e-9)
 
 
-def let_go(virtual, share, steps, every=10, start=stretched):
+def let_go(phantom, share, steps, every=10, start=stretched):
     """Largest energy over that at the start, and at how many instants a piece was inverted."""
-    stuff = material(virtual.mesh.dim)
-    mass = side_wise_mass(virtual, DENSITY)
-    force = InternalForce(virtual, stuff)
-    supports = Supports.none(virtual).prescribe(virtual, virtual.mesh.points[:, 0] < 1e-9)
+    stuff = material(phantom.mesh.dim)
+    mass = side_wise_mass(phantom, DENSITY)
+    force = InternalForce(phantom, stuff)
+    supports = Supports.none(phantom).prescribe(phantom, phantom.mesh.points[:, 0] < 1e-9)
     dynamic = DynamicBody(force, mass, supports=supports)
     state = dynamic.rest()
-    state.displacement[:] = start(virtual.node_points)
+    state.displacement[:] = start(phantom.node_points)
     before = force.evaluate(state.displacement)[1]
-    integrator = CentralDifferences(dynamic, share * rest_step(virtual, mass, stuff))
+    integrator = CentralDifferences(dynamic, share * rest_step(phantom, mass, stuff))
     largest, inverted = 0.0, 0
     for step in range(steps):
         integrator.step(state)

@@ -20,20 +20,20 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
 from verify.xfem.moving_body import treat_moving_body
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 
-def moving(virtual, top_held=False, **options):
+def moving(phantom, top_held=False, **options):
     """Body with its default treatment, perhaps held at the top and under its weight."""
-    last = virtual.node_points[:, -1]
+    last = phantom.node_points[:, -1]
     # behind the cut nodes at the top belong to the lower part
-    held = top_held & (last > 1.0 - 1e-9) & (virtual.bodies == virtual.bodies[last.argmax()])
-    dim = virtual.mesh.dim
-    treated = treat_moving_body(virtual, material(dim), DENSITY, held=held, **options)
-    v = treated.virtual
+    held = top_held & (last > 1.0 - 1e-9) & (phantom.bodies == phantom.bodies[last.argmax()])
+    dim = phantom.mesh.dim
+    treated = treat_moving_body(phantom, material(dim), DENSITY, held=held, **options)
+    v = treated.phantom
     assert v.aggregation is not None
     fixed = np.repeat(held[v.node_corner][:, None], dim, axis=1)
     weight = treated.mass.weight(-GRAVITY * np.eye(dim)[-1])
@@ -50,15 +50,15 @@ def split(dim, size=1e-3):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_mass_of_every_part_is_its_own(dim, lumping):
     """CᵀMC moves rigid parts as M does: mass, first and second moments of each part."""
-    virtual = split(dim)
-    treated, _ = treat_slivers(virtual)
+    phantom = split(dim)
+    treated, _ = treat_slivers(phantom)
     found, want = (
         shifted_mass(v, DENSITY, lumping) if lumping == "row sum" else lumping(v, DENSITY)
-        for v in (treated, virtual)
+        for v in (treated, phantom)
     )
-    for part in range(virtual.bodies.max() + 1):
+    for part in range(phantom.bodies.max() + 1):
         fields = []
-        for v in (treated, virtual):
+        for v in (treated, phantom):
             here = (v.bodies == part)[:, None]
             fields.append(here * np.column_stack([np.ones(v.node_count), v.node_points]))
         moments = [f.T @ m.apply(f) for f, m in zip(fields, (found, want), strict=True)]
@@ -72,8 +72,8 @@ def test_the_critical_step_is_never_below_that_of_the_smallest_element(seed):
     """Up to four cuts at random. K ≤ ω²M for every piece, hence CᵀKC ≤ ω²CᵀMC."""
     dim = 2 + seed % 2
     mesh = mesh_of(dim, 5 if dim == 2 else 3, seed // 2)
-    virtual = cut_mesh(mesh, degenerate_cuts(mesh, seed))
-    treated, _ = treat_slivers(virtual)
+    phantom = cut_mesh(mesh, degenerate_cuts(mesh, seed))
+    treated, _ = treat_slivers(phantom)
     pattern = body_pattern(treated)
     K = pattern.matrix(InternalForce(treated, material(dim), "linear").stiffness(pattern))
     mass = side_wise_mass(treated, DENSITY)
@@ -96,7 +96,7 @@ def test_a_mass_lumped_anew_would_not_keep_the_step():
 def test_a_freed_half_falls_with_g_and_the_account_closes(dim, scheme):
     """The upper half is held, the lower one falls from rest: to round-off as a rigid body."""
     body = moving(split(dim), top_held=True)
-    v, state = body.force.virtual, body.rest()
+    v, state = body.force.phantom, body.rest()
     free = v.bodies != v.bodies[body.fixed.any(axis=1)][0]
     h, count = 0.002, 20
     account = run(scheme(body, h), body, state, count)
@@ -120,7 +120,7 @@ def test_a_free_body_keeps_its_momenta_part_by_part(dim, scheme):
     """Turning and deforming at random; central differences keep the angular momentum, too."""
     body = moving(split(dim))
     body.weight = np.zeros(body.shape)
-    v, state = body.force.virtual, body.rest()
+    v, state = body.force.phantom, body.rest()
     random = np.random.default_rng(0)
     state.velocity[:] = 0.1 * random.normal(size=body.shape)
     state.velocity += v.node_points @ (rotation(dim, 0.5) - np.eye(dim)).T
@@ -150,7 +150,7 @@ def test_a_cut_midway_keeps_momenta_and_loses_what_slivers_moved_otherwise(dim, 
     waves = np.sin(3.0 * old.node_points + random.uniform(0.0, 3.0, dim))
     state = MotionState(0.05 * waves, 0.3 * waves[:, ::-1].copy())
     body = moving(new, top_held=held)
-    v = body.force.virtual
+    v = body.force.phantom
     source = ancestors(old, new)
     still = source[v.node_corner][body.fixed[:, 0]]
     state.displacement[still] = state.velocity[still] = 0.0
@@ -191,7 +191,7 @@ def test_a_linear_motion_is_inherited_as_it_is():
         old = cut_mesh(new.mesh, [])
         state = MotionState(0.1 * old.node_points, 0.3 * old.node_points[:, ::-1].copy())
         body = moving(new)
-        v = body.force.virtual
+        v = body.force.phantom
         after = inherit_state(old, v, state, body)
         source = ancestors(old, new)
         for got, was in (
@@ -206,7 +206,7 @@ def test_a_linear_motion_is_inherited_as_it_is():
 def test_inherited_twice_what_is_aggregated_stays_where_it_is():
     """The same cuts once more: nothing changes."""
     body = moving(split(2))
-    v = body.force.virtual
+    v = body.force.phantom
     random = np.random.default_rng(0)
     state = MotionState(*random.normal(scale=0.02, size=(2, *body.shape)))
     after = inherit_state(v, v, state, body)
@@ -230,9 +230,9 @@ def test_a_linearised_step_has_the_force_and_the_stiffness_of_the_body(dim):
 
 
 def test_an_explicit_step_moves_supports_that_no_root_shares_and_refuses_others():
-    virtual = split(2)
-    treated = moving(virtual)
-    v = treated.force.virtual
+    phantom = split(2)
+    treated = moving(phantom)
+    v = treated.force.phantom
     coupled = np.unique(treated.mass.entries[0][treated.mass.entries[0] != treated.mass.entries[1]])
 
     def driven(nodes):
@@ -256,10 +256,10 @@ def test_a_part_without_a_root_keeps_its_unknowns_and_falls_too():
     """A strip a thousandth of an element thin, cut off along the whole body: counted."""
     mesh = mesh_of(2, 6, 0)
     cuts = [Plane([0.5, 0.55 + gap], [0.1, 1.0]) for gap in (0.0, 1e-3 / 6)]
-    virtual = cut_mesh(mesh, cuts)
-    treated = treat_moving_body(virtual, material(2), DENSITY)
-    strip = virtual.bodies[virtual.cells[:, 0]]
-    thin = np.bincount(strip, virtual.volumes).argmin()
+    phantom = cut_mesh(mesh, cuts)
+    treated = treat_moving_body(phantom, material(2), DENSITY)
+    strip = phantom.bodies[phantom.cells[:, 0]]
+    thin = np.bincount(strip, phantom.volumes).argmin()
     assert treated.slivers.rootless == (strip == thin).sum()
     assert f"({treated.slivers.rootless} of them without a root cell)" in treated.summary
     body = DynamicBody(treated.force, treated.mass, weight=treated.mass.weight([0.0, -GRAVITY]))

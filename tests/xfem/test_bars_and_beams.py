@@ -20,10 +20,10 @@ from verify.xfem.inherit import inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.moving_body import treat_moving_body
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 HALF, STRAIN = 0.5, 0.01
 SPEED = 3.668996928526  # √((λ + 2μ)/ρ)
@@ -39,12 +39,12 @@ def bar(dim, cells):
     return box_mesh((cells, 1, 1), lower, upper)
 
 
-def dynamic(virtual, policy):
+def dynamic(phantom, policy):
     """The bar's body, and its supports' displacement."""
-    treated = treat_moving_body(virtual, material(virtual.mesh.dim), DENSITY, policy)
-    ends = np.abs(np.abs(virtual.mesh.points[:, 0]) - HALF) < 1e-9
-    supports = Supports.none(treated.virtual).prescribe(
-        treated.virtual, ends, lambda at, _: STRAIN * at * np.eye(at.shape[1])[0]
+    treated = treat_moving_body(phantom, material(phantom.mesh.dim), DENSITY, policy)
+    ends = np.abs(np.abs(phantom.mesh.points[:, 0]) - HALF) < 1e-9
+    supports = Supports.none(treated.phantom).prescribe(
+        treated.phantom, ends, lambda at, _: STRAIN * at * np.eye(at.shape[1])[0]
     )
     fixed = supports.fixed.copy()
     fixed[:, 1:] = True  # what follows a root cell does not move across either
@@ -56,16 +56,16 @@ def freed_bar(dim, cells, offset, policy):
     mesh = bar(dim, cells)
     whole = dynamic(cut_mesh(mesh, []), "keep")
     state = whole.rest()
-    state.displacement[:, 0] = STRAIN * whole.force.virtual.node_points[:, 0]
+    state.displacement[:, 0] = STRAIN * whole.force.phantom.node_points[:, 0]
     h = 0.9 * RESONANCE_FREE * 2.0 * HALF / cells / SPEED
     run(CentralDifferences(whole, h), whole, state, 10)
     # equilibrium: nothing has moved
     assert np.abs(state.velocity).max() < 1e-12
     normal = np.eye(dim)[0]
-    virtual = cut_mesh(mesh, [Plane(offset * normal, normal)])
-    body = dynamic(virtual, policy)
-    treated = body.force.virtual
-    state = inherit_state(whole.force.virtual, treated, state, body)
+    phantom = cut_mesh(mesh, [Plane(offset * normal, normal)])
+    body = dynamic(phantom, policy)
+    treated = body.force.phantom
+    state = inherit_state(whole.force.phantom, treated, state, body)
     parts = subdivide(treated)
     # the cut as realised: a dropped sliver moves it to the nearest faces
     left = parts.points[parts.cells].mean(axis=1)[:, 0] < parts.cut_facets[:, :, 0].mean()
@@ -178,7 +178,7 @@ def test_a_rigid_turn_at_constant_rate_stores_nothing_and_keeps_every_momentum(d
     The exact mass: every axis of a square or cube is a principal one, none of its lumped nodes'.
     """
     body, state = spinning(dim, consistent_mass)
-    X = body.force.virtual.node_points - 0.5
+    X = body.force.phantom.node_points - 0.5
     W = (rotation(dim, 0.5 * np.pi) - rotation(dim, -0.5 * np.pi)) / 2.0
     first = None
     for angle in np.linspace(0.0, 2.0 * np.pi, 9):
@@ -188,7 +188,7 @@ def test_a_rigid_turn_at_constant_rate_stores_nothing_and_keeps_every_momentum(d
         force, energy = body.force.evaluate(state.displacement)
         assert np.abs(force).max() < 1e-10
         assert energy < 1e-12
-        where = body.force.virtual.node_points + state.displacement - 0.5
+        where = body.force.phantom.node_points + state.displacement - 0.5
         momenta = body.mass.apply(state.velocity)
         turning = (
             np.cross(where, momenta).sum(axis=0)
@@ -205,7 +205,7 @@ def test_a_rigid_turn_at_constant_rate_stores_nothing_and_keeps_every_momentum(d
 def test_the_halves_of_a_spinning_cut_body_each_keep_their_momentum(dim, scheme):
     """One full turn: energy, both momenta, and the linear momentum of each half on its own."""
     body, state = spinning(dim)
-    v = body.force.virtual
+    v = body.force.phantom
     K = body.pattern.matrix(body.force.stiffness(body.pattern, np.zeros(body.shape)))
     h = 0.9 * RESONANCE_FREE * critical_step(K, body.mass)
     if scheme is EnergyMomentum:

@@ -17,10 +17,10 @@ from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 CASES = {
     "through": (rectangle_mesh((6, 6)), Polyline([[-1.0, 0.0], [2.0, 1.0]])),
@@ -31,20 +31,20 @@ CASES = {
 }
 
 
-def blocks_by_the_thesis(virtual, sign_of_kaa=1.0):
+def blocks_by_the_thesis(phantom, sign_of_kaa=1.0):
     """(u, a) stiffness from nodal signs and fractions only."""
-    mesh = virtual.mesh
+    mesh = phantom.mesh
     split = np.zeros(len(mesh.cells), dtype=bool)
-    split[virtual.parent[virtual.split]] = True
-    plus = virtual.label[:, 0] > 0
-    above = np.bincount(virtual.parent[plus], virtual.fraction[plus], minlength=len(mesh.cells))
+    split[phantom.parent[phantom.split]] = True
+    plus = phantom.label[:, 0] > 0
+    above = np.bincount(phantom.parent[plus], phantom.fraction[plus], minlength=len(mesh.cells))
     state = "plane strain" if mesh.dim == 2 else "solid"
     return shifted_stiffness(
         mesh,
         isotropic(1.0, 0.3, state),
-        np.where(virtual.level_sets[:, 0] >= 0.0, 1, -1),
+        np.where(phantom.level_sets[:, 0] >= 0.0, 1, -1),
         above,
-        virtual.enriched_nodes,
+        phantom.enriched_nodes,
         split,
         sign_of_kaa,
     )
@@ -53,27 +53,27 @@ def blocks_by_the_thesis(virtual, sign_of_kaa=1.0):
 @pytest.mark.parametrize("name", CASES)
 def test_the_transformed_stiffness_equals_the_thesis_blocks_with_the_corrected_sign(name):
     mesh, cut = CASES[name]
-    virtual = cut_mesh(mesh, [cut])
-    through_t = transformed_matrix(virtual, "shifted", sparse_stiffness(virtual)).toarray()
-    assert np.abs(through_t - blocks_by_the_thesis(virtual)).max() < 1e-14
+    phantom = cut_mesh(mesh, [cut])
+    through_t = transformed_matrix(phantom, "shifted", sparse_stiffness(phantom)).toarray()
+    assert np.abs(through_t - blocks_by_the_thesis(phantom)).max() < 1e-14
 
 
 def test_the_sign_printed_in_2_64_makes_the_stiffness_indefinite():
     """Negative control: the wrong sign of K^aa must not pass unnoticed."""
-    virtual = cut_mesh(*[(CASES["through"][0]), [CASES["through"][1]]])
-    right = np.linalg.eigvalsh(blocks_by_the_thesis(virtual))
-    wrong = np.linalg.eigvalsh(blocks_by_the_thesis(virtual, sign_of_kaa=-1.0))
+    phantom = cut_mesh(*[(CASES["through"][0]), [CASES["through"][1]]])
+    right = np.linalg.eigvalsh(blocks_by_the_thesis(phantom))
+    wrong = np.linalg.eigvalsh(blocks_by_the_thesis(phantom, sign_of_kaa=-1.0))
     assert right[0] > -1e-14
     assert wrong[0] < -0.1 * wrong[-1]
 
 
 def test_the_sign_printed_in_2_64_gives_a_wrong_energy():
     mesh, cut = CASES["through"]
-    virtual = cut_mesh(mesh, [cut])
-    p = exact.f1(virtual.node_points, virtual.node_side)
-    q = from_sidewise(virtual, "shifted", p).ravel()
-    assert 0.5 * q @ blocks_by_the_thesis(virtual) @ q == pytest.approx(exact.ENERGY_F1, rel=1e-9)
-    wrong = 0.5 * q @ blocks_by_the_thesis(virtual, sign_of_kaa=-1.0) @ q
+    phantom = cut_mesh(mesh, [cut])
+    p = exact.f1(phantom.node_points, phantom.node_side)
+    q = from_sidewise(phantom, "shifted", p).ravel()
+    assert 0.5 * q @ blocks_by_the_thesis(phantom) @ q == pytest.approx(exact.ENERGY_F1, rel=1e-9)
+    wrong = 0.5 * q @ blocks_by_the_thesis(phantom, sign_of_kaa=-1.0) @ q
     assert abs(wrong / exact.ENERGY_F1 - 1.0) > 0.1
 
 
@@ -81,45 +81,45 @@ def test_the_sign_printed_in_2_64_gives_a_wrong_energy():
 @pytest.mark.parametrize("name", CASES)
 def test_conversions_between_bases_are_inverse_to_each_other(name, basis):
     mesh, cut = CASES[name]
-    virtual = cut_mesh(mesh, [cut])
-    p = np.random.default_rng(0).normal(size=virtual.node_points.shape)
-    q = from_sidewise(virtual, basis, p)
-    assert np.abs(sidewise_from(virtual, basis, q) - p).max() < 1e-15
-    assert np.linalg.cond(transformation(virtual, basis).toarray()) < 3.0
+    phantom = cut_mesh(mesh, [cut])
+    p = np.random.default_rng(0).normal(size=phantom.node_points.shape)
+    q = from_sidewise(phantom, basis, p)
+    assert np.abs(sidewise_from(phantom, basis, q) - p).max() < 1e-15
+    assert np.linalg.cond(transformation(phantom, basis).toarray()) < 3.0
 
 
 @pytest.mark.parametrize("basis", ["shifted", "heaviside"])
 def test_all_bases_give_the_same_displacement_to_round_off(basis):
     """The system solved in its own unknowns, Dirichlet values included, by a dense solver."""
     mesh, cut = CASES["through"]
-    virtual = cut_mesh(mesh, [cut])
+    phantom = cut_mesh(mesh, [cut])
     nodes = boundary_nodes(mesh)
-    supports = Supports.none(virtual).prescribe(virtual, nodes, exact.f3)
-    sidewise = solve_static(virtual, isotropic(1.0, 0.3, "plane strain"), supports).displacement
-    K = transformed_matrix(virtual, basis, csr_array(sparse_stiffness(virtual))).toarray()
-    given = from_sidewise(virtual, basis, supports.values)
+    supports = Supports.none(phantom).prescribe(phantom, nodes, exact.f3)
+    sidewise = solve_static(phantom, isotropic(1.0, 0.3, "plane strain"), supports).displacement
+    K = transformed_matrix(phantom, basis, csr_array(sparse_stiffness(phantom))).toarray()
+    given = from_sidewise(phantom, basis, supports.values)
     # an enriched node with a prescribed value has both u and a prescribed
     on_boundary = np.isin(
-        np.concatenate([np.arange(len(mesh.points)), virtual.enriched_nodes]), nodes
+        np.concatenate([np.arange(len(mesh.points)), phantom.enriched_nodes]), nodes
     )
     fixed = np.repeat(on_boundary, 2)
     q = given.ravel().copy()
     q[~fixed] = np.linalg.solve(K[np.ix_(~fixed, ~fixed)], -K[np.ix_(~fixed, fixed)] @ q[fixed])
-    got = sidewise_from(virtual, basis, q.reshape(-1, 2))
+    got = sidewise_from(phantom, basis, q.reshape(-1, 2))
     assert np.abs(got - sidewise).max() < 1e-13
 
 
 def test_a_is_the_displacement_above_minus_below():
     """Both bases: the jump is a (shifted) or 2a (plain), whatever the side of the node."""
     mesh, cut = CASES["through"]
-    virtual = cut_mesh(mesh, [cut])
-    p = np.where(virtual.node_side > 0, [0.3, 0.7], [0.1, 0.2]) * np.ones((virtual.node_count, 2))
+    phantom = cut_mesh(mesh, [cut])
+    p = np.where(phantom.node_side > 0, [0.3, 0.7], [0.1, 0.2]) * np.ones((phantom.node_count, 2))
     count = len(mesh.points)
-    assert from_sidewise(virtual, "shifted", p)[count:] == pytest.approx(
-        np.tile([0.2, 0.5], (len(virtual.enriched_nodes), 1))
+    assert from_sidewise(phantom, "shifted", p)[count:] == pytest.approx(
+        np.tile([0.2, 0.5], (len(phantom.enriched_nodes), 1))
     )
-    assert from_sidewise(virtual, "heaviside", p)[count:] == pytest.approx(
-        np.tile([0.1, 0.25], (len(virtual.enriched_nodes), 1))
+    assert from_sidewise(phantom, "heaviside", p)[count:] == pytest.approx(
+        np.tile([0.1, 0.25], (len(phantom.enriched_nodes), 1))
     )
 
 
@@ -131,9 +131,9 @@ def test_two_crossing_cuts_have_no_shifted_basis():
 
 
 def test_an_unknown_basis_is_refused():
-    virtual = cut_mesh(CASES["through"][0], [CASES["through"][1]])
+    phantom = cut_mesh(CASES["through"][0], [CASES["through"][1]])
     with pytest.raises(XfemError, match="expected shifted or heaviside"):
-        transformation(virtual, "ramp")
+        transformation(phantom, "ramp")
 
 
 def test_two_parts_beyond_one_cut_have_unknowns_of_their_own_and_no_shifted_basis():
@@ -142,8 +142,8 @@ def test_two_parts_beyond_one_cut_have_unknowns_of_their_own_and_no_shifted_basi
     points = np.vstack([[[0.0, 0.0]], np.column_stack([np.cos(turn), np.sin(turn)])])
     around = np.arange(6)
     mesh = SimplexMesh(points, np.column_stack([0 * around, 1 + around, 1 + (around + 1) % 6]))
-    virtual = cut_mesh(mesh, [ImplicitCut(lambda x: 0.7 - np.abs(x[:, 0]))])
-    assert np.bincount(virtual.node_parent)[0] == 3
-    assert virtual.bodies.max() == 2  # the middle and both corners
+    phantom = cut_mesh(mesh, [ImplicitCut(lambda x: 0.7 - np.abs(x[:, 0]))])
+    assert np.bincount(phantom.node_parent)[0] == 3
+    assert phantom.bodies.max() == 2  # the middle and both corners
     with pytest.raises(BasisError, match="node 0 has 3 unknowns"):
-        transformation(virtual, "shifted")
+        transformation(phantom, "shifted")

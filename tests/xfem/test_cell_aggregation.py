@@ -17,22 +17,22 @@ from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 SOFT = {2: isotropic(1.0, 0.3, "plane strain"), 3: isotropic(1.0, 0.3, "solid")}
 
 
-def aggregated(virtual, nodes=()):
+def aggregated(phantom, nodes=()):
     """Default policy, with a support at some nodes of the uncut mesh."""
-    held = np.zeros(len(virtual.mesh.points), dtype=bool)
+    held = np.zeros(len(phantom.mesh.points), dtype=bool)
     held[np.asarray(nodes, dtype=int)] = True
-    return treat_slivers(virtual, held=held[virtual.node_parent])
+    return treat_slivers(phantom, held=held[phantom.node_parent])
 
 
 def mesh_of(dim, count, seed):
@@ -74,8 +74,8 @@ def test_the_patch_test_holds_for_any_cut(dim, count):
         random = np.random.default_rng(seed)
         mesh = mesh_of(dim, count, seed)
         cut = random_cut(mesh, random)
-        virtual = cut_mesh(mesh, [cut])
-        treated, report = aggregated(virtual, boundary_nodes(mesh))
+        phantom = cut_mesh(mesh, [cut])
+        treated, report = aggregated(phantom, boundary_nodes(mesh))
         following += report.aggregated
         field = stretched_sides(cut, random)
         supports = Supports.none(treated).prescribe(treated, boundary_nodes(mesh), field)
@@ -83,7 +83,7 @@ def test_the_patch_test_holds_for_any_cut(dim, count):
         want = field(treated.node_points, treated.node_side)
         assert np.abs(solution.displacement - want).max() < 1e-13
         # also where there is no unknown
-        everywhere = field(virtual.node_points, virtual.node_side)
+        everywhere = field(phantom.node_points, phantom.node_side)
         assert np.abs(treated.extend(solution.displacement) - everywhere).max() < 1e-12
     assert following > 24 * 3
 
@@ -98,14 +98,14 @@ def test_the_patch_test_holds_without_values_on_slivers(dim, count):
         random = np.random.default_rng(50 + seed)
         mesh = mesh_of(dim, count, seed)
         cut = Plane(random.uniform(0.4, 0.6, dim), np.eye(dim)[-1] + 0.1 * random.normal(size=dim))
-        virtual = cut_mesh(mesh, [cut])
+        phantom = cut_mesh(mesh, [cut])
         field = stretched_sides(cut, random)
         far = np.abs(mesh.points[:, -1] - 0.5) > 0.5 - 1e-9
-        treated, _ = treat_slivers(virtual, held=far[virtual.node_parent])
+        treated, _ = treat_slivers(phantom, held=far[phantom.node_parent])
         supports = Supports.none(treated).prescribe(treated, far, field)
         # what the exact stress asks of the other nodes: internal forces of the uncut policy
-        everywhere = field(virtual.node_points, virtual.node_side)
-        load = InternalForce(virtual, SOFT[dim], "linear").evaluate(everywhere)[0]
+        everywhere = field(phantom.node_points, phantom.node_side)
+        load = InternalForce(phantom, SOFT[dim], "linear").evaluate(everywhere)[0]
         solution = solve_static(treated, SOFT[dim], supports, treated.restrict(load))
         want = field(treated.node_points, treated.node_side)
         assert np.abs(solution.displacement - want).max() < 1e-12
@@ -122,8 +122,8 @@ def test_the_patch_test_holds_for_a_flat_membrane_in_space(normal_axis):
         cut = random_cut(plane, random)
         lift = np.eye(3)[axes]
         mesh = SimplexMesh(plane.points @ lift, plane.cells)
-        virtual = cut_mesh(mesh, [Plane(cut.point @ lift, cut.normal @ lift)])
-        treated, report = aggregated(virtual, boundary_nodes(mesh))
+        phantom = cut_mesh(mesh, [Plane(cut.point @ lift, cut.normal @ lift)])
+        treated, report = aggregated(phantom, boundary_nodes(mesh))
         assert report.rootless == 0
         following += report.aggregated
         across, shifts = cut.normal, 0.02 * random.normal(size=(2, 2))
@@ -157,13 +157,13 @@ def turned_f3(angle):
     return field, turn @ exact.ACROSS
 
 
-def energy_error(virtual, displacement, field):
+def energy_error(phantom, displacement, field):
     """√∫ 2μ|ε|² + λ tr² of the error; exact strains by central differences, to 1e-9."""
-    body, mesh = subdivide(virtual), virtual.mesh
-    corners, sides = body.points[body.cells], virtual.piece_side[body.cell_piece]
+    body, mesh = subdivide(phantom), phantom.mesh
+    corners, sides = body.points[body.cells], phantom.piece_side[body.cell_piece]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / (2 if mesh.dim == 2 else 6)
-    nodal = virtual.extend(displacement)[virtual.cells]
-    slopes = np.einsum("pik,pil->pkl", nodal, mesh.gradients[virtual.parent])[body.cell_piece]
+    nodal = phantom.extend(displacement)[phantom.cells]
+    slopes = np.einsum("pik,pil->pkl", nodal, mesh.gradients[phantom.parent])[body.cell_piece]
     total = 0.0
     for point, weight in zip(*simplex_rule(mesh.dim, 4), strict=True):
         at = np.einsum("k,ckd->cd", point, corners)
@@ -180,11 +180,11 @@ def errors_kept_and_aggregated(mesh, angle):
     """L2 and energy errors (2, 2), with slivers kept and aggregated."""
     field, normal = turned_f3(angle)
     ends = boundary_nodes(mesh)
-    virtual = cut_mesh(mesh, [Plane([0.5] * mesh.dim, np.pad(normal, (0, mesh.dim - 2)))])
-    treated, report = aggregated(virtual, ends)
+    phantom = cut_mesh(mesh, [Plane([0.5] * mesh.dim, np.pad(normal, (0, mesh.dim - 2)))])
+    treated, report = aggregated(phantom, ends)
     assert report.aggregated > 0
     found = []
-    for body in (virtual, treated):
+    for body in (phantom, treated):
         supports = Supports.none(body).prescribe(body, ends, field)
         moved = solve_static(body, SOFT[mesh.dim], supports).displacement
         found.append((relative_l2_error(body, moved, field), energy_error(body, moved, field)))
@@ -223,9 +223,9 @@ def test_the_displacement_keeps_its_error_in_space():
         assert (treated < 1.02 * kept).all()
 
 
-def dense_stiffness(virtual):
-    pattern = body_pattern(virtual)
-    blocks = InternalForce(virtual, SOFT[virtual.mesh.dim], "linear").stiffness(pattern)
+def dense_stiffness(phantom):
+    pattern = body_pattern(phantom)
+    blocks = InternalForce(phantom, SOFT[phantom.mesh.dim], "linear").stiffness(pattern)
     return pattern.matrix(blocks).toarray()
 
 
@@ -234,17 +234,17 @@ def test_bodies_and_rigid_motions_stay_what_they_are(seed):
     """Up to four cuts at random: 3 or 6 motions without energy for each part, and no other."""
     dim = 2 + seed % 2
     mesh = mesh_of(dim, 5 if dim == 2 else 3, seed // 2)
-    virtual = cut_mesh(mesh, degenerate_cuts(mesh, seed))
-    treated, report = treat_slivers(virtual)
-    assert treated.bodies.max() == virtual.bodies.max()
+    phantom = cut_mesh(mesh, degenerate_cuts(mesh, seed))
+    treated, report = treat_slivers(phantom)
+    assert treated.bodies.max() == phantom.bodies.max()
     K = dense_stiffness(treated)
     # what the matrix must be: Cᵀ K C, from a product of dense matrices
     C = np.kron(report.extension.toarray(), np.eye(dim))
-    want = C.T @ dense_stiffness(virtual) @ C
+    want = C.T @ dense_stiffness(phantom) @ C
     assert np.abs(K - want).max() < 1e-14 * np.abs(want).max()
     scale = 1.0 / np.sqrt(np.diag(K))
     values = np.linalg.eigvalsh(scale[:, None] * K * scale)
-    parts = virtual.bodies.max() + 1
+    parts = phantom.bodies.max() + 1
     assert (np.abs(values) < 1e-11).sum() == (3 if dim == 2 else 6) * parts
 
 
@@ -264,16 +264,16 @@ def test_the_condition_number_without_scaling_is_bounded(dim):
     times; a root is continued to twice its size. Kept, it grows without limit.
     """
 
-    def condition(virtual):
-        held = np.repeat(virtual.node_points[:, -1] % 1.0 < 1e-9, dim)
-        values = np.linalg.eigvalsh(dense_stiffness(virtual)[np.ix_(~held, ~held)])
+    def condition(phantom):
+        held = np.repeat(phantom.node_points[:, -1] % 1.0 < 1e-9, dim)
+        values = np.linalg.eigvalsh(dense_stiffness(phantom)[np.ix_(~held, ~held)])
         return values[-1] / values[0]
 
     uncut = condition(cut_mesh(near_nodes(dim, 0.5).mesh, []))
     for size in (0.3, 1e-1, 1e-2, 1e-4, 1e-8, 1e-12, 0.0, -1e-12, -1e-8, -1e-4):
-        virtual = near_nodes(dim, size)
-        ends = virtual.node_points[:, -1] % 1.0 < 1e-9
-        treated, _ = treat_slivers(virtual, held=ends)
+        phantom = near_nodes(dim, size)
+        ends = phantom.node_points[:, -1] % 1.0 < 1e-9
+        treated, _ = treat_slivers(phantom, held=ends)
         assert condition(treated) < 20.0 * uncut
     assert condition(near_nodes(dim, 1e-4)) > 1e4 * uncut
 
@@ -305,30 +305,30 @@ def test_the_root_does_not_depend_on_the_numbers_of_nodes_and_cells():
 def test_prescribed_values_on_slivers_are_what_they_are(policy):
     """A thin wedge between cut and boundary is pulled by its sharp end, where only slivers are."""
     mesh = rectangle_mesh((8, 8))
-    virtual = cut_mesh(mesh, [Plane([1.0, 0.9995], [-0.06, 1.0])])
+    phantom = cut_mesh(mesh, [Plane([1.0, 0.9995], [-0.06, 1.0])])
     tip = (mesh.points > 0.87).all(axis=1) & (mesh.points[:, 1] == 1.0)
     base = mesh.points[:, 1] == 0.0
-    held = (tip | base)[virtual.node_parent]
-    treated, report = treat_slivers(virtual, policy, held=held)
+    held = (tip | base)[phantom.node_parent]
+    treated, report = treat_slivers(phantom, policy, held=held)
     assert (report.aggregated > 0) == (policy == "merge")
     supports = Supports.none(treated).prescribe(treated, base)
     supports = supports.prescribe(treated, tip, lambda x, side: 0.01 * x)
     solution = solve_static(treated, SOFT[2], supports)
-    at = np.flatnonzero(tip[virtual.node_parent])
+    at = np.flatnonzero(tip[phantom.node_parent])
     values = treated.extend(solution.displacement)[at]
-    assert values == pytest.approx(0.01 * virtual.node_points[at], abs=1e-15)
+    assert values == pytest.approx(0.01 * phantom.node_points[at], abs=1e-15)
     if policy == "merge":
-        plain, _ = treat_slivers(virtual, policy)
+        plain, _ = treat_slivers(phantom, policy)
         with pytest.raises(XfemError, match="follow a root cell"):
             Supports.none(plain).prescribe(plain, tip)
 
 
 def test_supports_of_another_body_and_a_penalty_on_top_are_refused():
-    virtual = near_nodes(2, 1e-3)
+    phantom = near_nodes(2, 1e-3)
     with pytest.raises(XfemError, match="held nodes"):
-        treat_slivers(virtual, held=np.ones(3, dtype=bool))
+        treat_slivers(phantom, held=np.ones(3, dtype=bool))
     with pytest.raises(XfemError, match="aggregated"):
-        GhostPenalty(treat_slivers(virtual)[0], SOFT[2])
+        GhostPenalty(treat_slivers(phantom)[0], SOFT[2])
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -357,8 +357,8 @@ def test_static_equilibrium_at_large_rotation_is_that_of_the_kept_slivers_but_fo
 
     Energies differ by less than what the aggregated slivers are of the volume.
     """
-    virtual = near_nodes(dim, 1e-2)
-    mesh = virtual.mesh
+    phantom = near_nodes(dim, 1e-2)
+    mesh = phantom.mesh
     ends = np.abs(mesh.points[:, -1] - 0.5) > 0.5 - 1e-9
     turn = rotation(dim, 0.5, (0.0, 0.0, 1.0)) - np.eye(dim)
 
@@ -373,7 +373,7 @@ def test_static_equilibrium_at_large_rotation_is_that_of_the_kept_slivers_but_fo
         force = InternalForce(treated, SOFT[dim])
         return static_equilibrium(force, supports.fixed, prescribed, load, 4).energy
 
-    treated, report = treat_slivers(virtual, held=ends[virtual.node_parent])
+    treated, report = treat_slivers(phantom, held=ends[phantom.node_parent])
     assert report.aggregated > 0
-    kept, found = energy(virtual), energy(treated)
+    kept, found = energy(phantom), energy(treated)
     assert found == pytest.approx(kept, rel=report.volume_share)

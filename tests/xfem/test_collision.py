@@ -83,10 +83,10 @@ def test_the_nearest_facet_is_that_of_all(dim) -> None:
 @pytest.mark.parametrize("dim", [2, 3])
 def test_each_part_of_a_cut_body_answers_for_itself(dim) -> None:
     cutter, _, collider, _, _, rng = _model(dim, 2)
-    virtual = cutter.virtual_mesh()
+    phantom = cutter.phantom_mesh()
     order = np.argsort(cutter.body.piece_parent.rows, kind="stable")
     piece_body = np.empty(len(order), dtype=np.int64)
-    piece_body[order] = virtual.bodies[virtual.cells[:, 0]]
+    piece_body[order] = phantom.bodies[phantom.cells[:, 0]]
     points = rng.uniform(-0.3, 1.3, (40, dim))
     every = collider.nearest(points)
     one_by_one = [collider.nearest(points, piece_body=piece_body, body=b) for b in (0, 1)]

@@ -8,9 +8,9 @@ from xfem_bodies import zero_modes
 
 from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, Polyline
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.virtual import cut_mesh
 
 SQUARE = rectangle_mesh((4, 4))
 CUBE = box_mesh((2, 2, 2))
@@ -56,9 +56,9 @@ PLANAR = {
 @pytest.mark.parametrize("name", PLANAR)
 def test_every_free_piece_of_a_plate_has_exactly_three_zero_energy_modes(name):
     cuts, pieces = PLANAR[name]
-    virtual = cut_mesh(SQUARE, cuts)
-    assert virtual.bodies.max() + 1 == pieces
-    modes, next_value = zero_modes(virtual)
+    phantom = cut_mesh(SQUARE, cuts)
+    assert phantom.bodies.max() + 1 == pieces
+    modes, next_value = zero_modes(phantom)
     assert modes == 3 * pieces
     assert next_value > 1e-6  # nothing between a zero mode and an elastic one
 
@@ -85,9 +85,9 @@ SPATIAL = {
 @pytest.mark.parametrize("name", SPATIAL)
 def test_every_free_piece_of_a_block_has_exactly_six_zero_energy_modes(name):
     cuts, pieces = SPATIAL[name]
-    virtual = cut_mesh(CUBE, cuts)
-    assert virtual.bodies.max() + 1 == pieces
-    modes, next_value = zero_modes(virtual)
+    phantom = cut_mesh(CUBE, cuts)
+    assert phantom.bodies.max() + 1 == pieces
+    modes, next_value = zero_modes(phantom)
     assert modes == 6 * pieces
     assert next_value > 1e-6
 
@@ -96,8 +96,8 @@ def test_the_order_of_the_cuts_does_not_matter():
     cuts = PLANAR["crossing, then a branch"][0]
     counts = set()
     for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0], [2, 0, 1]):
-        virtual = cut_mesh(SQUARE, [cuts[k] for k in order])
-        counts.add((virtual.node_count, len(virtual.cells), int(virtual.bodies.max())))
+        phantom = cut_mesh(SQUARE, [cuts[k] for k in order])
+        counts.add((phantom.node_count, len(phantom.cells), int(phantom.bodies.max())))
     assert len(counts) == 1
 
 
@@ -119,8 +119,8 @@ def test_whether_a_zero_point_is_near_enough_does_not_depend_on_the_order_of_cor
         lambda x: np.where(x[:, 1] > 0.0, 0.5, -0.5) if len(x) == 3 else 0.35 + 0 * x[:, 0]
     )
     for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
-        virtual = cut_mesh(SimplexMesh(obtuse, [order]), [far, *beside])
-        assert len(virtual.cells) == 2
+        phantom = cut_mesh(SimplexMesh(obtuse, [order]), [far, *beside])
+        assert len(phantom.cells) == 2
 
 
 @pytest.mark.parametrize(
@@ -129,28 +129,28 @@ def test_whether_a_zero_point_is_near_enough_does_not_depend_on_the_order_of_cor
 def test_a_tip_inside_an_element_moves_to_an_edge_by_the_chosen_rule(tip, length):
     mesh = rectangle_mesh((4, 4))
     # the row of triangles is crossed at x = 0, 0.02.., 0.25, ...; the tip is in the third square
-    virtual = cut_mesh(mesh, [line(-1.0, 0.52, 0.40, 0.52)], tip)
-    facets = subdivide(virtual).cut_facets
+    phantom = cut_mesh(mesh, [line(-1.0, 0.52, 0.40, 0.52)], tip)
+    facets = subdivide(phantom).cut_facets
     realised = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum()
     crossings = np.array([0.25, 0.27, 0.5])  # vertical edge, diagonal, vertical edge
     want = {"inside": crossings[1], "through": crossings[2], "nearest": crossings[2]}[tip]
     assert realised == pytest.approx(want, abs=1e-12)
-    assert virtual.bodies.max() == 0
+    assert phantom.bodies.max() == 0
 
 
 def test_nodes_of_the_edge_that_holds_the_tip_are_not_enriched():
-    virtual = cut_mesh(rectangle_mesh((4, 4)), [line(-1.0, 0.52, 0.5, 0.52)])
-    points = virtual.mesh.points[virtual.enriched_nodes]
+    phantom = cut_mesh(rectangle_mesh((4, 4)), [line(-1.0, 0.52, 0.5, 0.52)])
+    points = phantom.mesh.points[phantom.enriched_nodes]
     assert (points[:, 0] < 0.5).all()
     assert len(points) == 4  # two columns of nodes above and below: x = 0 and 0.25
 
 
 def test_a_strip_of_cut_triangles_enriches_two_nodes_more_than_it_has_triangles():
     """Table 4.3 of the thesis: n cut triangles enrich n + 2 nodes."""
-    virtual = cut_mesh(rectangle_mesh((16, 5)), [line(-1.0, 0.5, 2.0, 0.5)])
-    cut_cells = len(np.unique(virtual.parent[virtual.split]))
+    phantom = cut_mesh(rectangle_mesh((16, 5)), [line(-1.0, 0.5, 2.0, 0.5)])
+    cut_cells = len(np.unique(phantom.parent[phantom.split]))
     assert cut_cells == 32
-    assert len(virtual.enriched_nodes) == cut_cells + 2
+    assert len(phantom.enriched_nodes) == cut_cells + 2
 
 
 def test_the_turns_of_a_spiral_do_not_disturb_each_other():
@@ -160,10 +160,10 @@ def test_the_turns_of_a_spiral_do_not_disturb_each_other():
     spiral = Polyline(0.5 + radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1))
     length = np.linalg.norm(np.diff(spiral.vertices, axis=0), axis=1).sum()
     for n, tolerance in ((24, 0.05), (60, 0.02)):  # an element at each end may stay whole
-        virtual = cut_mesh(rectangle_mesh((n, n)), [spiral])
-        facets = subdivide(virtual).cut_facets
+        phantom = cut_mesh(rectangle_mesh((n, n)), [spiral])
+        facets = subdivide(phantom).cut_facets
         realised = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum()
-        assert virtual.bodies.max() == 0
+        assert phantom.bodies.max() == 0
         assert realised == pytest.approx(length, abs=tolerance)
         # chords of elements of size h√2 under radii above 0.05
         assert np.abs(spiral.level_set(facets.reshape(-1, 2))).max() < 2.0 / n**2 / (8 * 0.05)
@@ -174,8 +174,8 @@ def test_the_area_inside_a_circular_cut_converges_at_second_order():
     circle = Polyline(0.5 + 0.3 * np.stack([np.cos(angle), np.sin(angle)], 1), closed=True)
     errors = []
     for n in (16, 32, 64):
-        virtual = cut_mesh(rectangle_mesh((n, n)), [circle])
-        inside = virtual.piece_side[:, 0] > 0
-        errors.append(abs(virtual.volumes[inside].sum() - np.pi * 0.09))
+        phantom = cut_mesh(rectangle_mesh((n, n)), [circle])
+        inside = phantom.piece_side[:, 0] > 0
+        errors.append(abs(phantom.volumes[inside].sum() - np.pi * 0.09))
     # |error| ≤ length · h²·2/8 · curvature / …: a factor of four per halving, within a third
     assert errors[0] / errors[2] == pytest.approx(16.0, rel=1 / 3)

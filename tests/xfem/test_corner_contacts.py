@@ -10,9 +10,9 @@ from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.faceted_cuts import Polyline
 from verify.xfem.flat_cuts import Cut, Plane, PolygonPatch
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.tool_path import ToolPath
-from verify.xfem.virtual import cut_mesh
 
 
 def without_a_quarter(mesh):
@@ -34,11 +34,11 @@ def test_a_cut_through_a_re_entrant_corner_leaves_no_hinge(dim, slope, side):
     """Above the line are two parts that meet in the corner only, whichever side is called plus."""
     mesh = angle_body(dim)
     normal = side * np.array([-slope, 1.0, 0.0])[:dim]
-    virtual = cut_mesh(mesh, [Plane([0.5] * dim, normal)])
-    assert virtual.bodies.max() + 1 == 3
-    assert zero_modes(virtual)[0] == 3 * (3 if dim == 2 else 6)
-    above = virtual.mesh.points[:, 1] - 0.5 - slope * (virtual.mesh.points[:, 0] - 0.5)
-    assert len(np.unique(virtual.bodies[: len(mesh.points)][above > 1e-9])) == 2
+    phantom = cut_mesh(mesh, [Plane([0.5] * dim, normal)])
+    assert phantom.bodies.max() + 1 == 3
+    assert zero_modes(phantom)[0] == 3 * (3 if dim == 2 else 6)
+    above = phantom.mesh.points[:, 1] - 0.5 - slope * (phantom.mesh.points[:, 0] - 0.5)
+    assert len(np.unique(phantom.bodies[: len(mesh.points)][above > 1e-9])) == 2
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -52,9 +52,9 @@ def test_a_tool_through_a_re_entrant_corner_leaves_no_hinge(dim, back):
     cutter.begin(path)
     for time in np.linspace(0.1, 1.0, 4):
         cutter.advance(time)
-    virtual = cutter.virtual_mesh()
-    assert virtual.bodies.max() + 1 == 3
-    assert_same_cut(virtual, cut_mesh(mesh, [path.sweep]))
+    phantom = cutter.phantom_mesh()
+    assert phantom.bodies.max() + 1 == 3
+    assert_same_cut(phantom, cut_mesh(mesh, [path.sweep]))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -74,14 +74,14 @@ def test_a_branch_from_a_stem_along_edges_or_faces_comes_off(side, way, tip):
     for stroke in (ToolPath.of_tip([[0.5 - side, 0.5], [0.5 + side, 0.5]], [0.0, 1.0]), path):
         cutter.begin(stroke)
         cutter.advance(stroke.times[-1])
-    assert cutter.virtual_mesh().bodies.max() + 1 == 3
+    assert cutter.phantom_mesh().bodies.max() + 1 == 3
 
     block = box_mesh((2, 2, 2))
     rim = [[0.45, -1.0, 0.5], [0.45, 2.0, 0.5], [0.55, 2.0, end], [0.55, -1.0, end]]
     for outline in (rim, rim[::-1]):
         cuts = [Plane([0.5] * 3, [0.0, 0.0, side]), PolygonPatch(outline)]
-        virtual = cut_mesh(block, cuts, tip)
-        assert virtual.bodies.max() + 1 == 3
+        phantom = cut_mesh(block, cuts, tip)
+        assert phantom.bodies.max() + 1 == 3
 
 
 def _scattered(rng, dim):
@@ -121,10 +121,10 @@ def test_exactly_degenerate_cuts_do_not_know_which_side_is_called_plus(dim):
         for turned in (False, True):
             rng = np.random.default_rng([dim, seed])
             mesh = _scattered(rng, dim)
-            virtual = cut_mesh(mesh, _cuts(rng, mesh, turned))
-            body = virtual.bodies[virtual.cells[:, 0]]
-            volumes = np.sort(np.bincount(body, virtual.volumes))
-            found.append((virtual.node_count, virtual.parent, volumes))
+            phantom = cut_mesh(mesh, _cuts(rng, mesh, turned))
+            body = phantom.bodies[phantom.cells[:, 0]]
+            volumes = np.sort(np.bincount(body, phantom.volumes))
+            found.append((phantom.node_count, phantom.parent, volumes))
         (nodes, parent, volumes), (turned_nodes, turned_parent, turned_volumes) = found
         assert nodes == turned_nodes, seed
         assert np.array_equal(parent, turned_parent), seed

@@ -20,7 +20,7 @@ from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh, cut_mesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 
 def _bodies():
@@ -35,21 +35,21 @@ def _bodies():
 
 def _disturbed(force, size=0.1, seed=2):
     rng = np.random.default_rng(seed)
-    X = force.virtual.node_points
+    X = force.phantom.node_points
     turned = X @ rotation(X.shape[1], 1.1).T - X if force.is_corotational else np.zeros_like(X)
-    return turned + size * np.sqrt(force.virtual.mesh.measures.min()) * rng.normal(size=X.shape)
+    return turned + size * np.sqrt(force.phantom.mesh.measures.min()) * rng.normal(size=X.shape)
 
 
-def _energy_by_svd(virtual, lam, mu, displacement):
+def _energy_by_svd(phantom, lam, mu, displacement):
     """Independent twin: singular values of each deformation gradient."""
     total = 0.0
-    for piece, cell in enumerate(virtual.parent):
-        X = virtual.mesh.points[virtual.mesh.cells[cell]]
-        x = X + displacement[virtual.cells[piece]]
+    for piece, cell in enumerate(phantom.parent):
+        X = phantom.mesh.points[phantom.mesh.cells[cell]]
+        x = X + displacement[phantom.cells[piece]]
         F = np.linalg.solve((X[1:] - X[0]), x[1:] - x[0]).T
         s = np.linalg.svd(F)[1]
         s[-1] *= np.sign(np.linalg.det(F))
-        total += virtual.volumes[piece] * (mu * ((s - 1) ** 2).sum() + lam / 2 * (s - 1).sum() ** 2)
+        total += phantom.volumes[piece] * (mu * ((s - 1) ** 2).sum() + lam / 2 * (s - 1).sum() ** 2)
     return total
 
 
@@ -60,7 +60,7 @@ def test_energy_is_that_of_the_singular_values_also_where_pieces_are_inverted(di
     u = _disturbed(force, size)
     if size > 1.0:
         assert len(inverted_cells(force, u)) > 0
-    expected = _energy_by_svd(force.virtual, force.elements.lam[0], force.elements.mu[0], u)
+    expected = _energy_by_svd(force.phantom, force.elements.lam[0], force.elements.mu[0], u)
     assert force.evaluate(u)[1] == pytest.approx(expected, rel=1e-12)
 
 
@@ -75,7 +75,7 @@ def test_force_is_the_gradient_of_the_energy_and_stiffness_the_gradient_of_the_f
     change = sum(w * samples[k][0] for k, w in weights.items()) / step
     f = force.evaluate(u)[0]
     assert np.sum(f * direction) == pytest.approx(slope, rel=1e-9)
-    pattern = block_pattern(force.virtual.cells, force.virtual.node_count)
+    pattern = block_pattern(force.phantom.cells, force.phantom.node_count)
     K = pattern.matrix(force.stiffness(pattern, u))
     product = (K @ direction.ravel()).reshape(u.shape)
     assert np.abs(product - change).max() < 1e-9 * np.abs(change).max()
@@ -86,7 +86,7 @@ def test_force_is_the_gradient_of_the_energy_and_stiffness_the_gradient_of_the_f
 @pytest.mark.parametrize("force", _bodies())
 def test_frozen_stiffness_has_no_negative_mode_and_equals_its_product(force):
     u = _disturbed(force)
-    pattern = block_pattern(force.virtual.cells, force.virtual.node_count)
+    pattern = block_pattern(force.phantom.cells, force.phantom.node_count)
     K = pattern.matrix(force.stiffness(pattern, u, "rotation-fixed"))
     values = np.linalg.eigvalsh(K.toarray())
     assert values[0] > -1e-13 * values[-1]
@@ -136,7 +136,7 @@ def test_rigid_separation_costs_no_energy_at_any_rotation(body, angle):
 @pytest.mark.parametrize(("degrees", "energy"), [(30.0, 162.233085), (90.0, 9038.461538)])
 def test_linear_kinematics_pays_for_the_same_rotation(degrees, energy):
     force = InternalForce(cut_square(), material(2), "linear")
-    found = force.evaluate(_upper_half_turned(force.virtual, np.radians(degrees)))[1]
+    found = force.evaluate(_upper_half_turned(force.phantom, np.radians(degrees)))[1]
     # the printed values have six decimals
     assert found == pytest.approx(energy, abs=1e-6)
 
@@ -148,14 +148,14 @@ def test_internal_forces_have_no_resultant_and_in_corotation_no_moment(force):
     size = np.abs(f).sum()
     assert np.abs(f.sum(axis=0)).max() < 1e-14 * size
     if force.is_corotational:
-        x = force.virtual.node_points + u
+        x = force.phantom.node_points + u
         moment = np.einsum("ni,nj->ij", x, f)
         assert np.abs(moment - moment.T).max() < 1e-14 * size * np.abs(x).max()
 
 
 @pytest.mark.parametrize("force", [f for f in _bodies() if f.is_corotational])
 def test_a_turned_body_has_the_turned_forces(force):
-    u, X = _disturbed(force), force.virtual.node_points
+    u, X = _disturbed(force), force.phantom.node_points
     f, energy = (force.evaluate(u)[0].copy(), force.evaluate(u)[1])
     for angle in (0.7, 2.4, np.pi):
         Q = rotation(X.shape[1], angle)
@@ -166,11 +166,11 @@ def test_a_turned_body_has_the_turned_forces(force):
 
 def test_a_turned_membrane_resists_in_its_plane_only():
     force = InternalForce(cut_membrane(), isotropic(1.0, 0.3, "plane stress"))
-    pattern = block_pattern(force.virtual.cells, force.virtual.node_count)
-    u = np.zeros_like(force.virtual.node_points)
+    pattern = block_pattern(force.phantom.cells, force.phantom.node_count)
+    u = np.zeros_like(force.phantom.node_points)
     values = np.linalg.eigvalsh(pattern.matrix(force.stiffness(pattern, u)).toarray())
     # a triangle has 3 in-plane strains: no more stiff modes than 3 per piece
-    assert (values > 1e-10 * values[-1]).sum() <= 3 * len(force.virtual.cells)
+    assert (values > 1e-10 * values[-1]).sum() <= 3 * len(force.phantom.cells)
     assert values[0] > -1e-13 * values[-1]
 
 
@@ -199,7 +199,7 @@ def _plane_of(dim):
 
 
 def test_wrong_input_is_refused_in_one_sentence():
-    v: VirtualMesh = cut_body(2)
+    v: PhantomMesh = cut_body(2)
     with pytest.raises(XfemError, match="kinematics 'quadratic'"):
         InternalForce(v, material(2), "quadratic")  # type: ignore[arg-type]
     sheet = cut_membrane()

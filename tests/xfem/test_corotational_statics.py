@@ -11,9 +11,9 @@ from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.static_newton import NotInEquilibriumError
 from verify.xfem.structured_meshes import rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 LAM, MU = 0.5769230769230769, 0.38461538461538464  # E = 1, ν = .3
 

@@ -8,12 +8,12 @@ from xfem_bodies import boundary_nodes
 
 from verify.xfem.cuts import Polyline
 from verify.xfem.elasticity import isotropic
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 KOLOSOV = 3.0 - 4.0 * exact.POISSON
 
@@ -53,11 +53,11 @@ ENERGY = 0.474129375227  # ½∮t·u over the box
 def relative_energy_error(n, degree=20):
     """‖σ_h − σ‖/‖σ‖ in energy, the same from the energies alone, and ‖σ‖²."""
     mesh = rectangle_mesh((n, n), (-1.0, -1.0), (1.0, 1.0))
-    virtual = cut_mesh(mesh, [Polyline([[-2.0, 0.0], [0.0, 0.0]])])
-    supports = Supports.none(virtual).prescribe(virtual, boundary_nodes(mesh), mode_one)
+    phantom = cut_mesh(mesh, [Polyline([[-2.0, 0.0], [0.0, 0.0]])])
+    supports = Supports.none(phantom).prescribe(phantom, boundary_nodes(mesh), mode_one)
     material = isotropic(exact.YOUNG, exact.POISSON, "plane strain")
-    solution = solve_static(virtual, material, supports)
-    body = subdivide(virtual)
+    solution = solve_static(phantom, material, supports)
+    body = subdivide(phantom)
     corners = body.points[body.cells]
     values = (body.interpolation @ solution.displacement)[body.cells]
     edges = corners[:, 1:] - corners[:, :1]
@@ -140,9 +140,9 @@ def test_the_energy_at_a_tip_is_that_of_the_thesis_blocks():
     """Two ways to the same space that share no code but the mesh."""
     energy = energy_by_the_thesis_blocks(17)
     mesh = rectangle_mesh((17, 17), (-1.0, -1.0), (1.0, 1.0))
-    virtual = cut_mesh(mesh, [Polyline([[-2.0, 0.0], [0.0, 0.0]])])
-    supports = Supports.none(virtual).prescribe(virtual, boundary_nodes(mesh), mode_one)
+    phantom = cut_mesh(mesh, [Polyline([[-2.0, 0.0], [0.0, 0.0]])])
+    supports = Supports.none(phantom).prescribe(phantom, boundary_nodes(mesh), mode_one)
     material = isotropic(exact.YOUNG, exact.POISSON, "plane strain")
-    assert solve_static(virtual, material, supports).strain_energy == pytest.approx(
+    assert solve_static(phantom, material, supports).strain_energy == pytest.approx(
         energy, rel=1e-11
     )

@@ -11,7 +11,7 @@ from verify.xfem.explicit import ForwardEuler
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import cut_mesh
+from verify.xfem.phantom import cut_mesh
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [0.2, 0.9, 0.3], [0.1, 0.2, 0.8]])
 ELEMENTS = {
@@ -43,7 +43,7 @@ def test_a_crushed_or_reflected_element_moves_on_with_a_rotation_and_a_closed_ac
     scheme, name, how
 ):
     body = _body(name)
-    X = body.force.virtual.node_points
+    X = body.force.phantom.node_points
     space = X.shape[1]
     diagonal = CRUSHED[how][-space:] if how == "reflection" else CRUSHED[how][:space]
     state = body.rest()
@@ -64,7 +64,7 @@ def test_a_crushed_or_reflected_element_moves_on_with_a_rotation_and_a_closed_ac
 def test_one_element_that_flies_at_a_kilometre_a_second_and_turns_by_a_radian_a_step(scheme, name):
     """As a piece that is cut off and thrown: the strain of the spin stays, energy goes nowhere."""
     body = _body(name)
-    X = body.force.virtual.node_points
+    X = body.force.phantom.node_points
     step, drift = 1e-3, 1e3
     state = body.rest()
     arm = X - X.mean(axis=0)
@@ -76,7 +76,7 @@ def test_one_element_that_flies_at_a_kilometre_a_second_and_turns_by_a_radian_a_
     size = account.kinetic[0]
     assert np.ptp(account.balance - account.unbalanced) < 1e-11 * size
     # the centre of mass goes as it would without the spin
-    centre = side_wise_mass(body.force.virtual, DENSITY).weights @ state.displacement
+    centre = side_wise_mass(body.force.phantom, DENSITY).weights @ state.displacement
     assert centre / body.mass.weights.sum() == pytest.approx(
         np.full(X.shape[1], drift * 100 * step), rel=1e-12
     )

@@ -7,10 +7,10 @@ from verify.xfem.cuts import ImplicitCut, Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 
 def doubled(mesh, on_cut, above):
@@ -54,17 +54,17 @@ def test_a_cut_along_element_faces_equals_the_mesh_with_doubled_nodes(name, plan
         first = (np.c_[x, np.ones(len(x))] @ to_reference)[:, 0]
         return np.full(len(x), np.inf) if reach is through else 0.5 - first
 
-    virtual = cut_mesh(mesh, [ImplicitCut(flat.level_set, depth)])
+    phantom = cut_mesh(mesh, [ImplicitCut(flat.level_set, depth)])
     on_cut = (np.abs(height) < 1e-9) & reach(reference)
     above = height[mesh.cells].mean(axis=1) > 0.0
     conforming = doubled(mesh, on_cut, above)
-    assert virtual.node_count == len(conforming.points)
-    assert (virtual.fraction == 1.0).all()
+    assert phantom.node_count == len(conforming.points)
+    assert (phantom.fraction == 1.0).all()
 
     state = "plane strain" if dim == 2 else "solid"
     material, gravity = isotropic(1.0, 0.3, state), np.eye(dim)[last] * -0.1
     solutions = []
-    for body in (virtual, cut_mesh(conforming, [])):
+    for body in (phantom, cut_mesh(conforming, [])):
         place = np.concatenate([reference, reference[on_cut]])[body.node_parent]
         held = (place[:, last] < 1e-9) | (place[:, last] > 1.0 - 1e-9)
         held = held & ~((np.abs(place[:, 0]) < 1e-9) & (plane == "diagonal"))
@@ -73,7 +73,7 @@ def test_a_cut_along_element_faces_equals_the_mesh_with_doubled_nodes(name, plan
     ours, theirs = solutions
     assert ours.strain_energy == pytest.approx(theirs.strain_energy, rel=1e-12)
     # compare cell by cell: the numbering of the doubled nodes differs
-    order = np.argsort(virtual.parent)
-    got = ours.displacement[virtual.cells[order]]
+    order = np.argsort(phantom.parent)
+    got = ours.displacement[phantom.cells[order]]
     want = theirs.displacement[conforming.cells]
     assert np.abs(got - want).max() < 1e-12 * np.abs(want).max()

@@ -17,8 +17,8 @@ from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.cuts import ToolPath
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 QUICK = settings(
     max_examples=60,
@@ -54,18 +54,18 @@ def _claims(dim: int, most: int):
             cutter.begin(path)
             for time in [*(path.times[0] + m for m in sorted(moments)), path.times[-1]]:
                 surface.update(cutter.advance(time))
-            virtual = cutter.virtual_mesh()
+            phantom = cutter.phantom_mesh()
             if cutter.body.held == 0:  # else the cuts at once would join what was separate
                 assert_same_cut(
-                    virtual, cut_mesh(mesh, [p.sweep for p in paths[: len(cutter.strokes)]])
+                    phantom, cut_mesh(mesh, [p.sweep for p in paths[: len(cutter.strokes)]])
                 )
-            assert (virtual.fraction > 0.0).all()
-            np.testing.assert_allclose(virtual.volumes.sum(), 1.0, rtol=1e-13)
+            assert (phantom.fraction > 0.0).all()
+            np.testing.assert_allclose(phantom.volumes.sum(), 1.0, rtol=1e-13)
             facets = surface.surface.facets.rows[surface.surface.used]
             assert loose_edges(facets) == 0
             # the sum of some thousand triangles' shares, each of round-off 1e-16
             np.testing.assert_allclose(
-                enclosed_by_body(surface.surface, virtual), volume_by_body(virtual), atol=1e-12
+                enclosed_by_body(surface.surface, phantom), volume_by_body(phantom), atol=1e-12
             )
 
     return claim

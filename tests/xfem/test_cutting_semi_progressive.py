@@ -8,8 +8,8 @@ from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 PLANE_STROKES = [
     ToolPath.of_tip([[-0.1, 0.43], [0.4, 0.51], [0.8, 0.3]], [0.0, 1.0, 2.0]),
@@ -40,8 +40,8 @@ def test_at_every_moment_the_growing_cut_is_the_cut_made_at_once(mesh, paths) ->
         for time in np.linspace(path.times[0], path.times[-1], 9):
             increment = cutter.advance(time)
             split += increment is not None
-            assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, cutter.cuts))
-    assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, [path.sweep for path in paths]))
+            assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, cutter.cuts))
+    assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, [path.sweep for path in paths]))
     assert split > len(paths)
 
 
@@ -53,7 +53,7 @@ def test_the_number_of_frames_does_not_matter() -> None:
         cutter.begin(SPACE_STROKES[0])
         for time in np.linspace(0.0, 2.0, frames + 1)[1:]:
             cutter.advance(time)
-        ends.append(cutter.virtual_mesh())
+        ends.append(cutter.phantom_mesh())
     for end in ends[1:]:
         assert_same_cut(ends[0], end)
 
@@ -66,11 +66,11 @@ def test_energy_and_momentum_are_continuous_when_an_element_splits() -> None:
     for path in SPACE_STROKES:
         cutter.begin(path)
         for time in np.linspace(path.times[0], path.times[-1], 5):
-            before = cutter.virtual_mesh()
+            before = cutter.phantom_mesh()
             increment = cutter.advance(time)
             if increment is None:
                 continue
-            after = cutter.virtual_mesh()
+            after = cutter.phantom_mesh()
             inherited = increment.inherit(velocity)
             for moment in (_momentum, _kinetic_energy, _strain_energy):
                 # sums of some 1e3 terms of both signs
@@ -81,21 +81,21 @@ def test_energy_and_momentum_are_continuous_when_an_element_splits() -> None:
     assert len(velocity) > len(mesh.points) + 50
 
 
-def _momentum(virtual, velocity):
-    mass = virtual.volumes[:, None] / 4.0
-    return (mass[:, :, None] * velocity[virtual.cells]).sum(axis=(0, 1))
+def _momentum(phantom, velocity):
+    mass = phantom.volumes[:, None] / 4.0
+    return (mass[:, :, None] * velocity[phantom.cells]).sum(axis=(0, 1))
 
 
-def _kinetic_energy(virtual, velocity):
-    return 0.5 * (virtual.volumes[:, None, None] / 4.0 * velocity[virtual.cells] ** 2).sum()
+def _kinetic_energy(phantom, velocity):
+    return 0.5 * (phantom.volumes[:, None, None] / 4.0 * velocity[phantom.cells] ** 2).sum()
 
 
-def _strain_energy(virtual, displacement):
+def _strain_energy(phantom, displacement):
     gradient = np.einsum(
-        "pai,paj->pij", displacement[virtual.cells], virtual.mesh.gradients[virtual.parent]
+        "pai,paj->pij", displacement[phantom.cells], phantom.mesh.gradients[phantom.parent]
     )
     strain = 0.5 * (gradient + gradient.transpose(0, 2, 1))
-    return (virtual.volumes * (strain**2).sum(axis=(1, 2))).sum()
+    return (phantom.volumes * (strain**2).sum(axis=(1, 2))).sum()
 
 
 def test_delay_is_element_size_over_tool_speed() -> None:
@@ -141,7 +141,7 @@ def test_a_live_tool_whose_path_is_told_bit_by_bit_cuts_what_is_recorded_of_it()
     for k in range(1, 60):
         cutter.extend(tips[k : k + 1, None], [float(k)])
         cutter.advance(float(k))
-    grown = cutter.virtual_mesh()
+    grown = cutter.phantom_mesh()
     assert_same_cut(grown, cut_mesh(mesh, cutter.cuts))
     # where the tool has long been, the path known in advance gives the same but for kinks
     known = cut_mesh(mesh, [ToolPath.of_tip(tips, np.arange(60)).sweep])
@@ -161,8 +161,8 @@ def test_a_tool_that_leaves_and_comes_back_goes_on_cutting() -> None:
     cutter.begin(path)
     for time in np.linspace(0.0, 1.0, 12):
         cutter.advance(time)
-    assert_same_cut(cutter.virtual_mesh(), cut_mesh(comb, [path.sweep]))
-    assert len(np.unique(cutter.virtual_mesh().bodies)) == 3
+    assert_same_cut(cutter.phantom_mesh(), cut_mesh(comb, [path.sweep]))
+    assert len(np.unique(cutter.phantom_mesh().bodies)) == 3
 
 
 def test_a_stroke_that_begins_inside_is_found() -> None:
@@ -172,7 +172,7 @@ def test_a_stroke_that_begins_inside_is_found() -> None:
     cutter.begin(path)
     assert cutter.advance(0.7) is not None
     cutter.advance(1.0)
-    assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, [path.sweep]))
+    assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, [path.sweep]))
 
 
 @pytest.mark.parametrize(
@@ -194,9 +194,9 @@ def test_a_degenerate_stroke_cuts_what_the_cut_at_once_does(tips, splits) -> Non
     cutter = SemiProgressiveCutter(mesh)
     cutter.begin(path)
     changed = [cutter.advance(time) is not None for time in np.linspace(0.0, 1.0, 6)]
-    virtual = cutter.virtual_mesh()
-    assert_same_cut(virtual, cut_mesh(mesh, [path.sweep]))
-    np.testing.assert_allclose(virtual.volumes.sum(), 1.0, rtol=1e-13)
+    phantom = cutter.phantom_mesh()
+    assert_same_cut(phantom, cut_mesh(mesh, [path.sweep]))
+    np.testing.assert_allclose(phantom.volumes.sum(), 1.0, rtol=1e-13)
     assert any(changed) is splits
 
 
@@ -207,7 +207,7 @@ def test_cutting_again_in_the_same_place_changes_nothing_that_moves() -> None:
         cutter.begin(SPACE_STROKES[0])
         cutter.advance(2.0)
     assert cutter.body.node_count == cut_mesh(mesh, [SPACE_STROKES[0].sweep]).node_count
-    assert_same_cut(cutter.virtual_mesh(), cut_mesh(mesh, cutter.cuts))
+    assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, cutter.cuts))
 
 
 def test_bad_input_is_refused_with_its_reason() -> None:

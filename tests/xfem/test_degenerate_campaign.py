@@ -12,30 +12,30 @@ from surface_measures import enclosed_by_body, loose_edges, volume_by_body
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
-from verify.xfem.virtual import cut_mesh
+from verify.xfem.phantom import cut_mesh
 
 STROKES = 4  # a body; each one meets what those before have left
 
 
 def assert_sound(cutter: SemiProgressiveCutter, skin: BodySurface) -> None:
     """Volumes, sub-simplices and surface of a body that has been cut."""
-    virtual = cutter.virtual_mesh()
-    mesh, sub = virtual.mesh, virtual.sub_cells
-    assert (virtual.fraction > 0.0).all()
+    phantom = cutter.phantom_mesh()
+    mesh, sub = phantom.mesh, phantom.sub_cells
+    assert (phantom.fraction > 0.0).all()
     assert (sub.fraction > 0.0).all()
     # every share is a sum of a few products of a few ratios, each good to a few ulp
-    in_cell = np.bincount(virtual.parent, virtual.fraction, minlength=len(mesh.cells))
+    in_cell = np.bincount(phantom.parent, phantom.fraction, minlength=len(mesh.cells))
     np.testing.assert_allclose(in_cell, 1.0, rtol=1e-14)
-    assert virtual.volumes.sum() == pytest.approx(mesh.measures.sum(), rel=1e-14)
-    of_piece = np.bincount(sub.piece, sub.fraction, minlength=len(virtual.cells))
-    np.testing.assert_allclose(of_piece[virtual.split], virtual.fraction[virtual.split], 1e-14)
-    assert len(np.unique(virtual.cells)) == virtual.node_count  # no unknown without material
+    assert phantom.volumes.sum() == pytest.approx(mesh.measures.sum(), rel=1e-14)
+    of_piece = np.bincount(sub.piece, sub.fraction, minlength=len(phantom.cells))
+    np.testing.assert_allclose(of_piece[phantom.split], phantom.fraction[phantom.split], 1e-14)
+    assert len(np.unique(phantom.cells)) == phantom.node_count  # no unknown without material
     surface = skin.surface
     assert loose_edges(surface.facets.rows[surface.used]) == 0
     # vertices are rounded to 1 ulp of the body's size, and the sum over hundreds of facets is not
     # relative to the piece: absolute, in units of the unit body
     np.testing.assert_allclose(
-        enclosed_by_body(surface, virtual), volume_by_body(virtual), rtol=0.0, atol=1e-13
+        enclosed_by_body(surface, phantom), volume_by_body(phantom), rtol=0.0, atol=1e-13
     )
 
 
@@ -56,7 +56,7 @@ def cut_one_body(dim: int, seed: int) -> int:
             skin.update(increment)
             assert_sound(cutter, skin)
     if cutter.body.held == 0 and cutter.body.vanished == 0:
-        assert_same_cut(cutter.virtual_mesh(), cut_mesh(cutter.mesh, cutter.cuts))
+        assert_same_cut(cutter.phantom_mesh(), cut_mesh(cutter.mesh, cutter.cuts))
     return insertions
 
 

@@ -12,8 +12,8 @@ from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, collapsed_cells
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 YOUNG = 1e4
 
@@ -29,14 +29,14 @@ def elastica(ratio):
     return 2.0 - 2.0 * ellipe(modulus) / ellipk(modulus), 2.0 * np.sqrt(modulus) / ellipk(modulus)
 
 
-def press(virtual, force, load_steps):
+def press(phantom, force, load_steps):
     """Load on the tip of a column, with 1e-4 of it across."""
-    X = virtual.node_points
+    X = phantom.node_points
     fixed = np.repeat(X[:, :1] == 0.0, 2, axis=1)
     end = X[:, 0] == 1.0
     load = np.zeros_like(X)
     load[end] = np.array([-force, 1e-4 * force]) / end.sum()
-    internal = InternalForce(virtual, isotropic(YOUNG, 0.0, "plane strain"))
+    internal = InternalForce(phantom, isotropic(YOUNG, 0.0, "plane strain"))
     found = static_equilibrium(internal, fixed, None, load, load_steps)
     return found, found.displacement[end].mean(axis=0)
 

@@ -27,11 +27,11 @@ def under_the_knife():
 
 def system(cutter, rng):
     """Sparsity, and blocks of a stiffness with a mass: positive definite."""
-    virtual = cutter.virtual_mesh()
-    pattern = side_wise_mass(virtual, 1000.0).pattern(virtual)
+    phantom = cutter.phantom_mesh()
+    pattern = side_wise_mass(phantom, 1000.0).pattern(phantom)
     blocks = np.zeros((len(pattern.columns), 3, 3))
-    force = InternalForce(virtual, material(3))
-    force.evaluate(0.01 * rng.standard_normal((virtual.node_count, 3)))
+    force = InternalForce(phantom, material(3))
+    force.evaluate(0.01 * rng.standard_normal((phantom.node_count, 3)))
     force.add_stiffness(pattern, blocks)
     blocks[pattern.diagonal] += np.abs(blocks).max() * 1e-3 * np.eye(3)
     return pattern, blocks
@@ -73,7 +73,7 @@ def test_held_nodes_are_left_out_and_what_couples_them_is_not_read(new_are_held)
         if increment is None:
             continue
         pattern, blocks = system(cutter, rng)
-        held = at_end[cutter.virtual_mesh().node_parent]
+        held = at_end[cutter.phantom_mesh().node_parent]
         if not new_are_held:
             held[len(at_end) :] = False
         solver = solver.extended(pattern, increment.source, held)
@@ -86,7 +86,7 @@ def test_held_nodes_are_left_out_and_what_couples_them_is_not_read(new_are_held)
         error = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
         assert np.linalg.norm(error) < ROUND_OFF * np.linalg.norm(load)
         cuts += 1
-        from_held += at_end[cutter.virtual_mesh().node_parent[increment.nodes_before :]].sum()
+        from_held += at_end[cutter.phantom_mesh().node_parent[increment.nodes_before :]].sum()
     assert cuts > 12
     assert from_held > 4
     anew = [Cholesky(pattern, 3, some).factor_entries for some in (held, None)]

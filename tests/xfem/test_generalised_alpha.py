@@ -15,9 +15,9 @@ from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 RADII = [0.0, 0.3, 0.8, 1.0]
 
@@ -28,7 +28,7 @@ def _body(v, kinematics="linear", mass_of=side_wise_mass, **further):
 
 
 def _modes(body):
-    v = body.force.virtual
+    v = body.force.phantom
     K = body.pattern.matrix(
         InternalForce(v, material(v.mesh.dim), "linear").stiffness(body.pattern)
     )
@@ -195,8 +195,8 @@ def test_a_radius_outside_of_its_range_is_refused_and_the_others_have_none():
 def test_at_a_radius_of_one_it_goes_the_way_of_the_trapezoidal_rule():
     body = _body(cut_body(3), "linear")
     held = body.held_by(
-        Supports.none(body.force.virtual).prescribe(
-            body.force.virtual, body.force.virtual.mesh.points[:, 2] == 0.0
+        Supports.none(body.force.phantom).prescribe(
+            body.force.phantom, body.force.phantom.mesh.points[:, 2] == 0.0
         )
     )
     held.weight = held.mass.weight([1.0, 2.0, -9.8])

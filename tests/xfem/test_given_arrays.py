@@ -23,11 +23,11 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 PLATE, BLOCK = rectangle_mesh((4, 4)), box_mesh((2, 2, 2))
 CUT = cut_mesh(PLATE, [Plane([0.5, 0.53], [0.0, 1.0])])

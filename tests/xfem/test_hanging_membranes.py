@@ -10,9 +10,9 @@ from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.static_newton import NotInEquilibriumError
 from verify.xfem.structured_meshes import rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 STIFFNESS, WEIGHT = 20.0, 19.6  # E times thickness, N/m; weight, N/m²
 WIDTH = 0.1
@@ -25,13 +25,13 @@ def sheet(counts, height, cuts=(), width=1.0):
     return cut_mesh(SimplexMesh(points, flat.cells), list(cuts))
 
 
-def area(virtual):
-    return float(virtual.volumes.sum())
+def area(phantom):
+    return float(phantom.volumes.sum())
 
 
-def hang(virtual, poisson, held, prescribed=None, load_steps=1, weight=WEIGHT):
-    force = InternalForce(virtual, isotropic(STIFFNESS, poisson, "plane stress"))
-    load = side_wise_mass(virtual, weight / 9.8).weight([0.0, 0.0, -9.8])
+def hang(phantom, poisson, held, prescribed=None, load_steps=1, weight=WEIGHT):
+    force = InternalForce(phantom, isotropic(STIFFNESS, poisson, "plane stress"))
+    load = side_wise_mass(phantom, weight / 9.8).weight([0.0, 0.0, -9.8])
     fixed = np.repeat(held[:, None], 3, axis=1)
     path = None if prescribed is None else lambda share: share * prescribed
     return static_equilibrium(force, fixed, path, load, load_steps)
@@ -56,10 +56,10 @@ def test_a_flat_strip_hangs_as_the_elastic_catenary(span):
     sag, energy = catenary(span)
     errors = []
     for n in (16, 32):
-        virtual = sheet([n, 1], lambda x, y: 0.0 * x, width=WIDTH)
-        x = virtual.node_points[:, 0]
+        phantom = sheet([n, 1], lambda x, y: 0.0 * x, width=WIDTH)
+        x = phantom.node_points[:, 0]
         drawn = (span - 1.0) * x[:, None] * [1.0, 0.0, 0.0]
-        found = hang(virtual, 0.0, (x == 0.0) | (x == 1.0), drawn)
+        found = hang(phantom, 0.0, (x == 0.0) | (x == 1.0), drawn)
         lowest = -found.displacement[:, 2].min()
         errors.append((abs(found.energy / (WIDTH * energy) - 1.0), abs(lowest / sag - 1.0)))
     assert max(errors[1]) < 2e-3  # linear elements: h²

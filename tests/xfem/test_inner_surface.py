@@ -28,14 +28,14 @@ def test_three_cuts_through_leave_eight_closed_surfaces_of_the_right_volume() ->
         cutter.begin(path)
         for time in path.times[0] + np.linspace(0.0, 1.0, 5):
             body.update(cutter.advance(time))
-        virtual = cutter.virtual_mesh()
+        phantom = cutter.phantom_mesh()
         facets = body.surface.facets.rows[body.surface.used]
         # nothing is closed any more: every edge has exactly two triangles, in opposite directions
         assert loose_edges(facets) == 0
         assert pinched_edges(facets) == 0
-        volumes = volume_by_body(virtual)
+        volumes = volume_by_body(phantom)
         assert len(volumes) == 2 ** (k + 1)
-        np.testing.assert_allclose(enclosed_by_body(body.surface, virtual), volumes, rtol=1e-12)
+        np.testing.assert_allclose(enclosed_by_body(body.surface, phantom), volumes, rtol=1e-12)
 
 
 def test_the_two_sides_of_an_open_cut_face_each_other_and_have_its_area() -> None:
@@ -65,12 +65,12 @@ def test_a_sliver_is_as_closed_as_any_piece(offset) -> None:
         ToolPath.of_tip([[-0.1, -0.2, height], [1.1, -0.2, height]], [0.0, 1.0], [0.0, 1.4, 0.0])
     )
     body.update(cutter.advance(1.0))
-    virtual = cutter.virtual_mesh()
+    phantom = cutter.phantom_mesh()
     facets = body.surface.facets.rows[body.surface.used]
     assert loose_edges(facets) == 0
     assert pinched_edges(facets) == 0
     np.testing.assert_allclose(
-        np.sort(enclosed_by_body(body.surface, virtual)),
+        np.sort(enclosed_by_body(body.surface, phantom)),
         np.sort([height, 1.0 - height]),
         rtol=1e-12,
     )
@@ -88,10 +88,10 @@ def test_in_the_plane_the_outline_of_each_part_is_closed() -> None:
             body.update(cutter.advance(time))
             facets = body.surface.facets.rows[body.surface.used]
             assert loose_edges(facets) == 0
-    virtual = cutter.virtual_mesh()
-    assert len(volume_by_body(virtual)) == 4
+    phantom = cutter.phantom_mesh()
+    assert len(volume_by_body(phantom)) == 4
     np.testing.assert_allclose(
-        enclosed_by_body(body.surface, virtual), volume_by_body(virtual), rtol=1e-12
+        enclosed_by_body(body.surface, phantom), volume_by_body(phantom), rtol=1e-12
     )
 
 

@@ -12,10 +12,10 @@ from xfem_bodies import zero_modes
 from verify.methods.virtual_nodes import virtual_node
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.virtual import cut_mesh
 
 
 def sectors(rng, count, least=0.35):
@@ -33,8 +33,8 @@ def fork(point, angles, reach=2.0):
     return [Polyline(line) for line in lines]
 
 
-def areas(virtual):
-    return np.sort(np.bincount(virtual.bodies[virtual.cells[:, 0]], virtual.volumes))
+def areas(phantom):
+    return np.sort(np.bincount(phantom.bodies[phantom.cells[:, 0]], phantom.volumes))
 
 
 def sector_areas(point, angles):
@@ -60,13 +60,13 @@ def test_cuts_that_end_in_one_point_of_an_element_leave_a_part_for_each_sector(c
     point, angles = rng.uniform(0.3, 0.7, 2), sectors(rng, count)
     cuts = fork(point, angles)
     for order in list(permutations(range(count)))[:: max(1, count - 2)][:6]:
-        virtual = cut_mesh(mesh, [cuts[k] for k in order])
-        assert virtual.bodies.max() + 1 == count
-        modes, following = zero_modes(virtual)
+        phantom = cut_mesh(mesh, [cuts[k] for k in order])
+        assert phantom.bodies.max() + 1 == count
+        modes, following = zero_modes(phantom)
         assert modes == 3 * count
         assert following > 1e-9
         # straight cuts are realised exactly; the border is sampled in steps of 1/4000
-        np.testing.assert_allclose(areas(virtual), sector_areas(point, angles), atol=5e-4)
+        np.testing.assert_allclose(areas(phantom), sector_areas(point, angles), atol=5e-4)
 
 
 def half_planes(rng, count):
@@ -87,16 +87,16 @@ def test_half_planes_that_end_on_one_line_in_tetrahedra_leave_a_part_for_each_se
     rng = np.random.default_rng([3, count, seed])
     mesh = shaken(box_mesh((2, 2, 2)), seed)
     cuts = half_planes(rng, count)
-    virtual = cut_mesh(mesh, cuts)
-    assert virtual.bodies.max() + 1 == count
-    modes, following = zero_modes(virtual)
+    phantom = cut_mesh(mesh, cuts)
+    assert phantom.bodies.max() + 1 == count
+    modes, following = zero_modes(phantom)
     assert modes == 6 * count
     assert following > 1e-9
-    divided = subdivide(virtual)
+    divided = subdivide(phantom)
     torn = facet_measures(divided.cut_facets).sum()
     # facets as thin as round-off measure up to its root, 1e-8 of their length
     assert exterior(divided) == pytest.approx(6.0 + 2.0 * torn, abs=1e-6)
-    assert divided.cell_piece.max() + 1 == len(virtual.cells)
+    assert divided.cell_piece.max() + 1 == len(phantom.cells)
 
 
 def forked_slit(point, angles, reach):
@@ -112,9 +112,9 @@ def test_a_fork_that_ends_inside_is_one_slit_that_opens_to_its_ends(seed):
     cells, reach = 12, 0.3
     mesh = shaken(rectangle_mesh((cells, cells)), seed)
     point, angles = rng.uniform(0.4, 0.6, 2), sectors(rng, 3)
-    virtual = cut_mesh(mesh, forked_slit(point, angles, reach))
-    assert virtual.bodies.max() == 0
-    divided = subdivide(virtual)
+    phantom = cut_mesh(mesh, forked_slit(point, angles, reach))
+    assert phantom.bodies.max() == 0
+    divided = subdivide(phantom)
     torn = facet_measures(divided.cut_facets).sum()
     # each loses less than the way through an element at its tip, at most its longest edge
     assert 3.0 * (reach - np.sqrt(2.0) / cells * 1.3) < torn <= 3.0 * reach + 1e-12
@@ -143,9 +143,9 @@ def test_a_branch_from_the_kink_of_a_polyline_comes_off(bend, seed):
     stem = Polyline([2.0 * point - off(0.0), point, off(turn)])
     branch = Polyline([point, off(turn + away)])
     for cuts in ([stem, branch], [branch, stem]):
-        virtual = cut_mesh(mesh, cuts)
-        assert virtual.bodies.max() + 1 == 3
-        assert zero_modes(virtual)[0] == 9
+        phantom = cut_mesh(mesh, cuts)
+        assert phantom.bodies.max() + 1 == 3
+        assert zero_modes(phantom)[0] == 9
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -163,11 +163,11 @@ def test_strokes_that_end_in_one_point_part_the_body_as_the_cuts_at_once_do(seed
         cutter.begin(ToolPath.of_tip(tips, [k, k + 1.0]))
         for time in np.linspace(k, k + 1.0, 6)[1:]:
             cutter.advance(time)
-            virtual = cutter.virtual_mesh()
-            assert_same_cut(virtual, cut_mesh(mesh, cutter.cuts))
-            assert virtual.node_count >= nodes
-            nodes = virtual.node_count
-    assert virtual.bodies.max() + 1 == (3 if through else 1)
+            phantom = cutter.phantom_mesh()
+            assert_same_cut(phantom, cut_mesh(mesh, cutter.cuts))
+            assert phantom.node_count >= nodes
+            nodes = phantom.node_count
+    assert phantom.bodies.max() + 1 == (3 if through else 1)
 
 
 def test_a_stroke_that_goes_on_past_a_junction_parts_what_was_one():
@@ -180,7 +180,7 @@ def test_a_stroke_that_goes_on_past_a_junction_parts_what_was_one():
     cutter.begin(ToolPath.of_tip([[0.6, -1.0], point, 2.0 * point - [0.6, -1.0]], [1.0, 2.0, 3.0]))
     for time, parts in ((2.0, 2), (3.0, 3)):
         cutter.advance(time)
-        assert cutter.virtual_mesh().bodies.max() + 1 == parts
+        assert cutter.phantom_mesh().bodies.max() + 1 == parts
 
 
 @pytest.mark.parametrize("policy", ["merge", "drop"])
@@ -189,15 +189,15 @@ def test_pieces_that_no_cut_keeps_apart_are_slivers_together_or_not_at_all(polic
     mesh = rectangle_mesh((4, 4))
     point = np.array([0.375, 0.5 + 1e-4])
     cuts = fork(point, np.array([0.3, 2.2, 4.5]))
-    virtual = cut_mesh(mesh, cuts)
-    assert virtual.fraction.min() < 1e-3
-    cell = virtual.parent[virtual.fraction.argmin()]
-    assert len(np.unique(virtual.part[virtual.parent == cell])) == 3
-    treated, report = treat_slivers(virtual, policy)
+    phantom = cut_mesh(mesh, cuts)
+    assert phantom.fraction.min() < 1e-3
+    cell = phantom.parent[phantom.fraction.argmin()]
+    assert len(np.unique(phantom.part[phantom.parent == cell])) == 3
+    treated, report = treat_slivers(phantom, policy)
     assert treated.bodies.max() + 1 == 3
     # only what is dropped goes to another part
     moved = report.volume_share if policy == "drop" else 0.0
-    np.testing.assert_allclose(areas(treated.corners), areas(virtual), atol=moved + 1e-12)
+    np.testing.assert_allclose(areas(treated.corners), areas(phantom), atol=moved + 1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -205,4 +205,4 @@ def test_cells_copied_for_parts_with_a_node_keep_the_sectors_of_a_fork_apart(see
     rng = np.random.default_rng([11, seed])
     mesh = shaken(rectangle_mesh((5, 5)), seed)
     body = virtual_node(mesh, fork(rng.uniform(0.35, 0.65, 2), sectors(rng, 3)))
-    assert body.virtual.bodies.max() + 1 == 3
+    assert body.phantom.bodies.max() + 1 == 3

@@ -26,14 +26,14 @@ def _free(v, kinematics="corotational"):
 
 
 def _critical(body):
-    v = body.force.virtual
+    v = body.force.phantom
     stiffness = InternalForce(v, material(v.mesh.dim), "linear").stiffness(body.pattern)
     return critical_step(body.pattern.matrix(stiffness), body.mass)
 
 
 def _moving(body, strain, spin=0.0):
     """Stretched along x, with a spin in 1/s about the centre and a drift."""
-    state, X = body.rest(), body.force.virtual.node_points
+    state, X = body.rest(), body.force.phantom.node_points
     dim = X.shape[1]
     state.displacement[:, 0] = strain * (X[:, 0] - 0.5)
     W = spin * (rotation(dim, 0.5 * np.pi) - rotation(dim, -0.5 * np.pi)) / 2.0
@@ -199,7 +199,7 @@ def test_energy_is_kept_while_pieces_turn_inside_out():
 def test_implicit_euler_halves_the_energy_of_a_mode_in_ln_2_over_omega_squared_h():
     body = _free(cut_square(4), "linear")
     K = body.pattern.matrix(
-        InternalForce(body.force.virtual, material(2), "linear").stiffness(body.pattern)
+        InternalForce(body.force.phantom, material(2), "linear").stiffness(body.pattern)
     )
     root = np.repeat(np.sqrt(body.mass.diagonal), 2)
     values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))
@@ -235,7 +235,7 @@ def test_forward_euler_gains_energy_at_any_step():
 def test_a_damped_mode_decays_as_rayleigh_says(scheme):
     body = _free(cut_square(4), "linear")
     K = body.pattern.matrix(
-        InternalForce(body.force.virtual, material(2), "linear").stiffness(body.pattern)
+        InternalForce(body.force.phantom, material(2), "linear").stiffness(body.pattern)
     )
     root = np.repeat(np.sqrt(body.mass.diagonal), 2)
     values, vectors = np.linalg.eigh(K.toarray() / np.outer(root, root))

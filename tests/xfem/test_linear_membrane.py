@@ -11,10 +11,10 @@ from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 MATERIAL = isotropic(1e4, 0.3, "plane stress")
 TURN = rotation(3, 0.8)
@@ -31,9 +31,9 @@ def plate(turn=None):
     return cut_mesh(SimplexMesh(points, flat.cells), [cut])
 
 
-def dense(virtual):
-    pattern = block_pattern(virtual.cells, virtual.node_count)
-    return pattern.matrix(InternalForce(virtual, MATERIAL, "linear").stiffness(pattern)).toarray()
+def dense(phantom):
+    pattern = block_pattern(phantom.cells, phantom.node_count)
+    return pattern.matrix(InternalForce(phantom, MATERIAL, "linear").stiffness(pattern)).toarray()
 
 
 def test_a_turned_membrane_has_the_turned_stiffness_of_the_plate_and_none_across():

@@ -82,7 +82,7 @@ def test_a_load_that_is_not_finite_is_named_by_its_node(kind, wrong):
     solver = SOLVERS[kind](pattern, 3)
     solver.factorize(blocks)
     load[7, 1] = wrong
-    with pytest.raises(XfemError, match="right-hand side is not finite, first at unknown node 7"):
+    with pytest.raises(XfemError, match="right-hand side is not finite, first at dof node 7"):
         solver.solve(load)
 
 

@@ -9,11 +9,11 @@ from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports, UnsupportedBodyError
-from verify.xfem.virtual import cut_mesh
 
 LINE = Polyline([[-1.0, 0.1], [2.0, 1.1]])
 PLATE = cut_mesh(rectangle_mesh((5, 5)), [LINE])
@@ -21,28 +21,28 @@ BLOCK = cut_mesh(box_mesh((3, 3, 3)), [Plane([0.5, 0.5, 0.5], [-1.0, -2.0, 3.0])
 STRAIN = isotropic(1.0, 0.3, "plane strain")
 
 
-@pytest.mark.parametrize("virtual", [PLATE, BLOCK], ids=["plate", "block"])
-def test_gravity_on_each_body_is_its_weight_at_its_centre_of_mass(virtual):
+@pytest.mark.parametrize("phantom", [PLATE, BLOCK], ids=["plate", "block"])
+def test_gravity_on_each_body_is_its_weight_at_its_centre_of_mass(phantom):
     """Force and moment are exact on every piece, so that a freed body falls without turning."""
-    dim = virtual.mesh.dim
-    load = body_force(virtual, np.arange(1.0, dim + 1))
-    per_piece = virtual.bodies[virtual.cells[:, 0]]
+    dim = phantom.mesh.dim
+    load = body_force(phantom, np.arange(1.0, dim + 1))
+    per_piece = phantom.bodies[phantom.cells[:, 0]]
     for body in range(2):
-        weight = virtual.volumes[per_piece == body]
-        centre = weight @ virtual.piece_centroids[per_piece == body] / weight.sum()
-        here = virtual.bodies == body
+        weight = phantom.volumes[per_piece == body]
+        centre = weight @ phantom.piece_centroids[per_piece == body] / weight.sum()
+        here = phantom.bodies == body
         assert load[here].sum(axis=0) == pytest.approx(weight.sum() * np.arange(1.0, dim + 1))
         # Σ f_k x_k with a constant density is density·V·(centre of mass)
-        moment = load[here].T @ virtual.node_points[here]
+        moment = load[here].T @ phantom.node_points[here]
         want = weight.sum() * np.outer(np.arange(1.0, dim + 1), centre)
         assert moment == pytest.approx(want, rel=1e-13)
 
 
-@pytest.mark.parametrize("virtual", [PLATE, BLOCK], ids=["plate", "block"])
-def test_a_constant_density_given_as_a_function_is_integrated_exactly(virtual):
-    force = np.arange(1.0, virtual.mesh.dim + 1)
-    as_function = body_force(virtual, lambda x, side: np.broadcast_to(force, x.shape), degree=1)
-    assert as_function == pytest.approx(body_force(virtual, force), abs=1e-15)
+@pytest.mark.parametrize("phantom", [PLATE, BLOCK], ids=["plate", "block"])
+def test_a_constant_density_given_as_a_function_is_integrated_exactly(phantom):
+    force = np.arange(1.0, phantom.mesh.dim + 1)
+    as_function = body_force(phantom, lambda x, side: np.broadcast_to(force, x.shape), degree=1)
+    assert as_function == pytest.approx(body_force(phantom, force), abs=1e-15)
 
 
 def test_a_density_that_jumps_across_the_cut_acts_on_the_right_side():
@@ -52,10 +52,10 @@ def test_a_density_that_jumps_across_the_cut_acts_on_the_right_side():
     assert (load[PLATE.node_side[:, 0] < 0] == 0.0).all()
 
 
-@pytest.mark.parametrize("virtual", [PLATE, BLOCK], ids=["plate", "block"])
-def test_a_uniform_pressure_on_the_whole_surface_balances_on_the_whole_and_opens_the_cut(virtual):
+@pytest.mark.parametrize("phantom", [PLATE, BLOCK], ids=["plate", "block"])
+def test_a_uniform_pressure_on_the_whole_surface_balances_on_the_whole_and_opens_the_cut(phantom):
     """∮ n dA = 0 over the body; over one half it is minus the area vector of the cut."""
-    mesh = virtual.mesh
+    mesh = phantom.mesh
     facets = mesh.boundary_facets
 
     def outward(x, side):
@@ -64,9 +64,9 @@ def test_a_uniform_pressure_on_the_whole_surface_balances_on_the_whole_and_opens
         normal[np.arange(len(x)), nearest // 2] = np.where(nearest % 2 == 1, 1.0, -1.0)
         return normal
 
-    load = traction(virtual, facets, outward)
+    load = traction(phantom, facets, outward)
     assert np.abs(load.sum(axis=0)).max() < 1e-14
-    upper = load[virtual.node_side[:, 0] > 0].sum(axis=0)
+    upper = load[phantom.node_side[:, 0] > 0].sum(axis=0)
     if mesh.dim == 2:
         assert upper == pytest.approx([-1 / 3, 1.0], abs=1e-14)
     else:
@@ -74,20 +74,20 @@ def test_a_uniform_pressure_on_the_whole_surface_balances_on_the_whole_and_opens
 
 
 def test_a_pulled_plate_with_a_cut_along_the_pull_has_the_uniaxial_solution():
-    virtual = cut_mesh(rectangle_mesh((6, 6)), [Polyline([[-1.0, 0.52], [2.0, 0.52]])])
-    mesh = virtual.mesh
+    phantom = cut_mesh(rectangle_mesh((6, 6)), [Polyline([[-1.0, 0.52], [2.0, 0.52]])])
+    mesh = phantom.mesh
     x = mesh.points
     facets = mesh.boundary_facets
     local = np.arange(3) != facets[:, 1:]
     ends = mesh.points[mesh.cells[facets[:, 0]][local].reshape(-1, 2)]
     right = facets[(ends[:, :, 0] > 1.0 - 1e-9).all(axis=1)]
-    supports = Supports.none(virtual).prescribe(virtual, x[:, 0] < 1e-9, components=(0,))
+    supports = Supports.none(phantom).prescribe(phantom, x[:, 0] < 1e-9, components=(0,))
     corners = (x[:, 0] < 1e-9) & ((x[:, 1] < 1e-9) | (x[:, 1] > 1.0 - 1e-9))
-    supports = supports.prescribe(virtual, corners, components=(1,))
-    load = traction(virtual, right, [1.0, 0.0])
+    supports = supports.prescribe(phantom, corners, components=(1,))
+    load = traction(phantom, right, [1.0, 0.0])
     for state, modulus in (("plane stress", 1.0), ("plane strain", 1.0 / 0.91)):
-        solution = solve_static(virtual, isotropic(1.0, 0.3, state), supports, load)
-        assert solution.displacement[:, 0] == pytest.approx(virtual.node_points[:, 0] / modulus)
+        solution = solve_static(phantom, isotropic(1.0, 0.3, state), supports, load)
+        assert solution.displacement[:, 0] == pytest.approx(phantom.node_points[:, 0] / modulus)
         assert solution.strain_energy == pytest.approx(0.5 / modulus, rel=1e-12)
         assert solution.reaction.sum(axis=0) == pytest.approx([-1.0, 0.0], abs=1e-13)
 
@@ -113,12 +113,12 @@ def test_a_piece_that_nothing_holds_is_named():
 
 
 def test_a_body_held_in_one_node_can_still_turn_and_is_refused():
-    virtual = cut_mesh(rectangle_mesh((3, 3)), [])
-    one = Supports.none(virtual).prescribe(virtual, [0])
+    phantom = cut_mesh(rectangle_mesh((3, 3)), [])
+    one = Supports.none(phantom).prescribe(phantom, [0])
     with pytest.raises(UnsupportedBodyError, match="rigid body"):
-        solve_static(virtual, STRAIN, one)
-    two = one.prescribe(virtual, [3], components=(1,))
-    assert solve_static(virtual, STRAIN, two, body_force(virtual, [0, -1])).residual < 1e-12
+        solve_static(phantom, STRAIN, one)
+    two = one.prescribe(phantom, [3], components=(1,))
+    assert solve_static(phantom, STRAIN, two, body_force(phantom, [0, -1])).residual < 1e-12
 
 
 def square(**changes):

@@ -158,8 +158,8 @@ def test_each_vertex_belongs_to_the_piece_that_contains_it() -> None:
     surface = embedded.surface
     rows = surface.used
     # pull the two halves apart: everything above the cut by 1, everything below by -1
-    virtual = cutter.virtual_mesh()
-    side = virtual.node_side[:, 0].astype(float)
+    phantom = cutter.phantom_mesh()
+    side = phantom.node_side[:, 0].astype(float)
     lift = surface.positions(np.stack([0 * side, 0 * side, side], axis=1))
     lift = (lift - surface.material.rows)[:, 2]
     facet_lift = lift[surface.facets.rows[rows]]
@@ -244,10 +244,10 @@ def test_a_tool_in_the_deformed_body_is_found_in_the_material() -> None:
     )
     displacement = nodes @ turn.T - nodes + 0.005 * rng.normal(size=nodes.shape)
     # in every piece a point of its material: the centroid of a sub-simplex, or of the element
-    virtual = cutter.virtual_mesh()
-    wanted = virtual.piece_centroids
-    share = virtual.shape_integrals / virtual.volumes[:, None]
-    place = np.einsum("pa,pas->ps", share, nodes[virtual.cells] + displacement[virtual.cells])
+    phantom = cutter.phantom_mesh()
+    wanted = phantom.piece_centroids
+    share = phantom.shape_integrals / phantom.volumes[:, None]
+    place = np.einsum("pa,pas->ps", share, nodes[phantom.cells] + displacement[phantom.cells])
     order = np.argsort(body.piece_parent.rows, kind="stable")
     same, found = pull_back(cutter, displacement, place, order)
     np.testing.assert_array_equal(found, order)
@@ -266,9 +266,9 @@ def test_a_tool_in_the_deformed_body_is_found_in_the_material() -> None:
 def test_a_tool_in_an_open_cut_is_outside_the_material() -> None:
     cutter, _, _ = _cut(box_mesh((3, 3, 3)), PATHS[:1])
     body = cutter.body
-    virtual = cutter.virtual_mesh()
+    phantom = cutter.phantom_mesh()
     displacement = np.zeros((body.node_count, 3))
-    displacement[:, 2] = 0.1 * virtual.node_side[:, 0]
+    displacement[:, 2] = 0.1 * phantom.node_side[:, 0]
     below = int(np.flatnonzero(body.piece_label.rows[:, 0] < 0)[0])
     height = 0.48 + 0.07 / 1.2 * 0.6 + 0.05 / 1.4 * 0.7  # of the cut at (0.5, 0.5)
     above_gap = [[0.5, 0.5, height + z] for z in (-0.12, 0.0, 0.12)]

@@ -8,8 +8,8 @@ from verify.xfem.cuts import Plane
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import consistent_mass, second_moments, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 LUMPINGS = ("enrichment", "row sum", "weighted diagonal")
 

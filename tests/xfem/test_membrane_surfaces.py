@@ -103,8 +103,8 @@ def test_two_strokes_through_a_membrane_leave_four_parts_with_rims_of_their_own(
 
 def test_the_rims_open_with_the_material_and_forces_on_them_do_the_same_work() -> None:
     cutter, skin = stroked(curved(), THROUGH)
-    virtual = cutter.virtual_mesh()
-    apart = np.where(virtual.node_side[:, :1] > 0, 1.0, -1.0) * [0.0, 0.1, 0.02]
+    phantom = cutter.phantom_mesh()
+    apart = np.where(phantom.node_side[:, :1] > 0, 1.0, -1.0) * [0.0, 0.1, 0.02]
     x = skin.surface.positions(apart)
     rims = skin.rims
     moved = (x - skin.surface.material.rows)[rims.ravel()]
@@ -149,10 +149,10 @@ def test_a_tool_on_a_deformed_membrane_is_found_in_its_material() -> None:
     nodes = cutter.mesh.points[body.node_parent.rows]
     R = rotation(3, 1.1) @ np.diag([1.2, 0.9, 1.0])
     displacement = nodes @ R.T - nodes + 1e-3 * random.normal(size=nodes.shape)
-    virtual = cutter.virtual_mesh()
-    wanted = virtual.piece_centroids
-    share = virtual.shape_integrals / virtual.volumes[:, None]
-    x = nodes[virtual.cells] + displacement[virtual.cells]
+    phantom = cutter.phantom_mesh()
+    wanted = phantom.piece_centroids
+    share = phantom.shape_integrals / phantom.volumes[:, None]
+    x = nodes[phantom.cells] + displacement[phantom.cells]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     order = np.argsort(body.piece_parent.rows, kind="stable")
@@ -200,7 +200,7 @@ def test_beside_the_edge_and_in_an_open_cut_there_is_no_material() -> None:
     flat = rectangle_mesh((5, 5))
     mesh = SimplexMesh(np.pad(flat.points, ((0, 0), (0, 1))), flat.cells)
     cutter, _ = stroked(mesh, THROUGH)
-    side = cutter.virtual_mesh().node_side[:, :1]
+    side = cutter.phantom_mesh().node_side[:, :1]
     apart = np.where(side == side[0], -0.1, 0.1) * [0.0, 1.0, 0.0]  # the part of node 0 goes down
     places = [[0.31, 0.15, 0.2], [-0.01, 0.15, 0.0], [0.5, 0.49, 0.1], [0.0, 0.1, 0.3]]
     start = [int(cutter.body.first_piece[0])] * 4

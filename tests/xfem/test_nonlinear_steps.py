@@ -13,8 +13,8 @@ from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh
-from verify.xfem.virtual import cut_mesh
 
 STATES = {(2, 2): "plane strain", (3, 3): "solid", (2, 3): "plane stress"}
 
@@ -44,11 +44,11 @@ def test_no_stretch_in_reach_and_no_rotation_makes_the_exact_step_of_an_element_
         stuff = isotropic(1e4, poisson, STATES[dim, space])
         for _ in range(25):
             mesh = SimplexMesh(random.normal(size=(dim + 1, space)), [range(dim + 1)])
-            virtual = cut_mesh(mesh, [])
-            force = InternalForce(virtual, stuff)
-            pattern = block_pattern(virtual.cells, virtual.node_count)
+            phantom = cut_mesh(mesh, [])
+            force = InternalForce(phantom, stuff)
+            pattern = block_pattern(phantom.cells, phantom.node_count)
             K = pattern.matrix(force.stiffness(pattern, deformed(random, mesh, strain)))
-            exact = critical_step(K, side_wise_mass(virtual, DENSITY))
+            exact = critical_step(K, side_wise_mass(phantom, DENSITY))
             bound = element_critical_steps(mesh, stuff, DENSITY, strain)[0]
             assert exact >= (1.0 - 1e-9) * bound
 
@@ -64,15 +64,15 @@ def test_up_to_strains_of_one_the_bound_is_that_of_the_linear_element(dim):
             element_critical_steps(mesh, material(dim), DENSITY, strain)
 
 
-def growth(virtual, turn, steps=3000):
+def growth(phantom, turn, steps=3000):
     """Largest energy over that of the start, from the highest mode at 5 % strain, with ωh given."""
-    force, mass = InternalForce(virtual, material(3)), side_wise_mass(virtual, DENSITY)
+    force, mass = InternalForce(phantom, material(3)), side_wise_mass(phantom, DENSITY)
     body = DynamicBody(force, mass)
     K = body.pattern.matrix(force.stiffness(body.pattern, np.zeros(body.shape))).toarray()
     root = np.repeat(np.sqrt(mass.diagonal), 3)
     values, vectors = np.linalg.eigh(K / np.outer(root, root))
     mode = (vectors[:, -1] / root).reshape(body.shape)
-    slopes = np.einsum("pik,pil->pkl", mode[virtual.cells], virtual.mesh.gradients[virtual.parent])
+    slopes = np.einsum("pik,pil->pkl", mode[phantom.cells], phantom.mesh.gradients[phantom.parent])
     state = body.rest()
     state.displacement[:] = 0.05 / np.linalg.norm(slopes, ord=2, axis=(1, 2)).max() * mode
     start, largest = force.evaluate(state.displacement)[1], 0.0
@@ -92,17 +92,17 @@ def growth(virtual, turn, steps=3000):
 
 def test_an_uncut_cube_blows_up_where_three_turns_of_its_fastest_mode_are_a_full_one():
     """ωh = √3, .87 of the linear critical step; a little below, and at √2, nothing happens."""
-    virtual = cut_mesh(box_mesh((2, 2, 2)), [])
-    assert growth(virtual, np.sqrt(3.0)) > 100.0
+    phantom = cut_mesh(box_mesh((2, 2, 2)), [])
+    assert growth(phantom, np.sqrt(3.0)) > 100.0
     for turn in (0.97 * np.sqrt(3.0), np.sqrt(2.0), 0.9 * np.sqrt(2.0)):
-        assert growth(virtual, turn) < 1.01
+        assert growth(phantom, turn) < 1.01
 
 
 def test_an_uncut_cube_let_go_from_a_uniform_stretch_needs_the_smaller_step_too():
     """15 % strain: at .9 of the linear step it blows up, at .9 of the resonance-free one not."""
-    virtual = cut_mesh(box_mesh((3, 3, 3)), [])
-    assert let_go(virtual, 0.9, 2_000, start=uniform)[0] > 10.0
-    largest, inverted = let_go(virtual, 0.9 * RESONANCE_FREE, 10_000, start=uniform)
+    phantom = cut_mesh(box_mesh((3, 3, 3)), [])
+    assert let_go(phantom, 0.9, 2_000, start=uniform)[0] > 10.0
+    largest, inverted = let_go(phantom, 0.9 * RESONANCE_FREE, 10_000, start=uniform)
     assert inverted == 0
     assert largest < 1.01
 

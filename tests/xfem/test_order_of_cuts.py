@@ -5,14 +5,14 @@ import pytest
 from degenerate_strokes import body, strokes
 
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh, cut_mesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 # Of random sets of two to four strokes that are exactly degenerate or nearly, a third of which end
 # inside the body, with tip rule `inside`: shares that docs/guide/simulator.md states, rounded up.
 ORDER, NUMBERING = {2: 0.004, 3: 0.015}, {2: 0.002, 3: 0.006}
 
 
-def _same(a: VirtualMesh, b: VirtualMesh, order) -> bool:
+def _same(a: PhantomMesh, b: PhantomMesh, order) -> bool:
     """Whether pieces, their volumes and common unknowns are the same.
 
     The cuts of `b` are those of `a` in another order.

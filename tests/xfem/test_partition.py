@@ -9,10 +9,10 @@ from verify.xfem.clip import staircase
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.pieces import split_cells
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.virtual import cut_mesh
 
 TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
 TETRAHEDRON = SimplexMesh(np.concatenate([np.zeros((1, 3)), np.eye(3)]), [[0, 1, 2, 3]])
@@ -41,13 +41,13 @@ def check_pieces(mesh, cuts):
     assert (partition.simplices.fraction >= 0.0).all()
     # sums of at most some ten products of a few factors each
     assert np.abs(total[split] - 1.0).max(initial=0.0) <= 1e-14
-    virtual = cut_mesh(mesh, cuts)
-    assert virtual.volumes.sum() == pytest.approx(mesh.measures.sum(), rel=1e-14)
-    assert (virtual.fraction > 0.0).all()
+    phantom = cut_mesh(mesh, cuts)
+    assert phantom.volumes.sum() == pytest.approx(mesh.measures.sum(), rel=1e-14)
+    assert (phantom.fraction > 0.0).all()
     # no unknown without material, no material without unknowns
-    assert np.array_equal(np.unique(virtual.cells), np.arange(virtual.node_count))
-    assert np.array_equal(virtual.node_parent[virtual.cells], mesh.cells[virtual.parent])
-    return virtual
+    assert np.array_equal(np.unique(phantom.cells), np.arange(phantom.node_count))
+    assert np.array_equal(phantom.node_parent[phantom.cells], mesh.cells[phantom.parent])
+    return phantom
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -87,11 +87,11 @@ def test_ten_thousand_random_and_degenerate_cuts_lose_no_volume_and_no_piece(dim
     values = rng.choice([-1.0, 1.0], (count, corners)) * 10.0 ** rng.uniform(-14, 2, (count, 1))
     values = values * 10.0 ** rng.choice([0.0, 0.0, -6.0, -12.0], (count, corners))
     values[rng.random((count, corners)) < 0.1] = 0.0
-    virtual = check_pieces(mesh, [nodal_cut(mesh, values.ravel())])
+    phantom = check_pieces(mesh, [nodal_cut(mesh, values.ravel())])
     # a cell splits into two unless all its nodes are on one side, zero being the plus side
-    used = virtual.level_sets.reshape(count, corners)
+    used = phantom.level_sets.reshape(count, corners)
     above, below = (used > 0.0).any(axis=1), (used < 0.0).any(axis=1)
-    pieces = np.bincount(virtual.parent, minlength=count)
+    pieces = np.bincount(phantom.parent, minlength=count)
     assert np.array_equal(pieces, np.where(above & below, 2, 1))
 
 
@@ -100,12 +100,12 @@ def test_ten_thousand_random_and_degenerate_cuts_lose_no_volume_and_no_piece(dim
 def test_a_cut_off_corner_keeps_all_digits_of_its_volume(dim, size):
     """φ = size − Σx cuts off the corner at the origin: a fraction of size^dim."""
     mesh = TRIANGLE if dim == 2 else TETRAHEDRON
-    virtual = cut_mesh(mesh, [Plane([0.5 * size] * 2 + [0.0] * (dim - 2), -np.ones(dim))])
+    phantom = cut_mesh(mesh, [Plane([0.5 * size] * 2 + [0.0] * (dim - 2), -np.ones(dim))])
     if size == 1.0:
-        assert virtual.fraction.tolist() == [1.0]
+        assert phantom.fraction.tolist() == [1.0]
     else:
         # φ itself carries a round-off of some 1e-17 from subtracting coordinates of size 1e-12
-        assert virtual.fraction.min() == pytest.approx(size**dim, rel=1e-15 / size + 1e-14)
+        assert phantom.fraction.min() == pytest.approx(size**dim, rel=1e-15 / size + 1e-14)
 
 
 def test_volume_shares_of_a_two_two_split_match_the_product_formula():
@@ -199,9 +199,9 @@ def test_the_subdivision_beside_a_tip_has_no_hanging_node():
 def test_a_thin_layer_between_two_cuts_keeps_its_volume():
     gap = 1e-9
     cuts = [Plane([0.5, 0.52], [0.0, 1.0]), Plane([0.5, 0.52 + gap], [0.0, 1.0])]
-    virtual = check_pieces(rectangle_mesh((4, 4)), cuts)
-    layer = virtual.bodies[virtual.cells[:, 0]]
-    volumes = np.bincount(layer, virtual.volumes)
+    phantom = check_pieces(rectangle_mesh((4, 4)), cuts)
+    layer = phantom.bodies[phantom.cells[:, 0]]
+    volumes = np.bincount(layer, phantom.volumes)
     assert len(volumes) == 3
     # positions carry round-off of 1e-16, the gap a relative 1e-7 of it
     assert volumes.min() == pytest.approx(gap, rel=1e-6)
@@ -209,18 +209,18 @@ def test_a_thin_layer_between_two_cuts_keeps_its_volume():
 
 def test_a_cut_that_misses_the_body_changes_nothing():
     mesh = rectangle_mesh((4, 4))
-    virtual = cut_mesh(mesh, [Plane([0.0, 2.0], [0.0, 1.0]), Polyline([[-2.0, 0.5], [-1.0, 0.5]])])
-    assert np.array_equal(virtual.cells, mesh.cells)
-    assert virtual.node_count == len(mesh.points)
-    assert len(subdivide(virtual).cut_facets) == 0
+    phantom = cut_mesh(mesh, [Plane([0.0, 2.0], [0.0, 1.0]), Polyline([[-2.0, 0.5], [-1.0, 0.5]])])
+    assert np.array_equal(phantom.cells, mesh.cells)
+    assert phantom.node_count == len(mesh.points)
+    assert len(subdivide(phantom).cut_facets) == 0
 
 
 def test_what_was_snapped_and_dropped_is_counted():
     mesh = rectangle_mesh((4, 4))
-    virtual = cut_mesh(mesh, [Plane([0.0, 0.5 + 1e-17], [1e-17, 1.0])])
-    assert virtual.snapped + (virtual.level_sets == 0.0).sum() >= 5
+    phantom = cut_mesh(mesh, [Plane([0.0, 0.5 + 1e-17], [1e-17, 1.0])])
+    assert phantom.snapped + (phantom.level_sets == 0.0).sum() >= 5
     # the plus side of every cell below the line has no volume: eight cells touch it from below
-    assert virtual.dropped == 8
+    assert phantom.dropped == 8
 
 
 def test_a_level_set_that_is_not_finite_is_refused():

@@ -9,44 +9,44 @@ from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import NotConvergedError
 from verify.xfem.loads import body_force
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 LINE = Polyline([[-1.0, 0.0], [2.0, 1.0]])
 PLANE = Plane([0.5, 0.5, 0.5], exact.NORMAL)
 
 
 def solve(mesh, cut, field, solver="direct"):
-    virtual = cut_mesh(mesh, [cut])
-    supports = Supports.none(virtual).prescribe(virtual, boundary_nodes(mesh), field)
+    phantom = cut_mesh(mesh, [cut])
+    supports = Supports.none(phantom).prescribe(phantom, boundary_nodes(mesh), field)
     state = "plane strain" if mesh.dim == 2 else "solid"
     material = isotropic(exact.YOUNG, exact.POISSON, state)
-    return virtual, solve_static(virtual, material, supports, solver=solver)
+    return phantom, solve_static(phantom, material, supports, solver=solver)
 
 
 @pytest.mark.parametrize("diagonal", ["right", "left", "alternating", "crossed"])
 @pytest.mark.parametrize("n", [5, 8])
 def test_a_cut_plate_passes_the_patch_test_to_round_off(n, diagonal):
-    virtual, solution = solve(rectangle_mesh((n, n), diagonal=diagonal), LINE, exact.f1)
+    phantom, solution = solve(rectangle_mesh((n, n), diagonal=diagonal), LINE, exact.f1)
     assert solution.strain_energy == pytest.approx(exact.ENERGY_F1, rel=1e-9)
-    want = exact.f1(virtual.node_points, virtual.node_side)
+    want = exact.f1(phantom.node_points, phantom.node_side)
     # round-off of a solve with a few hundred unknowns, displacements of order 0.1
     assert np.abs(solution.displacement - want).max() < 1e-14
 
 
 def test_the_side_of_an_unknown_is_that_of_its_material():
-    virtual = cut_mesh(rectangle_mesh((8, 8)), [LINE])
-    geometric = np.sign(LINE.level_set(virtual.node_piece_points))
-    assert np.array_equal(virtual.node_side[:, 0], geometric)
+    phantom = cut_mesh(rectangle_mesh((8, 8)), [LINE])
+    geometric = np.sign(LINE.level_set(phantom.node_piece_points))
+    assert np.array_equal(phantom.node_side[:, 0], geometric)
 
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 def test_a_cut_cube_passes_the_patch_test_to_round_off(solver):
-    virtual, solution = solve(box_mesh((4, 4, 4)), PLANE, exact.f1_3d, solver)
+    phantom, solution = solve(box_mesh((4, 4, 4)), PLANE, exact.f1_3d, solver)
     assert solution.strain_energy == pytest.approx(exact.ENERGY_F1_3D, rel=1e-9)
-    want = exact.f1_3d(virtual.node_points, virtual.node_side)
+    want = exact.f1_3d(phantom.node_points, phantom.node_side)
     tolerance = 1e-14 if solver == "direct" else 1e-13  # CG stops at a relative residual of 1e-13
     assert np.abs(solution.displacement - want).max() < tolerance
 
@@ -54,9 +54,9 @@ def test_a_cut_cube_passes_the_patch_test_to_round_off(solver):
 def test_a_large_cut_cube_is_solved_by_iteration_as_exactly_as_by_factorisation():
     """The cut leaves slivers of 1e-8 of the elements; what is plane is factorised at any size."""
     plane = Plane([0.5, 0.5, 0.5 + 1e-9], [0.0, 0.0, 1.0])
-    virtual, solution = solve(box_mesh((12, 12, 12)), plane, exact.f1_3d, "auto")
+    phantom, solution = solve(box_mesh((12, 12, 12)), plane, exact.f1_3d, "auto")
     assert solution.solver == "iterative"
-    assert virtual.node_count > 2000
+    assert phantom.node_count > 2000
     _, direct = solve(box_mesh((12, 12, 12)), plane, exact.f1_3d, "direct")
     assert solution.strain_energy == pytest.approx(direct.strain_energy, rel=1e-13)
     assert np.abs(solution.displacement - direct.displacement).max() < 1e-12
@@ -67,30 +67,30 @@ def test_a_large_cut_cube_is_solved_by_iteration_as_exactly_as_by_factorisation(
 def test_a_thin_strip_that_bends_is_factorised_where_iterations_do_not_end():
     """Equilibrium: the load works twice the strain energy; asked for, iterations say why not."""
     mesh = box_mesh((240, 5, 1), upper=(1.2, 0.02, 0.001))
-    virtual = cut_mesh(mesh, [])
-    held = Supports.none(virtual).prescribe(virtual, np.flatnonzero(mesh.points[:, 0] == 0.0))
-    load = body_force(virtual, (0.0, 0.0, -1.0))
-    solution = solve_static(virtual, isotropic(1e4, 0.3, "solid"), held, load)
-    assert virtual.node_count > 2000
+    phantom = cut_mesh(mesh, [])
+    held = Supports.none(phantom).prescribe(phantom, np.flatnonzero(mesh.points[:, 0] == 0.0))
+    load = body_force(phantom, (0.0, 0.0, -1.0))
+    solution = solve_static(phantom, isotropic(1e4, 0.3, "solid"), held, load)
+    assert phantom.node_count > 2000
     assert solution.solver == "direct"
     work = np.sum(load * solution.displacement)
     # round-off times the condition number, (length/thickness)⁴
     assert work == pytest.approx(2.0 * solution.strain_energy, rel=1e-4)
     with pytest.raises(NotConvergedError):
-        solve_static(virtual, isotropic(1e4, 0.3, "solid"), held, load, "iterative")
+        solve_static(phantom, isotropic(1e4, 0.3, "solid"), held, load, "iterative")
 
 
 def test_swapped_sides_of_the_prescribed_values_are_seen_in_the_displacement():
     """Negative control. The energy alone is blind to it: both halves are congruent."""
-    virtual, solution = solve(rectangle_mesh((8, 8)), LINE, lambda x, side: exact.f1(x, -side))
-    assert relative_l2_error(virtual, solution.displacement, exact.f1) > 1.0
+    phantom, solution = solve(rectangle_mesh((8, 8)), LINE, lambda x, side: exact.f1(x, -side))
+    assert relative_l2_error(phantom, solution.displacement, exact.f1) > 1.0
 
 
 def test_energy_and_displacement_of_f3_converge_at_first_and_second_order():
     errors, energies = [], []
     for n in (16, 32, 64):
-        virtual, solution = solve(rectangle_mesh((n, n)), LINE, exact.f3)
-        errors.append(relative_l2_error(virtual, solution.displacement, exact.f3))
+        phantom, solution = solve(rectangle_mesh((n, n)), LINE, exact.f3)
+        errors.append(relative_l2_error(phantom, solution.displacement, exact.f3))
         energies.append(solution.strain_energy)
     # independent values: another minimal P1 XFEM on the same meshes, to the digits stated
     assert energies == pytest.approx([2.80440, 2.78535, 2.78055], abs=5.1e-6)
@@ -120,13 +120,13 @@ def test_a_turned_problem_has_the_turned_solution(angle):
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s], [s, c]])
     mesh = rectangle_mesh((6, 6))
-    virtual, solution = solve(mesh, LINE, exact.f3)
+    phantom, solution = solve(mesh, LINE, exact.f3)
     turned_mesh = type(mesh)(mesh.points @ turn.T, mesh.cells)
     turned_cut = Polyline(LINE.vertices @ turn.T)
-    turned_virtual, turned = solve(
+    turned_phantom, turned = solve(
         turned_mesh, turned_cut, lambda x, side: exact.f3(x @ turn, side) @ turn.T
     )
-    assert np.array_equal(turned_virtual.cells, virtual.cells)
+    assert np.array_equal(turned_phantom.cells, phantom.cells)
     assert np.allclose(turned.displacement, solution.displacement @ turn.T, atol=1e-13)
 
 
@@ -134,7 +134,7 @@ def test_a_turned_problem_has_the_turned_solution(angle):
 def test_linear_kinematics_charge_energy_for_a_rigid_rotation_of_one_half(degrees, energy):
     """Rigid separation costs nothing; a rotation costs 2(λ+μ)(1−cos θ)² per area."""
     mesh = rectangle_mesh((8, 8))
-    virtual = cut_mesh(mesh, [Polyline([[-1.0, 0.03], [2.0, 1.03]])])
+    phantom = cut_mesh(mesh, [Polyline([[-1.0, 0.03], [2.0, 1.03]])])
     angle = np.radians(degrees)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     everywhere = np.arange(len(mesh.points))
@@ -147,6 +147,6 @@ def test_linear_kinematics_charge_energy_for_a_rigid_rotation_of_one_half(degree
         return np.where(side > 0, [0.3, 0.7], 0.0) * np.ones_like(x)
 
     for field, want, tolerance in ((turned, energy, 1e-6), (moved, 0.0, 1e-9 * 1e4)):
-        supports = Supports.none(virtual).prescribe(virtual, everywhere, field)
-        solution = solve_static(virtual, material, supports)
+        supports = Supports.none(phantom).prescribe(phantom, everywhere, field)
+        solution = solve_static(phantom, material, supports)
         assert solution.strain_energy == pytest.approx(want, abs=tolerance)

@@ -19,10 +19,10 @@ from verify.xfem.internal_force import inverted_cells
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 SCHEMES = [
     CentralDifferences,
@@ -34,9 +34,9 @@ SCHEMES = [
 ]
 
 
-def penalised(virtual, factor=0.01):
-    stuff = material(virtual.mesh.dim)
-    return treat_moving_body(virtual, stuff, DENSITY, "penalise", factor=factor)
+def penalised(phantom, factor=0.01):
+    stuff = material(phantom.mesh.dim)
+    return treat_moving_body(phantom, stuff, DENSITY, "penalise", factor=factor)
 
 
 def sliver(dim, size):
@@ -68,7 +68,7 @@ def test_the_penalised_stiffness_is_the_derivative_of_force_and_energy(dim, kine
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_every_scheme_closes_its_account_with_a_penalty_and_its_mass(scheme, dim):
     treated = penalised(cut_body(dim))
-    v, mass = treated.virtual, treated.mass
+    v, mass = treated.phantom, treated.mass
     assert mass.diagonal is None
     body = DynamicBody(
         treated.force,
@@ -102,7 +102,7 @@ def test_a_turning_body_does_not_feel_the_penalty(dim):
 @pytest.mark.parametrize("size", [0.5, 1e-3, 1e-12, 0.0])
 def test_with_its_mass_the_penalty_keeps_the_explicit_step_of_the_uncut_body(dim, size):
     treated = penalised(sliver(dim, size))
-    v = treated.virtual
+    v = treated.phantom
     pattern = treated.mass.pattern(v, treated.force.ghost.couplings)
     K = pattern.matrix(
         treated.force.stiffness(pattern, np.zeros_like(v.node_points), "rotation-fixed")
@@ -153,7 +153,7 @@ def test_each_policy_says_what_it_did_and_keeps_mass_and_separation(policy):
     v = sliver(2, 1e-3)
     treated = treat_moving_body(v, material(2), DENSITY, policy)
     assert treated.mass.weights.sum() == pytest.approx(DENSITY, rel=1e-12)
-    assert treated.virtual.bodies.max() == 1
+    assert treated.phantom.bodies.max() == 1
     report = treated.slivers
     counts = {"keep": report.kept, "drop": report.dropped, "merge": report.aggregated}
     assert str(counts.get(policy, report.kept)) in treated.summary

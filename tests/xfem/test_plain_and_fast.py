@@ -20,17 +20,17 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN
 from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 KERNELS = {"plain": PLAIN, "fast": FAST}
 
 
-def _stuff(virtual):
-    mesh = virtual.mesh
+def _stuff(phantom):
+    mesh = phantom.mesh
     kind = "solid" if mesh.dim == 3 else "plane strain" if mesh.space == 2 else "plane stress"
     return isotropic(1e4, 0.3, kind)
 
@@ -53,28 +53,28 @@ BODIES = {
 }
 
 
-def _held(virtual):
-    points = virtual.mesh.points
+def _held(phantom):
+    points = phantom.mesh.points
     low, high = points[:, 0].min(), points[:, 0].max()
     ends = (points[:, 0] == low) | (points[:, 0] == high)
-    held = Supports.none(virtual).prescribe(virtual, ends)
-    if virtual.mesh.dim < virtual.mesh.space:  # resists in its plane alone
+    held = Supports.none(phantom).prescribe(phantom, ends)
+    if phantom.mesh.dim < phantom.mesh.space:  # resists in its plane alone
         whole = np.ones(len(points), dtype=bool)
-        held = held.prescribe(virtual, whole, components=(2,))
+        held = held.prescribe(phantom, whole, components=(2,))
     return held
 
 
-def _load(virtual):
-    return body_force(virtual, [30.0, -20.0, 10.0][: virtual.mesh.space])
+def _load(phantom):
+    return body_force(phantom, [30.0, -20.0, 10.0][: phantom.mesh.space])
 
 
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 def test_linear_statics(solver, name):
-    virtual = BODIES[name]()
-    stuff, held, load = _stuff(virtual), _held(virtual), _load(virtual)
+    phantom = BODIES[name]()
+    stuff, held, load = _stuff(phantom), _held(phantom), _load(phantom)
     plain, fast = (
-        solve_static(virtual, stuff, held, load, solver=solver, kernels=kernels)
+        solve_static(phantom, stuff, held, load, solver=solver, kernels=kernels)
         for kernels in KERNELS.values()
     )
     size = np.abs(fast.displacement).max()
@@ -85,11 +85,11 @@ def test_linear_statics(solver, name):
 
 
 def test_linear_statics_with_a_ghost_penalty():
-    virtual = BODIES["block with slivers"]()
-    stuff, held, load = _stuff(virtual), _held(virtual), _load(virtual)
-    ghost = GhostPenalty(virtual, stuff)
+    phantom = BODIES["block with slivers"]()
+    stuff, held, load = _stuff(phantom), _held(phantom), _load(phantom)
+    ghost = GhostPenalty(phantom, stuff)
     plain, fast = (
-        solve_static(virtual, stuff, held, load, ghost=ghost, kernels=kernels)
+        solve_static(phantom, stuff, held, load, ghost=ghost, kernels=kernels)
         for kernels in KERNELS.values()
     )
     assert plain.strain_energy == pytest.approx(fast.strain_energy, rel=1e-11)
@@ -107,10 +107,10 @@ def test_linear_statics_with_a_ghost_penalty():
 def test_equilibria_after_large_turns(make, degrees):
     body = make()
     path = turn(body, degrees)
-    stuff = _stuff(body.virtual)
+    stuff = _stuff(body.phantom)
     plain, fast = (
         static_equilibrium(
-            InternalForce(body.virtual, stuff, kernels=kernels), body.fixed, path, load_steps=2
+            InternalForce(body.phantom, stuff, kernels=kernels), body.fixed, path, load_steps=2
         )
         for kernels in KERNELS.values()
     )
@@ -123,15 +123,15 @@ def test_equilibria_after_large_turns(make, degrees):
     "scheme", [RealTimeEuler, ImplicitEuler, Trapezoidal, GeneralisedAlpha, EnergyMomentum]
 )
 def test_motion(scheme, name):
-    virtual = BODIES[name]()
+    phantom = BODIES[name]()
     moved = []
     for kernels in KERNELS.values():
-        mass = side_wise_mass(virtual, DENSITY)
+        mass = side_wise_mass(phantom, DENSITY)
         body = DynamicBody(
-            InternalForce(virtual, _stuff(virtual), kernels=kernels),
+            InternalForce(phantom, _stuff(phantom), kernels=kernels),
             mass,
-            weight=mass.weight([3.0, -2.0, 1.0][: virtual.mesh.space]),
-            supports=_held(virtual),
+            weight=mass.weight([3.0, -2.0, 1.0][: phantom.mesh.space]),
+            supports=_held(phantom),
         )
         integrator, state = scheme(body, 0.02), body.rest()
         for _ in range(6):
@@ -147,9 +147,9 @@ def test_motion(scheme, name):
 @pytest.mark.parametrize("kernels", KERNELS.values(), ids=KERNELS)
 def test_a_free_piece_is_refused_by_both(kernels, name):
     """Held by one end, cut right through: the other half floats."""
-    virtual = BODIES[name]()
-    points = virtual.node_points
-    fixed = np.repeat((points[:, 0] == points[:, 0].min())[:, None], virtual.mesh.space, axis=1)
-    force = InternalForce(virtual, _stuff(virtual), kernels=kernels)
+    phantom = BODIES[name]()
+    points = phantom.node_points
+    fixed = np.repeat((points[:, 0] == points[:, 0].min())[:, None], phantom.mesh.space, axis=1)
+    force = InternalForce(phantom, _stuff(phantom), kernels=kernels)
     with pytest.raises(SingularStiffnessError):
-        static_equilibrium(force, fixed, load=_load(virtual))
+        static_equilibrium(force, fixed, load=_load(phantom))

@@ -31,10 +31,10 @@ STEP = 2e-3
 
 def hanging(n=3, drive=None):
     """A cut cube under gravity, one face held, or driven up and down."""
-    virtual = cut_cube(n)
-    face = virtual.node_points[:, 2] == 0.0
-    mass = side_wise_mass(virtual, DENSITY)
-    supports = Supports.none(virtual).prescribe(virtual, virtual.mesh.points[:, 2] == 0.0)
+    phantom = cut_cube(n)
+    face = phantom.node_points[:, 2] == 0.0
+    mass = side_wise_mass(phantom, DENSITY)
+    supports = Supports.none(phantom).prescribe(phantom, phantom.mesh.points[:, 2] == 0.0)
     if drive is not None:
         fixed = np.repeat(face[:, None], 3, axis=1)
         zero = np.zeros((len(face), 3))
@@ -44,7 +44,7 @@ def hanging(n=3, drive=None):
 
         supports = MovingSupports(fixed, motion)
     return DynamicBody(
-        InternalForce(virtual, material(3), kernels=FAST),
+        InternalForce(phantom, material(3), kernels=FAST),
         mass,
         weight=mass.weight([0.0, 0.0, -9.8]),
         supports=supports,
@@ -108,10 +108,10 @@ def test_a_penalised_solid_is_swept_to_the_force_and_stiffness_of_evaluation_and
     body = treat_moving_body(
         cut_cube(3), material(3), DENSITY, "penalise", factor=0.01, kernels=FAST
     )
-    force, virtual = body.force, body.force.virtual
-    pattern = body.mass.pattern(virtual, force.ghost.couplings)
+    force, phantom = body.force, body.force.phantom
+    pattern = body.mass.pattern(phantom, force.ghost.couplings)
     rng = np.random.default_rng(2)
-    u, v = 0.02 * rng.normal(size=(2, virtual.node_count, 3))
+    u, v = 0.02 * rng.normal(size=(2, phantom.node_count, 3))
     internal, blocks = np.empty_like(u), np.empty((len(pattern.columns), 3, 3))
     force.linearise(pattern, u, v, 0.1, 0.3, internal, blocks)
     expected, _ = force.evaluate(u)

@@ -9,10 +9,10 @@ from scipy.spatial import Delaunay
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 
 def _coarse_mesh(dim, rng):
@@ -43,13 +43,13 @@ def test_every_unknown_lies_on_the_sides_of_its_pieces_in_any_order_of_the_cuts(
         orders = list(permutations(range(len(planes))))
         for order in [orders[k] for k in rng.choice(len(orders), 2, replace=False)]:
             cuts = [planes[k] for k in order]
-            virtual = cut_mesh(mesh, cuts)
+            phantom = cut_mesh(mesh, cuts)
             # planes end nowhere, so that no piece lies on both sides of one
-            truth = _signs(cuts, virtual.piece_centroids)
-            np.testing.assert_array_equal(virtual.piece_side, truth)
-            corners = virtual.cells.shape[1]
+            truth = _signs(cuts, phantom.piece_centroids)
+            np.testing.assert_array_equal(phantom.piece_side, truth)
+            corners = phantom.cells.shape[1]
             np.testing.assert_array_equal(
-                virtual.node_side[virtual.cells], np.repeat(truth[:, None], corners, axis=1)
+                phantom.node_side[phantom.cells], np.repeat(truth[:, None], corners, axis=1)
             )
             places += truth.size * corners
     assert places >= 10_000
@@ -59,11 +59,11 @@ def test_parts_between_planes_that_move_rigidly_are_held_where_they_are():
     mesh = rectangle_mesh((3, 3))
     planes = [Plane([0.40, 0.0], [1.0, 0.2]), Plane([0.55, 0.0], [1.0, 0.1])]
     for order in ((0, 1), (1, 0)):
-        virtual = cut_mesh(mesh, [planes[k] for k in order])
-        supports = Supports.none(virtual).prescribe(
-            virtual,
+        phantom = cut_mesh(mesh, [planes[k] for k in order])
+        supports = Supports.none(phantom).prescribe(
+            phantom,
             np.arange(len(mesh.points)),
             lambda x, side: np.column_stack([0.1 * side.sum(axis=1), 0.0 * x[:, 0]]),
         )
-        solved = solve_static(virtual, isotropic(1.0, 0.3, "plane strain"), supports)
+        solved = solve_static(phantom, isotropic(1.0, 0.3, "plane strain"), supports)
         assert solved.strain_energy < 1e-28

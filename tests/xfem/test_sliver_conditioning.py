@@ -20,10 +20,10 @@ from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 SIZES = [0.5, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6]
 SHIFTED_RAW = [6.6e2, 9.4e2, 4.7e4, 4.7e6, 4.7e8, 4.7e12]
@@ -41,13 +41,13 @@ def alternating(count):
     return SimplexMesh(points, cells)
 
 
-def condition_numbers(virtual, basis):
+def condition_numbers(phantom, basis):
     """Raw and with Jacobi scaling."""
-    matrix, held = sparse_stiffness(virtual, 1e4), clamped(virtual).fixed
+    matrix, held = sparse_stiffness(phantom, 1e4), clamped(phantom).fixed
     if basis != "sidewise":
-        matrix = transformed_matrix(virtual, basis, csr_array(matrix))
-        nodes = held[: len(virtual.mesh.points)]
-        held = np.concatenate([nodes, nodes[virtual.enriched_nodes]])
+        matrix = transformed_matrix(phantom, basis, csr_array(matrix))
+        nodes = held[: len(phantom.mesh.points)]
+        held = np.concatenate([nodes, nodes[phantom.enriched_nodes]])
     free = ~held.ravel()
     dense = matrix.toarray()[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.diag(dense))
@@ -94,8 +94,8 @@ def test_side_wise_unknowns_have_the_smallest_scaled_condition_numbers_and_they_
     assert (scaled < table("shifted")[1]).all()
 
 
-def ghost_stiffness(virtual, ghost):
-    return sparse_stiffness(virtual) + kron(ghost.matrix, identity(virtual.mesh.dim))
+def ghost_stiffness(phantom, ghost):
+    return sparse_stiffness(phantom) + kron(ghost.matrix, identity(phantom.mesh.dim))
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -103,10 +103,10 @@ def test_a_ghost_penalty_bounds_the_raw_condition_number(dim):
     """At most three times that of the cut through the middle of the elements."""
     raw = []
     for size in (0.5, 1e-2, 1e-6, 1e-12):
-        virtual = body(dim, size)
-        ghost = GhostPenalty(virtual, isotropic(1.0, 0.3, "plane strain"), 0.1)
-        free = ~clamped(virtual).fixed.ravel()
-        values = np.linalg.eigvalsh(ghost_stiffness(virtual, ghost).toarray()[np.ix_(free, free)])
+        phantom = body(dim, size)
+        ghost = GhostPenalty(phantom, isotropic(1.0, 0.3, "plane strain"), 0.1)
+        free = ~clamped(phantom).fixed.ravel()
+        values = np.linalg.eigvalsh(ghost_stiffness(phantom, ghost).toarray()[np.ix_(free, free)])
         raw.append(values[-1] / values[0])
     assert max(raw) < 3.0 * raw[0]
 
@@ -117,10 +117,10 @@ def test_a_ghost_penalty_keeps_the_explicit_step_only_with_its_mass(dim):
     uncut = cut_mesh(body(dim, 0.5).mesh, [])
     whole = critical_step(csr_array(sparse_stiffness(uncut)), side_wise_mass(uncut, 1.0))
     for size in (0.5, 1e-2, 1e-6, 1e-12):
-        virtual = body(dim, size)
-        ghost = GhostPenalty(virtual, isotropic(1.0, 0.3, "plane strain"), 0.01)
-        lumped = side_wise_mass(virtual, 1.0)
-        stiffness = csr_array(ghost_stiffness(virtual, ghost))
+        phantom = body(dim, size)
+        ghost = GhostPenalty(phantom, isotropic(1.0, 0.3, "plane strain"), 0.01)
+        lumped = side_wise_mass(phantom, 1.0)
+        stiffness = csr_array(ghost_stiffness(phantom, ghost))
         with_mass = ghost.mass(lumped, 1.0)
         assert critical_step(stiffness, with_mass) > 0.99 * whole
         assert with_mass.matrix.sum() == pytest.approx(1.0, rel=1e-12)
@@ -129,26 +129,26 @@ def test_a_ghost_penalty_keeps_the_explicit_step_only_with_its_mass(dim):
 
 def test_a_ghost_penalty_costs_less_than_half_a_percent_of_accuracy_and_nothing_if_linear():
     mesh = alternating(16)
-    virtual = cut_mesh(mesh, [Plane([0.5, 0.5], [-1.0, 3.0])])
+    phantom = cut_mesh(mesh, [Plane([0.5, 0.5], [-1.0, 3.0])])
     material = isotropic(1.0, 0.3, "plane strain")
-    ghost = GhostPenalty(virtual, material)
-    linear = virtual.node_points @ np.array([[0.1, 0.7], [-0.4, 0.2]])
+    ghost = GhostPenalty(phantom, material)
+    linear = phantom.node_points @ np.array([[0.1, 0.7], [-0.4, 0.2]])
     assert np.abs(ghost.force(linear)[0]).max() < 1e-14
-    supports = Supports.none(virtual).prescribe(virtual, boundary_nodes(mesh), exact.f3)
-    plain = solve_static(virtual, material, supports)
-    errors = [relative_l2_error(virtual, plain.displacement, exact.f3)]
+    supports = Supports.none(phantom).prescribe(phantom, boundary_nodes(mesh), exact.f3)
+    plain = solve_static(phantom, material, supports)
+    errors = [relative_l2_error(phantom, plain.displacement, exact.f3)]
     for solver in ("direct", "iterative"):
-        solution = solve_static(virtual, material, supports, solver=solver, ghost=ghost)
-        errors.append(relative_l2_error(virtual, solution.displacement, exact.f3))
+        solution = solve_static(phantom, material, supports, solver=solver, ghost=ghost)
+        errors.append(relative_l2_error(phantom, solution.displacement, exact.f3))
         assert solution.residual < 1e-9
         assert 0.0 < solution.penalty_energy < 1e-3 * solution.strain_energy
     assert errors[1:] == pytest.approx([errors[0]] * 2, rel=5e-3)
 
 
 def test_a_ghost_penalty_ties_no_halves_together():
-    virtual = body(2, 1e-3)
-    ghost = GhostPenalty(virtual, isotropic(1.0, 0.3, "plane strain"))
-    lifted = np.where(virtual.node_side > 0, 1.0, 0.0) * np.ones(2)
+    phantom = body(2, 1e-3)
+    ghost = GhostPenalty(phantom, isotropic(1.0, 0.3, "plane strain"))
+    lifted = np.where(phantom.node_side > 0, 1.0, 0.0) * np.ones(2)
     assert np.abs(ghost.force(lifted)[0]).max() < 1e-15
 
 

@@ -14,12 +14,12 @@ from verify.xfem.errors import XfemError
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import DEFAULT_POLICY, DEFAULT_THRESHOLD, treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 POLICIES = ["keep", "drop", "merge"]
 
@@ -47,8 +47,8 @@ def test_no_volume_mass_or_load_is_lost_and_points_stay_where_they_are(dim, poli
     """Two crossing planes at random; sums to round-off of as many terms."""
     absorbed = 0
     for seed in range(6):
-        virtual = randomly_cut(dim, seed)
-        treated, report = treat_slivers(virtual, policy)
+        phantom = randomly_cut(dim, seed)
+        treated, report = treat_slivers(phantom, policy)
         absorbed += report.dropped + report.aggregated
         assert treated.volumes.sum() == pytest.approx(1.0, abs=1e-13)
         assert treated.shape_integrals.sum() == pytest.approx(1.0, abs=1e-13)
@@ -66,7 +66,7 @@ def test_no_volume_mass_or_load_is_lost_and_points_stay_where_they_are(dim, poli
             divided.points, abs=1e-13
         )
         extended = report.extension @ treated.node_points
-        assert extended == pytest.approx(virtual.node_points, abs=1e-13)
+        assert extended == pytest.approx(phantom.node_points, abs=1e-13)
         # what is left is no sliver, unless it is said
         left = (treated.fraction < DEFAULT_THRESHOLD).sum()
         assert left <= report.kept + report.aggregated
@@ -88,33 +88,33 @@ def test_first_moments_of_the_mass_stay_with_the_policy_that_continues_the_displ
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_halves_stay_separate(dim, size, policy):
     """Two bodies; one half moves rigidly at no energy while the other is held."""
-    virtual, _ = treat_slivers(body(dim, size), policy)
-    assert virtual.bodies.max() == 1
-    last = virtual.mesh.points[:, -1]
+    phantom, _ = treat_slivers(body(dim, size), policy)
+    assert phantom.bodies.max() == 1
+    last = phantom.mesh.points[:, -1]
     lift = np.full(dim, 0.1)
-    supports = clamped(virtual).prescribe(virtual, last > 1.0 - 1e-9, lift)
-    solution = solve_static(virtual, isotropic(1.0, 0.3, "solid"), supports)
+    supports = clamped(phantom).prescribe(phantom, last > 1.0 - 1e-9, lift)
+    solution = solve_static(phantom, isotropic(1.0, 0.3, "solid"), supports)
     assert solution.strain_energy < 1e-25
-    assert solution.displacement[virtual.node_side[:, 0] > 0] == pytest.approx(
-        np.broadcast_to(lift, (np.sum(virtual.node_side[:, 0] > 0), dim)), abs=1e-12
+    assert solution.displacement[phantom.node_side[:, 0] > 0] == pytest.approx(
+        np.broadcast_to(lift, (np.sum(phantom.node_side[:, 0] > 0), dim)), abs=1e-12
     )
 
 
-def force_on_smallest_piece(virtual, report):
+def force_on_smallest_piece(phantom, report):
     """Unit force at the centroid of the smallest piece before the policy, in its new unknowns."""
-    smallest = virtual.fraction.argmin()
-    rows = virtual.sub_cells.piece == smallest
-    weights = virtual.sub_cells.fraction[rows]
-    shape = weights @ virtual.sub_cells.barycentric[rows].mean(axis=1) / weights.sum()
-    force = np.zeros_like(virtual.node_points)
-    force[virtual.cells[smallest], -1] = shape
+    smallest = phantom.fraction.argmin()
+    rows = phantom.sub_cells.piece == smallest
+    weights = phantom.sub_cells.fraction[rows]
+    shape = weights @ phantom.sub_cells.barycentric[rows].mean(axis=1) / weights.sum()
+    force = np.zeros_like(phantom.node_points)
+    force[phantom.cells[smallest], -1] = shape
     return report.extension.T @ force
 
 
 def compliance(dim, size, policy):
-    virtual = body(dim, size)
-    treated, report = treat_slivers(virtual, policy)
-    force = force_on_smallest_piece(virtual, report)
+    phantom = body(dim, size)
+    treated, report = treat_slivers(phantom, policy)
+    force = force_on_smallest_piece(phantom, report)
     material = isotropic(1.0, 0.3, "solid")
     solution = solve_static(treated, material, clamped(treated), force)
     return (force * solution.displacement).sum()
@@ -137,9 +137,9 @@ def test_without_a_policy_the_response_in_space_grows_like_the_inverse_of_the_si
 
 
 def solved_f3(mesh, policy):
-    virtual = cut_mesh(mesh, [Plane([0.5] * mesh.dim, [-1.0, 3.0, 0.0][: mesh.dim])])
+    phantom = cut_mesh(mesh, [Plane([0.5] * mesh.dim, [-1.0, 3.0, 0.0][: mesh.dim])])
     ends = np.isin(np.arange(len(mesh.points)), boundary_nodes(mesh))
-    treated, report = treat_slivers(virtual, policy, held=ends[virtual.node_parent])
+    treated, report = treat_slivers(phantom, policy, held=ends[phantom.node_parent])
 
     def field(points, sides):
         plane = exact.f3(points[:, :2], sides)
@@ -173,32 +173,32 @@ def test_a_corner_cut_off_by_a_sliver_is_given_back_or_counted(dim):
     mesh = rectangle_mesh((3, 3)) if dim == 2 else box_mesh((3, 3, 3))
     for size in (1e-1, 1e-4, 1e-12):
         corner = np.ones(dim) - size / 3.0 * np.eye(dim)[0]
-        virtual = cut_mesh(mesh, [Plane(corner, np.arange(1.0, dim + 1.0))])
-        assert virtual.bodies.max() == 1
-        small = (virtual.fraction < DEFAULT_THRESHOLD).sum()
-        treated, report = treat_slivers(virtual, "drop")
+        phantom = cut_mesh(mesh, [Plane(corner, np.arange(1.0, dim + 1.0))])
+        assert phantom.bodies.max() == 1
+        small = (phantom.fraction < DEFAULT_THRESHOLD).sum()
+        treated, report = treat_slivers(phantom, "drop")
         assert treated.bodies.max() == 0
         assert (report.dropped, report.aggregated) == (small, 0)
         # nothing is left of the cut: the uncut mesh again
         assert treated.node_count == len(mesh.points)
         assert len(subdivide(treated).cut_facets) == 0
-        treated, report = treat_slivers(virtual, "merge")
-        assert treated is virtual
+        treated, report = treat_slivers(phantom, "merge")
+        assert treated is phantom
         assert (report.rootless, report.kept, report.aggregated) == (small, small, 0)
 
 
 def test_a_strip_between_two_cuts_a_sliver_apart_is_taken_out_or_counted():
     cuts = [Plane([0.0, 0.53 + gap], [0.1, 1.0]) for gap in (0.0, 1e-6)]
-    virtual = cut_mesh(rectangle_mesh((8, 8)), cuts)
-    assert virtual.bodies.max() == 2
-    treated, report = treat_slivers(virtual, "drop")
+    phantom = cut_mesh(rectangle_mesh((8, 8)), cuts)
+    assert phantom.bodies.max() == 2
+    treated, report = treat_slivers(phantom, "drop")
     assert treated.bodies.max() == 1
     # the strip has sunk into its siblings: nothing moves but two halves
-    strip = virtual.bodies[virtual.cells[:, 0]]
-    volumes = np.bincount(strip, virtual.volumes)
+    strip = phantom.bodies[phantom.cells[:, 0]]
+    volumes = np.bincount(strip, phantom.volumes)
     assert report.volume_share >= volumes.min()
     # it reaches no root: three parts stay three, and it is counted
-    treated, report = treat_slivers(virtual, "merge")
+    treated, report = treat_slivers(phantom, "merge")
     assert treated.bodies.max() == 2
     assert report.rootless == (strip == volumes.argmin()).sum()
 
@@ -208,12 +208,12 @@ def test_a_thin_neck_that_alone_holds_two_parts_together_is_kept(policy):
     """A strip between two cuts, 2 % of an element thick in its middle and thick at both ends."""
     lower = ImplicitCut(lambda x: x[:, 1] - 0.51)
     upper = ImplicitCut(lambda x: x[:, 1] - 0.5125 - np.maximum(np.abs(x[:, 0] - 0.5) - 0.2, 0.0))
-    virtual = cut_mesh(rectangle_mesh((8, 8)), [lower, upper])
-    treated, report = treat_slivers(virtual, policy)
-    assert virtual.bodies.max() == treated.bodies.max() == 2
+    phantom = cut_mesh(rectangle_mesh((8, 8)), [lower, upper])
+    treated, report = treat_slivers(phantom, policy)
+    assert phantom.bodies.max() == treated.bodies.max() == 2
     assert report.kept > 0
     # what is no bridge is still treated
-    assert report.kept < (virtual.fraction < DEFAULT_THRESHOLD).sum()
+    assert report.kept < (phantom.fraction < DEFAULT_THRESHOLD).sum()
 
 
 def test_pieces_in_a_chain_are_never_torn_apart():
@@ -222,27 +222,27 @@ def test_pieces_in_a_chain_are_never_torn_apart():
         random = np.random.default_rng(seed)
         slope, level = random.uniform(-0.3, 0.3), random.uniform(0.4, 0.6)
         cuts = [Plane([0.5, level + k * 0.02], [slope, 1.0]) for k in range(3)]
-        virtual = cut_mesh(shaken(rectangle_mesh((8, 8)), seed), cuts)
+        phantom = cut_mesh(shaken(rectangle_mesh((8, 8)), seed), cuts)
         for policy in ("drop", "merge"):
-            treated, report = treat_slivers(virtual, policy)
+            treated, report = treat_slivers(phantom, policy)
             origin = report.node
             for number in range(treated.bodies.max() + 1):
                 nodes = np.flatnonzero((origin >= 0) & (treated.bodies[origin] == number))
-                assert len(np.unique(virtual.bodies[nodes])) == 1
-            assert treated.bodies.max() <= virtual.bodies.max()
+                assert len(np.unique(phantom.bodies[nodes])) == 1
+            assert treated.bodies.max() <= phantom.bodies.max()
 
 
 def test_the_report_counts_everything():
-    virtual = body(2, 1e-3)
-    small = virtual.fraction < DEFAULT_THRESHOLD
-    treated, report = treat_slivers(virtual)
+    phantom = body(2, 1e-3)
+    small = phantom.fraction < DEFAULT_THRESHOLD
+    treated, report = treat_slivers(phantom)
     assert (report.policy, report.threshold) == (DEFAULT_POLICY, DEFAULT_THRESHOLD)
     assert (report.dropped, report.aggregated, report.kept) == (0, small.sum(), 0)
-    assert report.largest == virtual.fraction[small].max()
-    assert report.volume_share == pytest.approx(virtual.volumes[small].sum(), rel=1e-12)
-    kept, report = treat_slivers(virtual, "keep")
+    assert report.largest == phantom.fraction[small].max()
+    assert report.volume_share == pytest.approx(phantom.volumes[small].sum(), rel=1e-12)
+    kept, report = treat_slivers(phantom, "keep")
     assert (report.dropped, report.aggregated, report.kept) == (0, 0, small.sum())
-    assert np.array_equal(kept.cells, virtual.cells)
+    assert np.array_equal(kept.cells, phantom.cells)
     again, report = treat_slivers(treated)
     assert report.aggregated == small.sum()
     assert np.array_equal(again.node_parent, treated.node_parent)
@@ -279,10 +279,10 @@ def test_any_crossing_and_degenerate_cuts_keep_volume_points_and_bodies(seed):
     """Slivers beside slivers, in parallelograms too, with thresholds up to 0.4."""
     mesh = rectangle_mesh((5, 5)) if seed % 2 else box_mesh((3, 3, 3))
     mesh = shaken(mesh, seed) if seed % 3 else mesh
-    virtual = cut_mesh(mesh, degenerate_cuts(mesh, seed))
+    phantom = cut_mesh(mesh, degenerate_cuts(mesh, seed))
     for policy in ("drop", "merge"):
         for threshold in (0.02, 0.1, 0.4):
-            treated, report = treat_slivers(virtual, policy, threshold)
+            treated, report = treat_slivers(phantom, policy, threshold)
             divided = subdivide(treated)
             corners = divided.points[divided.cells]
             volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / factorial(mesh.dim)
@@ -292,7 +292,7 @@ def test_any_crossing_and_degenerate_cuts_keep_volume_points_and_bodies(seed):
             moved = divided.interpolation @ treated.node_points
             assert np.abs(moved - divided.points).max() < 1e-12
             extended = report.extension @ treated.node_points
-            assert np.abs(extended - virtual.node_points).max() < 1e-12
+            assert np.abs(extended - phantom.node_points).max() < 1e-12
             used = np.unique(treated.cells)
             assert np.array_equal(used, np.arange(treated.corners.node_count))
-            assert treated.bodies.max() <= virtual.bodies.max()
+            assert treated.bodies.max() <= phantom.bodies.max()

@@ -12,10 +12,10 @@ from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 SIZES = [0.5, 1e-1, 1e-2, 1e-4, 1e-6, 1e-9, 1e-12, 0.0, -1e-12, -1e-6]
 
@@ -27,15 +27,15 @@ def body(dim, size):
     return cut_mesh(mesh, [Plane(np.full(dim, 0.5) + size * h * np.eye(dim)[-1], np.eye(dim)[-1])])
 
 
-def clamped(virtual):
-    last = virtual.mesh.points[:, -1]
+def clamped(phantom):
+    last = phantom.mesh.points[:, -1]
     held = (last < 1e-9) | (last > 1.0 - 1e-9)
-    return Supports.none(virtual).prescribe(virtual, held)
+    return Supports.none(phantom).prescribe(phantom, held)
 
 
-def scaled_condition_number(virtual):
-    fixed = clamped(virtual).fixed.ravel()
-    values = np.linalg.eigvalsh(scaled_dense_stiffness(virtual)[np.ix_(~fixed, ~fixed)])
+def scaled_condition_number(phantom):
+    fixed = clamped(phantom).fixed.ravel()
+    values = np.linalg.eigvalsh(scaled_dense_stiffness(phantom)[np.ix_(~fixed, ~fixed)])
     return values[-1] / values[0]
 
 
@@ -51,15 +51,15 @@ def test_the_scaled_condition_number_does_not_see_slivers(dim):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_conjugate_gradients_need_no_more_iterations_with_slivers(dim):
-    def iterations(virtual):
-        pattern = block_pattern(virtual.cells, virtual.node_count)
-        stiffness = InternalForce(virtual, isotropic(1e4, 0.3, "solid"), "linear")
+    def iterations(phantom):
+        pattern = block_pattern(phantom.cells, phantom.node_count)
+        stiffness = InternalForce(phantom, isotropic(1e4, 0.3, "solid"), "linear")
         blocks = stiffness.stiffness(pattern)
-        supports = clamped(virtual)
+        supports = clamped(phantom)
         constrain(pattern, supports.fixed, blocks)
         solver = ConjugateGradients(pattern, dim, tolerance=1e-8)
         solver.factorize(blocks)
-        load = body_force(virtual, np.full(dim, -1.0))
+        load = body_force(phantom, np.full(dim, -1.0))
         solver.solve(np.where(supports.fixed, 0.0, load))
         return solver.iterations
 
@@ -72,7 +72,7 @@ def test_conjugate_gradients_need_no_more_iterations_with_slivers(dim):
 @pytest.mark.parametrize("size", SIZES)
 def test_the_patch_test_holds_for_every_sliver(size):
     """F1 turned to a horizontal cut: constant stress along it, each half its own."""
-    virtual = body(2, size)
+    phantom = body(2, size)
     level = 0.5 + size / 8
 
     def stretched(x, side):
@@ -81,9 +81,9 @@ def test_the_patch_test_holds_for_every_sliver(size):
         across = gap - exact.ETA * strain * (x[:, 1] - level)
         return np.stack([strain * (x[:, 0] - 0.5), across], axis=1)
 
-    supports = Supports.none(virtual).prescribe(virtual, boundary_nodes(virtual.mesh), stretched)
-    solution = solve_static(virtual, isotropic(1.0, 0.3, "plane strain"), supports)
-    want = stretched(virtual.node_points, virtual.node_side)
+    supports = Supports.none(phantom).prescribe(phantom, boundary_nodes(phantom.mesh), stretched)
+    solution = solve_static(phantom, isotropic(1.0, 0.3, "plane strain"), supports)
+    want = stretched(phantom.node_points, phantom.node_side)
     assert np.abs(solution.displacement - want).max() < 1e-14
     plane = 1.0 / (1.0 - 0.3**2)  # E' in plane strain
     energy = 0.5 * plane * (0.1**2 * (1.0 - level) + 0.05**2 * level)
@@ -95,13 +95,13 @@ def test_the_solution_is_continuous_in_the_position_of_the_cut_at_a_node(dim):
     """From above, exactly on and from below the nodes: the same body to the size moved."""
     energies = []
     for size in (1e-9, 1e-12, 0.0, -1e-12, -1e-9):
-        virtual = body(dim, size)
-        last = virtual.mesh.points[:, -1]
-        supports = clamped(virtual).prescribe(
-            virtual, last > 1 - 1e-9, np.full(dim, 0.01) * (np.arange(dim) == 0)
+        phantom = body(dim, size)
+        last = phantom.mesh.points[:, -1]
+        supports = clamped(phantom).prescribe(
+            phantom, last > 1 - 1e-9, np.full(dim, 0.01) * (np.arange(dim) == 0)
         )
         supports = supports.prescribe(
-            virtual, virtual.mesh.points[:, 0] < 1e-9, lambda x, side: 0.01 * x * side[:, :1]
+            phantom, phantom.mesh.points[:, 0] < 1e-9, lambda x, side: 0.01 * x * side[:, :1]
         )
-        energies.append(solve_static(virtual, isotropic(1.0, 0.3, "solid"), supports).strain_energy)
+        energies.append(solve_static(phantom, isotropic(1.0, 0.3, "solid"), supports).strain_energy)
     assert energies == pytest.approx([energies[2]] * 5, rel=1e-7)

@@ -15,10 +15,10 @@ from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 
 def _body(divisions, at=0.5, normal=(1.0, 0.9, 0.4), kinematics="corotational"):

@@ -9,10 +9,10 @@ from scipy.sparse.csgraph import connected_components
 from verify.xfem import clip
 from verify.xfem.cuts import Plane
 from verify.xfem.join import join_parts
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.pieces import split_cells
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.virtual import cut_mesh
 
 # products of the same factors, taken in another order: a few ulp
 ROUND_OFF = 4e-15

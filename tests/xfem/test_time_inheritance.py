@@ -15,10 +15,10 @@ from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 
 def _histories():
@@ -135,7 +135,7 @@ def test_motion_turns_with_the_problem_and_does_not_see_the_numbering(scheme):
         state, integrator = body.rest(), scheme(body, 0.01)
         for _ in range(40):
             integrator.step(state)
-        u = state.displacement[: len(body.force.virtual.mesh.points)] @ Q
+        u = state.displacement[: len(body.force.phantom.mesh.points)] @ Q
         ends.append(u if shuffle is None else u[shuffle])
     assert np.abs(ends[0]).max() > 0.05
     # round-off and Newton's tolerance, over 40 steps

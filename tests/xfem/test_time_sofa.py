@@ -10,9 +10,9 @@ from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import cut_mesh
 
 HERE = Path(__file__).parent / "sofa"
 

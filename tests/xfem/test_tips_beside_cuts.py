@@ -7,9 +7,9 @@ import pytest
 from test_sliver_policies import shaken
 
 from verify.xfem.cuts import PolygonPatch, Polyline
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.virtual import cut_mesh
 
 
 def facet_measures(corners):

@@ -9,10 +9,10 @@ from verify.xfem import equilibrium
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.rigid_motion import RigidMotions, nearest_rotation, part_of_rotation
 from verify.xfem.static_newton import NotInEquilibriumError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 ANGLES = range(15, 346, 15)
 # E L^d, with the longest side 1.3 m: what round-off and the tolerance of forces leave is far below
@@ -123,7 +123,7 @@ def test_turned_and_stretched_parts_of_ten_meshes_at_every_angle() -> None:
 def test_halves_that_turn_by_their_own_angles_about_their_own_axes_store_nothing() -> None:
     body = turned_body(2, 3, 4)
     up = turn(body, 230.0)
-    points = body.virtual.node_points
+    points = body.phantom.node_points
     Q = rotation(3, np.radians(-140.0), (1.0, 0.2, -0.7))
     down = (points - 0.4) @ Q.T + 0.4 - points
     found = static_equilibrium(

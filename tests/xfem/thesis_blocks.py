@@ -1,7 +1,7 @@
 """K^uu, K^ua and K^aa written out as in the thesis (2.58–2.64), with its signs put right.
 
 An independent way to the stiffness of the shifted basis: from nodal signs and volume fractions
-only, without virtual cells. For checks; dense loops, one cut.
+only, without cut-cell parts. For checks; dense loops, one cut.
 """
 
 import numpy as np

@@ -10,7 +10,7 @@ from scipy.spatial import Delaunay
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh, cut_mesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 YOUNG, POISSON = 3e4, 0.42
 
@@ -18,15 +18,15 @@ YOUNG, POISSON = 3e4, 0.42
 class TurnedBody(NamedTuple):
     """A body cut in two: unknowns of the upper part, and held components."""
 
-    virtual: VirtualMesh
+    phantom: PhantomMesh
     upper: NDArray[np.bool_]
     fixed: NDArray[np.bool_]
 
     @property
     def force(self) -> InternalForce:
-        dim, space = self.virtual.mesh.dim, self.virtual.mesh.space
+        dim, space = self.phantom.mesh.dim, self.phantom.mesh.space
         kind = "solid" if dim == 3 else "plane strain" if space == 2 else "plane stress"
-        return InternalForce(self.virtual, isotropic(YOUNG, POISSON, kind))
+        return InternalForce(self.phantom, isotropic(YOUNG, POISSON, kind))
 
 
 def random_mesh(seed: int, dim: int, across: int) -> SimplexMesh:
@@ -62,8 +62,8 @@ def turned_body(seed: int, dim: int, across: int, strip: bool = False) -> Turned
     else:
         x = np.concatenate([[-0.1], np.sort(random.uniform(0.2, 1.1, 2)), [1.4]])
         cuts = [Polyline(np.column_stack([x, random.uniform(0.38, 0.67, 4)]))]
-    virtual = cut_mesh(mesh, cuts)
-    return _held(virtual, strip)
+    phantom = cut_mesh(mesh, cuts)
+    return _held(phantom, strip)
 
 
 def turned_sheet(seed: int, across: int) -> TurnedBody:
@@ -76,20 +76,20 @@ def turned_sheet(seed: int, across: int) -> TurnedBody:
     return _held(cut_mesh(mesh, [cut]), False)
 
 
-def _held(virtual: VirtualMesh, strip: bool) -> TurnedBody:
-    mesh, points = virtual.mesh, virtual.node_points
+def _held(phantom: PhantomMesh, strip: bool) -> TurnedBody:
+    mesh, points = phantom.mesh, phantom.node_points
     on = np.zeros(len(mesh.points), dtype=bool)
     for cell, opposite in mesh.boundary_facets:
         on[np.delete(mesh.cells[cell], opposite)] = True
-    upper = virtual.bodies == virtual.bodies[np.argmax(points[:, 1])]
+    upper = phantom.bodies == phantom.bodies[np.argmax(points[:, 1])]
     high = points[:, 1] == 1.0 if strip else points[:, 1] > 0.75
-    held = on[virtual.node_parent] & np.where(upper, high, points[:, 1] < 0.3)
-    return TurnedBody(virtual, upper, np.repeat(held[:, None], points.shape[1], axis=1))
+    held = on[phantom.node_parent] & np.where(upper, high, points[:, 1] < 0.3)
+    return TurnedBody(phantom, upper, np.repeat(held[:, None], points.shape[1], axis=1))
 
 
 def turn(body: TurnedBody, degrees: float, axis=(0.3, -0.5, 0.8), shift=0.2, stretch=0.0):
     """Path of displacements: the upper part stretched along x, turned about a place, and moved."""
-    points, space = body.virtual.node_points, body.virtual.node_points.shape[1]
+    points, space = body.phantom.node_points, body.phantom.node_points.shape[1]
     centre = np.array([0.6, 0.5, 0.3][:space])
     along = np.zeros(space)
     along[0] = 1.0

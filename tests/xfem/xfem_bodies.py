@@ -15,36 +15,36 @@ def boundary_nodes(mesh):
     return np.unique(mesh.cells[facets[:, 0]][local])
 
 
-def sparse_stiffness(virtual, young=1.0, poisson=0.3):
-    state = "plane strain" if virtual.mesh.dim == 2 else "solid"
-    pattern = block_pattern(virtual.cells, virtual.node_count)
-    blocks = InternalForce(virtual, isotropic(young, poisson, state), "linear").stiffness(pattern)
+def sparse_stiffness(phantom, young=1.0, poisson=0.3):
+    state = "plane strain" if phantom.mesh.dim == 2 else "solid"
+    pattern = block_pattern(phantom.cells, phantom.node_count)
+    blocks = InternalForce(phantom, isotropic(young, poisson, state), "linear").stiffness(pattern)
     return pattern.matrix(blocks).tocsr()
 
 
-def scaled_dense_stiffness(virtual):
+def scaled_dense_stiffness(phantom):
     """D^-1/2 K D^-1/2, so that slivers do not hide in round-off."""
-    K = sparse_stiffness(virtual).toarray()
+    K = sparse_stiffness(phantom).toarray()
     scale = 1.0 / np.sqrt(np.diag(K))
     return scale[:, None] * K * scale
 
 
-def zero_modes(virtual):
+def zero_modes(phantom):
     """Number of eigenvalues of the scaled stiffness that are zero, and the gap to the next."""
-    values = np.linalg.eigvalsh(scaled_dense_stiffness(virtual))
+    values = np.linalg.eigvalsh(scaled_dense_stiffness(phantom))
     zero = int((np.abs(values) < 1e-11).sum())
     return zero, values[zero]
 
 
-def relative_l2_error(virtual, displacement, exact, degree=6):
+def relative_l2_error(phantom, displacement, exact, degree=6):
     """‖u − exact‖/‖exact‖ over the body, integrated on the pieces."""
-    body = subdivide(virtual)
+    body = subdivide(phantom)
     values = (body.interpolation @ displacement)[body.cells]
     corners = body.points[body.cells]
-    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / (2 if virtual.mesh.dim == 2 else 6)
-    sides = virtual.piece_side[body.cell_piece]
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / (2 if phantom.mesh.dim == 2 else 6)
+    sides = phantom.piece_side[body.cell_piece]
     error = size = 0.0
-    for point, weight in zip(*simplex_rule(virtual.mesh.dim, degree), strict=True):
+    for point, weight in zip(*simplex_rule(phantom.mesh.dim, degree), strict=True):
         at = np.einsum("k,ckd->cd", point, corners)
         want = exact(at, sides)
         got = np.einsum("k,ckd->cd", point, values)

@@ -16,7 +16,7 @@ from verify.methods.nodal_cut import NodalCut, crossed_edges
 from verify.xfem.cuts import Cut, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import cut_mesh
+from verify.xfem.phantom import cut_mesh
 
 __all__ = ["IncisionCount", "count_incisions", "growing_incisions"]
 
@@ -92,17 +92,17 @@ def count_incisions(
     """
     counts = []
     for cuts in incisions:
-        virtual = cut_mesh(mesh, cuts)
+        phantom = cut_mesh(mesh, cuts)
         nodes, elements = {}, {}
         for method in methods:
             if method == "xfem":
-                nodes[method] = virtual.node_count - len(mesh.points)
-                elements[method] = len(virtual.cells) - len(mesh.cells)
+                nodes[method] = phantom.node_count - len(mesh.points)
+                elements[method] = len(phantom.cells) - len(mesh.cells)
                 continue
             size = cut_by(method, mesh, cuts).counts
             nodes[method] = size.nodes - size.nodes_before
             elements[method] = size.elements - size.elements_before
-        through = int((np.bincount(virtual.parent, minlength=len(mesh.cells)) > 1).sum())
+        through = int((np.bincount(phantom.parent, minlength=len(mesh.cells)) > 1).sum())
         counts.append(IncisionCount(through, nodes, elements))
     return counts
 

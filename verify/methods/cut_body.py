@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from verify.xfem.elasticity import Material
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.subdivision import Subdivision, subdivide
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Change", "Counts", "CutBody", "make_body"]
 
@@ -51,15 +51,15 @@ class CutBody:
 
     Attributes
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         The material: loads, supports and masses go here.
-    resisting : VirtualMesh
-        What resists deformation: the same unknowns and cells as `virtual`, and its weights too,
+    resisting : PhantomMesh
+        What resists deformation: the same unknowns and cells as `phantom`, and its weights too,
         except where a method lets copies of cells resist as if they were whole.
     conforming : Subdivision
         The body as a mesh that conforms to the realised cut, for output and comparison.
     cell_origin : (m,) int array
-        Cell of the mesh as given in which each cell of ``virtual.mesh`` lies (or from which it
+        Cell of the mesh as given in which each cell of ``phantom.mesh`` lies (or from which it
         was moved).
     counts : Counts
     smallest_fraction : float
@@ -71,8 +71,8 @@ class CutBody:
         Where cells go as the cut opens: ascending numbers that the others keep.
     """
 
-    virtual: VirtualMesh
-    resisting: VirtualMesh
+    phantom: PhantomMesh
+    resisting: PhantomMesh
     conforming: Subdivision
     cell_origin: _Ints
     counts: Counts
@@ -82,7 +82,7 @@ class CutBody:
     cell_number: _Ints | None = None
 
     def material(self, given: Material) -> Material:
-        """Material of the cells of ``virtual.mesh``, from that of the cells as given."""
+        """Material of the cells of ``phantom.mesh``, from that of the cells as given."""
         count = len(self.cell_origin)
         lam, mu = (
             value if np.ndim(value) == 0 else value[self.cell_origin]
@@ -94,10 +94,10 @@ class CutBody:
 
 def make_body(
     given: SimplexMesh,
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     changes: tuple[Change, ...] = (),
     *,
-    resisting: VirtualMesh | None = None,
+    resisting: PhantomMesh | None = None,
     conforming: Subdivision | None = None,
     cell_origin: _Ints | None = None,
     seconds: dict[str, float] | None = None,
@@ -109,17 +109,17 @@ def make_body(
     ----------
     given : SimplexMesh
         The mesh before the method touched it.
-    virtual, resisting, conforming, cell_origin, changes, seconds, cell_number
-        As in `CutBody`; without them nothing but `virtual` is special.
+    phantom, resisting, conforming, cell_origin, changes, seconds, cell_number
+        As in `CutBody`; without them nothing but `phantom` is special.
     """
     origin = np.arange(len(given.cells)) if cell_origin is None else cell_origin
     return CutBody(
-        virtual=virtual,
-        resisting=virtual if resisting is None else resisting,
-        conforming=subdivide(virtual) if conforming is None else conforming,
+        phantom=phantom,
+        resisting=phantom if resisting is None else resisting,
+        conforming=subdivide(phantom) if conforming is None else conforming,
         cell_origin=origin,
-        counts=Counts(len(given.points), virtual.node_count, len(given.cells), len(virtual.cells)),
-        smallest_fraction=float((virtual.volumes / given.measures[origin[virtual.parent]]).min()),
+        counts=Counts(len(given.points), phantom.node_count, len(given.cells), len(phantom.cells)),
+        smallest_fraction=float((phantom.volumes / given.measures[origin[phantom.parent]]).min()),
         changes=tuple(change for change in changes if change.count),
         seconds=seconds or {},
         cell_number=cell_number,

@@ -16,7 +16,7 @@ from verify.methods.opened_mesh import OpenedMesh
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh, cut_mesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 __all__ = ["OpenedCells", "Seams", "cut_so_far", "seams_of", "welded"]
 
@@ -24,12 +24,12 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 # of a mesh with all cuts: cells (m, cuts) that each cut has opened
-OpenedCells = Callable[[VirtualMesh], NDArray[np.bool_]]
+OpenedCells = Callable[[PhantomMesh], NDArray[np.bool_]]
 
 
 def cut_so_far(
     mesh: SimplexMesh, cuts: Sequence[Cut], tip: TipRule, opened: OpenedCells | None
-) -> VirtualMesh:
+) -> PhantomMesh:
     """Cut a mesh in the cells that are open; without `opened` in all."""
     whole = cut_mesh(mesh, cuts, tip)
     return whole if opened is None else cut_mesh(mesh, cuts, tip, opened(whole))
@@ -41,7 +41,7 @@ class Seams(NamedTuple):
     Attributes
     ----------
     one, other : (k, d) int array
-        Their unknown nodes, those at the same place in the same column.
+        Their dof nodes, those at the same place in the same column.
     points : (k, d, space) float array
         Their corners, in metres.
     """
@@ -51,28 +51,28 @@ class Seams(NamedTuple):
     points: _Floats
 
 
-def seams_of(virtual: VirtualMesh) -> Seams:
+def seams_of(phantom: PhantomMesh) -> Seams:
     """Find the faces of the cut in a mesh of whole cells."""
-    corners = virtual.cells.shape[1]
+    corners = phantom.cells.shape[1]
     sides = [[k for k in range(corners) if k != opposite] for opposite in range(corners)]
-    facets = np.concatenate([virtual.cells[:, side] for side in sides])
-    _, place = np.unique(virtual.node_points, axis=0, return_inverse=True)
+    facets = np.concatenate([phantom.cells[:, side] for side in sides])
+    _, place = np.unique(phantom.node_points, axis=0, return_inverse=True)
     facets = np.take_along_axis(facets, place.ravel()[facets].argsort(axis=1), axis=1)
     places = place.ravel()[facets]
     order = np.lexsort(places.T)
     facets, places = facets[order], places[order]
     twin = (places[1:] == places[:-1]).all(axis=1) & (facets[1:] != facets[:-1]).any(axis=1)
     one, other = facets[:-1][twin], facets[1:][twin]
-    return Seams(one, other, virtual.node_points[one])
+    return Seams(one, other, phantom.node_points[one])
 
 
-def welded(virtual: VirtualMesh, seams: Seams, closed: NDArray[np.bool_]) -> VirtualMesh:
+def welded(phantom: PhantomMesh, seams: Seams, closed: NDArray[np.bool_]) -> PhantomMesh:
     """Join the two faces of the seams (k,) that are closed; cells stay as they are."""
-    count = virtual.node_count
+    count = phantom.node_count
     first, second = seams.one[closed].ravel(), seams.other[closed].ravel()
     graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     group = connected_components(graph, directed=False)[1]
     _, node = np.unique(group, return_index=True)
-    mesh = virtual.mesh
-    joined = OpenedMesh(virtual.node_points[node], group[virtual.cells], mesh.boundary_facets)
+    mesh = phantom.mesh
+    joined = OpenedMesh(phantom.node_points[node], group[phantom.cells], mesh.boundary_facets)
     return cut_mesh(joined, [])

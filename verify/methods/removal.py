@@ -24,7 +24,7 @@ from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh, cut_mesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 __all__ = ["removal", "removal_refined"]
 
@@ -115,7 +115,7 @@ def removal_refined(
 
 def _remove(
     given: SimplexMesh,
-    cut: VirtualMesh,
+    cut: PhantomMesh,
     origin: _Ints,
     start: float,
     changes: list[Change],
@@ -133,7 +133,7 @@ def _remove(
     outer = np.zeros(mesh.cells.shape, dtype=bool)
     outer[tuple(mesh.boundary_facets.T)] = True
     opened = OpenedMesh(mesh.points[node_parent], cells, np.argwhere(outer[parents]))
-    virtual = cut_mesh(opened, [])
+    phantom = cut_mesh(opened, [])
     seconds = {"cutting": perf_counter() - start}
     lost = mesh.measures[cut.parent[kept & ~remaining]].sum()
     gone = float(mesh.measures[touched].sum())
@@ -151,7 +151,7 @@ def _remove(
     facets = opened.points[opened.cells[faces[:, 0]][on_face].reshape(-1, mesh.dim)]
     return make_body(
         given,
-        virtual,
+        phantom,
         tuple(changes),
         conforming=conforming_to(opened, origin[parents], facets),
         cell_origin=origin[parents],
@@ -160,7 +160,7 @@ def _remove(
     )
 
 
-def _touched(cut: VirtualMesh) -> _Bools:
+def _touched(cut: PhantomMesh) -> _Bools:
     """(m,) cells of which no piece has all the volume."""
     largest = np.zeros(len(cut.mesh.cells))
     np.maximum.at(largest, cut.parent, cut.fraction)
@@ -173,16 +173,16 @@ def _longest_edges(mesh: SimplexMesh) -> _Floats:
     return np.linalg.norm(ends[:, first] - ends[:, second], axis=2).max(axis=1)
 
 
-def _debris(virtual: VirtualMesh, bodies: _Ints, touched: _Bools) -> _Bools:
+def _debris(phantom: PhantomMesh, bodies: _Ints, touched: _Bools) -> _Bools:
     """(p,) cells that only the removed ones joined to their body and that all lie at the gap."""
-    first, second = face_contacts(virtual)
-    count = len(virtual.cells)
+    first, second = face_contacts(phantom)
+    count = len(phantom.cells)
     graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     part = connected_components(graph, directed=False)[1]
-    at_gap = np.zeros(len(virtual.mesh.points), dtype=bool)
-    at_gap[virtual.mesh.cells[touched]] = True
-    beside = at_gap[virtual.mesh.cells[virtual.parent]].any(axis=1)
-    volume = np.bincount(part, virtual.volumes)
+    at_gap = np.zeros(len(phantom.mesh.points), dtype=bool)
+    at_gap[phantom.mesh.cells[touched]] = True
+    beside = at_gap[phantom.mesh.cells[phantom.parent]].any(axis=1)
+    volume = np.bincount(part, phantom.volumes)
     away = np.bincount(part, ~beside) > 0
     body = np.zeros(len(volume), dtype=np.int64)
     body[part] = bodies
@@ -192,18 +192,18 @@ def _debris(virtual: VirtualMesh, bodies: _Ints, touched: _Bools) -> _Bools:
     return loose[part]
 
 
-def _without_hinges(virtual: VirtualMesh) -> tuple[_Ints, _Ints]:
+def _without_hinges(phantom: PhantomMesh) -> tuple[_Ints, _Ints]:
     """Cells (p, d + 1) joined across faces only, and the mesh node of each of their nodes."""
-    corners = virtual.cells.shape[1]
-    first, second = face_contacts(virtual)
-    pair, a, b = np.nonzero(virtual.cells[first][:, :, None] == virtual.cells[second][:, None, :])
-    size = virtual.cells.size
+    corners = phantom.cells.shape[1]
+    first, second = face_contacts(phantom)
+    pair, a, b = np.nonzero(phantom.cells[first][:, :, None] == phantom.cells[second][:, None, :])
+    size = phantom.cells.size
     rows, columns = first[pair] * corners + a, second[pair] * corners + b
     graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(size, size))
     group = connected_components(graph, directed=False)[1]
     old = np.zeros(group.max() + 1, dtype=np.int64)
-    old[group] = virtual.cells.ravel()
+    old[group] = phantom.cells.ravel()
     order = np.argsort(old, kind="stable")
     number = np.empty_like(order)
     number[order] = np.arange(len(order))
-    return number[group].reshape(-1, corners), virtual.node_parent[old[order]]
+    return number[group].reshape(-1, corners), phantom.node_parent[old[order]]

@@ -13,7 +13,7 @@ from verify.methods.snapped_mesh import snap_nodes, take_near_nodes
 from verify.methods.whole_cells import whole_cells
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import cut_mesh
+from verify.xfem.phantom import cut_mesh
 
 __all__ = ["snapping"]
 
@@ -33,8 +33,8 @@ def snapping(mesh: SimplexMesh, cuts: Sequence[Cut], quality: float = 0.2) -> Cu
     start = perf_counter()
     snapped = take_near_nodes(snap_nodes(mesh, cuts, 0.5, quality), 0.5)
     moved = perf_counter()
-    virtual = cut_mesh(snapped.mesh, snapped.cuts)
-    assert len(virtual.cells) == len(mesh.cells)  # every crossed edge has an end on the cut
-    virtual = whole_cells(virtual)
+    phantom = cut_mesh(snapped.mesh, snapped.cuts)
+    assert len(phantom.cells) == len(mesh.cells)  # every crossed edge has an end on the cut
+    phantom = whole_cells(phantom)
     seconds = {"snapping": moved - start, "cutting": perf_counter() - moved}
-    return make_body(mesh, virtual, tuple(snapped.changes), seconds=seconds)
+    return make_body(mesh, phantom, tuple(snapped.changes), seconds=seconds)

@@ -12,7 +12,7 @@ from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.kernels import PLAIN, Kernels
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["SpringForce"]
 
@@ -28,7 +28,7 @@ class SpringForce(InternalForce):
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         Pieces of cells have springs on all edges of their cell, weaker by their share of it.
     material : Material
         Fitted by the springs as far as springs can; see `verify.methods.spring_fit`.
@@ -53,19 +53,19 @@ class SpringForce(InternalForce):
 
     def __init__(
         self,
-        virtual: VirtualMesh,
+        phantom: PhantomMesh,
         material: Material,
         kinematics: Kinematics = "corotational",
         fit: Fit = "fitted",
         kernels: Kernels = PLAIN,
     ) -> None:
-        super().__init__(virtual, material, kinematics, kernels)
-        mesh = virtual.mesh
+        super().__init__(phantom, material, kinematics, kernels)
+        mesh = phantom.mesh
         stiffness, clamped = spring_stiffness(mesh, material, fit)
-        self.springs = stiffness[virtual.parent] * virtual.fraction[:, None]
-        self.clamped = int(clamped[virtual.parent].sum())
+        self.springs = stiffness[phantom.parent] * phantom.fraction[:, None]
+        self.clamped = int(clamped[phantom.parent].sum())
         self._edges = cell_edges(mesh.dim)
-        ends = mesh.points[mesh.cells[virtual.parent]]
+        ends = mesh.points[mesh.cells[phantom.parent]]
         self._rest = ends[:, self._edges[:, 1]] - ends[:, self._edges[:, 0]]
         length = np.linalg.norm(self._rest, axis=2, keepdims=True)
         self._directions = self._rest / length
@@ -88,7 +88,7 @@ class SpringForce(InternalForce):
         force = np.empty(self._shape) if out is None else out
         force[:] = 0.0
         energy = spring_force(
-            self.virtual.cells, self._edges, self._rest, self.springs, displacement,
+            self.phantom.cells, self._edges, self._rest, self.springs, displacement,
             self.is_corotational, self._directions, self._excess, force,
         )  # fmt: skip
         return force, float(energy)
@@ -96,7 +96,7 @@ class SpringForce(InternalForce):
     def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
         """Add `scale` K v (N, d), K along the springs of the last `evaluate`, to `out`."""
         spring_product(
-            self.virtual.cells, self._edges, self.springs, self._directions, vector, scale, out
+            self.phantom.cells, self._edges, self.springs, self._directions, vector, scale, out
         )
 
     def add_stiffness(
@@ -115,7 +115,7 @@ class SpringForce(InternalForce):
         if kind not in get_args(TangentKind):
             expected = ", ".join(get_args(TangentKind))
             raise XfemError(f"stiffness '{kind}'; expected one of {expected}")
-        targets = pattern.targets[: len(self.virtual.cells)]
+        targets = pattern.targets[: len(self.phantom.cells)]
         add_spring_stiffness(
             targets, self._edges, self.springs, self._directions, self._excess,
             kind == "consistent", scale, blocks,

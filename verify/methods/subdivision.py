@@ -23,8 +23,8 @@ from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.subdivision import subdivide
-from verify.xfem.virtual import cut_mesh
 
 __all__ = ["snapping_subdivision", "subdivision"]
 
@@ -102,12 +102,12 @@ def _split(
     except XfemError as error:
         raise XfemError(f"subdivision along these cuts leaves no valid mesh: {error}") from None
     opened = OpenedMesh(parts.points, parts.cells, outer)
-    virtual = cut_mesh(opened, [])
+    phantom = cut_mesh(opened, [])
     seconds["cutting"] = perf_counter() - start
     parents = origin[parts.cell_parent]
     return make_body(
         mesh,
-        virtual,
+        phantom,
         tuple(snapped.changes),
         conforming=conforming_to(opened, parents, parts.cut_facets),
         cell_origin=parents,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from verify.methods.cut_body import Change, CutBody, make_body
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import cut_mesh
+from verify.xfem.phantom import cut_mesh
 
 __all__ = ["uncut"]
 

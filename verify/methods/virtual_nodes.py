@@ -25,7 +25,7 @@ from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["CopyWeights", "virtual_node", "virtual_node_arbitrary"]
 
@@ -60,8 +60,8 @@ def virtual_node(
     merged = np.flatnonzero(into != np.arange(len(into)))
     largest = float(cut.fraction[merged].max(initial=0.0))
     change = Change("part without a node left with its sibling", len(merged), largest, "fraction")
-    virtual = absorb(cut, into)[0] if len(merged) else cut
-    return _body(mesh, virtual, weights, [change], start)
+    phantom = absorb(cut, into)[0] if len(merged) else cut
+    return _body(mesh, phantom, weights, [change], start)
 
 
 def virtual_node_arbitrary(
@@ -81,21 +81,21 @@ def virtual_node_arbitrary(
 
 
 def _body(
-    mesh: SimplexMesh, virtual: VirtualMesh, weights: str, changes: list[Change], start: float
+    mesh: SimplexMesh, phantom: PhantomMesh, weights: str, changes: list[Change], start: float
 ) -> CutBody:
     if weights not in ("share", "whole"):
         raise XfemError(f"weights of copies '{weights}'; expected share or whole")
-    resisting = whole_cells(virtual) if weights == "whole" else virtual
-    extra = float(resisting.volumes.sum() / virtual.volumes.sum() - 1.0)
-    copies = int((resisting.fraction > virtual.fraction).sum())
+    resisting = whole_cells(phantom) if weights == "whole" else phantom
+    extra = float(resisting.volumes.sum() / phantom.volumes.sum() - 1.0)
+    copies = int((resisting.fraction > phantom.fraction).sum())
     changes.append(
         Change("copy that resists as a whole cell; material added", copies, extra, "fraction")
     )
     seconds = {"cutting": perf_counter() - start}
-    return make_body(mesh, virtual, tuple(changes), resisting=resisting, seconds=seconds)
+    return make_body(mesh, phantom, tuple(changes), resisting=resisting, seconds=seconds)
 
 
-def _parts_with_nodes(cut: VirtualMesh) -> NDArray[np.int64]:
+def _parts_with_nodes(cut: PhantomMesh) -> NDArray[np.int64]:
     """(p,) each piece with a node of its cell in it stays; another goes to a sibling with one.
 
     The sibling with which it shares most of the cut; without contact the largest.

@@ -12,7 +12,7 @@ from verify.simulator.stage import Stage
 from verify.xfem.body import DynamicBody
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["BodyParts", "held_nodes"]
 
@@ -40,7 +40,7 @@ class BodyParts:
     def of(
         cls,
         stage: Stage,
-        virtual: VirtualMesh,
+        phantom: PhantomMesh,
         start: dict[int, _Floats],
         facets: Sequence[NDArray[np.bool_]],
     ) -> "BodyParts":
@@ -49,15 +49,15 @@ class BodyParts:
         Parameters
         ----------
         stage : Stage
-        virtual : VirtualMesh
+        phantom : PhantomMesh
         start : dict
             Displacement (N, s) at which each hook (by its number) has gripped.
         facets : sequence of (m, d + 1) bool arrays
             `verify.simulator.grips.held_facets` of each hold.
         """
-        mass = side_wise_mass(virtual, stage.density)
-        grips = Grips(virtual, stage.holds, stage.hooks, mass.weights, start, facets)
-        return cls(stage, InternalForce(virtual, stage.material, kernels=FAST), mass, grips)
+        mass = side_wise_mass(phantom, stage.density)
+        grips = Grips(phantom, stage.holds, stage.hooks, mass.weights, start, facets)
+        return cls(stage, InternalForce(phantom, stage.material, kernels=FAST), mass, grips)
 
     def body(self, load: Callable[[float], _Floats]) -> DynamicBody:
         """Make the body and its sparsity; `load` gives nodal forces (N, s) at a time, N."""
@@ -72,5 +72,5 @@ class BodyParts:
 
 
 def held_nodes(body: DynamicBody) -> NDArray[np.bool_]:
-    """(N,) unknown nodes that are held altogether, which need not be solved for."""
+    """(N,) dof nodes that are held altogether, which need not be solved for."""
     return body.fixed.all(axis=1)

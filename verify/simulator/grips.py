@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from verify.simulator.stage import Hold, Hook
 from verify.xfem.body import MovingSupports
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["Grips", "gripped", "held_facets", "held_unknowns"]
 
@@ -17,32 +17,32 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 
-def gripped(virtual: VirtualMesh, hook: Hook) -> _Ints:
-    """Unknown nodes that a hook grips: those on its side within its radius, at least the nearest.
+def gripped(phantom: PhantomMesh, hook: Hook) -> _Ints:
+    """Dof nodes that a hook grips: those on its side within its radius, at least the nearest.
 
     The unknowns at nodes across the cut are among them: they carry the material up to the cut.
     """
-    on_side = np.flatnonzero(virtual.node_side[:, hook.stroke] == hook.side)
+    on_side = np.flatnonzero(phantom.node_side[:, hook.stroke] == hook.side)
     if len(on_side) == 0:
         return on_side
-    away = np.linalg.norm(virtual.node_points[on_side] - hook.at, axis=1)
+    away = np.linalg.norm(phantom.node_points[on_side] - hook.at, axis=1)
     return on_side[away <= max(hook.radius, float(away.min()))]
 
 
 def held_unknowns(
-    virtual: VirtualMesh, nodes: NDArray[np.bool_], on_held: NDArray[np.bool_] | None = None
+    phantom: PhantomMesh, nodes: NDArray[np.bool_], on_held: NDArray[np.bool_] | None = None
 ) -> NDArray[np.bool_]:
-    """Unknown nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
+    """Dof nodes (N,) to be held where some nodes (n,) of the uncut mesh are.
 
     The unknown of the material at a node is held. Another one there, of material beyond a cut, is
     held only if that material reaches a held facet: else a part that is cut free would hang on a
     node that is no part of it. `on_held` is what `held_facets` gives, if it is known.
     """
-    held = np.zeros(virtual.node_count, dtype=bool)
+    held = np.zeros(phantom.node_count, dtype=bool)
     held[: len(nodes)] = nodes
-    sub = virtual.sub_cells
-    facets = held_facets(virtual.mesh, nodes) if on_held is None else on_held
-    _hold_parts(facets, virtual.cells, virtual.parent, sub.piece, sub.barycentric, held)
+    sub = phantom.sub_cells
+    facets = held_facets(phantom.mesh, nodes) if on_held is None else on_held
+    _hold_parts(facets, phantom.cells, phantom.parent, sub.piece, sub.barycentric, held)
     return held
 
 
@@ -79,7 +79,7 @@ class Grips:
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     holds : sequence of Hold
     hooks : sequence of Hook
     weights : (N,) float array
@@ -92,23 +92,23 @@ class Grips:
 
     def __init__(
         self,
-        virtual: VirtualMesh,
+        phantom: PhantomMesh,
         holds: Sequence[Hold],
         hooks: Sequence[Hook],
         weights: _Floats,
         start: dict[int, _Floats],
         facets: Sequence[NDArray[np.bool_]] | None = None,
     ) -> None:
-        shape = (virtual.node_count, virtual.mesh.space)
+        shape = (phantom.node_count, phantom.mesh.space)
         self._fixed, self._values = np.zeros(shape, dtype=bool), np.zeros(shape)
         for k, hold in enumerate(holds):
-            at = held_unknowns(virtual, hold.nodes, None if facets is None else facets[k])
+            at = held_unknowns(phantom, hold.nodes, None if facets is None else facets[k])
             for axis, value in zip(hold.components, hold.values, strict=True):
                 self._fixed[at, axis], self._values[at, axis] = True, value
         self._moved: list[tuple[Hook, _Ints, _Floats]] = []
         self._pulled: list[tuple[Hook, _Ints, _Floats]] = []
         for number, begun in start.items():
-            hook, nodes = hooks[number], gripped(virtual, hooks[number])
+            hook, nodes = hooks[number], gripped(phantom, hooks[number])
             if len(nodes) == 0:
                 continue
             if hook.is_force:

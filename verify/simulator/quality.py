@@ -55,14 +55,14 @@ class Quality:
 
 def quality_of(session: Session) -> Quality:
     """Measure the body of a session as it is now."""
-    virtual, displacement = session.virtual, session.displacement
-    whole = float(virtual.mesh.measures.sum())
+    phantom, displacement = session.phantom, session.displacement
+    whole = float(phantom.mesh.measures.sum())
     body = session.cutter.body  # surfaces count pieces as it does
     gradients = deformation_gradients(
         body.mesh, body.piece_parent.rows, body.piece_cells.rows, displacement
     )
     stretch = float(np.linalg.svd(gradients, compute_uv=False)[:, 0].max())
-    solid = virtual.mesh.dim == virtual.mesh.space
+    solid = phantom.mesh.dim == phantom.mesh.space
     inverted = int((np.linalg.det(gradients) < 0.0).sum()) if solid else 0
     enclosed, loose = float("nan"), 0
     if solid:
@@ -70,10 +70,10 @@ def quality_of(session: Session) -> Quality:
         enclosed = abs(_enclosed(surface) / whole - 1.0)
         loose = _loose_edges(surface.facets.rows[surface.used])
     turned, astray = 0, 0
-    if virtual.mesh.space == 3:
+    if phantom.mesh.space == 3:
         turned, astray = _bad_facets(session.surfaces.shown, displacement, gradients, stretch)
     return Quality(
-        abs(float(virtual.volumes.sum()) / whole - 1.0),
+        abs(float(phantom.volumes.sum()) / whole - 1.0),
         enclosed, loose, inverted, stretch, turned, astray,
     )  # fmt: skip
 

@@ -21,8 +21,8 @@ from verify.simulator.touched_memory import touch_memory
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import ToolPath
 from verify.xfem.energy_balance import BalanceRecorder
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Session"]
 
@@ -57,7 +57,7 @@ class Session:
     surfaces : Surfaces
     state : MotionState
         Of the unknowns, as they are now.
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         The body as it is now.
     records : list of StepRecord
 
@@ -95,7 +95,7 @@ class Session:
             self.cutter, self.surfaces, self._parts_after, self._body_of, self._end_of_step,
             self._timed,
         )  # fmt: skip
-        self.virtual: VirtualMesh
+        self.phantom: PhantomMesh
         self._assemble()
         self.state = self.body.rest()
         self._ledger = BalanceRecorder(self.body, self.state)
@@ -175,7 +175,7 @@ class Session:
 
     def picture(self) -> Picture:
         """Draw the body as it is now."""
-        return self.surfaces.picture(self.virtual, self.displacement)
+        return self.surfaces.picture(self.phantom, self.displacement)
 
     def blades(self) -> list[tuple[_Floats, _Floats]]:
         """Tip and other end of each blade under way, m."""
@@ -247,16 +247,16 @@ class Session:
             self._start[number] = self.state.displacement.copy()
         with self._timed("assembly"):
             stage, weights = self.stage, self.body.mass.weights
-            grips = Grips(self.virtual, stage.holds, stage.hooks, weights, self._start, self._held)
+            grips = Grips(self.phantom, stage.holds, stage.hooks, weights, self._start, self._held)
             self._follow(self.body.held_by(grips.supports), grips, self._solver)
         self._begin_account()
 
-    def _parts(self, virtual: VirtualMesh, start: dict[int, _Floats]) -> BodyParts:
-        return BodyParts.of(self.stage, virtual, start, self._held)
+    def _parts(self, phantom: PhantomMesh, start: dict[int, _Floats]) -> BodyParts:
+        return BodyParts.of(self.stage, phantom, start, self._held)
 
-    def _parts_after(self, increment: Increment, virtual: VirtualMesh) -> BodyParts:
+    def _parts_after(self, increment: Increment, phantom: PhantomMesh) -> BodyParts:
         start = {hook: increment.inherit(at) for hook, at in self._start.items()}
-        return self._parts(virtual, start)
+        return self._parts(phantom, start)
 
     def _body_of(self, parts: BodyParts) -> DynamicBody:
         return parts.body(self._load)
@@ -266,14 +266,14 @@ class Session:
 
     def _assemble(self) -> None:
         """Make the body anew that is there already, with what holds it from now on."""
-        parts = self._parts(self.cutter.virtual_mesh(), self._start)
+        parts = self._parts(self.cutter.phantom_mesh(), self._start)
         body = self._body_of(parts)
         solver = Cholesky(body.pattern, self.stage.mesh.space, held_nodes(body))
         self._follow(body, parts.grips, solver)
 
     def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
         """Move with another body from now on."""
-        self.body, self._grips, self.virtual = body, grips, body.force.virtual
+        self.body, self._grips, self.phantom = body, grips, body.force.phantom
         self._tool_load, self._ahead = None, None
         self._solver = solver
         self.integrator = RealTimeEuler(body, self.stage.time_step, solver)

@@ -18,7 +18,7 @@ from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.grips import Grips
 from verify.simulator.surfaces import Surfaces
 from verify.xfem.body import DynamicBody
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["MOST", "Followed", "Pieces", "StagedCut"]
 
@@ -56,7 +56,7 @@ class StagedCut:
 
     cutter: SemiProgressiveCutter
     surfaces: Surfaces
-    parts_after: Callable[[Increment, VirtualMesh], BodyParts]
+    parts_after: Callable[[Increment, PhantomMesh], BodyParts]
     body_of: Callable[[BodyParts], DynamicBody]
     end_of_step: Callable[[], float]
     timed: Callable[[str], AbstractContextManager[None]]
@@ -92,7 +92,7 @@ class StagedCut:
             increment = self.cutter.divide(division, self.end_of_step())
         yield increment
         with self.timed("assembly"):
-            parts = self.parts_after(increment, self.cutter.virtual_mesh())
+            parts = self.parts_after(increment, self.cutter.phantom_mesh())
             body = self.body_of(parts)
         yield increment
         with self.timed("assembly"):

@@ -69,11 +69,11 @@ class SurfacePart:
         return self._whole.retired
 
     def positions(self, displacement: _Floats, out: _Floats | None = None) -> _Floats:
-        """(v, s) vertices of the whole surface for a displacement of the unknown nodes, m."""
+        """(v, s) vertices of the whole surface for a displacement of the dof nodes, m."""
         return self._whole.positions(displacement, out)
 
     def facet_force(self, facet: int, at: _Floats, force: _Floats, out: _Floats) -> _Floats:
-        """Add a force at a point of a facet to those on the unknown nodes (N, s), N."""
+        """Add a force at a point of a facet to those on the dof nodes (N, s), N."""
         return self._whole.facet_force(facet, at, force, out)
 
 

@@ -13,7 +13,7 @@ from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.stage import Stage
 from verify.simulator.surface_part import SurfacePart, embed_together
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["Picture", "Surfaces"]
 
@@ -96,10 +96,10 @@ class Surfaces:
         """(v, s) vertices of that surface after the last `move`, m."""
         return self._positions[-1 if self.collision else 0]
 
-    def picture(self, virtual: VirtualMesh, displacement: _Floats) -> Picture:
+    def picture(self, phantom: PhantomMesh, displacement: _Floats) -> Picture:
         """Draw the body as it is now: the visual surface with the faces of the cuts."""
-        if virtual.mesh.space == 2:
-            return _pieces(virtual, displacement)
+        if phantom.mesh.space == 2:
+            return _pieces(phantom, displacement)
         inside = self.material.surface
         parts: list[tuple[MovingSurface | SurfacePart, _Ints]] = [(inside, inside.used)]
         if self.visual is not None:
@@ -115,13 +115,13 @@ class Surfaces:
         return Picture(*(np.concatenate(rows) for rows in (points, material, triangles, inner)))
 
 
-def _pieces(virtual: VirtualMesh, displacement: _Floats) -> Picture:
+def _pieces(phantom: PhantomMesh, displacement: _Floats) -> Picture:
     """Draw a plane body: its whole triangles and the parts of the split ones."""
-    piece, at, _ = virtual.solid_simplices
-    corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
+    piece, at, _ = phantom.solid_simplices
+    corners = phantom.mesh.points[phantom.mesh.cells[phantom.parent[piece]]]
     turned = np.linalg.det(at) < 0.0  # sub-simplices come in the order of their numbers
     at = np.where(turned[:, None, None], at[:, ::-1], at)
-    moved = corners + displacement[virtual.cells[piece]]
+    moved = corners + displacement[phantom.cells[piece]]
     now, before = (
         np.einsum("qki,qis->qks", at, x).reshape(-1, corners.shape[2]) for x in (moved, corners)
     )

@@ -177,7 +177,7 @@ class MethodSolver:
             mesh, size = background_mesh(scene, level)
             body = METHODS[self._method](mesh, cuts_of(scene, size), **own)
             material = material_of(scene, body.resisting.mesh)
-            return system_of(scene, body.virtual, body.resisting, material, exact)
+            return system_of(scene, body.phantom, body.resisting, material, exact)
         except XfemError as error:
             raise InputError(str(error), str(scene.file or scene.name)) from None
 
@@ -227,8 +227,8 @@ class MethodSolver:
         body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
         material = material_of(scene, body.resisting.mesh)
         start = perf_counter()
-        supports = supports_of(scene, body.virtual, exact)
-        load = loads_of(scene, body.virtual, exact)
+        supports = supports_of(scene, body.phantom, exact)
+        load = loads_of(scene, body.phantom, exact)
         timings = {**body.seconds, "loading": perf_counter() - start}
         notes: dict[str, str] = {}
         further: list[Regularisation] = []
@@ -241,7 +241,7 @@ class MethodSolver:
             start = perf_counter()
             force = self._force(body.resisting, material, kinematics, kernels=FAST)
 
-            path = path_of_supports(scene, body.virtual, exact)
+            path = path_of_supports(scene, body.phantom, exact)
             found = static_equilibrium(
                 force, supports.fixed, lambda s: path(s).values, load, choice.load_steps or 1
             )
@@ -341,7 +341,7 @@ def _solution(
         Regularisation(change.kind, change.count, change.size, change.unit)
         for change in body.changes
     ]
-    regularisations += [*run.further, *across_interfaces(scene, body.virtual.mesh)]
+    regularisations += [*run.further, *across_interfaces(scene, body.phantom.mesh)]
     if run.clamped:
         kind = "spring that the fit would make negative left out"
         regularisations.append(Regularisation(kind, run.clamped, 0.0, "N/m"))

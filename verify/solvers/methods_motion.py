@@ -16,7 +16,7 @@ from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.errors import XfemError
 from verify.xfem.inherit import ancestors
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["MethodMover"]
 
@@ -86,7 +86,7 @@ class MethodMover(Mover):
         self._opening = np.empty((0, 0))
         self.final = self._kept_body(self._made(np.inf))
         if self._method in _WELDED:
-            self._seams = seams_of(self.final.virtual)
+            self._seams = seams_of(self.final.phantom)
             self._seam_times = seam_times(self.asked, self.cuts, self._seams.points, self.opens)
             return np.unique(self._seam_times)
         return np.unique(self._opening[~np.isnan(self._opening)])
@@ -96,40 +96,40 @@ class MethodMover(Mover):
         if self._method in (*_WELDED, "uncut"):
             return METHODS[self._method](self.mesh, self.cuts, **self._parameters)
 
-        def opened(cut: VirtualMesh) -> _Bools:
+        def opened(cut: PhantomMesh) -> _Bools:
             self._opening = opening_times(self.asked, cut, self.opens)
             return self._opening <= time
 
         return METHODS[self._method](self.mesh, self.cuts, **self._parameters, opened=opened)
 
-    def _cut_at(self, time: float) -> VirtualMesh:
+    def _cut_at(self, time: float) -> PhantomMesh:
         if self._seams is not None:
             closed = self._seam_times > time
             if not closed.any():
-                return self.final.virtual
-            virtual = welded(self.final.virtual, self._seams, closed)
+                return self.final.phantom
+            phantom = welded(self.final.phantom, self._seams, closed)
             shown, origin = self.final.conforming, self.final.cell_origin
-            body = make_body(self.mesh, virtual, conforming=shown, cell_origin=origin)
-            return self._kept_body(body).virtual
+            body = make_body(self.mesh, phantom, conforming=shown, cell_origin=origin)
+            return self._kept_body(body).phantom
         if self._method == "uncut" or not (self._opening > time).any():
-            return self.final.virtual
-        return self._kept_body(self._made(time)).virtual
+            return self.final.phantom
+        return self._kept_body(self._made(time)).phantom
 
     def _kept_body(self, body: CutBody) -> CutBody:
-        self._bodies[id(body.virtual)] = body
+        self._bodies[id(body.phantom)] = body
         return body
 
-    def _law(self, virtual: VirtualMesh) -> InternalForce:
-        return self._internal_force(self._bodies[id(virtual)])
+    def _law(self, phantom: PhantomMesh) -> InternalForce:
+        return self._internal_force(self._bodies[id(phantom)])
 
     def _inherited(
-        self, virtual: VirtualMesh, state: MotionState, further: DynamicBody
+        self, phantom: PhantomMesh, state: MotionState, further: DynamicBody
     ) -> MotionState:
-        source = self._source(virtual, further.force.virtual)
+        source = self._source(phantom, further.force.phantom)
         return MotionState(state.displacement[source], state.velocity[source], state.time)
 
-    def _source(self, old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
-        """Unknown node (N,) of an old body from which each of a new one comes, cell by cell."""
+    def _source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
+        """Dof node (N,) of an old body from which each of a new one comes, cell by cell."""
         if old is new:
             return np.arange(new.node_count)
         if self._seams is None and self._bodies[id(new)].cell_number is None:

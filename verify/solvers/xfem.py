@@ -22,8 +22,8 @@ from verify.system import System
 from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.kernels import PLAIN
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import join_specks, treat_slivers
-from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["XfemSolver"]
 
@@ -179,9 +179,9 @@ class XfemSolver:
         exact = _exact(scene)
         try:
             mesh, size = background_mesh(scene, level)
-            virtual = _cut(scene, mesh, size, exact, tip, slivers)[0]
+            phantom = _cut(scene, mesh, size, exact, tip, slivers)[0]
             return system_of(
-                scene, virtual, virtual, material_of(scene, virtual.mesh), exact, mass, basis,
+                scene, phantom, phantom, material_of(scene, phantom.mesh), exact, mass, basis,
                 slivers == "penalise",
             )  # fmt: skip
         except BasisError as error:
@@ -192,17 +192,17 @@ class XfemSolver:
 
 def _cut(
     scene: Scene, mesh: SimplexMesh, size: float, exact: Any, tip: str, slivers: str
-) -> tuple[VirtualMesh, Any, Any]:
+) -> tuple[PhantomMesh, Any, Any]:
     """Cut the mesh and treat its slivers; report what was treated, and what was joined."""
     rule: Any = tip
     policy: Any = slivers
-    virtual = cut_mesh(mesh, cuts_of(scene, size), rule)
-    virtual, specks = join_specks(virtual, supports_of(scene, virtual, exact))
+    phantom = cut_mesh(mesh, cuts_of(scene, size), rule)
+    phantom, specks = join_specks(phantom, supports_of(scene, phantom, exact))
     report = None
     if slivers in ("merge", "drop"):
-        held = supports_of(scene, virtual, exact).fixed.any(axis=1)
-        virtual, report = treat_slivers(virtual, policy, held=held)
-    return virtual, report, specks
+        held = supports_of(scene, phantom, exact).fixed.any(axis=1)
+        phantom, report = treat_slivers(phantom, policy, held=held)
+    return phantom, report, specks
 
 
 def _check_penalty(scene: Scene, basis: str, mass: str) -> None:
@@ -257,14 +257,14 @@ def _run(
     if scene.analysis.kind == "dynamic":
         return move(scene, mesh, size, exact, choice.motion, trial)
     start = perf_counter()
-    virtual, slivers, specks = _cut(scene, mesh, size, exact, choice.tip, choice.slivers)
+    phantom, slivers, specks = _cut(scene, mesh, size, exact, choice.tip, choice.slivers)
     enrichment = perf_counter() - start
     penalise = choice.slivers == "penalise"
     found = solve_equilibrium(
-        scene, virtual, exact, choice.basis, choice.load_steps, penalise, choice.motion.kernels
+        scene, phantom, exact, choice.basis, choice.load_steps, penalise, choice.motion.kernels
     )
     return Answer(
-        virtual=virtual,
+        phantom=phantom,
         times=np.zeros(1),
         displacement=found.displacement[None],
         velocity=None,

@@ -10,9 +10,9 @@ from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import across_interfaces
 from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import SliverReport, Specks
 from verify.xfem.subdivision import Subdivision, subdivide
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Answer", "joined", "penalised", "solution_of"]
 
@@ -23,7 +23,7 @@ _Floats = NDArray[np.float64]
 class Answer:
     """Displacements and their rates (t, N, d) of the unknowns of a cut mesh at output times."""
 
-    virtual: VirtualMesh
+    phantom: PhantomMesh
     times: _Floats
     displacement: _Floats
     velocity: _Floats | None
@@ -57,8 +57,8 @@ def solution_of(
     notes : dict of str to str
         Choices of the solver, beside those of the answer.
     """
-    virtual = answer.virtual
-    body = subdivide(virtual)
+    phantom = answer.phantom
+    body = subdivide(phantom)
     return Solution(
         points=body.points,
         cells=body.cells,
@@ -67,17 +67,17 @@ def solution_of(
         velocity=_at_points(body, answer.velocity),
         acceleration=_at_points(body, answer.acceleration),
         cut_facets=body.cut_facets,
-        cell_sides=_side_labels(virtual.label[body.cell_piece]),
+        cell_sides=_side_labels(phantom.label[body.cell_piece]),
         ledger=answer.ledger,
         unknowns=answer.unknowns,
         size=size,
         timings=timings,
         iterations=answer.iterations,
         regularisations=[
-            *_regularisations(scene, virtual, body),
+            *_regularisations(scene, phantom, body),
             *_treated(answer.slivers),
             *answer.further,
-            *across_interfaces(scene, virtual.mesh),
+            *across_interfaces(scene, phantom.mesh),
         ],
         notes={**notes, **answer.notes},
     )
@@ -115,14 +115,14 @@ def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:
     return sides
 
 
-def _regularisations(scene: Scene, virtual: VirtualMesh, body: Subdivision) -> list[Regularisation]:
+def _regularisations(scene: Scene, phantom: PhantomMesh, body: Subdivision) -> list[Regularisation]:
     """Report what the solver moved or left out, each with its size."""
     entries = []
-    if virtual.snapped:
-        entries.append(Regularisation("node taken as on the cut", virtual.snapped, 0.0, "m"))
-    if virtual.dropped:
+    if phantom.snapped:
+        entries.append(Regularisation("node taken as on the cut", phantom.snapped, 0.0, "m"))
+    if phantom.dropped:
         entries.append(
-            Regularisation("piece without volume left out", virtual.dropped, 0.0, "volume fraction")
+            Regularisation("piece without volume left out", phantom.dropped, 0.0, "volume fraction")
         )
     moved = _moved_ends(scene, body)
     if moved:

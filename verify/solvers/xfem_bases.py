@@ -23,14 +23,14 @@ from verify.xfem.bases import (
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import BasisError
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["held_in_basis", "solve_in_basis"]
 
 
 def solve_in_basis(
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     material: Material,
     supports: Supports,
     load: NDArray[np.float64],
@@ -41,7 +41,7 @@ def solve_in_basis(
     Returns
     -------
     displacement : (N, d) array
-        At the unknown nodes of the side-wise basis, m.
+        At the dof nodes of the side-wise basis, m.
     timings : dict of str to float
         Wall seconds of ``assembly``, ``factorisation`` and ``solve``.
 
@@ -50,14 +50,14 @@ def solve_in_basis(
     XfemError
         If a node has more than two unknowns, or a free piece can move rigidly.
     """
-    check_bodies(virtual, supports)
+    check_bodies(phantom, supports)
     clock = [perf_counter()]
-    pattern = body_pattern(virtual)
-    blocks = InternalForce(virtual, material, "linear").stiffness(pattern)
-    matrix = transformed_matrix(virtual, basis, csr_array(pattern.matrix(blocks)))
-    known = from_sidewise(virtual, basis, supports.values).ravel()
-    held = held_in_basis(virtual, supports, basis)
-    transposed = transformation(virtual, basis).T
+    pattern = body_pattern(phantom)
+    blocks = InternalForce(phantom, material, "linear").stiffness(pattern)
+    matrix = transformed_matrix(phantom, basis, csr_array(pattern.matrix(blocks)))
+    known = from_sidewise(phantom, basis, supports.values).ravel()
+    held = held_in_basis(phantom, supports, basis)
+    transposed = transformation(phantom, basis).T
     force = (transposed @ load).ravel() - matrix @ np.where(held, known, 0.0)
     free = np.flatnonzero(~held)
     inner = matrix[free][:, free].tocsc()
@@ -67,20 +67,20 @@ def solve_in_basis(
     unknowns = np.where(held, known, 0.0)
     unknowns[free] = factors.solve(force[free])
     clock.append(perf_counter())
-    displacement = sidewise_from(virtual, basis, unknowns.reshape(-1, load.shape[1]))
+    displacement = sidewise_from(phantom, basis, unknowns.reshape(-1, load.shape[1]))
     phases = ("assembly", "factorisation", "solve")
     return displacement, dict(zip(phases, np.diff(clock).tolist(), strict=True))
 
 
-def held_in_basis(virtual: VirtualMesh, supports: Supports, basis: Basis) -> NDArray[np.bool_]:
+def held_in_basis(phantom: PhantomMesh, supports: Supports, basis: Basis) -> NDArray[np.bool_]:
     """Which unknowns (u of all nodes, then a of the enriched) are prescribed.
 
     The plain basis knows the two sides of a node only together; in the shifted one u is the
     node's own side, and a the difference.
     """
-    count = len(virtual.mesh.points)
+    count = len(phantom.mesh.points)
     nodes, beyond = supports.fixed[:count], supports.fixed[count:]
-    own = nodes[virtual.node_parent[count:]]
+    own = nodes[phantom.node_parent[count:]]
     if (beyond & ~own).any() or (basis == "heaviside" and (own != beyond).any()):
         raise BasisError(
             f"a support holds one side of a cut element and not the other, which the {basis} "

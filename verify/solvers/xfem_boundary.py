@@ -7,7 +7,7 @@ from verify.errors import InputError
 from verify.scene import Scene
 from verify.scene.parts import on_part
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["boundary_nodes", "facet_parts", "facets_on", "own_corners"]
 
@@ -42,36 +42,36 @@ def facets_on(scene: Scene, mesh: SimplexMesh, where: str, key: str) -> _Ints:
     return chosen
 
 
-def own_corners(virtual: VirtualMesh) -> NDArray[np.bool_]:
+def own_corners(phantom: PhantomMesh) -> NDArray[np.bool_]:
     """(N,) whether the node of an unknown lies in the material that the unknown moves.
 
     Behind a cut it does not: the unknown belongs to a node that is beyond.
     """
-    piece, barycentric, _ = virtual.solid_simplices
-    own = np.zeros(virtual.corners.node_count, dtype=bool)
+    piece, barycentric, _ = phantom.solid_simplices
+    own = np.zeros(phantom.corners.node_count, dtype=bool)
     simplex, vertex = np.nonzero(barycentric.max(axis=2) == 1.0)
-    own[virtual.cells[piece[simplex], barycentric[simplex, vertex].argmax(axis=1)]] = True
-    return own[virtual.node_corner]
+    own[phantom.cells[piece[simplex], barycentric[simplex, vertex].argmax(axis=1)]] = True
+    return own[phantom.node_corner]
 
 
-def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
+def facet_parts(phantom: PhantomMesh) -> tuple[_Ints, NDArray[np.float64]]:
     """Boundary facets, of those that are cut the parts, each for every unknown that moves it.
 
     Returns
     -------
     unknowns : (k,) int array
-        Unknown nodes at the nodes of a facet, on the side of the part; nodes that follow a root
+        Dof nodes at the nodes of a facet, on the side of the part; nodes that follow a root
         cell have none.
     points : (k, space) array
         Centroid of the part, m.
     """
-    mesh = virtual.mesh
-    piece, in_cell, _ = virtual.solid_simplices
+    mesh = phantom.mesh
+    piece, in_cell, _ = phantom.solid_simplices
     facets = mesh.boundary_facets
     outer = np.zeros(len(mesh.cells), dtype=bool)
     outer[facets[:, 0]] = True
-    mine = outer[virtual.parent[piece]]
-    piece, cell, in_cell = piece[mine], virtual.parent[piece[mine]], in_cell[mine]
+    mine = outer[phantom.parent[piece]]
+    piece, cell, in_cell = piece[mine], phantom.parent[piece[mine]], in_cell[mine]
     unknowns, points = [], []
     corners = mesh.dim + 1
     for local in range(corners):
@@ -85,7 +85,7 @@ def facet_parts(virtual: VirtualMesh) -> tuple[_Ints, NDArray[np.float64]]:
             middle = in_cell[on_facet][:, side].mean(axis=1)
             nodes = mesh.points[mesh.cells[cell[on_facet]]]
             centroid = np.einsum("ki,kij->kj", middle, nodes)
-            unknowns.append(virtual.cells[piece[on_facet]][:, rest].ravel())
+            unknowns.append(phantom.cells[piece[on_facet]][:, rest].ravel())
             points.append(np.repeat(centroid, mesh.dim, axis=0))
-    node = virtual.corner_node[np.concatenate(unknowns)]
+    node = phantom.corner_node[np.concatenate(unknowns)]
     return node[node >= 0], np.concatenate(points)[node >= 0]

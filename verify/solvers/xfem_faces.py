@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import CutFaces, Scene, faces_of
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.subdivision import Subdivision, subdivide
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["face_forces"]
 
@@ -17,7 +17,7 @@ _Ints = NDArray[np.int64]
 _DEGREE = 4  # of the load times the shape functions, integrated exactly
 
 
-def face_forces(scene: Scene, virtual: VirtualMesh, i: int, time: float) -> _Floats:
+def face_forces(scene: Scene, phantom: PhantomMesh, i: int, time: float) -> _Floats:
     """Nodal forces (N, d) of load i, on the faces of a cut as realised, N (per metre in 2D).
 
     The faces are facets of the conforming sub-division on which the field is linear, so that the
@@ -31,7 +31,7 @@ def face_forces(scene: Scene, virtual: VirtualMesh, i: int, time: float) -> _Flo
     """
     load, key = scene.loads[i], f"loads[{i}]"
     assert isinstance(load, CutFaces)
-    body = subdivide(virtual)
+    body = subdivide(phantom)
     facets, outward = _faces(body)
     corners = body.points[facets]
     place = next(k for k, cut in enumerate(scene.cuts) if cut.name == load.cut)

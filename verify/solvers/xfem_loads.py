@@ -12,7 +12,7 @@ from verify.solvers.xfem_boundary import facets_on
 from verify.solvers.xfem_faces import face_forces
 from verify.xfem.loads import Density, body_force, traction
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["NodalForces", "forces_of", "is_moving", "loads_of", "nodal_forces"]
 
@@ -26,22 +26,22 @@ class NodalForces(NamedTuple):
     forces: _Floats
 
 
-def loads_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> _Floats:
+def loads_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> _Floats:
     """Return the consistent nodal forces (N, d) of all loads, N (per metre in 2D)."""
-    total = np.zeros_like(virtual.node_points)
-    for one in nodal_forces(scene, virtual, exact):
+    total = np.zeros_like(phantom.node_points)
+    for one in nodal_forces(scene, phantom, exact):
         total += one.forces
     return total
 
 
-def nodal_forces(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[NodalForces]:
+def nodal_forces(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[NodalForces]:
     """Return the nodal forces of every load at the time 0, in the order of the scene.
 
     Those of a membrane are times its thickness: forces per volume and per area stay what they
     are.
     """
     return [
-        NodalForces(entry, forces_of(scene, i, virtual, exact))
+        NodalForces(entry, forces_of(scene, i, phantom, exact))
         for i, entry in enumerate(scene.loads)
     ]
 
@@ -53,24 +53,24 @@ def is_moving(load: Load, exact: Any) -> bool:
     return bool(load.timed or (load.exact and exact.moves))
 
 
-def forces_of(scene: Scene, i: int, virtual: VirtualMesh, exact: Any, time: float = 0.0) -> _Floats:
+def forces_of(scene: Scene, i: int, phantom: PhantomMesh, exact: Any, time: float = 0.0) -> _Floats:
     """Return the nodal forces (N, d) of a load at a time, without the factor of its history, N."""
     entry = scene.loads[i]
     field: Any = None if exact is None else exact.at(time)
     if isinstance(entry, Gravity):
-        forces = body_force(virtual, _weight(scene, virtual.mesh, entry))
+        forces = body_force(phantom, _weight(scene, phantom.mesh, entry))
     elif isinstance(entry, CutFaces):
-        forces = face_forces(scene, virtual, i, time)
+        forces = face_forces(scene, phantom, i, time)
     elif isinstance(entry, Traction):
-        facets = facets_on(scene, virtual.mesh, entry.where, f"loads[{i}].where")
+        facets = facets_on(scene, phantom.mesh, entry.where, f"loads[{i}].where")
         if entry.exact:
-            forces = _stresses(virtual, facets, field)
+            forces = _stresses(phantom, facets, field)
         else:
-            forces = traction(virtual, facets, _density(entry, entry.traction, time))
+            forces = traction(phantom, facets, _density(entry, entry.traction, time))
     elif entry.exact:
-        forces = body_force(virtual, lambda points, sides: field.body_force(points))
+        forces = body_force(phantom, lambda points, sides: field.body_force(points))
     else:
-        forces = body_force(virtual, _density(entry, entry.force, time))
+        forces = body_force(phantom, _density(entry, entry.force, time))
     return np.asarray((scene.material.thickness or 1.0) * forces)
 
 
@@ -85,15 +85,15 @@ def _density(load: BodyForce | Traction, given: Any, time: float) -> Any:
     return given if is_uniform(given) else lambda points, sides: load.values(points, time)
 
 
-def _stresses(virtual: VirtualMesh, facets: NDArray[np.int64], exact: Any) -> _Floats:
+def _stresses(phantom: PhantomMesh, facets: NDArray[np.int64], exact: Any) -> _Floats:
     """Nodal forces (N, d) of the exact solution's stress vectors on facets."""
-    mesh = virtual.mesh
+    mesh = phantom.mesh
     normals = -mesh.gradients[facets[:, 0], facets[:, 1]]
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    load = np.zeros_like(virtual.node_points)
+    load = np.zeros_like(phantom.node_points)
     distinct, group = np.unique(np.round(normals, 12), axis=0, return_inverse=True)
     for k, normal in enumerate(distinct):
-        load += traction(virtual, facets[group.ravel() == k], _stress_vector(exact, normal))
+        load += traction(phantom, facets[group.ravel() == k], _stress_vector(exact, normal))
     return load
 
 

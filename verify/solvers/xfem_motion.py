@@ -34,9 +34,9 @@ from verify.xfem.kernels import Kernels
 from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.moving_body import treat_moving_body
+from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import SliverReport, treat_slivers
 from verify.xfem.supports import check_bodies
-from verify.xfem.virtual import VirtualMesh, cut_mesh
 
 __all__ = ["MotionChoice", "Mover", "move"]
 
@@ -95,7 +95,7 @@ def move(
 class _Output(NamedTuple):
     """A state at an output time, on the mesh with the cuts that are open then."""
 
-    virtual: VirtualMesh
+    phantom: PhantomMesh
     state: MotionState
     acceleration: _Floats | None
 
@@ -145,22 +145,22 @@ class Mover:
         initial = self.scene.initial
         closed_before = isinstance(initial, Equilibrium) and not starts_open(initial)
         opened = -np.inf if closed_before else self.due
-        virtual = self._cut(opened)
-        body = self._body(virtual)
+        phantom = self._cut(opened)
+        body = self._body(phantom)
         state = self._initial(body)
         fields: list[_Output] = []
         while True:
             due = state.time + self.due
             if np.any((events > opened) & (events <= due)):
                 further = self._body(self._cut(due))
-                inherited = self._inherited(virtual, state, further)
+                inherited = self._inherited(phantom, state, further)
                 self.account.open(body, state, further, inherited)
                 body, state = further, inherited
-                virtual = body.force.virtual
+                phantom = body.force.phantom
             opened = due
             until = float(events[events > due].min(initial=np.inf))
             stage = self._stage(body, state, until, trial)
-            fields += [_Output(virtual, *output) for output in stage]
+            fields += [_Output(phantom, *output) for output in stage]
             if trial or state.time >= float(self.times[-1]) - self.due:
                 return self._answer(fields)
 
@@ -175,30 +175,30 @@ class Mover:
         self.opening = opening_times(self.asked, cut_mesh(self.mesh, self.cuts, tip), self.opens)
         return np.unique(self.opening[~np.isnan(self.opening)])
 
-    def _cut(self, time: float) -> VirtualMesh:
+    def _cut(self, time: float) -> PhantomMesh:
         """Cut the mesh where the cuts have opened it at a time."""
         clock = perf_counter()
         policy: Any = self.choice.slivers
-        virtual = self._cut_at(time)
+        phantom = self._cut_at(time)
         if policy in ("merge", "drop"):
-            held = motion_of_supports(self.scene, virtual, self.exact).fixed.any(axis=1)
-            virtual, self.slivers = treat_slivers(virtual, policy, held=held)
+            held = motion_of_supports(self.scene, phantom, self.exact).fixed.any(axis=1)
+            phantom, self.slivers = treat_slivers(phantom, policy, held=held)
         self.timings["enrichment"] += perf_counter() - clock
-        return virtual
+        return phantom
 
-    def _cut_at(self, time: float) -> VirtualMesh:
+    def _cut_at(self, time: float) -> PhantomMesh:
         tip: Any = self.choice.tip
         return cut_mesh(self.mesh, self.cuts, tip, self.opening <= time)
 
-    def _body(self, virtual: VirtualMesh) -> DynamicBody:
+    def _body(self, phantom: PhantomMesh) -> DynamicBody:
         """Give a cut mesh its elasticity, mass, supports and loads."""
         clock = perf_counter()
-        scene, density = self.scene, density_of(self.scene, virtual.mesh)
-        force, mass = self._inertia(virtual, density)
-        weight = np.zeros_like(virtual.node_points)
+        scene, density = self.scene, density_of(self.scene, phantom.mesh)
+        force, mass = self._inertia(phantom, density)
+        weight = np.zeros_like(phantom.node_points)
         driven: list[tuple[_Floats, Any]] = []
         moving: list[tuple[int, Any]] = []
-        for i, (load, forces) in enumerate(nodal_forces(scene, virtual, self.exact)):
+        for i, (load, forces) in enumerate(nodal_forces(scene, phantom, self.exact)):
             if isinstance(load, Gravity):  # on the mass as it is lumped, so that all falls alike
                 weight += mass.weight(load.acceleration)
             elif is_moving(load, self.exact):
@@ -211,7 +211,7 @@ class Mover:
             for forces, history in driven:
                 total += factor_at(history, time) * forces
             for i, history in moving:
-                forces = forces_of(scene, i, virtual, self.exact, time)
+                forces = forces_of(scene, i, phantom, self.exact, time)
                 total += factor_at(history, time) * forces
             return total
 
@@ -220,36 +220,36 @@ class Mover:
             mass,
             weight,
             load_at if driven or moving else None,
-            motion_of_supports(scene, virtual, self.exact),
+            motion_of_supports(scene, phantom, self.exact),
             RayleighDamping(*scene.analysis.damping),
         )
         self.timings["loading"] += perf_counter() - clock
         return body
 
     def _inertia(
-        self, virtual: VirtualMesh, density: float | _Floats
+        self, phantom: PhantomMesh, density: float | _Floats
     ) -> tuple[InternalForce, Mass]:
         """Return elasticity and mass of a cut mesh, with the penalty if there is to be one."""
         if self.choice.slivers != "penalise":
             try:
-                mass = MASSES[self.choice.mass](virtual, density)
+                mass = MASSES[self.choice.mass](phantom, density)
             except XfemError as error:  # a lumping of the thesis, where cuts cross
                 raise UnsupportedSceneError(f"mass = '{self.choice.mass}': {error}") from None
-            return self._law(virtual), mass
+            return self._law(phantom), mass
         kinematics = self.scene.analysis.kinematics
-        material = material_of(self.scene, virtual.mesh)
+        material = material_of(self.scene, phantom.mesh)
         treated = treat_moving_body(
-            virtual, material, density, "penalise", kinematics=kinematics,
+            phantom, material, density, "penalise", kinematics=kinematics,
             kernels=self.choice.kernels,
         )  # fmt: skip
         self.penalty = treated.ghost
         return treated.force, treated.mass
 
-    def _law(self, virtual: VirtualMesh) -> InternalForce:
+    def _law(self, phantom: PhantomMesh) -> InternalForce:
         """Return the elasticity of a cut mesh."""
-        material = material_of(self.scene, virtual.mesh)
+        material = material_of(self.scene, phantom.mesh)
         kinematics = self.scene.analysis.kinematics
-        return InternalForce(virtual, material, kinematics, self.choice.kernels)
+        return InternalForce(phantom, material, kinematics, self.choice.kernels)
 
     def _initial(self, body: DynamicBody) -> MotionState:
         """Return the state at the time 0, before what opens then."""
@@ -257,10 +257,10 @@ class Mover:
         state, initial = body.rest(), self.scene.initial
         if isinstance(initial, Moving):
             free = ~body.fixed
-            state.velocity[free] = initial.velocities(body.force.virtual.node_points)[free]
+            state.velocity[free] = initial.velocities(body.force.phantom.node_points)[free]
         elif isinstance(initial, InitialField):
-            virtual, free = body.force.virtual, ~body.fixed
-            u, v = initial.state(virtual.node_points, virtual.node_piece_points, self.exact)
+            phantom, free = body.force.phantom, ~body.fixed
+            u, v = initial.state(phantom.node_points, phantom.node_piece_points, self.exact)
             state.displacement[free], state.velocity[free] = u[free], v[free]
         elif isinstance(initial, Equilibrium):
             state.displacement[:] = self._equilibrium(body)
@@ -268,24 +268,24 @@ class Mover:
         return state
 
     def _equilibrium(self, body: DynamicBody) -> _Floats:
-        virtual = body.force.virtual
+        phantom = body.force.phantom
         assert body.weight is not None
         load = body.weight.copy()
-        for entry, forces in nodal_forces(self.scene, virtual, self.exact):
+        for entry, forces in nodal_forces(self.scene, phantom, self.exact):
             if not isinstance(entry, Gravity):
                 load += first_factor(entry.history) * forces
 
-        path = initial_path(self.scene, virtual, self.exact)
-        check_bodies(virtual, path(1.0))
+        path = initial_path(self.scene, phantom, self.exact)
+        check_bodies(phantom, path(1.0))
         return static_equilibrium(
             body.force, body.fixed, lambda share: path(share).values, load
         ).displacement
 
     def _inherited(
-        self, virtual: VirtualMesh, state: MotionState, further: DynamicBody
+        self, phantom: PhantomMesh, state: MotionState, further: DynamicBody
     ) -> MotionState:
         try:
-            return inherit_state(virtual, further.force.virtual, state, further)
+            return inherit_state(phantom, further.force.phantom, state, further)
         except XfemError as error:
             raise InputError(
                 f"the state at {state.time:g} s cannot be handed on to the body that is cut "
@@ -302,8 +302,8 @@ class Mover:
         scene, choice = self.scene, self.choice
         largest, self.said = largest_step(
             body,
-            material_of(scene, body.force.virtual.mesh),
-            density_of(scene, body.force.virtual.mesh),
+            material_of(scene, body.force.phantom.mesh),
+            density_of(scene, body.force.phantom.mesh),
             choice.scheme,
             choice.step_factor,
             scene.analysis.time_step,
@@ -353,26 +353,26 @@ class Mover:
         except XfemError as error:  # explicit, with a mass that is not diagonal
             raise UnsupportedSceneError(f"scheme = '{self.choice.scheme}': {error}") from None
 
-    def _source(self, old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
+    def _source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
         """Corner of an old body from which each corner of one that is cut further comes."""
         return ancestors(old, new)
 
     def _answer(self, fields: list["_Output"]) -> Answer:
-        virtual = self._cut(np.inf)
-        olds = {id(one.virtual): one.virtual for one in fields}
-        sources = {key: self._source(old, virtual) for key, old in olds.items()}
+        phantom = self._cut(np.inf)
+        olds = {id(one.phantom): one.phantom for one in fields}
+        sources = {key: self._source(old, phantom) for key, old in olds.items()}
         # before a cut opens nothing follows a root cell there: corners say it all
-        shape = (len(fields), *virtual.corners.node_points.shape)
+        shape = (len(fields), *phantom.corners.node_points.shape)
         displacement, velocity, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
         balanced = True
         for k, one in enumerate(fields):
-            source = sources[id(one.virtual)]
-            displacement[k] = one.virtual.extend(one.state.displacement)[source]
-            velocity[k] = one.virtual.extend(one.state.velocity)[source]
+            source = sources[id(one.phantom)]
+            displacement[k] = one.phantom.extend(one.state.displacement)[source]
+            velocity[k] = one.phantom.extend(one.state.velocity)[source]
             if one.acceleration is None:
                 balanced = False
             else:
-                acceleration[k] = one.virtual.extend(one.acceleration)[source]
+                acceleration[k] = one.phantom.extend(one.acceleration)[source]
         sizes = sorted(self.step_sizes)
         notes = {
             "scheme": self.choice.scheme,
@@ -388,7 +388,7 @@ class Mover:
         if self.solves:
             iterations["newton"] = self.solves
         return Answer(
-            virtual.corners,
+            phantom.corners,
             self.times[: len(fields)],
             displacement,
             velocity,
@@ -398,6 +398,6 @@ class Mover:
             iterations,
             notes,
             self.slivers,
-            virtual.node_points.size,
+            phantom.node_points.size,
             penalised(self.penalty),
         )

@@ -19,9 +19,9 @@ from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.kernels import Kernels
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.statics import solve_static
 from verify.xfem.supports import Supports, check_bodies
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Equilibrium", "dismissed_equilibria", "path_notes", "solve_equilibrium"]
 
@@ -42,7 +42,7 @@ class Equilibrium:
 
 def solve_equilibrium(
     scene: Scene,
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     exact: Any,
     basis: str,
     load_steps: int,
@@ -57,29 +57,29 @@ def solve_equilibrium(
         From the library.
     """
     clock = perf_counter()
-    supports = supports_of(scene, virtual, exact)
-    load = loads_of(scene, virtual, exact)
+    supports = supports_of(scene, phantom, exact)
+    load = loads_of(scene, phantom, exact)
     loading = perf_counter() - clock
     if scene.analysis.kinematics == "linear":
-        found = _linear(scene, virtual, supports, load, basis, penalise, kernels)
+        found = _linear(scene, phantom, supports, load, basis, penalise, kernels)
     else:
-        found = _corotational(scene, virtual, exact, supports, load, load_steps, kernels)
+        found = _corotational(scene, phantom, exact, supports, load, load_steps, kernels)
     return replace(found, timings={"loading": loading, **found.timings})
 
 
 def _linear(
     scene: Scene,
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     supports: Supports,
     load: _Floats,
     basis: str,
     penalise: bool,
     kernels: Kernels,
 ) -> Equilibrium:
-    material = material_of(scene, virtual.mesh)
+    material = material_of(scene, phantom.mesh)
     if basis == "sidewise":
-        ghost = GhostPenalty(virtual, material) if penalise else None
-        static = solve_static(virtual, material, supports, load, ghost=ghost, kernels=kernels)
+        ghost = GhostPenalty(phantom, material) if penalise else None
+        static = solve_static(phantom, material, supports, load, ghost=ghost, kernels=kernels)
         share = static.penalty_energy / max(static.strain_energy, np.finfo(float).tiny)
         notes = {
             "linear solver": _said(static.solver, kernels),
@@ -93,24 +93,24 @@ def _linear(
             regularisations=penalised(ghost, share),
         )
     other: Any = basis
-    displacement, phases = solve_in_basis(virtual, material, supports, load, other)
-    energy = InternalForce(virtual, material, "linear").evaluate(displacement)[1]
+    displacement, phases = solve_in_basis(phantom, material, supports, load, other)
+    energy = InternalForce(phantom, material, "linear").evaluate(displacement)[1]
     return Equilibrium(displacement, energy, phases, notes={"linear solver": "SciPy SuperLU"})
 
 
 def _corotational(
     scene: Scene,
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     exact: Any,
     supports: Supports,
     load: _Floats,
     load_steps: int,
     kernels: Kernels,
 ) -> Equilibrium:
-    check_bodies(virtual, supports)
+    check_bodies(phantom, supports)
     clock = perf_counter()
-    force = InternalForce(virtual, material_of(scene, virtual.mesh), kernels=kernels)
-    path = path_of_supports(scene, virtual, exact)
+    force = InternalForce(phantom, material_of(scene, phantom.mesh), kernels=kernels)
+    path = path_of_supports(scene, phantom, exact)
     found = static_equilibrium(
         force, supports.fixed, lambda share: path(share).values, load, load_steps or 1
     )
@@ -160,7 +160,7 @@ def dismissed_equilibria(found: StaticEquilibrium) -> list[Regularisation]:
 
 
 def _inverted(force: InternalForce, displacement: _Floats) -> str:
-    mesh = force.virtual.mesh
+    mesh = force.phantom.mesh
     if mesh.dim < mesh.space:
         return "not defined for a membrane"
     return str(len(inverted_cells(force, displacement)))

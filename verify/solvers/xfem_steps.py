@@ -17,7 +17,7 @@ from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["MASSES", "SCHEMES", "integrator_of", "largest_step"]
 
@@ -30,12 +30,12 @@ SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
     "symplectic_euler": SymplecticEuler,
     "forward_euler": ForwardEuler,
 }
-MASSES: dict[str, Callable[[VirtualMesh, ArrayLike], Mass]] = {
+MASSES: dict[str, Callable[[PhantomMesh, ArrayLike], Mass]] = {
     "sidewise": side_wise_mass,
     "consistent": consistent_mass,
-    "row_sum": lambda virtual, density: shifted_mass(virtual, density, "row sum"),
-    "hrz": lambda virtual, density: shifted_mass(virtual, density, "weighted diagonal"),
-    "thesis": lambda virtual, density: shifted_mass(virtual, density, "enrichment"),
+    "row_sum": lambda phantom, density: shifted_mass(phantom, density, "row sum"),
+    "hrz": lambda phantom, density: shifted_mass(phantom, density, "weighted diagonal"),
+    "thesis": lambda phantom, density: shifted_mass(phantom, density, "enrichment"),
 }
 _REACH = 1.0  # strain up to which the step of a turning body is a bound
 _EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
@@ -103,11 +103,11 @@ def largest_step(
 
 
 def _critical(body: DynamicBody, material: Material, density: ArrayLike, explicit: bool) -> float:
-    virtual = body.force.virtual
+    phantom = body.force.phantom
     if not explicit or body.mass.keeps_element_steps:
         # side-wise mass: no cut makes it smaller than that of the smallest uncut element
         strain = _REACH if body.force.is_corotational else 0.0
-        step = float(element_critical_steps(virtual.mesh, material, density, strain).min())
+        step = float(element_critical_steps(phantom.mesh, material, density, strain).min())
     else:
         force: Any = body.force
         blocks = force.stiffness(body.pattern, np.zeros(body.shape), "rotation-fixed")

@@ -13,8 +13,8 @@ from verify.scene.parts import copies_on_part, lie_on_part
 from verify.scene.prescribed import PrescribedMotion
 from verify.solvers.xfem_boundary import boundary_nodes, facet_parts, own_corners
 from verify.xfem.body import MovingSupports
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["initial_path", "motion_of_supports", "path_of_supports", "supports_of"]
 
@@ -29,59 +29,59 @@ class _Held(PrescribedMotion):
     components: tuple[int, ...]
 
 
-def supports_of(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports:
+def supports_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> Supports:
     """Return the supports of a static scene; a later one wins where two hold the same node.
 
-    A field with jumps is taken at each unknown node on the side of its own material.
+    A field with jumps is taken at each dof node on the side of its own material.
     """
-    return path_of_supports(scene, virtual, exact)(1.0)
+    return path_of_supports(scene, phantom, exact)(1.0)
 
 
-def path_of_supports(scene: Scene, virtual: VirtualMesh, exact: Any) -> Callable[[float], Supports]:
+def path_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Callable[[float], Supports]:
     """Supports at a share of the path of a static scene: of displacements and angles."""
-    held = _held(scene, virtual, exact)
-    return lambda share: Supports(*_filled(virtual, held, [one.values(share) for one in held]))
+    held = _held(scene, phantom, exact)
+    return lambda share: Supports(*_filled(phantom, held, [one.values(share) for one in held]))
 
 
-def initial_path(scene: Scene, virtual: VirtualMesh, exact: Any) -> Callable[[float], Supports]:
+def initial_path(scene: Scene, phantom: PhantomMesh, exact: Any) -> Callable[[float], Supports]:
     """Supports at a share of the first factor of their history."""
-    held = _held(scene, virtual, exact)
+    held = _held(scene, phantom, exact)
     factors = [first_factor(one.support.history) for one in held]
 
     def at(share: float) -> Supports:
         values = [one.values(share * f) for one, f in zip(held, factors, strict=True)]
-        return Supports(*_filled(virtual, held, values))
+        return Supports(*_filled(phantom, held, values))
 
     return at
 
 
-def motion_of_supports(scene: Scene, virtual: VirtualMesh, exact: Any) -> Supports | MovingSupports:
+def motion_of_supports(scene: Scene, phantom: PhantomMesh, exact: Any) -> Supports | MovingSupports:
     """Supports of a dynamic scene: moving ones if one changes in time."""
-    held = _held(scene, virtual, exact)
-    fixed, values = _filled(virtual, held, [one.values(1.0) for one in held])
+    held = _held(scene, phantom, exact)
+    fixed, values = _filled(phantom, held, [one.values(1.0) for one in held])
     if not any(one.moves for one in held):
         return Supports(fixed, values)
 
     def motion(time: float) -> tuple[_Floats, _Floats]:
         where = [one.values(factor_at(one.support.history, time), time) for one in held]
         speed = [one.velocities(time) for one in held]
-        return _filled(virtual, held, where)[1], _filled(virtual, held, speed)[1]
+        return _filled(phantom, held, where)[1], _filled(phantom, held, speed)[1]
 
     return MovingSupports(fixed, motion)
 
 
 def _filled(
-    virtual: VirtualMesh, held: list[_Held], values: list[_Floats]
+    phantom: PhantomMesh, held: list[_Held], values: list[_Floats]
 ) -> tuple[NDArray[np.bool_], _Floats]:
-    fixed = np.zeros(virtual.node_points.shape, dtype=bool)
-    filled = np.zeros(virtual.node_points.shape)
+    fixed = np.zeros(phantom.node_points.shape, dtype=bool)
+    filled = np.zeros(phantom.node_points.shape)
     for one, value in zip(held, values, strict=True):
         place = np.ix_(one.unknowns, one.components)
         fixed[place], filled[place] = True, value
     return fixed, filled
 
 
-def _held(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[_Held]:
+def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
     """Find what each support holds.
 
     A node of the boundary is on a part by its place, and so is every unknown whose material
@@ -90,12 +90,12 @@ def _held(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[_Held]:
     *that* material is on the part. So a part may end at a cut, and a cut close to a support frees
     what is behind it.
     """
-    mesh = virtual.mesh
-    unknowns, parts = facet_parts(virtual)
-    at_node = own_corners(virtual)
+    mesh = phantom.mesh
+    unknowns, parts = facet_parts(phantom)
+    at_node = own_corners(phantom)
     outer = np.zeros(len(mesh.points), dtype=bool)
     outer[boundary_nodes(mesh)] = True
-    own = np.flatnonzero(at_node & outer[virtual.node_parent])
+    own = np.flatnonzero(at_node & outer[phantom.node_parent])
     number = np.full(len(at_node), -1)
     number[own] = np.arange(len(own))
     beside = number[unknowns] >= 0
@@ -107,12 +107,12 @@ def _held(scene: Scene, virtual: VirtualMesh, exact: Any) -> list[_Held]:
     for i, support in enumerate(scene.supports):
         key = f"supports[{i}].where"
         mark = np.zeros(len(at_node), dtype=bool)
-        places = virtual.node_points[own]
+        places = phantom.node_points[own]
         mark[own[copies_on_part(scene, support.where, places, own_parts, key)]] = True
         mark[unknowns[lie_on_part(scene, support.where, parts, size)]] = True
         at = np.flatnonzero(mark)
         components = support.held(scene.dimension)
         field = exact if support.displacement == "exact" else None
-        points, near = virtual.node_points[at], virtual.node_piece_points[at]
+        points, near = phantom.node_points[at], phantom.node_piece_points[at]
         found.append(_Held(support, points, near, field, at, components))
     return found

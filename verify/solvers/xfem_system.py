@@ -16,15 +16,15 @@ from verify.xfem.bases import transformed_matrix
 from verify.xfem.elasticity import Material
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["system_of"]
 
 
 def system_of(
     scene: Scene,
-    virtual: VirtualMesh,
-    resisting: VirtualMesh,
+    phantom: PhantomMesh,
+    resisting: PhantomMesh,
     material: Material,
     exact: Any,
     mass: str = "sidewise",
@@ -36,7 +36,7 @@ def system_of(
     Parameters
     ----------
     scene : Scene
-    virtual, resisting : VirtualMesh
+    phantom, resisting : PhantomMesh
         What has the mass and the supports, and what resists; the same unknowns.
     material : Material
         Of the cells of `resisting`.
@@ -59,21 +59,21 @@ def system_of(
     stiffness = csr_array(
         pattern.matrix(InternalForce(resisting, material, "linear").stiffness(pattern))
     )
-    supports = supports_of(scene, virtual, exact)
+    supports = supports_of(scene, phantom, exact)
     components = supports.fixed.shape[1]
     inertia = None
     if scene.material.density is not None:
-        inertia = MASSES[mass](virtual, density_of(scene, virtual.mesh))
+        inertia = MASSES[mass](phantom, density_of(scene, phantom.mesh))
     if penalise:
-        ghost = GhostPenalty(virtual, material)
+        ghost = GhostPenalty(phantom, material)
         stiffness = csr_array(stiffness + kron(ghost.matrix, identity(components)))
-        inertia = None if inertia is None else ghost.mass(inertia, density_of(scene, virtual.mesh))
+        inertia = None if inertia is None else ghost.mass(inertia, density_of(scene, phantom.mesh))
     matrix = None if inertia is None else csr_array(kron(inertia.matrix, identity(components)))
     if basis == "sidewise":
         return System(stiffness, matrix, supports.fixed.ravel())
     other: Any = basis
     return System(
-        transformed_matrix(virtual, other, stiffness),
-        None if matrix is None else transformed_matrix(virtual, other, matrix),
-        held_in_basis(virtual, supports, other),
+        transformed_matrix(phantom, other, stiffness),
+        None if matrix is None else transformed_matrix(phantom, other, matrix),
+        held_in_basis(phantom, supports, other),
     )

@@ -8,7 +8,7 @@ reading:
     simplices; what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
 `zero_points`, `clip`, `partition`, `crossing`, `junctions`, `pieces`
     exact division of cells at zero points of level sets; parts of the cells that cuts go through
-`join`, `sides`, `virtual`
+`join`, `sides`, `phantom`
     which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
     the result: standard finite elements with weights
 `mass`
@@ -35,16 +35,16 @@ A clamped plate, cut half through, under its own weight:
 
 >>> from verify.xfem.structured_meshes import rectangle_mesh
 >>> from verify.xfem.cuts import Polyline
->>> from verify.xfem.virtual import cut_mesh
+>>> from verify.xfem.phantom import cut_mesh
 >>> from verify.xfem.elasticity import isotropic
 >>> from verify.xfem.supports import Supports
 >>> from verify.xfem.loads import body_force
 >>> from verify.xfem.statics import solve_static
->>> virtual = cut_mesh(rectangle_mesh((8, 8)), [Polyline([[-1.0, 0.45], [0.5, 0.45]])])
->>> top = virtual.mesh.points[:, 1] > 0.999
->>> held = Supports.none(virtual).prescribe(virtual, top)
+>>> phantom = cut_mesh(rectangle_mesh((8, 8)), [Polyline([[-1.0, 0.45], [0.5, 0.45]])])
+>>> top = phantom.mesh.points[:, 1] > 0.999
+>>> held = Supports.none(phantom).prescribe(phantom, top)
 >>> solution = solve_static(
-...     virtual, isotropic(1e4, 0.3, "plane strain"), held, body_force(virtual, [0.0, -9.8e3])
+...     phantom, isotropic(1e4, 0.3, "plane strain"), held, body_force(phantom, [0.0, -9.8e3])
 ... )
 >>> bool(solution.residual < 1e-12)
 True

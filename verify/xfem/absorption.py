@@ -10,30 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["absorb", "renumber"]
 
 _Ints = NDArray[np.int64]
 
 
-def absorb(virtual: VirtualMesh, into: _Ints) -> tuple[VirtualMesh, csr_array, _Ints]:
+def absorb(phantom: PhantomMesh, into: _Ints) -> tuple[PhantomMesh, csr_array, _Ints]:
     """Let pieces absorb siblings.
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     into : (p,) int array
         Piece that absorbs each piece; itself if it stays. A piece that absorbs must stay.
 
     Returns
     -------
-    treated : VirtualMesh
+    treated : PhantomMesh
     extension : (N, N_new) csr_array
         Old unknowns from the new ones: those that are gone follow what has absorbed theirs. Its
         transpose carries nodal forces the other way.
     node : (N,) int array
-        New number of each old unknown node, −1 if only absorbed pieces used it.
+        New number of each old dof node, −1 if only absorbed pieces used it.
 
     Raises
     ------
@@ -42,42 +42,42 @@ def absorb(virtual: VirtualMesh, into: _Ints) -> tuple[VirtualMesh, csr_array, _
     """
     if not np.array_equal(into[into], into):
         raise ValueError("a piece is absorbed by one that does not stay")
-    if not np.array_equal(virtual.parent[into], virtual.parent):
+    if not np.array_equal(phantom.parent[into], phantom.parent):
         raise ValueError("a piece is absorbed by one of another cell")
     stays = into == np.arange(len(into))
     number = np.cumsum(stays) - 1
-    used = np.zeros(virtual.node_count, dtype=bool)
-    used[virtual.cells[stays]] = True
-    node_parent, node, old_of_new = renumber(virtual, used)
+    used = np.zeros(phantom.node_count, dtype=bool)
+    used[phantom.cells[stays]] = True
+    node_parent, node, old_of_new = renumber(phantom, used)
     gone = np.flatnonzero(~stays)
-    fraction = virtual.fraction.copy()
-    np.add.at(fraction, into[gone], virtual.fraction[gone])
-    sub = virtual.sub_cells
+    fraction = phantom.fraction.copy()
+    np.add.at(fraction, into[gone], phantom.fraction[gone])
+    sub = phantom.sub_cells
     treated = replace(
-        virtual,
-        cells=node[virtual.cells[stays]],
-        parent=virtual.parent[stays],
+        phantom,
+        cells=node[phantom.cells[stays]],
+        parent=phantom.parent[stays],
         fraction=fraction[stays],
-        label=virtual.label[stays],
+        label=phantom.label[stays],
         node_parent=node_parent,
-        node_side=virtual.node_side[old_of_new],
+        node_side=phantom.node_side[old_of_new],
         sub_cells=replace(sub, piece=number[into[sub.piece]]),
     )
-    return treated, _extension(virtual, into, node, len(node_parent)), node
+    return treated, _extension(phantom, into, node, len(node_parent)), node
 
 
-def renumber(virtual: VirtualMesh, used: NDArray[np.bool_]) -> tuple[_Ints, _Ints, _Ints]:
+def renumber(phantom: PhantomMesh, used: NDArray[np.bool_]) -> tuple[_Ints, _Ints, _Ints]:
     """Mesh node of each new unknown; new number of each old one, -1 if not used; old of new.
 
     Each mesh node must keep an unknown; the first of them takes the node's number.
     """
     kept = np.flatnonzero(used)
-    parent = virtual.node_parent[kept]
+    parent = phantom.node_parent[kept]
     order = np.argsort(parent, kind="stable")
     kept, parent = kept[order], parent[order]
     first = np.diff(parent, prepend=-1) != 0
-    nodes = len(virtual.mesh.points)
-    node = np.full(virtual.node_count, -1)
+    nodes = len(phantom.mesh.points)
+    node = np.full(phantom.node_count, -1)
     node[kept[first]] = parent[first]
     node[kept[~first]] = nodes + np.arange(int((~first).sum()))
     old_of_new = np.empty(len(kept), dtype=np.int64)
@@ -85,14 +85,14 @@ def renumber(virtual: VirtualMesh, used: NDArray[np.bool_]) -> tuple[_Ints, _Int
     return np.concatenate([np.arange(nodes), parent[~first]]), node, old_of_new
 
 
-def _extension(virtual: VirtualMesh, into: _Ints, node: _Ints, count: int) -> csr_array:
+def _extension(phantom: PhantomMesh, into: _Ints, node: _Ints, count: int) -> csr_array:
     kept = np.flatnonzero(node >= 0)
     gone = np.flatnonzero(into != np.arange(len(into)))
-    row, corner = np.nonzero(node[virtual.cells[gone]] < 0)
-    lost = virtual.cells[gone][row, corner]
+    row, corner = np.nonzero(node[phantom.cells[gone]] < 0)
+    lost = phantom.cells[gone][row, corner]
     # an unknown that several absorbed pieces used takes the mean of what they follow
     share = 1.0 / np.bincount(lost, minlength=len(node))[lost]
-    columns = node[virtual.cells[into[gone]][row, corner]]
+    columns = node[phantom.cells[into[gone]][row, corner]]
     return csr_array(
         (
             np.concatenate([np.ones(len(kept)), share]),

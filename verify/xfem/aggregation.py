@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 
 from verify.xfem.absorption import renumber
 from verify.xfem.contacts import face_contacts
-from verify.xfem.virtual import Aggregation, VirtualMesh
+from verify.xfem.phantom import Aggregation, PhantomMesh
 
 __all__ = ["Roots", "aggregate"]
 
@@ -46,45 +46,45 @@ class Roots:
     rootless: _Bools
 
 
-def aggregate(virtual: VirtualMesh, small: _Bools, held: _Bools) -> tuple[VirtualMesh, Roots]:
+def aggregate(phantom: PhantomMesh, small: _Bools, held: _Bools) -> tuple[PhantomMesh, Roots]:
     """Let nodes that only small parts use follow root cells.
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         Without aggregation.
     small : (p,) bool array
     held : (N,) bool array
-        Unknown nodes that keep their unknown, such as those that a support holds.
+        Dof nodes that keep their unknown, such as those that a support holds.
 
     Returns
     -------
-    aggregated : VirtualMesh
-        `virtual` itself if no node follows a root.
+    aggregated : PhantomMesh
+        `phantom` itself if no node follows a root.
     roots : Roots
     """
-    alone = np.ones(virtual.node_count, dtype=bool)
-    alone[virtual.cells[~small]] = False
+    alone = np.ones(phantom.node_count, dtype=bool)
+    alone[phantom.cells[~small]] = False
     alone &= ~held
-    sliver, root = _reached(virtual, small)
-    node, weights, cell = _continued(virtual, alone, sliver, root)
-    followed = np.full(virtual.node_count, -1)
+    sliver, root = _reached(phantom, small)
+    node, weights, cell = _continued(phantom, alone, sliver, root)
+    followed = np.full(phantom.node_count, -1)
     followed[node] = np.arange(len(node))
-    of_corner = followed[virtual.cells]
-    has_own = (alone[virtual.cells] & (of_corner < 0)).any(axis=1)
+    of_corner = followed[phantom.cells]
+    has_own = (alone[phantom.cells] & (of_corner < 0)).any(axis=1)
     roots = Roots(small & (of_corner >= 0).any(axis=1), small & has_own)
     if len(node) == 0:
-        return virtual, roots
-    return _aggregated(virtual, followed, weights, cell), roots
+        return phantom, roots
+    return _aggregated(phantom, followed, weights, cell), roots
 
 
-def _reached(virtual: VirtualMesh, small: _Bools) -> tuple[_Ints, _Ints]:
+def _reached(phantom: PhantomMesh, small: _Bools) -> tuple[_Ints, _Ints]:
     """Pairs (k,), (k,) of small parts and a root each, layer by layer away from the roots.
 
     A part takes the root from which its own corners are continued over the shortest way, among
     those of its neighbours one layer closer.
     """
-    contacts = face_contacts(virtual, near=True)
+    contacts = face_contacts(phantom, near=True)
     first, second = np.concatenate(contacts), np.concatenate(contacts[::-1])
     into = np.where(small, -1, np.arange(len(small)))
     while True:
@@ -93,24 +93,24 @@ def _reached(virtual: VirtualMesh, small: _Bools) -> tuple[_Ints, _Ints]:
         if len(one) == 0:
             found = np.flatnonzero(small & (into >= 0))
             return found, into[found]
-        corners = virtual.mesh.points[virtual.mesh.cells[virtual.parent[one]]]
-        reach = np.abs(_coordinates(virtual, corners, root)).sum(axis=2).max(axis=1)
-        best = _best(virtual, one, root, reach)
+        corners = phantom.mesh.points[phantom.mesh.cells[phantom.parent[one]]]
+        reach = np.abs(_coordinates(phantom, corners, root)).sum(axis=2).max(axis=1)
+        best = _best(phantom, one, root, reach)
         into[one[best]] = root[best]
 
 
-def _best(virtual: VirtualMesh, key: _Ints, root: _Ints, reach: _Floats) -> _Ints:
+def _best(phantom: PhantomMesh, key: _Ints, root: _Ints, reach: _Floats) -> _Ints:
     """Row of the best root for each key: least reach, then largest, then by place."""
-    place = virtual.piece_centroids[root]
-    place = np.round(place / virtual.mesh.extent, _DIGITS)
-    size = np.round(virtual.fraction[root], _DIGITS)
+    place = phantom.piece_centroids[root]
+    place = np.round(place / phantom.mesh.extent, _DIGITS)
+    size = np.round(phantom.fraction[root], _DIGITS)
     order = np.lexsort([*place.T, -size, np.round(reach, _DIGITS), key])
     return order[np.diff(key[order], prepend=-1) != 0]
 
 
-def _coordinates(virtual: VirtualMesh, points: _Floats, root: _Ints) -> _Floats:
+def _coordinates(phantom: PhantomMesh, points: _Floats, root: _Ints) -> _Floats:
     """(q, k, d + 1) barycentric coordinates of points (q, k, space) in the cells of the roots."""
-    mesh, cell = virtual.mesh, virtual.parent[root]
+    mesh, cell = phantom.mesh, phantom.parent[root]
     origin = mesh.points[mesh.cells[cell, 0]]
     at = np.einsum("qks,qis->qki", points - origin[:, None], mesh.gradients[cell])
     at[:, :, 0] += 1.0
@@ -118,44 +118,44 @@ def _coordinates(virtual: VirtualMesh, points: _Floats, root: _Ints) -> _Floats:
 
 
 def _continued(
-    virtual: VirtualMesh, alone: _Bools, sliver: _Ints, root: _Ints
+    phantom: PhantomMesh, alone: _Bools, sliver: _Ints, root: _Ints
 ) -> tuple[_Ints, _Floats, _Ints]:
     """Nodes (k,) that follow a root, weights (k, d + 1) of its corners, and the root (k,).
 
     Off the plane of the root triangle of a membrane there is no such field: nodes there are left
     alone.
     """
-    row, corner = np.nonzero(alone[virtual.cells[sliver]])
-    node, root = virtual.cells[sliver[row], corner], root[row]
-    points = virtual.node_points[node][:, None]
-    weights = _coordinates(virtual, points, root)[:, 0]
+    row, corner = np.nonzero(alone[phantom.cells[sliver]])
+    node, root = phantom.cells[sliver[row], corner], root[row]
+    points = phantom.node_points[node][:, None]
+    weights = _coordinates(phantom, points, root)[:, 0]
     weights[np.abs(weights) < _ROUND_OFF] = 0.0
     largest = np.abs(weights).argmax(axis=1)[:, None]
     rest = weights.sum(axis=1, keepdims=True) - np.take_along_axis(weights, largest, 1)
     np.put_along_axis(weights, largest, 1.0 - rest, 1)
-    mesh = virtual.mesh
+    mesh = phantom.mesh
     if mesh.dim < mesh.space:
-        corners = mesh.points[mesh.cells[virtual.parent[root]]]
+        corners = mesh.points[mesh.cells[phantom.parent[root]]]
         off = np.linalg.norm(np.einsum("qi,qis->qs", weights, corners) - points[:, 0], axis=1)
         flat = off <= _ROUND_OFF * mesh.extent
         node, root, weights = node[flat], root[flat], weights[flat]
-    best = _best(virtual, node, root, np.abs(weights).sum(axis=1))
+    best = _best(phantom, node, root, np.abs(weights).sum(axis=1))
     return node[best], weights[best], root[best]
 
 
 def _aggregated(
-    virtual: VirtualMesh, followed: _Ints, weights: _Floats, root: _Ints
-) -> VirtualMesh:
+    phantom: PhantomMesh, followed: _Ints, weights: _Floats, root: _Ints
+) -> PhantomMesh:
     """Return the mesh without the unknowns of nodes that follow others."""
     own = followed < 0
-    node_parent, node, old_of_new = renumber(virtual, own)
+    node_parent, node, old_of_new = renumber(phantom, own)
     kept = np.flatnonzero(own)
     gone = np.flatnonzero(~own)
     at = followed[gone]
-    columns = node[virtual.cells[root[at]]]
+    columns = node[phantom.cells[root[at]]]
     rows = np.broadcast_to(gone[:, None], columns.shape)
     entries = np.concatenate([np.ones(len(kept)), weights[at].ravel()])
     places = np.concatenate([kept, rows.ravel()]), np.concatenate([node[kept], columns.ravel()])
     extension = csr_array((entries, places), shape=(len(own), len(node_parent)))
     extension.eliminate_zeros()
-    return virtual.following(Aggregation(virtual, extension, node), old_of_new)
+    return phantom.following(Aggregation(phantom, extension, node), old_of_new)

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
-from verify.xfem.virtual import Aggregation, VirtualMesh
+from verify.xfem.phantom import Aggregation, PhantomMesh
 
 __all__ = [
     "add_mass",
@@ -28,26 +28,26 @@ _Ints = NDArray[np.int64]
 _ROUND_OFF = 1e-14  # of the largest diagonal entry of a node
 
 
-def body_pattern(virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockPattern:
+def body_pattern(phantom: PhantomMesh, couplings: _Ints | None = None) -> BlockPattern:
     """Sparsity of a body; its first cells are the pieces.
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     couplings : (k, 2) int array, optional
         Further pairs of dof nodes that are to be coupled.
     """
     extra = np.empty((0, 2), dtype=np.int64) if couplings is None else couplings
-    if virtual.aggregation is None:
-        return block_pattern(_with_pairs(virtual.cells, extra), virtual.node_count)
-    own = virtual.corner_node[virtual.cells]
+    if phantom.aggregation is None:
+        return block_pattern(_with_pairs(phantom.cells, extra), phantom.node_count)
+    own = phantom.corner_node[phantom.cells]
     around = np.flatnonzero((own < 0).any(axis=1))
-    nodes, weights = _followed(virtual.aggregation, virtual.cells[around])
+    nodes, weights = _followed(phantom.aggregation, phantom.cells[around])
     # a corner that follows others is represented by one of them
     own[around] = np.take_along_axis(nodes, np.abs(weights).argmax(axis=2)[:, :, None], 2)[:, :, 0]
-    pairs = np.concatenate([extra, _pairs(nodes.reshape(len(around), -1), virtual.node_count)])
-    plain = block_pattern(_with_pairs(own, pairs), virtual.node_count)
-    count, corners = len(plain.columns), virtual.cells.shape[1]
+    pairs = np.concatenate([extra, _pairs(nodes.reshape(len(around), -1), phantom.node_count)])
+    plain = block_pattern(_with_pairs(own, pairs), phantom.node_count)
+    count, corners = len(plain.columns), phantom.cells.shape[1]
     targets = plain.targets.copy()
     places = np.arange(len(around) * corners**2)
     targets[around] = count + places.reshape(-1, corners, corners)

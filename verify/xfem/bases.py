@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, identity, kron
 
 from verify.xfem.errors import BasisError, XfemError
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["Basis", "from_sidewise", "sidewise_from", "transformation", "transformed_matrix"]
 
@@ -22,7 +22,7 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 
-def transformation(virtual: VirtualMesh, basis: Basis) -> csr_array:
+def transformation(phantom: PhantomMesh, basis: Basis) -> csr_array:
     """T of p = T q, for each component of the displacement (N, n + enriched).
 
     Raises
@@ -31,8 +31,8 @@ def transformation(virtual: VirtualMesh, basis: Basis) -> csr_array:
         If the basis is unknown, or a node has more than two unknowns or two that no single cut
         separates: there the side-wise basis is the only one.
     """
-    own, other, sign = _pairs(virtual)
-    nodes, count = len(virtual.mesh.points), len(own)
+    own, other, sign = _pairs(phantom)
+    nodes, count = len(phantom.mesh.points), len(own)
     extra = nodes + np.arange(count)
     plain = np.ones(nodes)
     everywhere = np.arange(nodes)
@@ -47,21 +47,21 @@ def transformation(virtual: VirtualMesh, basis: Basis) -> csr_array:
         values = np.concatenate([plain, sign, np.ones(count), -sign])
     else:
         raise XfemError(f"basis '{basis}'; expected shifted or heaviside")
-    return csr_array((values, (rows, columns)), shape=(virtual.node_count, nodes + count))
+    return csr_array((values, (rows, columns)), shape=(phantom.node_count, nodes + count))
 
 
-def sidewise_from(virtual: VirtualMesh, basis: Basis, unknowns: _Floats) -> _Floats:
+def sidewise_from(phantom: PhantomMesh, basis: Basis, unknowns: _Floats) -> _Floats:
     """Side-wise displacement (N, d) from the unknowns (n + enriched, d) of another basis."""
-    T = transformation(virtual, basis)
+    T = transformation(phantom, basis)
     _check_count(unknowns, T.shape[1], "unknowns")
     return np.asarray(T @ unknowns)
 
 
-def from_sidewise(virtual: VirtualMesh, basis: Basis, displacement: _Floats) -> _Floats:
+def from_sidewise(phantom: PhantomMesh, basis: Basis, displacement: _Floats) -> _Floats:
     """Unknowns (n + enriched, d) of another basis from the side-wise displacement (N, d)."""
-    _check_count(displacement, virtual.node_count, "displacements")
-    own, other, sign = _pairs(virtual)
-    nodes = len(virtual.mesh.points)
+    _check_count(displacement, phantom.node_count, "displacements")
+    own, other, sign = _pairs(phantom)
+    nodes = len(phantom.mesh.points)
     jump = sign[:, None] * (displacement[own] - displacement[other])
     if basis == "shifted":
         return np.concatenate([displacement[:nodes], jump])
@@ -72,10 +72,10 @@ def from_sidewise(virtual: VirtualMesh, basis: Basis, displacement: _Floats) -> 
     raise XfemError(f"basis '{basis}'; expected shifted or heaviside")
 
 
-def transformed_matrix(virtual: VirtualMesh, basis: Basis, matrix: csr_array) -> csr_array:
+def transformed_matrix(phantom: PhantomMesh, basis: Basis, matrix: csr_array) -> csr_array:
     """Tᵀ K T for a matrix (N·d, N·d) with d components per node."""
-    dim = matrix.shape[0] // virtual.node_count
-    full = kron(transformation(virtual, basis), identity(dim), format="csr")
+    dim = matrix.shape[0] // phantom.node_count
+    full = kron(transformation(phantom, basis), identity(dim), format="csr")
     return csr_array(full.T @ matrix @ full)
 
 
@@ -84,23 +84,23 @@ def _check_count(values: _Floats, count: int, what: str) -> None:
         raise XfemError(f"{what} of shape {np.shape(values)}; expected ({count}, d)")
 
 
-def _pairs(virtual: VirtualMesh) -> tuple[_Ints, _Ints, _Floats]:
+def _pairs(phantom: PhantomMesh) -> tuple[_Ints, _Ints, _Floats]:
     """Enriched nodes: the unknown on the node's own side, the other, and H of the node."""
-    counts = np.bincount(virtual.node_parent)
+    counts = np.bincount(phantom.node_parent)
     if (counts > 2).any():
         raise BasisError(
             f"node {int(np.argmax(counts > 2))} has {counts.max()} unknowns; the shifted and "
             "Heaviside bases need one cut per element, use the side-wise one"
         )
-    own = virtual.enriched_nodes
+    own = phantom.enriched_nodes
     place = np.full(len(counts), -1)
-    place[virtual.node_parent[len(counts) :]] = np.arange(len(counts), virtual.node_count)
+    place[phantom.node_parent[len(counts) :]] = np.arange(len(counts), phantom.node_count)
     other = place[own]
-    apart = virtual.node_side[own] != virtual.node_side[other]
+    apart = phantom.node_side[own] != phantom.node_side[other]
     if not (apart.sum(axis=1) == 1).all():
         at = own[int(np.argmax(apart.sum(axis=1) != 1))]
         raise BasisError(f"no single cut separates the two unknowns of node {at}")
     if not len(own):  # nothing is cut
         return own, other, np.zeros(0)
     cut = apart.argmax(axis=1)
-    return own, other, virtual.node_side[own, cut].astype(float)
+    return own, other, phantom.node_side[own, cut].astype(float)

@@ -152,10 +152,10 @@ class DynamicBody:
     damping: RayleighDamping = field(default_factory=RayleighDamping)
 
     def __post_init__(self) -> None:
-        virtual = self.force.virtual
+        phantom = self.force.phantom
         if self.force.is_membrane and not self.force.is_corotational:
             raise XfemError("linear kinematics of a membrane in motion; expected corotational")
-        self.shape: tuple[int, int] = (virtual.node_count, virtual.mesh.space)
+        self.shape: tuple[int, int] = (phantom.node_count, phantom.mesh.space)
         if len(self.mass.weights) != self.shape[0]:
             raise XfemError(
                 f"mass of {len(self.mass.weights)} dof nodes; the body has {self.shape[0]}"
@@ -172,10 +172,10 @@ class DynamicBody:
         if not isinstance(self.damping, RayleighDamping):
             raise XfemError(f"damping {self.damping!r}; expected RayleighDamping")
         if self.supports is None:
-            self.supports = Supports.none(virtual)
+            self.supports = Supports.none(phantom)
         penalised = self.force if isinstance(self.force, PenalisedForce) else None
         couplings = penalised.ghost.couplings if penalised else None
-        self.pattern = self.mass.pattern(virtual, couplings)
+        self.pattern = self.mass.pattern(phantom, couplings)
         self._hold(self.supports)
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -224,8 +224,8 @@ class DynamicBody:
 
     def step_solver(self, tolerance: float) -> LinearSolver:
         """Make the linear solver of implicit steps; the tolerance is that of iterations."""
-        virtual, held = self.force.virtual, self.fixed.all(axis=1)
-        solid = virtual.mesh.dim == 3
+        phantom, held = self.force.phantom, self.fixed.all(axis=1)
+        solid = phantom.mesh.dim == 3
         return self.force.kernels.step(self.pattern, self.shape[1], held, solid, tolerance)
 
     def rest(self) -> MotionState:

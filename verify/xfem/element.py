@@ -21,8 +21,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from verify.xfem.elasticity import Material
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import adjugate
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = [
     "Elements",
@@ -93,7 +93,7 @@ class Elements(NamedTuple):
         )
 
 
-def elements_of(virtual: VirtualMesh, material: Material) -> Elements:
+def elements_of(phantom: PhantomMesh, material: Material) -> Elements:
     """Elements of a cut body.
 
     Raises
@@ -101,7 +101,7 @@ def elements_of(virtual: VirtualMesh, material: Material) -> Elements:
     XfemError
         If the material has neither one value nor one per cell of the uncut mesh.
     """
-    mesh = virtual.mesh
+    mesh = phantom.mesh
     normals = np.zeros((1, mesh.space))
     if mesh.dim < mesh.space:
         normals = np.cross(mesh.edge_vectors[:, 0], mesh.edge_vectors[:, 1])
@@ -110,7 +110,7 @@ def elements_of(virtual: VirtualMesh, material: Material) -> Elements:
     gradients = np.ascontiguousarray(mesh.gradients)
     axes, corners = tuple(range(mesh.space)), tuple(range(mesh.dim + 1))
     return Elements(
-        virtual.cells, virtual.parent, gradients, virtual.volumes, normals, lam, mu, axes, corners
+        phantom.cells, phantom.parent, gradients, phantom.volumes, normals, lam, mu, axes, corners
     )
 
 

@@ -139,7 +139,7 @@ class BalanceRecorder:
         body = self.body
         assert body.weight is not None
         momenta = body.mass.apply(state.velocity)
-        position = body.force.virtual.node_points + state.displacement
+        position = body.force.phantom.node_points + state.displacement
         energies = [
             state.time,
             0.5 * np.sum(state.velocity * momenta),

@@ -125,7 +125,7 @@ class EnergyMomentum(NewtonIntegrator):
         if not self._takes_all:
             super()._add_stiffness(displacement, kind)
             return
-        v, pattern = force.virtual, self.body.pattern
+        v, pattern = force.phantom, self.body.pattern
         if force.has_one_pass:
             force.evaluate(self._start.displacement)
             self._first[:] = force.rotations

@@ -89,7 +89,7 @@ class LoadPath:
         newton: Newton,
     ) -> None:
         self._force, self._fixed, self._load, self._newton = force, fixed, load, newton
-        self._motions = RigidMotions(force.virtual, fixed) if force.is_corotational else None
+        self._motions = RigidMotions(force.phantom, fixed) if force.is_corotational else None
         self._prescribed = prescribed if self._motions is None else self._along_turns(prescribed)
         self._sampled: dict[float, _Floats] = {}
         self._stable: bool | None = None
@@ -231,14 +231,14 @@ class LoadPath:
 
     def _floor(self) -> float:
         """Round-off of an energy, J."""
-        virtual = self._force.virtual
-        size = float(np.ptp(virtual.mesh.points, axis=0).max())
+        phantom = self._force.phantom
+        size = float(np.ptp(phantom.mesh.points, axis=0).max())
         return _ROUND_OFF * self._newton.largest_stiffness * size**2
 
     def _turns_inside_out(self, before: _Floats, after: _Floats) -> bool:
         if self._force.is_membrane:
             return False
-        volumes = self._force.virtual.volumes
+        volumes = self._force.phantom.volumes
         was, now = (volumes[inverted_cells(self._force, u)].sum() for u in (before, after))
         return bool(now - was > _INVERTED * volumes.sum())
 
@@ -322,8 +322,8 @@ def static_equilibrium(
         If a shape is wrong, a number not finite, or tolerance, load steps or iterations are not
         positive.
     """
-    virtual = force.virtual
-    shape = (virtual.node_count, virtual.mesh.space)
+    phantom = force.phantom
+    shape = (phantom.node_count, phantom.mesh.space)
     if fixed.shape != shape or fixed.dtype != bool:
         raise XfemError(f"supports of shape {fixed.shape}, {fixed.dtype}; expected {shape}, bool")
     if force.is_membrane and not force.is_corotational:

@@ -22,7 +22,7 @@ class SingularStiffnessError(XfemError):
 
     def __init__(self, node: int | None) -> None:
         self.node = node
-        where = "" if node is None else f" (at unknown node {node})"
+        where = "" if node is None else f" (at dof node {node})"
         super().__init__(
             f"the stiffness is not positive definite{where}: a free piece without support, "
             "or a wrong sign"

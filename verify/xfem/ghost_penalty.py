@@ -18,7 +18,7 @@ from verify.xfem.contacts import face_contacts
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, cell_densities
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["DEFAULT_FACTOR", "GhostPenalty"]
 
@@ -33,7 +33,7 @@ class GhostPenalty:
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     material : Material
     factor : float
         γ; dimensionless.
@@ -47,7 +47,7 @@ class GhostPenalty:
     modulus : (f,) float array
         (λ + 2μ) of the stiffer cell, in pascal.
     couplings : (f, 2) int array
-        Unknown nodes on either side of each face that only the penalty couples.
+        Dof nodes on either side of each face that only the penalty couples.
 
     Raises
     ------
@@ -57,22 +57,22 @@ class GhostPenalty:
     """
 
     def __init__(
-        self, virtual: VirtualMesh, material: Material, factor: float = DEFAULT_FACTOR
+        self, phantom: PhantomMesh, material: Material, factor: float = DEFAULT_FACTOR
     ) -> None:
         if not (isinstance(factor, int | float | np.floating) and 0.0 < factor < np.inf):
             raise XfemError(f"ghost penalty with factor {factor!r}; expected a positive one")
-        if virtual.aggregation is not None:
+        if phantom.aggregation is not None:
             raise XfemError("ghost penalty of a body with aggregated cells; expected one or other")
-        if virtual.mesh.dim < virtual.mesh.space:
+        if phantom.mesh.dim < phantom.mesh.space:
             raise XfemError("ghost penalty of a membrane in space; expected a body that fills it")
-        lam, mu = material.of_cells(len(virtual.mesh.cells))
-        self.virtual, self.factor = virtual, factor
-        pieces = np.stack(face_contacts(virtual, near=True))
-        counts_once = virtual.split[pieces].any(axis=0) & (virtual.part[pieces] == pieces).all(
+        lam, mu = material.of_cells(len(phantom.mesh.cells))
+        self.phantom, self.factor = phantom, factor
+        pieces = np.stack(face_contacts(phantom, near=True))
+        counts_once = phantom.split[pieces].any(axis=0) & (phantom.part[pieces] == pieces).all(
             axis=0
         )
         pieces = pieces[:, counts_once]
-        mesh, cells = virtual.mesh, virtual.parent[pieces]
+        mesh, cells = phantom.mesh, phantom.parent[pieces]
         local = (mesh.neighbours[cells[0]] == cells[1][:, None]).argmax(axis=1)
         there = (mesh.neighbours[cells[1]] == cells[0][:, None]).argmax(axis=1)
         faces = np.arange(len(local))
@@ -83,13 +83,13 @@ class GhostPenalty:
         area = mesh.measures[cells[0]] * mesh.dim * steepness
         normal = -slope / steepness[:, None]
         values = [np.einsum("fij,fj->fi", mesh.gradients[c], normal) for c in cells]
-        columns = np.concatenate([virtual.cells[p] for p in pieces], axis=1)
+        columns = np.concatenate([phantom.cells[p] for p in pieces], axis=1)
         rows = np.broadcast_to(faces[:, None], columns.shape)
         jump = np.concatenate([values[0], -values[1]], axis=1)
         self.jumps = csr_array(
             coo_array(
                 (jump.ravel(), (rows.ravel(), columns.ravel())),
-                shape=(len(faces), virtual.node_count),
+                shape=(len(faces), phantom.node_count),
             )
         )
         self.weights = 0.5 * (height + across) * area
@@ -97,7 +97,7 @@ class GhostPenalty:
         self._cells = cells
         self.modulus = self._of_faces(lam + 2.0 * mu)
         self.couplings: _Ints = np.stack(
-            [virtual.cells[pieces[0], local], virtual.cells[pieces[1], there]], axis=1
+            [phantom.cells[pieces[0], local], phantom.cells[pieces[1], there]], axis=1
         )
         self._places: tuple[BlockPattern, _Ints] | None = None
 
@@ -109,7 +109,7 @@ class GhostPenalty:
 
     def pattern(self) -> BlockPattern:
         """Sparsity of stiffness and penalty; its first cells are those of the body."""
-        return body_pattern(self.virtual, self.couplings)
+        return body_pattern(self.phantom, self.couplings)
 
     def add_stiffness(self, pattern: BlockPattern, blocks: _Floats, scale: float = 1.0) -> None:
         """Add `scale` times the penalty to nodal blocks (B, d, d) of a pattern.
@@ -141,13 +141,13 @@ class GhostPenalty:
 
         It does not act on rigid motion: total mass, weight and momenta stay.
         """
-        rho = self._of_faces(cell_densities(self.virtual.mesh, density))
+        rho = self._of_faces(cell_densities(self.phantom.mesh, density))
         weights = self.factor * rho * self._heights**2 * self.weights
         extra = self.jumps.T @ (self.jumps * weights[:, None])
         return Mass(csr_array(mass.matrix + extra), None, mass.weights)
 
     def _of_faces(self, values: NDArray) -> _Floats:
         """Larger of the values of both cells at each face."""
-        each = np.broadcast_to(values, len(self.virtual.mesh.cells))
+        each = np.broadcast_to(values, len(self.phantom.mesh.cells))
         larger: _Floats = each[self._cells].max(axis=0)
         return larger

@@ -192,7 +192,7 @@ class NewtonIntegrator(ABC):
         leaps, self._is_slow = 0, False
         for number in range(self.iterations):
             # round-off of positions, seen through the stiffness
-            noise = np.abs(body.force.virtual.node_points + displacement).max() * self._noise
+            noise = np.abs(body.force.phantom.node_points + displacement).max() * self._noise
             if self._excess(residual, noise) <= self.tolerance * scale:
                 self._left = left
                 return displacement, self._velocity(displacement), forces
@@ -260,11 +260,11 @@ class NewtonIntegrator(ABC):
             return "The iterates left the finite numbers: the step is far too long"
         force = self.body.force
         found = [f"{leaps} of {self.iterations} corrections did not lower the residual"]
-        if force.virtual.mesh.dim == force.virtual.mesh.space:
+        if force.phantom.mesh.dim == force.phantom.mesh.space:
             inverted = inverted_cells(force, displacement)
             if len(inverted) > 0:
                 found.append(
-                    f"{len(inverted)} of {len(force.virtual.cells)} pieces are inside out, the "
+                    f"{len(inverted)} of {len(force.phantom.cells)} pieces are inside out, the "
                     f"first number {inverted[0]}, where the force has no continuous stiffness"
                 )
         return f"{'; '.join(found)}. A shorter step may help"

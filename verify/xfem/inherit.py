@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 from verify.xfem.body import DynamicBody, MotionState, check_state
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import AggregatedMass
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["ancestors", "inherit_state"]
 
 
 def inherit_state(
-    old: VirtualMesh, new: VirtualMesh, state: MotionState, body: DynamicBody | None = None
+    old: PhantomMesh, new: PhantomMesh, state: MotionState, body: DynamicBody | None = None
 ) -> MotionState:
     """State of motion of a body that has been cut further.
 
     Parameters
     ----------
-    old, new : VirtualMesh
+    old, new : PhantomMesh
         On the same uncut mesh; the cuts of the old one come first in the new one, and may have
         grown.
     state : MotionState
@@ -47,14 +47,14 @@ def inherit_state(
     velocity = old.extend(state.velocity)[source]
     if new.aggregation is None:
         return MotionState(displacement, velocity, state.time)
-    if body is None or body.force.virtual is not new or not isinstance(body.mass, AggregatedMass):
+    if body is None or body.force.phantom is not new or not isinstance(body.mass, AggregatedMass):
         raise XfemError("state of a body with aggregated cells; expected that body with its mass")
     own = new.node_corner
     velocity = body.mass.project(velocity, body.fixed, velocity[own])
     return MotionState(displacement[own], velocity, state.time)
 
 
-def ancestors(old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
+def ancestors(old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
     """Corner of the old body from which each corner (N_corners,) of the new one comes.
 
     Corners are dof nodes where no cells are aggregated.
@@ -85,7 +85,7 @@ def ancestors(old: VirtualMesh, new: VirtualMesh) -> NDArray[np.int64]:
     return source
 
 
-def _parts_of(old: VirtualMesh, new: VirtualMesh, cuts: int) -> NDArray[np.int64]:
+def _parts_of(old: PhantomMesh, new: PhantomMesh, cuts: int) -> NDArray[np.int64]:
     """(p,) piece of the old body of which each new piece is a part."""
     starts = np.searchsorted(old.parent, np.arange(len(old.mesh.cells) + 1))
     counts = np.diff(starts)

@@ -24,8 +24,8 @@ from verify.xfem.element import (
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import check_floats
 from verify.xfem.kernels import PLAIN, Kernels, OnePass
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["InternalForce", "Kinematics", "TangentKind", "collapsed_cells", "inverted_cells"]
 
@@ -41,7 +41,7 @@ class InternalForce:
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         Triangles in the plane, tetrahedra, or triangles in space (membranes without bending
         stiffness; their material is in plane stress times the thickness, its unit N/m).
     material : Material
@@ -65,21 +65,21 @@ class InternalForce:
 
     def __init__(
         self,
-        virtual: VirtualMesh,
+        phantom: PhantomMesh,
         material: Material,
         kinematics: Kinematics = "corotational",
         kernels: Kernels = PLAIN,
     ) -> None:
         if kinematics not in get_args(Kinematics):
             raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
-        self.virtual, self.kinematics, self.kernels = virtual, kinematics, kernels
-        self.elements = elements_of(virtual, material)
+        self.phantom, self.kinematics, self.kernels = phantom, kinematics, kernels
+        self.elements = elements_of(phantom, material)
         self.left_out = 0
-        cells, space = len(virtual.cells), virtual.mesh.space
+        cells, space = len(phantom.cells), phantom.mesh.space
         self._rotations = np.tile(np.eye(space), (cells, 1, 1))
         self._quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (cells, 1))  # where rotations start
         self._gradient = np.empty((cells, space, space))
-        self._shape = (virtual.node_count, space)
+        self._shape = (phantom.node_count, space)
         self._pass: OnePass | None = None
         self._passed = False  # whether the last rotations are those of the pass
 
@@ -109,13 +109,13 @@ class InternalForce:
     @property
     def has_one_pass(self) -> bool:
         """Whether `linearise` takes the one pass of the kernels: of tetrahedra that follow none."""
-        solid = self.virtual.mesh.dim == 3 and self.virtual.aggregation is None
+        solid = self.phantom.mesh.dim == 3 and self.phantom.aggregation is None
         return solid and self.kernels.one_pass is not None
 
     def deformation(self, displacement: _Floats) -> _Floats:
         """Deformation gradients (p, d, d), of membranes zero across their plane; overwritten."""
         self._check(displacement=displacement)
-        deform(self.elements, self.virtual.extend(displacement), 1.0, self._gradient)
+        deform(self.elements, self.phantom.extend(displacement), 1.0, self._gradient)
         return self._gradient
 
     def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
@@ -153,17 +153,17 @@ class InternalForce:
             If an array has a wrong shape or type.
         """
         self._check(vector=vector, force=out)
-        deform(self.elements, self.virtual.extend(vector), 0.0, self._gradient)
+        deform(self.elements, self.phantom.extend(vector), 0.0, self._gradient)
         self._restrict_force(self._gradient, 0.0, scale, out)
 
     def _restrict_force(
         self, F: _Floats, share: float, scale: float, out: _Floats, overwrite: bool = False
     ) -> tuple[_Floats, float]:
-        corner_force = np.zeros_like(self.virtual.corners.node_points)
+        corner_force = np.zeros_like(self.phantom.corners.node_points)
         energy = add_force(self.elements, self.rotations, F, share, scale, corner_force)
         if overwrite:
             out[:] = 0.0
-        out += self.virtual.restrict(corner_force)
+        out += self.phantom.restrict(corner_force)
         return out, float(energy)
 
     def _check(self, **arrays: _Floats) -> None:
@@ -173,10 +173,10 @@ class InternalForce:
     def _check_blocks(self, pattern: BlockPattern, blocks: _Floats) -> None:
         space = self._shape[1]
         check_floats("blocks", blocks, (len(pattern.columns), space, space))
-        if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.virtual.cells):
+        if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.phantom.cells):
             raise XfemError(
                 f"pattern of {pattern.node_count} nodes and {len(pattern.targets)} cells; expected "
-                f"that of the body, {self._shape[0]} and {len(self.virtual.cells)}"
+                f"that of the body, {self._shape[0]} and {len(self.phantom.cells)}"
             )
 
     def add_stiffness(
@@ -210,7 +210,7 @@ class InternalForce:
         if kind not in get_args(TangentKind):
             expected = ", ".join(get_args(TangentKind))
             raise XfemError(f"stiffness '{kind}'; expected one of {expected}")
-        targets, added = pattern.targets[: len(self.virtual.cells)], pattern.unfold(blocks)
+        targets, added = pattern.targets[: len(self.phantom.cells)], pattern.unfold(blocks)
         if kind == "rotation-fixed" or not self.is_corotational:
             add_rotation_fixed(self.elements, self.rotations, scale, targets, added)
         elif displacement is None:
@@ -257,7 +257,7 @@ class InternalForce:
         """
         self._check_blocks(pattern, blocks)
         added = pattern.unfold(blocks)
-        targets = pattern.targets[: len(self.virtual.cells)]
+        targets = pattern.targets[: len(self.phantom.cells)]
         self._add_geometric(displacement, least, scale, targets, added)
         pattern.fold(added, blocks)
 
@@ -285,13 +285,13 @@ class InternalForce:
         """
         self._check(vector=vector, force=out)
         stiffness, n = self._geometric(displacement, 0.0)
-        moved = self.virtual.extend(vector)[self.virtual.cells]
+        moved = self.phantom.extend(vector)[self.phantom.cells]
         across = np.einsum("pjk,pk->pj", moved, scale * n)
         out += self.nodal_force((stiffness @ across[:, :, None]) * n[:, None, :])
 
     def nodal_force(self, forces: _Floats) -> _Floats:
         """Sum (N, d) of forces (p, c, d) at the corners of cells."""
-        v = self.virtual
+        v = self.phantom
         nodes, count = v.cells.ravel(), len(v.corners.node_points)
         columns = forces.reshape(-1, forces.shape[2]).T
         return v.restrict(np.stack([np.bincount(nodes, f, count) for f in columns], axis=1))

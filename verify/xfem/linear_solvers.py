@@ -207,5 +207,5 @@ def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> _Floats
     # one pass that allocates nothing tells, but of numbers whose squares overflow
     if not np.vdot(found, found) < np.inf and not np.isfinite(found).all():
         first = int(np.argmin(np.isfinite(found).all(axis=1)))
-        raise XfemError(f"the {name} is not finite, first at unknown node {first}")
+        raise XfemError(f"the {name} is not finite, first at dof node {first}")
     return found

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import index_array, real_array
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.quadrature import simplex_rule
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["body_force", "traction"]
 
@@ -24,12 +24,12 @@ _Ints = NDArray[np.int64]
 Density = Callable[[_Floats, NDArray[np.int8]], _Floats]
 
 
-def body_force(virtual: VirtualMesh, density: ArrayLike | Density, degree: int = 4) -> _Floats:
+def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int = 4) -> _Floats:
     """Nodal forces (N, d) of a force per volume, in newtons (per metre of thickness in 2D).
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     density : (d,) or (m, d) array_like or callable
         Force per volume in N/m³, e.g. ρg, of all cells of the uncut mesh or of each; a function
         of positions and sides.
@@ -37,19 +37,19 @@ def body_force(virtual: VirtualMesh, density: ArrayLike | Density, degree: int =
         Polynomial degree of density times shape function that is integrated exactly on each
         piece, if `density` is a function.
     """
-    load = np.zeros_like(virtual.corners.node_points)
+    load = np.zeros_like(phantom.corners.node_points)
     if not callable(density):
-        force = _of_pieces(virtual, density, load.shape[1])
-        np.add.at(load, virtual.cells, virtual.shape_integrals[:, :, None] * force)
-        return virtual.restrict(load)
-    piece, barycentric, share = virtual.solid_simplices
-    volume = share * virtual.mesh.measures[virtual.parent[piece]]
-    _integrate(virtual, load, piece, barycentric, volume, density, degree)
-    return virtual.restrict(load)
+        force = _of_pieces(phantom, density, load.shape[1])
+        np.add.at(load, phantom.cells, phantom.shape_integrals[:, :, None] * force)
+        return phantom.restrict(load)
+    piece, barycentric, share = phantom.solid_simplices
+    volume = share * phantom.mesh.measures[phantom.parent[piece]]
+    _integrate(phantom, load, piece, barycentric, volume, density, degree)
+    return phantom.restrict(load)
 
 
 def traction(
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     facets: ArrayLike,
     density: ArrayLike | Density,
     degree: int = 4,
@@ -58,7 +58,7 @@ def traction(
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     facets : (b, 2) array_like of int
         Pairs (cell, local node opposite to the facet) of the uncut mesh, such as rows of
         ``mesh.boundary_facets``.
@@ -73,7 +73,7 @@ def traction(
         If a facet does not exist, or the density or the degree makes no sense.
     """
     chosen = index_array(facets, "loaded facets")
-    mesh = virtual.mesh
+    mesh = phantom.mesh
     if chosen.size == 0:
         chosen = chosen.reshape(0, 2)
     if chosen.ndim != 2 or chosen.shape[1] != 2:
@@ -82,26 +82,26 @@ def traction(
         chosen.min() < 0 or chosen[:, 0].max() >= len(mesh.cells) or chosen[:, 1].max() > mesh.dim
     ):
         raise XfemError("a loaded facet is not a pair (cell, local node) of the mesh")
-    load = np.zeros_like(virtual.corners.node_points)
+    load = np.zeros_like(phantom.corners.node_points)
     function = density if callable(density) else _constant(_vector(density, load.shape[1]))
     for local in range(mesh.dim + 1):
         cells = chosen[chosen[:, 1] == local, 0]
-        piece, corners, area = _facet_parts(virtual, cells, local)
-        _integrate(virtual, load, piece, corners, area, function, degree)
-    return virtual.restrict(load)
+        piece, corners, area = _facet_parts(phantom, cells, local)
+        _integrate(phantom, load, piece, corners, area, function, degree)
+    return phantom.restrict(load)
 
 
-def _of_pieces(virtual: VirtualMesh, density: ArrayLike, dim: int) -> _Floats:
+def _of_pieces(phantom: PhantomMesh, density: ArrayLike, dim: int) -> _Floats:
     """Force per volume, one (d,) or that of each piece's cell (pieces, 1, d)."""
     force = real_array(density, "load density")
     if force.ndim < 2:
         return _vector(force, dim)
-    if force.shape != (len(virtual.mesh.cells), dim) or not np.isfinite(force).all():
+    if force.shape != (len(phantom.mesh.cells), dim) or not np.isfinite(force).all():
         raise XfemError(
             f"load density of shape {force.shape} or not finite; expected ({dim},) or "
-            f"({len(virtual.mesh.cells)}, {dim})"
+            f"({len(phantom.mesh.cells)}, {dim})"
         )
-    return force[virtual.parent][:, None, :]
+    return force[phantom.parent][:, None, :]
 
 
 def _vector(density: ArrayLike, dim: int) -> _Floats:
@@ -115,17 +115,17 @@ def _constant(force: _Floats) -> Density:
     return lambda points, sides: np.broadcast_to(force, points.shape)
 
 
-def _facet_parts(virtual: VirtualMesh, cells: _Ints, local: int) -> tuple[_Ints, _Floats, _Floats]:
+def _facet_parts(phantom: PhantomMesh, cells: _Ints, local: int) -> tuple[_Ints, _Floats, _Floats]:
     """Simplices of the facets opposite to a corner: piece, barycentric corners, measure."""
-    mesh = virtual.mesh
+    mesh = phantom.mesh
     others = [k for k in range(mesh.dim + 1) if k != local]
     # |∇λ| = 1/height and V = height·A/d
     height = 1.0 / np.linalg.norm(mesh.gradients[:, local], axis=1)
     area = mesh.measures * mesh.dim / height
     wanted = np.zeros(len(mesh.cells), dtype=bool)
     wanted[cells] = True
-    piece, barycentric, _ = virtual.solid_simplices
-    cell = virtual.parent[piece]
+    piece, barycentric, _ = phantom.solid_simplices
+    cell = phantom.parent[piece]
     here = np.flatnonzero(wanted[cell])
     found_piece, found_corners, found_area = [], [], []
     for opposite in range(mesh.dim + 1):
@@ -139,7 +139,7 @@ def _facet_parts(virtual: VirtualMesh, cells: _Ints, local: int) -> tuple[_Ints,
 
 
 def _integrate(
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     load: _Floats,
     piece: _Ints,
     corners: _Floats,
@@ -153,8 +153,8 @@ def _integrate(
     if not isinstance(degree, int | np.integer) or degree < 0:
         raise XfemError(f"quadrature of degree {degree!r}; expected an integer, 0 or more")
     rule, weights = simplex_rule(corners.shape[1] - 1, degree)
-    nodes = virtual.mesh.points[virtual.mesh.cells[virtual.parent[piece]]]
-    sides = virtual.piece_side[piece]
+    nodes = phantom.mesh.points[phantom.mesh.cells[phantom.parent[piece]]]
+    sides = phantom.piece_side[piece]
     for point, weight in zip(rule, weights, strict=True):
         shape = np.einsum("k,qki->qi", point, corners)
         given = density(np.einsum("qi,qij->qj", shape, nodes), sides)
@@ -165,4 +165,4 @@ def _integrate(
                 f"({len(piece)}, {load.shape[1]})"
             )
         share = (weight * measure)[:, None] * shape
-        np.add.at(load, virtual.cells[piece], share[:, :, None] * force[:, None, :])
+        np.add.at(load, phantom.cells[piece], share[:, :, None] * force[:, None, :])

@@ -1,6 +1,6 @@
-"""Mass of a cut body, as a scalar matrix on unknown nodes (the same for every component).
+"""Mass of a cut body, as a scalar matrix on dof nodes (the same for every component).
 
-Side-wise lumping gives each unknown node its share ρ V_piece/n of the pieces around it. It is
+Side-wise lumping gives each dof node its share ρ V_piece/n of the pieces around it. It is
 diagonal, conserves the mass of every piece exactly, and bounds the explicit step by that of the
 uncut elements, however small the pieces. The consistent mass integrates shape functions exactly.
 The lumpings that the thesis compares live in the shifted basis: see `verify.xfem.mass_shifted`.
@@ -19,7 +19,7 @@ from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import real_array
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.virtual import Aggregation, VirtualMesh
+from verify.xfem.phantom import Aggregation, PhantomMesh
 
 __all__ = [
     "AggregatedMass",
@@ -102,7 +102,7 @@ class Mass:
             raise XfemError(f"gravity {gravity!r}; expected a finite vector")
         return self.weights[:, None] * field
 
-    def pattern(self, virtual: VirtualMesh, couplings: _Ints | None = None) -> BlockPattern:
+    def pattern(self, phantom: PhantomMesh, couplings: _Ints | None = None) -> BlockPattern:
         """Sparsity of stiffness and mass together; its first cells are those of the body.
 
         The lumpings of the thesis couple the unknowns of one node, and the mass of a ghost
@@ -110,18 +110,18 @@ class Mass:
 
         Parameters
         ----------
-        virtual : VirtualMesh
+        phantom : PhantomMesh
         couplings : (k, 2) int array, optional
-            Further pairs of unknown nodes that are to be coupled.
+            Further pairs of dof nodes that are to be coupled.
         """
         own = np.empty((0, 2), dtype=np.int64) if couplings is None else couplings
         if self.diagonal is None:
             rows, columns, _ = self.entries
             upper = rows < columns
             pairs = np.stack([rows[upper], columns[upper]], axis=1)
-            _, found = find_places(body_pattern(virtual), pairs[:, 0], pairs[:, 1])
+            _, found = find_places(body_pattern(phantom), pairs[:, 0], pairs[:, 1])
             own = np.concatenate([own, pairs[~found]])
-        return body_pattern(virtual, own)
+        return body_pattern(phantom, own)
 
     def places(self, pattern: BlockPattern) -> _Ints:
         """Block of each of the `entries` in a pattern.
@@ -217,20 +217,20 @@ def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> _Floats:
     return np.broadcast_to(values, count)
 
 
-def side_wise_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
+def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     """Side-wise lumped mass: diag(ρ V_piece/n) in side-wise unknowns.
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     density : float or (m,) array_like
         In kg/m³; for membranes times the thickness.
     """
-    if virtual.aggregation is not None:
-        return AggregatedMass.of(side_wise_mass(virtual.corners, density), virtual.aggregation)
-    corners = virtual.cells.shape[1]
-    share = virtual.volumes * cell_densities(virtual.mesh, density)[virtual.parent] / corners
-    weights = np.bincount(virtual.cells.ravel(), np.repeat(share, corners))
+    if phantom.aggregation is not None:
+        return AggregatedMass.of(side_wise_mass(phantom.corners, density), phantom.aggregation)
+    corners = phantom.cells.shape[1]
+    share = phantom.volumes * cell_densities(phantom.mesh, density)[phantom.parent] / corners
+    weights = np.bincount(phantom.cells.ravel(), np.repeat(share, corners))
     root = _diagonal_matrix(1.0 / np.sqrt(weights))
     return Mass(matrix=_diagonal_matrix(weights), root=root, weights=weights)
 
@@ -240,34 +240,34 @@ def _diagonal_matrix(values: _Floats) -> csr_array:
     return csr_array((values, rows[:-1], rows), shape=(len(values), len(values)))
 
 
-def second_moments(virtual: VirtualMesh) -> _Floats:
+def second_moments(phantom: PhantomMesh) -> _Floats:
     """(p, d + 1, d + 1) exact integrals of N_i N_j over each piece, in m^d."""
-    corners = virtual.cells.shape[1]
+    corners = phantom.cells.shape[1]
     whole = (np.ones((corners, corners)) + np.eye(corners)) / (corners * (corners + 1))
-    moments = virtual.volumes[:, None, None] * whole
-    moments[virtual.split] = 0.0
-    sub = virtual.sub_cells
+    moments = phantom.volumes[:, None, None] * whole
+    moments[phantom.split] = 0.0
+    sub = phantom.sub_cells
     vertex_sum = sub.barycentric.sum(axis=1)
     products = np.einsum("kvi,kvj->kij", sub.barycentric, sub.barycentric)
     products += vertex_sum[:, :, None] * vertex_sum[:, None, :]
-    volume = sub.fraction * virtual.mesh.measures[virtual.parent[sub.piece]]
+    volume = sub.fraction * phantom.mesh.measures[phantom.parent[sub.piece]]
     products *= (volume / (corners * (corners + 1)))[:, None, None]
     np.add.at(moments, sub.piece, products)
     return moments
 
 
-def consistent_mass(virtual: VirtualMesh, density: ArrayLike) -> Mass:
+def consistent_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     """Consistent mass (2.72–75) in side-wise unknowns: ∫ρ N_i N_j over each piece.
 
     Its explicit step vanishes with the smallest piece.
     """
-    if virtual.aggregation is not None:
-        return AggregatedMass.of(consistent_mass(virtual.corners, density), virtual.aggregation)
-    moments = second_moments(virtual)
-    moments *= cell_densities(virtual.mesh, density)[virtual.parent][:, None, None]
-    rows = np.broadcast_to(virtual.cells[:, :, None], moments.shape)
-    columns = np.broadcast_to(virtual.cells[:, None, :], moments.shape)
-    count = virtual.node_count
+    if phantom.aggregation is not None:
+        return AggregatedMass.of(consistent_mass(phantom.corners, density), phantom.aggregation)
+    moments = second_moments(phantom)
+    moments *= cell_densities(phantom.mesh, density)[phantom.parent][:, None, None]
+    rows = np.broadcast_to(phantom.cells[:, :, None], moments.shape)
+    columns = np.broadcast_to(phantom.cells[:, None, :], moments.shape)
+    count = phantom.node_count
     entries = (moments.ravel(), (rows.ravel(), columns.ravel()))
     matrix = csr_array(coo_array(entries, shape=(count, count)))
     return Mass(matrix=matrix, root=None, weights=np.asarray(matrix.sum(axis=1)).ravel())

@@ -17,19 +17,19 @@ from scipy.sparse import coo_array, csr_array, diags_array
 
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import AggregatedMass, Mass, cell_densities, second_moments, side_wise_mass
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["ShiftedLumping", "shifted_mass"]
 
 ShiftedLumping = Literal["enrichment", "row sum", "weighted diagonal"]
 
 
-def shifted_mass(virtual: VirtualMesh, density: ArrayLike, lumping: ShiftedLumping) -> Mass:
+def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumping) -> Mass:
     """Mass lumped in the shifted basis, in side-wise unknowns.
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         At most one cut through any element: no node has more than two unknowns.
     density : float or (m,) array_like
         In kg/m³.
@@ -45,20 +45,20 @@ def shifted_mass(virtual: VirtualMesh, density: ArrayLike, lumping: ShiftedLumpi
     """
     if lumping not in ("enrichment", "row sum", "weighted diagonal"):
         raise XfemError(f"lumping '{lumping}'; expected enrichment, row sum or weighted diagonal")
-    if virtual.aggregation is not None:
-        whole = shifted_mass(virtual.corners, density, lumping)
-        return AggregatedMass.of(whole, virtual.aggregation)
-    count, nodes = virtual.node_count, len(virtual.mesh.points)
-    unknowns = np.bincount(virtual.node_parent)
+    if phantom.aggregation is not None:
+        whole = shifted_mass(phantom.corners, density, lumping)
+        return AggregatedMass.of(whole, phantom.aggregation)
+    count, nodes = phantom.node_count, len(phantom.mesh.points)
+    unknowns = np.bincount(phantom.node_parent)
     if unknowns.max() > 2:
         raise XfemError(
             f"node {int(np.argmax(unknowns))} has {unknowns.max()} unknowns; the lumpings in the "
             "shifted basis are defined for one cut per element"
         )
-    side_wise = side_wise_mass(virtual, density)
-    own = np.bincount(virtual.node_parent, side_wise.weights)
-    enriched = _enriched_mass(virtual, density, lumping, side_wise)
-    base = virtual.node_parent[nodes:]
+    side_wise = side_wise_mass(phantom, density)
+    own = np.bincount(phantom.node_parent, side_wise.weights)
+    enriched = _enriched_mass(phantom, density, lumping, side_wise)
+    base = phantom.node_parent[nodes:]
     extra = np.arange(nodes, count)
     rows = np.concatenate([np.arange(nodes), base, base, extra, extra])
     columns = np.concatenate([np.arange(nodes), base, extra, base, extra])
@@ -77,24 +77,24 @@ def shifted_mass(virtual: VirtualMesh, density: ArrayLike, lumping: ShiftedLumpi
 
 
 def _enriched_mass(
-    virtual: VirtualMesh, density: ArrayLike, lumping: ShiftedLumping, side_wise: Mass
+    phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumping, side_wise: Mass
 ) -> NDArray[np.float64]:
     """M^aa of the nodes with a second unknown, in the order of these unknowns."""
-    nodes = len(virtual.mesh.points)
+    nodes = len(phantom.mesh.points)
     if lumping == "enrichment":
         return side_wise.weights[nodes:]
-    enriched = virtual.cells >= nodes
-    moments = second_moments(virtual)
-    moments *= cell_densities(virtual.mesh, density)[virtual.parent][:, None, None]
+    enriched = phantom.cells >= nodes
+    moments = second_moments(phantom)
+    moments *= cell_densities(phantom.mesh, density)[phantom.parent][:, None, None]
     # ψ_i ψ_j is 1 where both nodes lie across the cut from the piece, and 0 elsewhere
     moments *= enriched[:, :, None] & enriched[:, None, :]
     share = moments.sum(axis=2)
     if lumping == "weighted diagonal":
         diagonal = np.einsum("pii->pi", moments)
-        of_cell = len(virtual.mesh.cells)
-        total = np.bincount(virtual.parent, moments.sum(axis=(1, 2)), minlength=of_cell)
-        traced = np.bincount(virtual.parent, diagonal.sum(axis=1), minlength=of_cell)
+        of_cell = len(phantom.mesh.cells)
+        total = np.bincount(phantom.parent, moments.sum(axis=(1, 2)), minlength=of_cell)
+        traced = np.bincount(phantom.parent, diagonal.sum(axis=1), minlength=of_cell)
         scale = np.divide(total, traced, out=np.zeros(of_cell), where=traced > 0.0)
-        share = diagonal * scale[virtual.parent][:, None]
-    summed = np.bincount(virtual.cells[enriched], share[enriched], minlength=virtual.node_count)
+        share = diagonal * scale[phantom.parent][:, None]
+    summed = np.bincount(phantom.cells[enriched], share[enriched], minlength=phantom.node_count)
     return summed[nodes:]

@@ -18,8 +18,8 @@ from verify.xfem.internal_force import InternalForce, Kinematics
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import DEFAULT_POLICY, DEFAULT_THRESHOLD, SliverReport, treat_slivers
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["MotionPolicy", "TreatedBody", "treat_moving_body"]
 
@@ -32,7 +32,7 @@ class TreatedBody:
 
     Attributes
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         The body as it is computed; supports and loads are those of this mesh.
     force : InternalForce
         With the penalty if there is one.
@@ -44,7 +44,7 @@ class TreatedBody:
         The penalty: its `factor`, and one entry of `weights` per face penalised.
     """
 
-    virtual: VirtualMesh
+    phantom: PhantomMesh
     force: InternalForce
     mass: Mass
     slivers: SliverReport
@@ -67,7 +67,7 @@ class TreatedBody:
 
 
 def treat_moving_body(
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     material: Material,
     density: NDArray[np.float64] | float,
     policy: MotionPolicy = DEFAULT_POLICY,
@@ -81,7 +81,7 @@ def treat_moving_body(
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     material : Material
     density : float or (m,) array
         In kg/m³.
@@ -104,10 +104,10 @@ def treat_moving_body(
         expected = ", ".join(get_args(MotionPolicy))
         raise XfemError(f"sliver policy '{policy}'; expected one of {expected}")
     if policy != "penalise":
-        treated, report = treat_slivers(virtual, policy, threshold, held)
+        treated, report = treat_slivers(phantom, policy, threshold, held)
         force = InternalForce(treated, material, kinematics, kernels)
         return TreatedBody(treated, force, side_wise_mass(treated, density), report, None)
-    treated, report = treat_slivers(virtual, "keep", threshold)
+    treated, report = treat_slivers(phantom, "keep", threshold)
     ghost = GhostPenalty(treated, material, factor)
     force = PenalisedForce(treated, material, ghost, kinematics, kernels)
     mass = ghost.mass(side_wise_mass(treated, density), density)

@@ -13,7 +13,7 @@ from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.kernels import PLAIN, Kernels
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["PenalisedForce"]
 
@@ -25,7 +25,7 @@ class PenalisedForce(InternalForce):
 
     Parameters
     ----------
-    virtual, material, kinematics, kernels
+    phantom, material, kinematics, kernels
         As for `InternalForce`.
     ghost : GhostPenalty
         Of the same body.
@@ -43,14 +43,14 @@ class PenalisedForce(InternalForce):
 
     def __init__(
         self,
-        virtual: VirtualMesh,
+        phantom: PhantomMesh,
         material: Material,
         ghost: GhostPenalty,
         kinematics: Kinematics = "corotational",
         kernels: Kernels = PLAIN,
     ) -> None:
-        super().__init__(virtual, material, kinematics, kernels)
-        if ghost.virtual is not virtual:
+        super().__init__(phantom, material, kinematics, kernels)
+        if ghost.phantom is not phantom:
             raise XfemError("the ghost penalty belongs to another body; expected one of this one")
         self.ghost = ghost
         self.penalty_energy = 0.0

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["RigidMotions", "nearest_rotation", "part_of_rotation"]
 
@@ -25,16 +25,16 @@ class RigidMotions:
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     fixed : (N, d) bool array
         Components that are prescribed. Nodes held in all components determine the motion; a body
         without such a node stays where it is.
     """
 
-    def __init__(self, virtual: VirtualMesh, fixed: NDArray[np.bool_]) -> None:
-        self._points = virtual.node_points
+    def __init__(self, phantom: PhantomMesh, fixed: NDArray[np.bool_]) -> None:
+        self._points = phantom.node_points
         whole = fixed.all(axis=1)
-        bodies = virtual.bodies
+        bodies = phantom.bodies
         held = np.flatnonzero(whole)
         count = np.bincount(bodies[held], minlength=int(bodies.max(initial=-1)) + 1)
         ends = np.cumsum(count)
@@ -44,7 +44,7 @@ class RigidMotions:
         size = np.bincount(bodies)
         self._nodes = [inside[end - n : end] for end, n in zip(np.cumsum(size), size, strict=True)]
         # corners that follow others have number −1: not held
-        self._edges = _edges_within(virtual.corner_node[virtual.cells], np.append(whole, False))
+        self._edges = _edges_within(phantom.corner_node[phantom.cells], np.append(whole, False))
 
     def follow(self, displacement: _Floats, change: _Floats) -> _Floats:
         """Displacement (N, d) after each body has followed the `change` (N, d) of its supports.

@@ -50,9 +50,9 @@ def node_sides(
     node_parent : (N,) int array
         Node of each unknown; the first n are those of the nodes' own material.
     cells : (p, d + 1) int array
-        Unknown nodes of each piece.
+        Dof nodes of each piece.
     label : (p, cuts) int8 array
-        Its sides, as in `VirtualMesh`.
+        Its sides, as in `PhantomMesh`.
     pieces : PieceSides
         Of the pieces that are not just their whole cells.
     """
@@ -90,7 +90,7 @@ def piece_sides(
         Nodes of the cell of each piece.
     label : (p, cuts) int8 array
     sub_piece, sub_barycentric, sub_fraction
-        See `verify.xfem.virtual.SubCells`.
+        See `verify.xfem.phantom.SubCells`.
     """
     share = np.bincount(sub_piece, sub_fraction, minlength=len(label))
     rows = np.flatnonzero(share > 0.0)

@@ -34,8 +34,8 @@ from verify.xfem.absorption import absorb
 from verify.xfem.aggregation import aggregate
 from verify.xfem.contacts import face_contacts, sibling_contacts
 from verify.xfem.errors import XfemError
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, loose_bodies
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = [
     "DEFAULT_POLICY",
@@ -102,21 +102,21 @@ class SliverReport:
 
 
 def treat_slivers(
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     policy: SliverPolicy = DEFAULT_POLICY,
     threshold: float = DEFAULT_THRESHOLD,
     held: _Bools | None = None,
-) -> tuple[VirtualMesh, SliverReport]:
+) -> tuple[PhantomMesh, SliverReport]:
     """Apply a sliver policy to a cut mesh.
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
     policy : {"keep", "drop", "merge"}
     threshold : float
         Volume fraction in (0, ½) below which a piece is a sliver.
     held : (N,) bool array, optional
-        Unknown nodes that a support is going to hold. Aggregation leaves them their unknown, so
+        Dof nodes that a support is going to hold. Aggregation leaves them their unknown, so
         that a prescribed value is what they have; elsewhere a root decides.
 
     Raises
@@ -128,25 +128,25 @@ def treat_slivers(
         raise XfemError(f"sliver policy '{policy}'; expected keep, drop or merge")
     if not (isinstance(threshold, float | np.floating) and 0.0 < threshold < 0.5):
         raise XfemError(f"sliver threshold {threshold!r}; expected a volume fraction in (0, 0.5)")
-    virtual = virtual.corners
-    kept_nodes = np.zeros(virtual.node_count, dtype=bool) if held is None else np.asarray(held)
-    if kept_nodes.shape != (virtual.node_count,) or kept_nodes.dtype != bool:
+    phantom = phantom.corners
+    kept_nodes = np.zeros(phantom.node_count, dtype=bool) if held is None else np.asarray(held)
+    if kept_nodes.shape != (phantom.node_count,) or kept_nodes.dtype != bool:
         raise XfemError(
             f"held nodes: {kept_nodes.dtype} array of shape {kept_nodes.shape}; expected bool and "
-            f"({virtual.node_count},)"
+            f"({phantom.node_count},)"
         )
-    small = virtual.part_fraction < threshold
+    small = phantom.part_fraction < threshold
     # a cell of many pieces keeps its largest one whatever its size
-    largest = np.isin(virtual.part, virtual.part[_largest_siblings(virtual)])
+    largest = np.isin(phantom.part, phantom.part[_largest_siblings(phantom)])
     small[largest] = False
     nothing = np.zeros_like(small)
-    treated, dropped, following, rootless = virtual, nothing, nothing, nothing
-    extension, node = csr_array(identity(virtual.node_count)), np.arange(virtual.node_count)
+    treated, dropped, following, rootless = phantom, nothing, nothing, nothing
+    extension, node = csr_array(identity(phantom.node_count)), np.arange(phantom.node_count)
     if policy == "drop" and small.any():
-        dropped = small & ~_bridges(virtual, small)
-        treated, extension, node = absorb(virtual, _siblings(virtual, dropped))
+        dropped = small & ~_bridges(phantom, small)
+        treated, extension, node = absorb(phantom, _siblings(phantom, dropped))
     elif policy == "merge" and small.any():
-        treated, roots = aggregate(virtual, small, kept_nodes)
+        treated, roots = aggregate(phantom, small, kept_nodes)
         following, rootless = roots.following, roots.rootless
         if treated.aggregation is not None:
             extension, node = treated.aggregation.extension, treated.aggregation.node
@@ -158,17 +158,17 @@ def treat_slivers(
         aggregated=int(following.sum()),
         kept=int((small & ~changed).sum()),
         rootless=int((rootless & ~following).sum()),
-        largest=float(virtual.fraction[changed].max(initial=0.0)),
-        volume_share=float(virtual.volumes[changed].sum() / virtual.volumes.sum()),
+        largest=float(phantom.fraction[changed].max(initial=0.0)),
+        volume_share=float(phantom.volumes[changed].sum() / phantom.volumes.sum()),
         extension=extension,
         node=node,
     )
 
 
-def _bridges(virtual: VirtualMesh, small: _Bools) -> _Bools:
+def _bridges(phantom: PhantomMesh, small: _Bools) -> _Bools:
     """Which small pieces hold parts of the body together; the whole body only if need be."""
-    suspects = _torn(face_contacts(virtual, near=True), small)
-    return _torn(face_contacts(virtual), small) if suspects.any() else suspects
+    suspects = _torn(face_contacts(phantom, near=True), small)
+    return _torn(face_contacts(phantom), small) if suspects.any() else suspects
 
 
 def _torn(contacts: tuple[_Ints, _Ints], removed: _Bools) -> _Bools:
@@ -190,32 +190,32 @@ def _torn(contacts: tuple[_Ints, _Ints], removed: _Bools) -> _Bools:
     return torn
 
 
-def _largest_siblings(virtual: VirtualMesh) -> _Ints:
+def _largest_siblings(phantom: PhantomMesh) -> _Ints:
     """Return the largest piece of each cell."""
-    parent, fraction = virtual.parent, virtual.part_fraction
+    parent, fraction = phantom.parent, phantom.part_fraction
     most = np.maximum.reduceat(fraction, np.flatnonzero(np.diff(parent, prepend=-1)))
     candidates = np.flatnonzero(fraction == most[parent])
     largest: _Ints = candidates[np.diff(parent[candidates], append=-1) != 0]
     return largest
 
 
-def _siblings(virtual: VirtualMesh, small: _Bools) -> _Ints:
+def _siblings(phantom: PhantomMesh, small: _Bools) -> _Ints:
     """(p,) the sibling that absorbs each small piece: among the larger ones, most in contact."""
-    largest = np.full(len(virtual.mesh.cells), -1)
-    best = _largest_siblings(virtual)
-    largest[virtual.parent[best]] = best
+    largest = np.full(len(phantom.mesh.cells), -1)
+    best = _largest_siblings(phantom)
+    largest[phantom.parent[best]] = best
     into = np.arange(len(small))
-    into[small] = largest[virtual.parent[small]]
-    first, second, area = sibling_contacts(virtual, virtual.parent[small])
-    share = virtual.part_fraction
+    into[small] = largest[phantom.parent[small]]
+    first, second, area = sibling_contacts(phantom, phantom.parent[small])
+    share = phantom.part_fraction
     upward = small[first] & (share[second] > share[first])
-    first, second, area = virtual.part[first[upward]], second[upward], area[upward]
+    first, second, area = phantom.part[first[upward]], second[upward], area[upward]
     pairs, back = np.unique(np.stack([first, second]), axis=1, return_inverse=True)
     total = np.bincount(back.ravel(), area, minlength=pairs.shape[1])
     order = np.lexsort([total, pairs[0]])
     last = np.diff(pairs[0][order], append=-1) != 0
     into[pairs[0][order[last]]] = pairs[1][order[last]]
-    into[small] = into[virtual.part[small]]
+    into[small] = into[phantom.part[small]]
     return _followed_to_the_end(into)
 
 
@@ -242,34 +242,34 @@ class Specks:
     largest: float
 
 
-def join_specks(virtual: VirtualMesh, supports: Supports) -> tuple[VirtualMesh, Specks]:
+def join_specks(phantom: PhantomMesh, supports: Supports) -> tuple[PhantomMesh, Specks]:
     """Join loose parts of less than a thousandth of an element across to the pieces beside them.
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         Before a sliver policy.
     supports : Supports
         Of its unknowns: a part that they hold is left alone.
 
     Returns
     -------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         The same object if there is no speck.
     specks : Specks
     """
-    body = virtual.bodies[virtual.cells[:, 0]]
-    share = np.bincount(body, virtual.fraction)
-    small = np.flatnonzero(share <= _ACROSS**virtual.mesh.dim)
-    specks = loose_bodies(virtual, supports, small)
+    body = phantom.bodies[phantom.cells[:, 0]]
+    share = np.bincount(body, phantom.fraction)
+    small = np.flatnonzero(share <= _ACROSS**phantom.mesh.dim)
+    specks = loose_bodies(phantom, supports, small)
     if not len(specks):
-        return virtual, Specks(0, 0.0)
+        return phantom, Specks(0, 0.0)
     is_speck = np.isin(body, specks)
     # the largest piece of each cell comes first; it is no speck, as fractions add up to one
-    order = np.lexsort([-virtual.fraction, virtual.parent])
-    first = order[np.diff(virtual.parent[order], prepend=-1) != 0]
-    largest = np.empty(len(virtual.mesh.cells), dtype=np.int64)
-    largest[virtual.parent[first]] = first
+    order = np.lexsort([-phantom.fraction, phantom.parent])
+    first = order[np.diff(phantom.parent[order], prepend=-1) != 0]
+    largest = np.empty(len(phantom.mesh.cells), dtype=np.int64)
+    largest[phantom.parent[first]] = first
     into = np.arange(len(body))
-    into[is_speck] = largest[virtual.parent[is_speck]]
-    return absorb(virtual, into)[0], Specks(len(specks), float(share[specks].max()))
+    into[is_speck] = largest[phantom.parent[is_speck]]
+    return absorb(phantom, into)[0], Specks(len(specks), float(share[specks].max()))

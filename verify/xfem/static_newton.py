@@ -61,12 +61,12 @@ class Newton:
     ) -> None:
         self._force, self._fixed = force, fixed
         self._tolerance, self._iterations = tolerance, iterations
-        self._pattern = body_pattern(force.virtual)
+        self._pattern = body_pattern(force.phantom)
         space = fixed.shape[1]
         self._blocks = np.zeros((len(self._pattern.columns), space, space))
         self._internal = np.empty(fixed.shape)
         self._held = held_entries(self._pattern, fixed)
-        limit = _MOST if is_large(force.virtual) else 0
+        limit = _MOST if is_large(force.phantom) else 0
         self._solver = StaticSolver(force, self._pattern, fixed, _INEXACT, limit)
 
     @property
@@ -101,7 +101,7 @@ class Newton:
         if len(collapsed) == 0:
             return "More load steps may help"
         return (
-            f"{len(collapsed)} of {len(self._force.virtual.cells)} pieces have collapsed, the "
+            f"{len(collapsed)} of {len(self._force.phantom.cells)} pieces have collapsed, the "
             f"first number {collapsed[0]}: the force is not continuous there (a strip is so thin "
             "at a stretch of 1 + 1/ν), so that there may be no equilibrium"
         )
@@ -136,7 +136,7 @@ class Newton:
         mode = self._softest_mode(place.displacement)
         if mode is None:
             return None
-        reach = float(np.ptp(self._force.virtual.mesh.points, axis=0).max())
+        reach = float(np.ptp(self._force.phantom.mesh.points, axis=0).max())
         for halving in range(2 * _HALVINGS):
             step = _FIRST_WAY_OUT * 0.5**halving * reach * mode
             trials = [self.place(place.displacement + sign * step, load) for sign in (1.0, -1.0)]
@@ -207,7 +207,7 @@ class Newton:
 
     def _is_small(self, place: Place) -> bool:
         """Whether a residual is within the tolerance, or what round-off of positions leaves."""
-        reach = np.abs(self._force.virtual.node_points + place.displacement).max()
+        reach = np.abs(self._force.phantom.node_points + place.displacement).max()
         round_off = _ROUND_OFF * self.largest_stiffness * reach
         return place.norm <= max(self._tolerance * place.scale, round_off)
 

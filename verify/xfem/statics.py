@@ -15,8 +15,8 @@ from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.penalised_force import PenalisedForce
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["StaticSolution", "StaticSolver", "is_large", "solve_static"]
 
@@ -61,7 +61,7 @@ class StaticSolution:
 
 
 def solve_static(
-    virtual: VirtualMesh,
+    phantom: PhantomMesh,
     material: Material,
     supports: Supports,
     load: _Floats | None = None,
@@ -73,7 +73,7 @@ def solve_static(
 
     Parameters
     ----------
-    virtual : VirtualMesh
+    phantom : PhantomMesh
         With slivers as a policy of `verify.xfem.slivers` left them, or untreated.
     material : Material
     supports : Supports
@@ -98,19 +98,19 @@ def solve_static(
     XfemError
         If shapes do not match or a load is not finite.
     """
-    shape = virtual.node_points.shape
+    shape = phantom.node_points.shape
     force = np.zeros(shape) if load is None else np.asarray(load, dtype=float)
     if force.shape != shape or supports.fixed.shape != shape or not np.isfinite(force).all():
         raise XfemError(
             f"load {force.shape} and supports {supports.fixed.shape}; expected finite {shape}"
         )
-    check_bodies(virtual, supports)
+    check_bodies(phantom, supports)
     if solver not in ("auto", "direct", "iterative"):
         raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
-    stiffness = _stiffness(virtual, material, ghost, kernels)
+    stiffness = _stiffness(phantom, material, ghost, kernels)
     clock = [perf_counter()]
-    pattern = ghost.pattern() if ghost else body_pattern(virtual)
-    iterates = solver == "iterative" or (solver == "auto" and not ghost and is_large(virtual))
+    pattern = ghost.pattern() if ghost else body_pattern(phantom)
+    iterates = solver == "iterative" or (solver == "auto" and not ghost and is_large(phantom))
     limit = _MOST if solver == "auto" else 5 * _MOST
     inverse = StaticSolver(stiffness, pattern, supports.fixed, _ROUNDING, limit if iterates else 0)
     clock.append(perf_counter())
@@ -138,16 +138,16 @@ def solve_static(
 
 
 def _stiffness(
-    virtual: VirtualMesh, material: Material, ghost: GhostPenalty | None, kernels: Kernels
+    phantom: PhantomMesh, material: Material, ghost: GhostPenalty | None, kernels: Kernels
 ) -> InternalForce:
     if ghost is None:
-        return InternalForce(virtual, material, "linear", kernels)
-    return PenalisedForce(virtual, material, ghost, "linear", kernels)
+        return InternalForce(phantom, material, "linear", kernels)
+    return PenalisedForce(phantom, material, ghost, "linear", kernels)
 
 
-def is_large(virtual: VirtualMesh) -> bool:
+def is_large(phantom: PhantomMesh) -> bool:
     """Whether iterations are quicker than a factorisation: of solids with many nodes."""
-    return virtual.cells.shape[1] == 4 and virtual.node_count >= ITERATE_FROM
+    return phantom.cells.shape[1] == 4 and phantom.node_count >= ITERATE_FROM
 
 
 class StaticSolver:

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from verify.xfem.clip import Simplices, bisected
 from verify.xfem.mesh import equal_rows, facets_of
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["Subdivision", "subdivide"]
 
@@ -33,11 +33,11 @@ class Subdivision:
     cells : (c, d + 1) int array
         Simplices, positively oriented.
     cell_piece : (c,) int array
-        Piece (virtual cell) that holds each.
+        Piece (cut-cell part) that holds each.
     cell_parent : (c,) int array
         Cell of the uncut mesh that holds each.
     interpolation : (k, N) sparse array
-        Displacement at the points = interpolation @ displacement of the unknown nodes.
+        Displacement at the points = interpolation @ displacement of the dof nodes.
     cut_facets : (f, d, d) float array
         The cut as realised: segments or triangles by their corners (second axis), in metres.
     """
@@ -50,28 +50,28 @@ class Subdivision:
     cut_facets: _Floats
 
 
-def subdivide(virtual: VirtualMesh) -> Subdivision:
+def subdivide(phantom: PhantomMesh) -> Subdivision:
     """Make the conforming sub-division of a cut mesh."""
-    if virtual.aggregation is not None:
-        divided = subdivide(virtual.corners)
-        interpolation = csr_array(divided.interpolation @ virtual.aggregation.extension)
+    if phantom.aggregation is not None:
+        divided = subdivide(phantom.corners)
+        interpolation = csr_array(divided.interpolation @ phantom.aggregation.extension)
         return replace(divided, interpolation=interpolation)
-    mesh, zero = virtual.mesh, virtual.sub_cells.zero_points
-    simplices = _conforming(virtual)
+    mesh, zero = phantom.mesh, phantom.sub_cells.zero_points
+    simplices = _conforming(phantom)
     piece, ids, barycentric = simplices.piece, simplices.points, simplices.barycentric
 
     # a mesh node moves with one unknown, a point of the cut with those of its edge
-    unknowns = virtual.cells[piece]
+    unknowns = phantom.cells[piece]
     row, corner = np.nonzero(ids >= len(mesh.points))
     node = np.take_along_axis(unknowns, barycentric.argmax(axis=2), axis=1)
     weights, columns = barycentric[row, corner], unknowns[row]
     support = np.sort(np.where(weights != 0.0, columns, -1), axis=1)
     keys = np.concatenate([ids[row, corner][:, None], support], axis=1)
     _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    node[row, corner] = virtual.node_count + number.ravel()
+    node[row, corner] = phantom.node_count + number.ravel()
     used, cells = np.unique(node, return_inverse=True)
     cells = cells.reshape(node.shape)
-    nodes = used[used < virtual.node_count]
+    nodes = used[used < phantom.node_count]
 
     corners = ids.shape[1]
     starts = np.concatenate(
@@ -83,27 +83,27 @@ def subdivide(virtual: VirtualMesh) -> Subdivision:
             np.concatenate([nodes, columns[first].ravel()]),
             starts,
         ),
-        shape=(len(used), virtual.node_count),
+        shape=(len(used), phantom.node_count),
     )
     interpolation.eliminate_zeros()
     cut_points = zero.positions[ids[row, corner][first]]
-    points = np.concatenate([virtual.node_points[nodes], cut_points])
+    points = np.concatenate([phantom.node_points[nodes], cut_points])
     return Subdivision(
         points=points,
         cells=_oriented(points, cells),
         cell_piece=piece,
-        cell_parent=virtual.parent[piece],
+        cell_parent=phantom.parent[piece],
         interpolation=interpolation,
         cut_facets=_cut_facets(points, cells, ids),
     )
 
 
-def _conforming(virtual: VirtualMesh) -> Simplices:
+def _conforming(phantom: PhantomMesh) -> Simplices:
     """Solid simplices, bisected where a neighbour has a point that they do not have."""
-    sub, mesh = virtual.sub_cells, virtual.mesh
-    whole = np.flatnonzero(~virtual.split)
+    sub, mesh = phantom.sub_cells, phantom.mesh
+    whole = np.flatnonzero(~phantom.split)
     sign = np.ones(len(sub.piece), dtype=np.int8)
-    simplices = Simplices.of_cells(whole, mesh.cells[virtual.parent[whole]])
+    simplices = Simplices.of_cells(whole, mesh.cells[phantom.parent[whole]])
     simplices += Simplices(sub.piece, sub.points, sub.barycentric, sub.fraction, sign)
     used = np.unique(sub.points)
     hanging = used[used >= len(mesh.points)] - len(mesh.points)

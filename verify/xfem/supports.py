@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import index_array, real_array
-from verify.xfem.virtual import VirtualMesh
+from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["Supports", "UnsupportedBodyError", "check_bodies", "loose_bodies"]
 
@@ -38,14 +38,14 @@ class Supports:
     values: _Floats
 
     @staticmethod
-    def none(virtual: VirtualMesh) -> "Supports":
+    def none(phantom: PhantomMesh) -> "Supports":
         """No support at all."""
-        shape = virtual.node_points.shape
+        shape = phantom.node_points.shape
         return Supports(np.zeros(shape, dtype=bool), np.zeros(shape))
 
     def prescribe(
         self,
-        virtual: VirtualMesh,
+        phantom: PhantomMesh,
         nodes: ArrayLike,
         values: ArrayLike | PrescribedField = 0.0,
         components: tuple[int, ...] | None = None,
@@ -54,7 +54,7 @@ class Supports:
 
         Parameters
         ----------
-        virtual : VirtualMesh
+        phantom : PhantomMesh
         nodes : (k,) array_like of int, or (n,) of bool
             Nodes of the *uncut* mesh; every dof node there is prescribed. None may follow a
             root cell (aggregation): its value would be what the root says.
@@ -70,11 +70,11 @@ class Supports:
             If these supports are of another body, nodes or components do not exist, a node has
             material that follows a root cell, or values have a wrong shape or are not finite.
         """
-        count, dim = len(virtual.mesh.points), self.fixed.shape[1]
-        if self.fixed.shape != virtual.node_points.shape:
+        count, dim = len(phantom.mesh.points), self.fixed.shape[1]
+        if self.fixed.shape != phantom.node_points.shape:
             raise XfemError(
                 f"supports of shape {self.fixed.shape} on a body with unknowns of shape "
-                f"{virtual.node_points.shape}"
+                f"{phantom.node_points.shape}"
             )
         chosen = np.asarray(nodes)
         if chosen.dtype == bool and chosen.shape != (count,):
@@ -85,20 +85,20 @@ class Supports:
                 raise XfemError(f"supported node outside 0..{count - 1}")
         mark = np.zeros(count, dtype=bool)
         mark[chosen] = True
-        following = virtual.corners.node_parent[virtual.corner_node < 0]
+        following = phantom.corners.node_parent[phantom.corner_node < 0]
         if mark[following].any():
             raise XfemError(
                 f"{int(mark[following].sum())} nodes of slivers at supported nodes follow a root "
                 "cell, so that no value can be prescribed there; say held= to the sliver policy"
             )
-        at = np.flatnonzero(mark[virtual.node_parent])
+        at = np.flatnonzero(mark[phantom.node_parent])
         axes = range(dim) if components is None else components
         if not isinstance(axes, Sequence) or any(axis not in range(dim) for axis in axes):
             raise XfemError(f"components {components}; expected some of 0..{dim - 1}")
         if len(at) == 0:
             return self
         field = (
-            values(virtual.node_points[at], virtual.node_side[at]) if callable(values) else values
+            values(phantom.node_points[at], phantom.node_side[at]) if callable(values) else values
         )
         try:
             given = np.broadcast_to(real_array(field, "prescribed values"), (len(at), dim))
@@ -117,7 +117,7 @@ class Supports:
         return Supports(fixed, prescribed)
 
 
-def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
+def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
     """Check that no free piece can move rigidly.
 
     Raises
@@ -127,7 +127,7 @@ def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
     XfemError
         If the supports are of another body, not of type bool, or a value is not finite.
     """
-    shape, fixed, values = virtual.node_points.shape, supports.fixed, supports.values
+    shape, fixed, values = phantom.node_points.shape, supports.fixed, supports.values
     if np.shape(fixed) != shape or np.shape(values) != shape or fixed.dtype != bool:
         raise XfemError(
             f"supports of shape {np.shape(fixed)} and type {fixed.dtype}, values of shape "
@@ -135,10 +135,10 @@ def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
         )
     if not np.isfinite(values).all():
         raise XfemError("a prescribed displacement is not finite")
-    for body in loose_bodies(virtual, supports, np.arange(virtual.bodies.max() + 1)):
-        pieces = virtual.corners.bodies[virtual.cells[:, 0]] == body
-        volume = virtual.volumes[pieces].sum()
-        centre = virtual.volumes[pieces] @ virtual.piece_centroids[pieces] / volume
+    for body in loose_bodies(phantom, supports, np.arange(phantom.bodies.max() + 1)):
+        pieces = phantom.corners.bodies[phantom.cells[:, 0]] == body
+        volume = phantom.volumes[pieces].sum()
+        centre = phantom.volumes[pieces] @ phantom.piece_centroids[pieces] / volume
         unit = "m²" if supports.fixed.shape[1] == 2 else "m³"
         raise UnsupportedBodyError(
             f"a piece of {volume:.3g} {unit} around {np.round(centre, 6).tolist()} is not "
@@ -146,12 +146,12 @@ def check_bodies(virtual: VirtualMesh, supports: Supports) -> None:
         )
 
 
-def loose_bodies(virtual: VirtualMesh, supports: Supports, bodies: _Ints) -> _Ints:
+def loose_bodies(phantom: PhantomMesh, supports: Supports, bodies: _Ints) -> _Ints:
     """Those of the given free bodies, by number (k,), that can move rigidly."""
-    points, scale = virtual.node_points, virtual.mesh.extent
+    points, scale = phantom.node_points, phantom.mesh.extent
     found = []
     for body in bodies:
-        nodes = np.flatnonzero(virtual.bodies == body)
+        nodes = np.flatnonzero(phantom.bodies == body)
         modes = _rigid_modes((points[nodes] - points[nodes].mean(axis=0)) / scale)
         held = modes[supports.fixed[nodes]]
         size = np.linalg.norm(modes.reshape(-1, modes.shape[-1]), axis=0)

@@ -117,7 +117,7 @@ class ToolPath:
 
     @property
     def sweep(self) -> "Sweep":
-        """The whole swept cut, as `verify.xfem.virtual.cut_mesh` takes it."""
+        """The whole swept cut, as `verify.xfem.phantom.cut_mesh` takes it."""
         return Sweep(self)
 
     def travel_at(self, time: float) -> float:

@@ -56,7 +56,7 @@ class DeformingFacets(Protocol):
         ...
 
     def positions(self, displacement: _Floats, out: _Floats | None = None) -> _Floats:
-        """(v, s) vertices for a displacement of the unknown nodes, in metres."""
+        """(v, s) vertices for a displacement of the dof nodes, in metres."""
         ...
 
 
@@ -112,7 +112,7 @@ class SurfaceCollider:
         Parameters
         ----------
         displacement : (N, s) float array
-            Of the unknown nodes, in metres.
+            Of the dof nodes, in metres.
         """
         if len(self.positions) != len(self.surface.material.rows):
             self.positions = np.empty_like(self.surface.material.rows)

@@ -1,7 +1,7 @@
 """A body that is cut again and again: every cut costs what it touches.
 
-The same pieces and the same joins as `verify.xfem.virtual.cut_mesh` gives for all cuts at once,
-kept up to date cell by cell. Numbers of pieces and unknown nodes never change: cells and nodes
+The same pieces and the same joins as `verify.xfem.phantom.cut_mesh` gives for all cuts at once,
+kept up to date cell by cell. Numbers of pieces and dof nodes never change: cells and nodes
 keep theirs, new ones follow.
 """
 
@@ -59,9 +59,9 @@ class Increment:
     moved : int array
         Those of them that have new unknowns, or are split anew.
     nodes_before : int
-        Number of unknown nodes before.
+        Number of dof nodes before.
     source : (new,) int array
-        Unknown node from which each new one inherits displacement and velocity.
+        Dof node from which each new one inherits displacement and velocity.
     """
 
     cells: _Ints
@@ -79,7 +79,7 @@ class Increment:
         Raises
         ------
         XfemError
-            If the number of values is not that of the unknown nodes before the cut.
+            If the number of values is not that of the dof nodes before the cut.
         """
         if len(values) != self.nodes_before:
             raise XfemError(f"{len(values)} nodal values; expected {self.nodes_before}")
@@ -96,13 +96,13 @@ class GrowingBody:
     Attributes
     ----------
     piece_cells : GrowingArray
-        (p, d + 1) unknown nodes of each piece.
+        (p, d + 1) dof nodes of each piece.
     piece_parent, piece_fraction, piece_label : GrowingArray
-        (p,), (p,), (p, cuts): as in `VirtualMesh`, in the order in which pieces came.
+        (p,), (p,), (p, cuts): as in `PhantomMesh`, in the order in which pieces came.
     first_piece, next_piece
         Pieces of a cell: the first, and after each the next or -1.
     node_parent : GrowingArray
-        (N,) mesh node of each unknown node.
+        (N,) mesh node of each dof node.
     points : PointNumbers
         Points where cuts meet the mesh.
     sub_piece, sub_points, sub_barycentric, sub_fraction : GrowingArray
@@ -149,7 +149,7 @@ class GrowingBody:
 
     @property
     def node_count(self) -> int:
-        """Number of unknown nodes."""
+        """Number of dof nodes."""
         return len(self.node_parent)
 
     @property

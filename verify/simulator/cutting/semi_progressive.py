@@ -23,8 +23,8 @@ from verify.simulator.cutting.whole_mesh import whole_mesh
 from verify.xfem.errors import XfemError
 from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import PhantomMesh
 from verify.xfem.tool_path import ToolPath
-from verify.xfem.virtual import VirtualMesh
 
 __all__ = ["Crossings", "SemiProgressiveCutter"]
 
@@ -217,8 +217,8 @@ class SemiProgressiveCutter:
         columns = [stroke.values for stroke in self.strokes]
         return np.stack(columns, axis=1) if columns else np.zeros((len(self.mesh.points), 0))
 
-    def virtual_mesh(self) -> VirtualMesh:
-        """Copy the body as it is now; unknown nodes keep their numbers."""
+    def phantom_mesh(self) -> PhantomMesh:
+        """Copy the body as it is now; dof nodes keep their numbers."""
         nodes = np.arange(len(self.mesh.points))
         columns = [stroke.level_sets(nodes) for stroke in self.strokes]
         level_sets = np.stack(columns, axis=1) if columns else np.zeros((len(nodes), 0))

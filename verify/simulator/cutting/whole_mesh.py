@@ -1,4 +1,4 @@
-"""The growing body as a `VirtualMesh`, for solvers that want all of it in one piece."""
+"""The growing body as a `PhantomMesh`, for solvers that want all of it in one piece."""
 
 from functools import cached_property
 
@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.simulator.cutting.growing_body import GrowingBody
+from verify.xfem.phantom import PhantomMesh, SubCells
 from verify.xfem.sides import node_sides, piece_sides
-from verify.xfem.virtual import SubCells, VirtualMesh
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["whole_mesh"]
@@ -16,10 +16,10 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 
-def whole_mesh(body: GrowingBody, level_sets: _Floats) -> VirtualMesh:
-    """Copy a growing body into a virtual mesh; costs what the whole mesh is.
+def whole_mesh(body: GrowingBody, level_sets: _Floats) -> PhantomMesh:
+    """Copy a growing body into a phantom-node mesh; costs what the whole mesh is.
 
-    Unknown nodes keep their numbers; pieces are ordered by their cell.
+    Dof nodes keep their numbers; pieces are ordered by their cell.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def whole_mesh(body: GrowingBody, level_sets: _Floats) -> VirtualMesh:
         level_sets, body.mesh.cells[parent[order]], label, sub_cells.piece, sub_cells.barycentric,
         sub_cells.fraction,
     )  # fmt: skip
-    return VirtualMesh(
+    return PhantomMesh(
         mesh=body.mesh,
         cells=cells,
         parent=parent[order],

@@ -1,7 +1,7 @@
 """A surface whose vertices move with the unknowns of a cut body: x = X + W u.
 
 Every vertex belongs to one piece: its weights are its barycentric coordinates in the parent
-element, its nodes the unknown nodes of the piece (barycentric mapping, thesis 3.2.2). Forces go
+element, its nodes the dof nodes of the piece (barycentric mapping, thesis 3.2.2). Forces go
 back by the transpose, so that the virtual work of a force on the surface and of what the solver
 gets is the same.
 """
@@ -36,7 +36,7 @@ class MovingSurface:
     material : GrowingArray
         (v, s) positions X of the vertices in the material frame, in metres.
     nodes, weights : GrowingArray
-        (v, corners) unknown nodes and weights of each vertex: the rows of W.
+        (v, corners) dof nodes and weights of each vertex: the rows of W.
     facets : GrowingArray
         (f, k) vertices; the first is -1 where a facet is no longer in use.
     facet_piece : GrowingArray
@@ -82,7 +82,7 @@ class MovingSurface:
         material : (q, k, s) float array
             Where it is, in metres.
         weights : (q, k, c) float array
-            Of the unknown nodes of its piece.
+            Of the dof nodes of its piece.
         counts : (q, k, c) bool array
             Whether a corner moves with a node: where it is not, the weight is zero; where it is,
             the weight may still round to zero.
@@ -90,7 +90,7 @@ class MovingSurface:
             Piece of each corner; that of the first is the facet's.
         inner : (q,) bool array
         piece_cells : (p, c) int array
-            Unknown nodes of each piece.
+            Dof nodes of each piece.
         owner : (q,) int array
             To what each facet belongs; facets of one owner come one after the other.
         bounds : (o, 2) int array
@@ -125,7 +125,7 @@ class MovingSurface:
         return np.flatnonzero(self.facets.rows[:, 0] >= 0)
 
     def positions(self, displacement: _Floats, out: _Floats | None = None) -> _Floats:
-        """Positions (v, s) of the vertices for a displacement (N, s) of the unknown nodes.
+        """Positions (v, s) of the vertices for a displacement (N, s) of the dof nodes.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class MovingSurface:
         Raises
         ------
         XfemError
-            If `displacement` has fewer rows than there are unknown nodes, or an array another shape
+            If `displacement` has fewer rows than there are dof nodes, or an array another shape
             or type.
         """
         self._check(displacement)
@@ -148,7 +148,7 @@ class MovingSurface:
         return out
 
     def nodal_forces(self, forces: _Floats, out: _Floats) -> _Floats:
-        """Add forces (v, s) on the vertices to those on the unknown nodes, `out` (N, s): Wᵀf.
+        """Add forces (v, s) on the vertices to those on the dof nodes, `out` (N, s): Wᵀf.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class MovingSurface:
         return out
 
     def facet_force(self, facet: int, at: _Floats, force: _Floats, out: _Floats) -> _Floats:
-        """Add a force at a point of a facet to the forces on the unknown nodes.
+        """Add a force at a point of a facet to the forces on the dof nodes.
 
         Parameters
         ----------

@@ -37,7 +37,7 @@ def pull_back(
     ----------
     cutter : SemiProgressiveCutter
     displacement : (N, s) float array
-        Of the unknown nodes, in metres.
+        Of the dof nodes, in metres.
     points : (q, s) array_like
         Where the tool is, in metres.
     start : (q,) array_like of int

@@ -20,8 +20,8 @@ from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import rectangle_mesh
-from verify.xfem.virtual import cut_mesh
 
 __all__ = ["THRESHOLDS", "FaceCount", "StripCount", "count_face", "count_strips"]
 
@@ -89,9 +89,9 @@ def count_strips(lengths: Sequence[int]) -> list[StripCount]:
         for length in lengths:
             mesh = rectangle_mesh((length, 1), (0.0, 0.0), (float(length), 1.0), pattern)
             cut = Polyline([[-1.0, _HEIGHT], [length + 1.0, _HEIGHT]])
-            virtual = cut_mesh(mesh, [cut])
-            through = int((np.bincount(virtual.parent) > 1).sum())
-            counts.append(StripCount(pattern, through, virtual.node_count - len(mesh.points)))
+            phantom = cut_mesh(mesh, [cut])
+            through = int((np.bincount(phantom.parent) > 1).sum())
+            counts.append(StripCount(pattern, through, phantom.node_count - len(mesh.points)))
     return counts
 
 
@@ -143,7 +143,7 @@ def _growth(stage: Stage, rows: Sequence[int]) -> list[tuple[int, int, float]]:
         cutter.advance(k * frame)
         split = int(np.count_nonzero(cutter.body.split_cells))
         while len(found) < len(rows) and split >= rows[len(found)]:
-            added = cutter.virtual_mesh().node_count - len(stage.mesh.points)
+            added = cutter.phantom_mesh().node_count - len(stage.mesh.points)
             found.append((split, added, k * frame))
     if len(found) < len(rows):
         raise ValueError(f"the strokes split {split} elements; expected {rows[-1]}")
@@ -167,4 +167,4 @@ def _step_of_body(body: CutBody) -> float:
     material = body.material(isotropic(1.0e4, 0.3, "plane stress"))
     pattern = block_pattern(body.resisting.cells, body.resisting.node_count)
     blocks = InternalForce(body.resisting, material, "linear").stiffness(pattern)
-    return critical_step(csr_array(pattern.matrix(blocks)), side_wise_mass(body.virtual, 1000.0))
+    return critical_step(csr_array(pattern.matrix(blocks)), side_wise_mass(body.phantom, 1000.0))

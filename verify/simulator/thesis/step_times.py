@@ -95,4 +95,4 @@ def _measure(stage: Stage, made: CutHand) -> tuple[list[float], int]:
     if not np.isfinite(session.state.displacement).all():
         raise ValueError(f"motion of {made.cuts} cuts is not finite")
     seconds = [record.total_seconds for record in records[_CUTTING:]]
-    return seconds, session.virtual.node_count
+    return seconds, session.phantom.node_count

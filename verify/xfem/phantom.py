@@ -1,4 +1,4 @@
-"""The cut body as a mesh of virtual cells: standard finite elements with a weight.
+"""The cut body as a mesh of cut-cell parts: standard finite elements with a weight.
 
 Every piece of a cell becomes a whole cell of its own (phantom nodes; Hansbo & Hansbo 2004) whose
 stiffness, mass and load count by the piece's share of the volume. The same space as the shifted
@@ -23,7 +23,7 @@ from verify.xfem.pieces import split_cells
 from verify.xfem.sides import node_sides, piece_sides
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["Aggregation", "SubCells", "VirtualMesh", "cut_mesh"]
+__all__ = ["Aggregation", "PhantomMesh", "SubCells", "cut_mesh"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -60,15 +60,15 @@ class Aggregation:
 
     Attributes
     ----------
-    corners : VirtualMesh
-        The same body with an unknown node for each corner.
+    corners : PhantomMesh
+        The same body with a dof node for each corner.
     extension : (N_corners, N) csr_array
-        Corner values from those of the unknown nodes; it reproduces linear fields.
+        Corner values from those of the dof nodes; it reproduces linear fields.
     node : (N_corners,) int array
-        Unknown node of each corner; −1 for one that follows others.
+        Dof node of each corner; −1 for one that follows others.
     """
 
-    corners: "VirtualMesh"
+    corners: "PhantomMesh"
     extension: csr_array
     node: _Ints
 
@@ -79,19 +79,19 @@ class Aggregation:
 
 
 @dataclass(frozen=True)
-class VirtualMesh:
-    """A cut mesh. "Unknown node" means: one displacement vector.
+class PhantomMesh:
+    """A cut mesh. "Dof node" means: one displacement vector.
 
     With cell aggregation (`verify.xfem.aggregation`) some corners of the pieces have no
     unknown of their own but follow others: `cells` counts corners, and everything else here that
-    has N rows is of the unknown nodes. `extend` and `restrict` lead from one to the other.
+    has N rows is of the dof nodes. `extend` and `restrict` lead from one to the other.
 
     Attributes
     ----------
     mesh : SimplexMesh
         The mesh before the cut.
     cells : (p, d + 1) int array
-        Corners of each piece (virtual cell), ordered by parent: unknown nodes if nothing is
+        Corners of each piece (cut-cell part), ordered by parent: dof nodes if nothing is
         aggregated.
     parent : (p,) int array
         Cell of the uncut mesh.
@@ -100,8 +100,8 @@ class VirtualMesh:
     label : (p, cuts) int8 array
         Side of each cut that splits the parent; 0 where the cut does not split it.
     node_parent : (N,) int array
-        Node of the uncut mesh. The first n unknown nodes are the nodes of the mesh, each with the
-        material in which it lies; further ones are virtual.
+        Node of the uncut mesh. The first n dof nodes are the nodes of the mesh, each with the
+        material in which it lies; further ones are phantom nodes.
     level_sets : (n, cuts) float array
         Nodal level set of each cut as used: snapped to zero within round-off, in metres.
     node_side : (N, cuts) int8 array
@@ -113,7 +113,7 @@ class VirtualMesh:
     dropped : int
         Pieces left out because their volume is exactly zero.
     aggregation : Aggregation, optional
-        Corners that follow the unknown nodes of a root cell.
+        Corners that follow the dof nodes of a root cell.
     """
 
     mesh: SimplexMesh
@@ -131,31 +131,31 @@ class VirtualMesh:
 
     @property
     def node_count(self) -> int:
-        """Number of unknown nodes."""
+        """Number of dof nodes."""
         return len(self.node_parent)
 
     @property
-    def corners(self) -> "VirtualMesh":
-        """The same body with an unknown node for each corner; itself if nothing is aggregated."""
+    def corners(self) -> "PhantomMesh":
+        """The same body with a dof node for each corner; itself if nothing is aggregated."""
         return self if self.aggregation is None else self.aggregation.corners
 
     @cached_property
     def corner_node(self) -> _Ints:
-        """(N_corners,) the unknown node of each corner; −1 for those that have none."""
+        """(N_corners,) the dof node of each corner; −1 for those that have none."""
         if self.aggregation is None:
             return np.arange(self.node_count)
         return self.aggregation.node
 
     @cached_property
     def node_corner(self) -> _Ints:
-        """(N,) the corner that each unknown node is."""
+        """(N,) the corner that each dof node is."""
         own = np.flatnonzero(self.corner_node >= 0)
         corner = np.empty(self.node_count, dtype=np.int64)
         corner[self.corner_node[own]] = own
         return corner
 
-    def following(self, aggregation: "Aggregation", old_of_new: _Ints) -> "VirtualMesh":
-        """Leave the unknown nodes `old_of_new` (N,) alone, which the other corners follow."""
+    def following(self, aggregation: "Aggregation", old_of_new: _Ints) -> "PhantomMesh":
+        """Leave the dof nodes `old_of_new` (N,) alone, which the other corners follow."""
         return replace(
             self,
             node_parent=self.node_parent[old_of_new],
@@ -173,7 +173,7 @@ class VirtualMesh:
 
     @cached_property
     def node_points(self) -> _Floats:
-        """(N, space) material position of the unknown nodes, in metres."""
+        """(N, space) material position of the dof nodes, in metres."""
         return self.mesh.points[self.node_parent]
 
     @cached_property
@@ -219,7 +219,7 @@ class VirtualMesh:
 
     @cached_property
     def enriched_nodes(self) -> _Ints:
-        """Nodes of the uncut mesh that have more than one unknown node."""
+        """Nodes of the uncut mesh that have more than one dof node."""
         return np.flatnonzero(np.bincount(self.node_parent) > 1)
 
     @cached_property
@@ -268,7 +268,7 @@ class VirtualMesh:
 
     @cached_property
     def bodies(self) -> _Ints:
-        """(N,) number of the free body to which each unknown node belongs."""
+        """(N,) number of the free body to which each dof node belongs."""
         if self.aggregation is not None:
             return self.corners.bodies[self.node_corner]
         first, others = self.cells[:, :1], self.cells[:, 1:]
@@ -283,7 +283,7 @@ def cut_mesh(
     cuts: Sequence[Cut],
     tip: TipRule = "inside",
     opened: NDArray[np.bool_] | None = None,
-) -> VirtualMesh:
+) -> PhantomMesh:
     """Cut a mesh.
 
     Parameters
@@ -313,10 +313,10 @@ def cut_mesh(
     solid = fraction > 0.0
     joined = join_parts(mesh, partition, solid)
     node_parent, numbering = number_nodes(mesh, partition, joined, solid)
-    return _virtual_mesh(mesh, partition, joined, solid, fraction, node_parent, numbering)
+    return _phantom_mesh(mesh, partition, joined, solid, fraction, node_parent, numbering)
 
 
-def _virtual_mesh(
+def _phantom_mesh(
     mesh: SimplexMesh,
     partition: Partition,
     joined: PatchNodes,
@@ -324,7 +324,7 @@ def _virtual_mesh(
     fraction: _Floats,
     node_parent: _Ints,
     numbering: _Ints,
-) -> VirtualMesh:
+) -> PhantomMesh:
     pieces, cuts = partition.label.shape
     untouched = np.ones(len(mesh.cells), dtype=bool)
     untouched[joined.cells] = False
@@ -353,7 +353,7 @@ def _virtual_mesh(
         level_sets, mesh.cells[parent], label, sub_cells.piece, sub_cells.barycentric,
         sub_cells.fraction,
     )  # fmt: skip
-    return VirtualMesh(
+    return PhantomMesh(
         mesh=mesh,
         cells=cells,
         parent=parent,
