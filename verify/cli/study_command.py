@@ -30,7 +30,6 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def _study(arguments: argparse.Namespace) -> int:
     from verify.report.study_page import render_study
-    from verify.result import Verdict
     from verify.study.record import write_study
 
     def announce(text: str) -> None:
@@ -59,8 +58,7 @@ def _study(arguments: argparse.Namespace) -> int:
         print(json.dumps({"record": str(written), "report": str(page), "findings": said}, indent=2))
         return 0
     for finding in findings:
-        marks = {Verdict.PASS: "as expected", Verdict.FAIL: "NOT KEPT", None: "shown"}
-        mark = marks.get(finding.verdict, str(finding.verdict))
+        mark = "shown" if finding.verdict is None else str(finding.verdict)
         print(f"{mark}: {finding.topic}: {finding.sentence} [expected: {finding.expected}]")
     print(f"report: {page}")
     return 0
