@@ -65,6 +65,14 @@ def test_the_three_bases_give_the_same_displacements(tmp_path):
         assert other.unknowns == solutions[0].unknowns
 
 
+def test_plain_kernels_give_the_same_displacements_and_say_so(tmp_path):
+    strip = scene(tmp_path)
+    fast, plain = (XfemSolver().solve(strip, 1, kernels=which) for which in ("fast", "plain"))
+    scale = np.abs(fast.displacement).max()
+    np.testing.assert_allclose(plain.displacement, fast.displacement, rtol=0, atol=1e-9 * scale)
+    assert "SciPy" in plain.notes["linear solver"] != fast.notes["linear solver"]
+
+
 def test_the_patch_has_its_exact_energy_on_every_level():
     patch = load_scene("statics/f1_patch")
     for level in range(XfemSolver().levels(patch)):
