@@ -220,10 +220,10 @@ def prescribed(case, body):
         on = np.zeros(len(case.points), dtype=bool)
         on[nodes] = True
         reached = boundary[on[boundary].all(axis=1)]
-        chosen = {}  # (node, side): its value
-        for node, values in zip(nodes, support["values"], strict=True):
-            chosen[node, 0 if body.phi[node] < 0 else 1] = values
         values = dict(zip(nodes, support["values"], strict=True))
+        # a node is held on the sides that its held facets reach, one without such on its own
+        alone = np.setdiff1d(nodes, reached)
+        chosen = {(node, 0 if body.phi[node] < 0 else 1): values[node] for node in alone}
         for facet in reached:
             for s, sign in enumerate((-1, 1)):
                 if (sign * body.phi[facet] > 0).any():
