@@ -53,7 +53,7 @@ def test_a_crushed_or_reflected_element_moves_on_with_a_rotation_and_a_closed_ac
     assert np.abs(R.T @ R - np.eye(space)).max() < 1e-14
     assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-14)
     # half a turn stores nothing: there energies are round-off of that of a strain of one
-    size = max(account.mechanical.max(), 1e-12 * float(body.force.mu[0]))
+    size = max(account.mechanical.max(), 1e-12 * float(body.force.elements.mu[0]))
     assert np.ptp(account.balance - account.unbalanced) < 1e-12 * size
     assert np.abs(account.unbalanced).max() < 1e-9 * size
     assert np.isfinite(state.displacement).all()
