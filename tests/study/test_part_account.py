@@ -1,5 +1,7 @@
 """Energies without a ledger, and separated parts: mass, inertia, momenta, against exact motions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cut_meshes import layered, quadratic, scene
@@ -13,8 +15,9 @@ from verify.assess.quantities import Measured, unit_of
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
 from verify.compare.separated import boundary_nodes, separated_parts
-from verify.scene import PartQuantity, Scene
+from verify.scene import PartQuantity, Scene, load_scene
 from verify.solution import Solution
+from verify.solvers import find_solver
 
 # what a blade releases is measured elsewhere
 ACCOUNT = [name for name in energy_account.ACCOUNT if not name.startswith("released")]
@@ -310,3 +313,20 @@ def test_a_part_asked_for_in_a_wrong_way_is_one_clear_error(entry, said):
             [LINE], material=PLANE, supports=[], analysis=DYNAMIC, initial=MOVING,
             quantities=[{"kind": "part", "name": "p", **entry}],
         )  # fmt: skip
+
+
+@pytest.mark.fenicsx
+def test_a_traction_that_is_let_go_at_the_start_does_no_work_and_one_that_stays_does():
+    """The trapezoidal rule keeps the energy of the cantilever, with its ledger and without one."""
+    case = load_scene("controls/cantilever")
+    solved = find_solver("conforming").solve(case, 0, 0)
+    assert np.ptp(solved.displacement[:, :, 1]) > 0.01  # it swings
+    bare = replace(solved, ledger={})
+    _, _, own, _ = accounted(case, solved)
+    _, _, metrics, _ = accounted(case, bare)
+    assert metrics["energy_drift"].value < 1e-8
+    assert metrics["energy_drift"].value == pytest.approx(own["energy_drift"].value, abs=1e-8)
+    stays = case.loads[0].model_copy(update={"history": None})
+    _, _, metrics, notes = accounted(case.model_copy(update={"loads": [stays]}), bare)
+    assert "energy_drift" not in metrics
+    assert "tractions" in notes["energy_drift"]

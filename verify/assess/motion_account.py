@@ -138,9 +138,10 @@ def _unaccountable(scene: Scene) -> str:
     """Why energy that enters or leaves the body cannot be had from output times alone."""
     if any(scene.analysis.damping):
         return "what the damping takes is not known between output times"
-    if any(isinstance(load, Traction) for load in scene.loads):
+    loads = [load for load in scene.loads if not (isinstance(load, Traction) and _is_let_go(load))]
+    if any(isinstance(load, Traction) for load in loads):
         return "the work of tractions is not known between output times"
-    if any(not isinstance(load, Gravity | BodyForce) for load in scene.loads):
+    if any(not isinstance(load, Gravity | BodyForce) for load in loads):
         return "the work of loads on the faces of cuts is not known between output times"
     if uniform_force(scene) is None:
         return "the work of body forces that are not uniform is not known between output times"
@@ -148,6 +149,13 @@ def _unaccountable(scene: Scene) -> str:
     if scene.initial.kind != "equilibrium":
         moved += [s for s in scene.supports if _moves(s.displacement) or s.rotation is not None]
     return "the work of supports that move is not known between output times" if moved else ""
+
+
+def _is_let_go(load: Traction) -> bool:
+    """Whether a traction ends at t = 0, so that it does no work in the motion."""
+    table = load.history or []
+    before = [factor for time, factor in table if time <= 0.0]
+    return bool(before) and not any([before[-1], *(f for time, f in table if time > 0.0)])
 
 
 def _moves(displacement: object) -> bool:
