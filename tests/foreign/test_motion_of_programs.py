@@ -106,6 +106,16 @@ def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(case, modules, 
     assert_same_motion(found, expected, 1e-9)
 
 
+def test_cells_of_an_uncut_body_are_read_with_positive_volumes(modules, tmp_path):
+    """Those of a structured block are of both orientations; Kratos and Akantu take one alone."""
+    export_case(load_scene("controls/hanging_bar"), tmp_path, [0], conforming=True)
+    case = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
+    edges = case.points[case.cells[:, 1:]] - case.points[case.cells[:, :1]]
+    volumes = np.linalg.det(edges) / 6.0
+    assert volumes.min() > 0.0
+    assert volumes.sum() == pytest.approx(np.ptp(case.points, axis=0).prod(), rel=1e-12)
+
+
 def test_cuts_that_open_in_turn_open_one_by_one(modules, tmp_path):
     scene = load_scene("dynamics/two_cuts_in_turn")
     export_case(scene, tmp_path, [0], conforming=True)

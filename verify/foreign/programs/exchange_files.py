@@ -27,6 +27,17 @@ class RefusedError(Exception):
     """The program cannot do the case; the text says why."""
 
 
+def _positive(points, cells):
+    """Cells with their nodes in the order of a positive volume; those of membranes as they are."""
+    if cells.shape[1] != points.shape[1] + 1:
+        return cells
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    turned = np.linalg.det(edges) < 0.0
+    cells = cells.copy()
+    cells[turned, :2] = cells[turned, 1::-1]
+    return cells
+
+
 class Case:
     """An exported case on one mesh level.
 
@@ -45,6 +56,7 @@ class Case:
     points : (n, d) array
         m.
     cells : (m, d + 1) int array
+        Their nodes in the order of a positive volume, unless they are membranes.
     material : (m,) int array
         Number of each cell's material.
     parameters : dict
@@ -59,9 +71,10 @@ class Case:
         self.content = json.loads((self.root / "case.json").read_text(encoding="utf-8"))
         name = "conforming.json" if conforming else "problem.json"
         self.problem = json.loads((self.folder / name).read_text(encoding="utf-8"))
-        points, self.cells, data = read_vtu(self.folder / self.problem["mesh"])
+        points, cells, data = read_vtu(self.folder / self.problem["mesh"])
         self.dimension = self.content["dimension"]
         self.points = np.ascontiguousarray(points[:, : self.dimension])
+        self.cells = _positive(self.points, cells)
         self.material = data.get("material", np.zeros(len(self.cells), dtype=int))
         request = self.root / "request.json"
         asked = json.loads(request.read_text(encoding="utf-8")) if request.is_file() else {}
