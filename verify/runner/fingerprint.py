@@ -12,6 +12,7 @@ from typing import Any
 import verify
 from verify.provenance import versions
 from verify.scene import MeshFile, Scene, mesh_path
+from verify.solvers.interface import is_built_in
 
 __all__ = [
     "bytes_digest",
@@ -28,7 +29,10 @@ _SOLVING = (
     "errors.py", "scene", "solution.py", "handed_over.py", "system.py", "solvers",
     "runner/solve.py", "calibration.py",
 )  # fmt: skip
-_METHODS = ("xfem", "methods")
+_METHODS = ("xfem", "accelerated", "methods")
+# what programs are handed, and those that come with the project
+_PROGRAMS = ("exchange", "foreign")
+_KINDS = (".py", ".toml", ".lock")
 # the layers forbid them to import our methods, so that these do not make them solve again
 _INDEPENDENT = ("conforming", "reference")
 # what can change a verdict, given the solutions
@@ -89,6 +93,8 @@ def _registered_source(name: str) -> list[str]:
 def code_of_solver(name: str) -> str:
     """Return the hash of the sources and of the versions that a solver's answers depend on."""
     parts = _SOLVING if name in _INDEPENDENT else (*_SOLVING, *_METHODS)
+    if not is_built_in(name):
+        parts = (*parts, *_PROGRAMS)
     return digest_of([versions(), _sources(parts, _PACKAGE.parent / "reference")])
 
 
@@ -102,7 +108,8 @@ def code_of_comparison() -> str:
 def _sources(parts: Iterable[str], *folders: Path) -> list[tuple[str, str]]:
     files: set[Path] = set()
     for place in (*(_PACKAGE / part for part in parts), *folders):
-        files |= {place} if place.is_file() else set(place.rglob("*.py"))
+        found = (path for path in place.rglob("*") if path.suffix in _KINDS)
+        files |= {place} if place.is_file() else set(found)
     return [
         (path.relative_to(_PACKAGE.parent).as_posix(), file_digest(path)) for path in sorted(files)
     ]

@@ -77,6 +77,8 @@ def seam_times(
         As of `opening_times`.
     """
     count, corners, space = seams.shape
+    if not count:
+        return np.empty(0)
     places = np.concatenate([seams, seams.mean(axis=1, keepdims=True)], axis=1).reshape(-1, space)
     off = np.stack(
         [np.maximum(np.abs(cut.level_set(places)), -cut.depth(places)) for cut in levels]
