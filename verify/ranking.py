@@ -123,11 +123,14 @@ class Profile:
         All of them; a solver that has not done an item has one number less.
     steps : dict of str to list of float
         By solver, the numbers at which its share grows by one item; ascending.
+    most : float or None
+        Number beyond which nothing is shown.
     """
 
     quantity: str
     items: int
     steps: dict[str, list[float]]
+    most: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

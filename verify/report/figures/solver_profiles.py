@@ -15,7 +15,8 @@ def profiles_figure(profiles: Sequence[Mapping[str, Any]]) -> Figure | None:
     palette, panels = Palette(), []
     for one in profiles:
         steps: Mapping[str, Sequence[float]] = one["steps"]
-        every = [value for own in steps.values() for value in own if value > 0.0]
+        most = one.get("most") or float("inf")
+        every = [value for own in steps.values() for value in own if 0.0 < value <= most]
         if one["items"] < 2 or not every:
             continue
         ends = log_range(every)

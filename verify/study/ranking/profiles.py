@@ -1,6 +1,7 @@
 """Performance profiles (Dolan and Moré 2002) and data profiles (Moré and Wild 2009) of solvers."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from verify.assess.rates import ROUND_OFF
 from verify.ranking import Profile
@@ -12,6 +13,7 @@ from verify.study.ranking.standing import Item
 __all__ = ["data_profiles", "performance_profile"]
 
 _METRIC = "displacement_l2"
+_FAR = 100.0  # times the least error: of no use, however much more it is
 _ERRORS = (0.1, 0.01)  # what a simulator needs, and what a verification does
 
 
@@ -27,7 +29,8 @@ def performance_profile(results: Sequence[CaseResult], solvers: Sequence[str]) -
         least = max(min(own.value for own in item.found.values()), ROUND_OFF)
         for name, own in item.found.items():
             steps[name].append(max(own.value, ROUND_OFF) / least)
-    return _profile("error over the least error, at equal element size", compared, steps)
+    quantity = "error over the least error, at equal element size"
+    return replace(_profile(quantity, compared, steps), most=_FAR)
 
 
 def data_profiles(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Profile]:
