@@ -96,8 +96,9 @@ def test_the_incision_in_the_face_opens_and_the_face_keeps_its_nodes() -> None:
     while session.time < 1.45:
         session.step()
     last = session.records[-1]
-    # no gravity, no prestress: nothing moves before it is pulled, but for round-off squared
-    assert last.strain < 1e-25
+    # no gravity, no prestress: nothing moves before it is pulled, but for strains of round-off,
+    # ½ E V ε² with E V = 0.8 J and ε = 5e-15
+    assert last.strain < 1e-29
     added = last.unknowns // 3 - len(whole.mesh.points)
     assert 40 < last.split < 60
     assert 0.8 < added / last.split < 1.7

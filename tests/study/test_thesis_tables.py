@@ -64,7 +64,7 @@ def crossed():
 @pytest.fixture(scope="module")
 def slivers():
     rows = load_scenes("slivers/plane_edges")
-    return sliver_systems([row for row in rows if row.row.value in (0.1, 1e-2, 1e-4)])
+    return sliver_systems([row for row in rows if row.row.value in (0.1, 1e-4, 1e-6)])
 
 
 def test_the_published_tables_are_those_of_the_thesis() -> None:
@@ -164,14 +164,14 @@ def test_lumped_to_the_sides_no_sliver_shortens_the_step_and_subdivided_each_doe
         assert min(step.ratio for step in steps(method)) > 0.99
         assert abs(exponent(steps(method))) < 0.01
     for method in ("subdivision", "xfem mass=consistent"):
-        assert exponent(steps(method)) == pytest.approx(1.0, abs=0.05)
+        assert exponent(steps(method)) == pytest.approx(1.0, abs=0.01)
     # a cut so near to nodes is snapped to them
     assert steps("snapping")[-1].ratio > 0.99
 
 
 def test_small_pieces_are_badly_scaled_and_nothing_worse(slivers) -> None:
     first, _, last = (row for row in slivers if row.method == "xfem")
-    assert last.condition > 100.0 * first.condition
+    assert last.condition > 1e4 * first.condition
     assert last.scaled < 1.1 * first.scaled
 
 

@@ -1,4 +1,4 @@
-"""Where the energy that a blade released went: one line per solver."""
+"""Energy that a blade released, by what became of it: one line per solver."""
 
 from verify.report.notation import number, solver_title
 from verify.result import SolveRecord

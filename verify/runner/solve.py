@@ -44,7 +44,7 @@ def main(job_file: Path) -> None:
     if comm is not None:
         outcome.setdefault("notes", {})["ranks"] = str(comm.size)
     if first:
-        write_json({**outcome, "peak_memory": peak_memory()}, folder / "outcome.json")
+        write_json({"peak_memory": peak_memory(), **outcome}, folder / "outcome.json")
     if comm is not None and outcome["status"] != Status.SOLVED:
         give_up(comm, outcome, folder / "outcome.json")
 
@@ -107,6 +107,7 @@ def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
         "timings": solution.timings,
         "iterations": solution.iterations,
         "regularisations": [vars(entry) for entry in solution.regularisations],
+        "peak_memory": peak_memory(),  # of the solve: eigenvalues come after it
         "notes": {
             **solution.notes,
             "calibration": calibration_note(),

@@ -23,8 +23,8 @@ from verify.study.measured_scenes import Measurement, measured_families, measure
 from verify.study.slivers.findings import findings
 from verify.study.slivers.growth import growth
 from verify.study.slivers.step_by_running import step_by_running
+from verify.study.uncut_twin import with_uncut_twin
 from verify.study.variants import Variant
-from verify.system import checked_system
 
 __all__ = ["SliverStudy", "sliver_study"]
 
@@ -116,9 +116,7 @@ def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iter
         yield _by_running(solver, variant, scene, level)
         return
     try:
-        own = checked_system(system(scene, level, **variant.parameters))
-        uncut = scene.model_copy(update={"cuts": [], "quantities": [], "acceptance": []})
-        whole = checked_system(system(uncut, level, **variant.parameters))
+        own, whole = with_uncut_twin(system, scene, level, variant.parameters)
     except Exception as problem:  # a guest may raise anything
         refused = isinstance(problem, UnsupportedSceneError | InputError)
         why = str(problem) if refused else f"{type(problem).__name__}: {problem}"

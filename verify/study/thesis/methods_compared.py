@@ -10,7 +10,7 @@ from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import Scene
 from verify.solvers import find_solver
 from verify.study.cost.work import work_points
-from verify.system import checked_system
+from verify.study.uncut_twin import with_uncut_twin
 
 __all__ = ["MethodOnCase", "compare_methods"]
 
@@ -112,17 +112,16 @@ def _relative(metric: Metric | None) -> float | None:
 
 def _critical_steps(scene: Scene, solvers: Set[str]) -> Mapping[tuple[str, int], float]:
     """Over that of the uncut mesh, by solver and level, of those that hand over their system."""
-    # the step does not depend on the density when it is one over another
+    # any density does: the ratio does not depend on it
     heavy = scene.material.model_copy(update={"density": scene.material.density or 1.0})
     scene = scene.model_copy(update={"material": heavy})
-    whole = scene.model_copy(update={"cuts": [], "quantities": [], "acceptance": []})
     found = {}
     for name in sorted(solvers - {"reference"}):
         system: Any = getattr(find_solver(name), "system", None)
         for level in range(scene.mesh.count) if system is not None else ():
             try:
-                own, bare = (checked_system(system(one, level)) for one in (scene, whole))
-                found[name, level] = critical_step(own) / critical_step(bare)
+                own, whole = with_uncut_twin(system, scene, level, {})
+                found[name, level] = critical_step(own) / critical_step(whole)
             except (UnsupportedSceneError, InputError):
                 continue  # the solver has said why
     return found

@@ -2,18 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from verify.assess.system_numbers import condition_numbers, critical_step
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
+from verify.study.uncut_twin import with_uncut_twin
 from verify.study.variants import variant_of
-from verify.system import System, checked_system
 
-__all__ = ["METHODS", "SliverSystem", "exponent", "sliver_systems"]
+__all__ = ["SliverSystem", "exponent", "sliver_systems"]
 
-METHODS = (
+_METHODS = (
     "xfem", "xfem mass=consistent", "virtual_node", "subdivision", "snapping_subdivision",
     "snapping",
 )  # fmt: skip
@@ -44,25 +45,22 @@ class SliverSystem:
     scaled: float
 
 
-def sliver_systems(scenes: Sequence[Scene], methods: Sequence[str] = METHODS) -> list[SliverSystem]:
+def sliver_systems(
+    scenes: Sequence[Scene], methods: Sequence[str] = _METHODS
+) -> list[SliverSystem]:
     """Measure the systems of rows of families of slivers, those of ε = 0 left out."""
     found = []
-    for method in methods:
+    for method in _METHODS:
         variant = variant_of(method)
-        solver = variant.found()
-
-        def system(scene: Scene, solver=solver, given=variant.parameters) -> System:  # type: ignore[no-untyped-def]
-            return checked_system(solver.system(scene, 0, **given))
-
+        system: Any = getattr(variant.found(), "system", None)
         for scene in scenes:
             if scene.row is None or not 0.0 < scene.row.value < 0.5:
                 continue
             try:
-                own = system(scene)
-                whole = scene.model_copy(update={"cuts": [], "quantities": [], "acceptance": []})
-                ratio = critical_step(own) / critical_step(system(whole))
+                own, whole = with_uncut_twin(system, scene, 0, variant.parameters)
             except UnsupportedSceneError:
                 continue
+            ratio = critical_step(own) / critical_step(whole)
             raw, scaled = condition_numbers(own)
             found.append(SliverSystem(scene.dimension, method, scene.row.value, ratio, raw, scaled))
     return found
