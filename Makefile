@@ -48,9 +48,10 @@ test: setup ## run the tests, without claims about time and heavy studies
 heavy: setup ## run the heavy studies (minutes to hours)
 	@$(PYTEST) -m heavy --timeout 0
 
-# One after the other; a claim that fails while other programs run is repeated, then undecided.
+# One after the other; a claim that fails while other programs run is repeated, then undecided;
+# with VERIFY_SHARED_MACHINE=1 also where the other programs are not to be seen (continuous integration).
 bench: setup ## run the claims about time, print medians with their spread
-	@$(PYTEST) -m "timing and not heavy" -p no:xdist --benchmark-columns=median,iqr,rounds
+	@$(PYTEST) -m "timing and not heavy" -p no:xdist -rs --benchmark-columns=median,iqr,rounds
 
 check: setup ## ruff, format, types, layers
 	$(BIN)/ruff check .

@@ -13,6 +13,8 @@ _VARIABLE = "VERIFY_CACHE"
 
 ATTEMPTS = 3  # at a claim about time that fails while other programs run
 BUSY = 0.1  # cores; other programs that take more than this can spoil a timing
+# a virtual machine beside others: who empties its caches and lowers its clock is not to be seen
+SHARED = "VERIFY_SHARED_MACHINE"
 
 
 def pytest_configure(config):
@@ -38,10 +40,13 @@ def pytest_runtest_protocol(item, nextitem):
         reports = runtestprotocol(item, nextitem=nextitem, log=False)
         taken = (time_of_others() - others) / max(time.monotonic() - clock, 1e-9)
         failed = [report for report in reports if report.when == "call" and report.failed]
-        if not failed or taken <= BUSY:
+        disturbed = taken > BUSY or (SHARED in os.environ and _is_claim(failed))
+        if not failed or not disturbed:
             break
         if attempt == ATTEMPTS:
             reason = f"undecided: other programs took {taken:.1f} cores, {ATTEMPTS} times"
+            if taken <= BUSY:
+                reason = f"undecided: {_said(failed)}, {ATTEMPTS} times on a shared machine"
             failed[0].outcome = "skipped"
             failed[0].longrepr = (str(item.path), item.location[1], reason)
         else:
@@ -50,6 +55,16 @@ def pytest_runtest_protocol(item, nextitem):
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+def _said(failed):
+    crash = getattr(failed[0].longrepr, "reprcrash", None)
+    return crash.message.split("\n", 1)[0] if crash else ""
+
+
+def _is_claim(failed):
+    """Whether an assertion failed and not the program: an error is one on every machine."""
+    return bool(failed) and _said(failed).startswith(("assert", "AssertionError"))
 
 
 def time_of_others():

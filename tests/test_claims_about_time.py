@@ -25,16 +25,18 @@ def test_claim(fresh):
     count = len(calls.read_text()) + 1 if calls.exists() else 1
     calls.write_text("x" * count)
     assert len(fresh) == 1
+    if {breaks}:
+        raise OSError("no file")
     assert count == {passes}
 """
 
 
-def run(pytester, taken, passes):
+def run(pytester, taken, passes, breaks=False):
     """Run the claim where other programs take so many cores."""
     clock = f"\ndef time_of_others():\n    return {taken} * time.monotonic()\n"
     pytester.makeconftest(CONFTEST + clock)
     pytester.makeini("[pytest]\nmarkers = timing: claims about time\n")
-    pytester.makepyfile(CLAIM.format(passes=passes))
+    pytester.makepyfile(CLAIM.format(passes=passes, breaks=breaks))
     found = pytester.runpytest_subprocess("-rs", "-p", "no:cacheprovider")
     return found, len((pytester.path / "calls").read_text())
 
@@ -49,12 +51,30 @@ def run(pytester, taken, passes):
         (0.0, 2, "failed", 1),
     ],
 )
-def test_a_claim_fails_only_on_a_quiet_machine(pytester, taken, passes, outcome, calls):
+def test_a_claim_fails_only_on_a_quiet_machine(
+    pytester, monkeypatch, taken, passes, outcome, calls
+):
+    monkeypatch.delenv("VERIFY_SHARED_MACHINE", raising=False)
     found, count = run(pytester, taken, passes)
     found.assert_outcomes(**{outcome: 1})
     assert count == calls
     if outcome == "skipped":
         found.stdout.fnmatch_lines(["*undecided: other programs took 0.9 cores*"])
+
+
+@pytest.mark.parametrize(
+    ("passes", "breaks", "outcome", "calls"),
+    [(2, False, "passed", 2), (9, False, "skipped", 3), (9, True, "failed", 1)],
+)
+def test_on_a_shared_machine_a_claim_is_undecided_and_an_error_is_one(
+    pytester, monkeypatch, passes, breaks, outcome, calls
+):
+    monkeypatch.setenv("VERIFY_SHARED_MACHINE", "1")
+    found, count = run(pytester, 0.0, passes, breaks)
+    found.assert_outcomes(**{outcome: 1})
+    assert count == calls
+    if outcome == "skipped":
+        found.stdout.fnmatch_lines(["*undecided: assert 3 == 9, 3 times on a shared machine*"])
 
 
 def test_a_program_sees_the_processor_time_of_another():
