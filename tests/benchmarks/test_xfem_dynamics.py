@@ -123,7 +123,7 @@ def test_the_step_costs_less_than_two_solutions_of_its_matrix(step):
     for _ in range(20):
         scheme.advance(state)
     # rotations, forces and matrix of all elements cost less than one solution; measured: 1.35 to
-    # 1.63, more where other programs empty the caches, for a sweep over all elements minds that most
+    # 1.63, the more the more other programs empty the caches
     assert _step_over_solution(scheme, state, STEPS) < 2.0
 
 
