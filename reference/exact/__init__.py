@@ -1,6 +1,6 @@
 """Exact solutions of cut bodies by name: formulas in numpy, no FEniCSx."""
 
-from reference.exact.catalogue import exact_solution, exact_solution_names
+from reference.exact.catalogue import exact_of, exact_solution, exact_solution_names
 from reference.exact.solution import ExactSolution
 
-__all__ = ["ExactSolution", "exact_solution", "exact_solution_names"]
+__all__ = ["ExactSolution", "exact_of", "exact_solution", "exact_solution_names"]

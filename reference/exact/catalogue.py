@@ -24,10 +24,10 @@ from reference.exact.solid_sinusoidal import SolidSinusoidal
 from reference.exact.solution import ExactSolution
 from reference.exact.straight_front import StraightFrontField
 from verify.errors import InputError
-from verify.scene import Material
+from verify.scene import Material, Scene
 from verify.scene.nearest import nearest
 
-__all__ = ["exact_solution", "exact_solution_names"]
+__all__ = ["exact_of", "exact_solution", "exact_solution_names"]
 
 _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] = {
     "linear": (Linear, "uniform strain, uncut: matrix, shift"),
@@ -109,6 +109,13 @@ _IN_SPACE = (
     "blade_strip",
 )  # fmt: skip
 _GROUP = "verify.exact_solutions"  # entry points of other packages
+
+
+def exact_of(scene: Scene) -> Any:
+    """Return the exact solution that a scene names, or None."""
+    if scene.exact is None:
+        return None
+    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
 def exact_solution_names() -> dict[str, str]:

@@ -7,7 +7,6 @@ import pytest
 
 from verify.errors import UnsupportedSceneError
 from verify.exchange import problem_of
-from verify.exchange.quadrature import simplex_rule
 from verify.scene import Scene, load_scene
 
 needs_gmsh = pytest.mark.skipif(find_spec("gmsh") is None, reason="needs gmsh")
@@ -108,17 +107,6 @@ def test_lame_constants_of_plane_stress_are_those_of_the_plane_problem():
     lam, mu = problem_of(stress, 0).lame()
     # uniaxial tension: σ = E ε needs λ + 2μ − λ²/(λ + 2μ) = E in the plane
     assert lam + 2 * mu - lam**2 / (lam + 2 * mu) == pytest.approx(2.0, rel=1e-14)
-
-
-@pytest.mark.parametrize("dimension, volume", [(1, 1.0), (2, 0.5), (3, 1 / 6)])
-def test_the_rule_is_exact_to_degree_seven(dimension, volume):
-    barycentric, weights = simplex_rule(dimension, 4)
-    for powers in [(7,), (4, 3), (2, 2, 3)][:dimension]:
-        term = np.prod([barycentric[:, i] ** p for i, p in enumerate(powers)], axis=0)
-        factorials = np.array([1, 1, 2, 6, 24, 120, 720, 5040, 40320, 362880, 3628800.0])
-        # ∫ Π λ_i^p_i over a simplex: d! V Π p_i! / (Σ p_i + d)!
-        exact = np.prod(factorials[list(powers)]) / factorials[sum(powers) + dimension]
-        assert volume * weights @ term == pytest.approx(exact, rel=1e-13)
 
 
 def test_a_given_mesh_in_space_conforms_without_a_cut_and_is_refused_with_one(tmp_path):

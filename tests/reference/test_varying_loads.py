@@ -66,8 +66,8 @@ def test_the_compact_solver_answers_as_under_the_exact_tractions():
 
 def test_a_varying_body_force_has_its_integral_on_both_sides_of_a_cut():
     from verify.solvers.body_of_scene import background_mesh
-    from verify.solvers.xfem_cuts import cuts_of
-    from verify.solvers.xfem_loads import loads_of
+    from verify.solvers.cuts_of_scene import cuts_of
+    from verify.solvers.loads_of_scene import loads_of
     from verify.xfem.phantom import cut_mesh
 
     scene = bar(True).model_copy(

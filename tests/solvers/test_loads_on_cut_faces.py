@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from reference.exact import exact_solution
 from verify.errors import UnsupportedSceneError
-from verify.exchange.problem import problem_of
+from verify.exchange import problem_of
 from verify.scene import Scene
 from verify.solvers import find_solver
 

@@ -106,11 +106,9 @@ def _coarsest(scene: "Scene", levels: int) -> "Scene":
 
 
 def _exact(scene: "Scene") -> Any:
-    if not scene.judged_by_exact or scene.exact is None:
-        return None
-    from reference.exact import exact_solution
+    from reference.exact import exact_of
 
-    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    return exact_of(scene) if scene.judged_by_exact else None
 
 
 def _run(

@@ -6,7 +6,8 @@
 
 from verify.exchange.answers import Answers, read_answers
 from verify.exchange.export import export_case
-from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
+from verify.exchange.layout import problem_of
+from verify.exchange.problem import HeldNodes, Load, Problem
 from verify.exchange.program import ProgramSolver
 
 __all__ = [

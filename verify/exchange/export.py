@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from verify.compare.hooke import hooke
 from verify.errors import InputError
-from verify.exchange.problem import HeldNodes, Load, Problem, problem_of
+from verify.exchange.layout import problem_of
+from verify.exchange.problem import HeldNodes, Load, Problem
 from verify.json_files import write_json
 from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, SpatialCut

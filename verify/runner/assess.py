@@ -51,6 +51,8 @@ _WILD = 1e3  # sizes of its body: a solution that moves farther has no openings 
 
 def main(question_file: Path) -> None:
     """Compare and judge what `question_file` says."""
+    from reference.exact import exact_of
+
     die_with_parent()
     question, folder = read_json(question_file), question_file.parent
     root = Path(question["root"])
@@ -60,7 +62,7 @@ def main(question_file: Path) -> None:
         write_whole(folder / JUDGING, at.get((record.solver, record.level), ""))
 
     records, solutions, at = _stored(root, question["folders"], question["unfit"], folder / JUDGING)
-    exact = _exact(scene)
+    exact = exact_of(scene)
     measured = assess_accuracy(scene, records, solutions, exact, announce)
     result: CaseResult = with_verdicts(scene, measured, question["judge_only"])
     (folder / JUDGING).unlink(missing_ok=True)
@@ -165,14 +167,6 @@ def _comparable(
 def _is_wild(solution: Solution) -> bool:
     size = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
     return bool(np.abs(solution.displacement).max() > _WILD * size)
-
-
-def _exact(scene: Scene) -> Any:
-    if scene.exact is None:
-        return None
-    from reference.exact import exact_solution
-
-    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
 def _error_pictures(

@@ -21,10 +21,10 @@ def check_scene(scene: Scene) -> None:
         except ValueError as error:
             raise InputError(str(error), where) from None
     if scene.exact is not None:
-        from reference.exact import exact_solution
+        from reference.exact import exact_of
 
         try:
-            exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+            exact_of(scene)
         except InputError as error:
             raise InputError(f"exact: {error}", where) from None
     for i, asked in enumerate(scene.quantities):

@@ -23,15 +23,16 @@ class PrescribedMotion:
     support : Support
     points : (k, d) array
         In m.
-    near : (k, d) array
-        Points of the material that the points move, which say on which side of a cut they are, m.
+    near : (k, d) array or None
+        Points of the material that the points move, which say on which side of a cut they are, m;
+        None: the points themselves say it.
     exact : object or None
         The exact solution, where the support says ``"exact"``.
     """
 
     support: Support
     points: Array
-    near: Array
+    near: Array | None
     exact: Any
 
     @property

@@ -20,7 +20,13 @@ from verify.xfem.elasticity import Material, State, isotropic
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
-__all__ = ["across_interfaces", "background_mesh", "density_of", "material_of"]
+__all__ = [
+    "across_interfaces",
+    "background_mesh",
+    "density_of",
+    "material_of",
+    "volumetric_mass",
+]
 
 
 def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
@@ -77,7 +83,7 @@ def material_of(scene: Scene, mesh: SimplexMesh) -> Material:
     """
     states: dict[str | None, State] = {"strain": "plane strain", "stress": "plane stress"}
     state = states.get(scene.material.plane, "solid")
-    young, poisson, _ = _of_cells(scene, mesh)
+    young, poisson, _ = _moduli(scene, mesh.points[mesh.cells].mean(axis=1))
     thickness = scene.material.thickness
     if thickness is None:
         return isotropic(young, poisson, state)
@@ -90,16 +96,21 @@ def density_of(scene: Scene, mesh: SimplexMesh) -> float | NDArray[np.float64]:
 
     One number, or one for each cell (m,) where materials differ by region.
     """
-    _, _, density = _of_cells(scene, mesh)
+    density = volumetric_mass(scene, mesh.points[mesh.cells].mean(axis=1))
     return density * (scene.material.thickness or 1.0)
 
 
-def _of_cells(scene: Scene, mesh: SimplexMesh) -> Any:
-    """Young's modulus, Poisson's ratio and density: numbers, or arrays (m,) by cell."""
+def volumetric_mass(scene: Scene, points: NDArray[np.float64]) -> Any:
+    """Return the density in kg/m³: one number, or (n,) at points where materials differ."""
+    return _moduli(scene, points)[2]
+
+
+def _moduli(scene: Scene, points: NDArray[np.float64]) -> Any:
+    """Young's modulus, Poisson's ratio and density: numbers, or arrays (n,) at points."""
     material = scene.material
     if material.is_uniform:
         return material.young, material.poisson, material.density
-    return material.at(mesh.points[mesh.cells].mean(axis=1))
+    return material.at(points)
 
 
 def across_interfaces(scene: Scene, mesh: SimplexMesh) -> list[Regularisation]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from reference.boundary_values import constrained_values
 from reference.dolfinx_versions import import_dolfinx
 from reference.elasticity import load_form, solve_linear
-from reference.exact import exact_solution
+from reference.exact import exact_of
 from reference.fracture.pressure import MIXED
 from reference.large_strain import LargeStrainSolve, solve_large_strain
 from reference.linear_system import linear_system
@@ -137,11 +137,8 @@ class ConformingSolver:
         """Return stiffness, consistent mass and supports of `scene`; all cuts are open."""
         if reason := _refusal(scene):
             raise UnsupportedSceneError(reason)
-        exact = None
-        if scene.exact is not None:
-            exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
         space = conforming_space(peer_mesh(scene, level, mesh), degree, None)
-        return System(*linear_system(scene, space, exact))
+        return System(*linear_system(scene, space, exact_of(scene)))
 
 
 class ReferenceSolver:
@@ -200,11 +197,7 @@ def _solve(
 ) -> Solution:
     if reason := _refusal(scene):
         raise UnsupportedSceneError(reason)
-    exact = None
-    if scene.exact is not None:
-        exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
-
-    comm = _comm()
+    exact, comm = exact_of(scene), _comm()
 
     def answer(level: int, mesh: ConformingMesh, size: float, trial: bool = False) -> _Answer:
         space = conforming_space(mesh, degree, comm)

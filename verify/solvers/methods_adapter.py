@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.exact import exact_of
 from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.methods.catalogue import METHODS
@@ -17,15 +18,19 @@ from verify.methods.cut_body import CutBody
 from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
 from verify.solution import Regularisation, Solution
-from verify.solvers.body_of_scene import across_interfaces, background_mesh, material_of
+from verify.solvers.body_of_scene import (
+    across_interfaces,
+    background_mesh,
+    material_of,
+)
+from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.loads_of_scene import loads_of
 from verify.solvers.methods_motion import MethodMover
+from verify.solvers.supports_of_scene import path_of_supports, supports_of
 from verify.solvers.xfem import XfemSolver
-from verify.solvers.xfem_cuts import cuts_of
-from verify.solvers.xfem_loads import loads_of
 from verify.solvers.xfem_motion import MotionChoice
 from verify.solvers.xfem_static import dismissed_equilibria, path_notes
 from verify.solvers.xfem_steps import SCHEMES
-from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.solvers.xfem_system import system_of
 from verify.system import System
 from verify.xfem.equilibrium import static_equilibrium
@@ -172,7 +177,7 @@ class MethodSolver:
             raise UnsupportedSceneError(reason)
         taken = list(signature(METHODS[self._method]).parameters)[2:]
         own = {name: value for name, value in parameters.items() if name in taken}
-        exact = _exact(scene)
+        exact = exact_of(scene)
         try:
             mesh, size = background_mesh(scene, level)
             body = METHODS[self._method](mesh, cuts_of(scene, size), **own)
@@ -206,7 +211,7 @@ class MethodSolver:
     ) -> _Run:
         """Cut, load, solve: all of it, nothing kept from the run before."""
         mesh = SimplexMesh(mesh.points, mesh.cells)
-        exact, kinematics = _exact(scene), scene.analysis.kinematics
+        exact, kinematics = exact_of(scene), scene.analysis.kinematics
         if scene.analysis.kind == "dynamic":
             forces: list[InternalForce] = []
 
@@ -322,15 +327,6 @@ class MassSpringSolver(MethodSolver):
                 f"{scheme} of springs: their critical step is not that of the elements, and they "
                 "have no stress; expected newmark, implicit_euler or generalised_alpha"
             )
-
-
-def _exact(scene: Scene) -> Any:
-    """Return the exact solution that supports or loads may be taken from."""
-    if scene.exact is None:
-        return None
-    from reference.exact import exact_solution  # formulas in numpy; no FEniCSx
-
-    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
 def _solution(

@@ -6,17 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from reference.exact import exact_of
 from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh, material_of
+from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.supports_of_scene import supports_of
 from verify.solvers.xfem_answer import Answer, joined, solution_of
-from verify.solvers.xfem_cuts import cuts_of
 from verify.solvers.xfem_motion import MotionChoice, move
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
-from verify.solvers.xfem_supports import supports_of
 from verify.solvers.xfem_system import system_of
 from verify.system import System
 from verify.xfem.errors import BasisError, XfemError
@@ -176,7 +177,7 @@ class XfemSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        exact = _exact(scene)
+        exact = exact_of(scene)
         try:
             mesh, size = background_mesh(scene, level)
             phantom = _cut(scene, mesh, size, exact, tip, slivers)[0]
@@ -217,7 +218,7 @@ def _check_penalty(scene: Scene, basis: str, mass: str) -> None:
 
 
 def _solve(scene: Scene, level: int, repetitions: int, choice: _Choice) -> Solution:
-    exact = _exact(scene)
+    exact = exact_of(scene)
     try:
         start = perf_counter()
         mesh, size = background_mesh(scene, level)
@@ -233,15 +234,6 @@ def _solve(scene: Scene, level: int, repetitions: int, choice: _Choice) -> Solut
     if repetitions:
         timings = {phase: [run.timings[phase] for run in runs] for phase in runs[0].timings}
     return solution_of(scene, runs[-1], size, {"meshing": [meshing], **timings}, choice.notes())
-
-
-def _exact(scene: Scene) -> Any:
-    """Return the exact solution that supports or loads may be taken from."""
-    if scene.exact is None:
-        return None
-    from reference.exact import exact_solution  # formulas in numpy; no FEniCSx
-
-    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
 def _run(

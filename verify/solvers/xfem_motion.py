@@ -14,13 +14,13 @@ from verify.scene import Equilibrium, Gravity, InitialField, Moving, Scene, Tool
 from verify.scene.history import factor_at, first_factor
 from verify.scene.initial import starts_open
 from verify.solvers.body_of_scene import density_of, material_of
+from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.loads_of_scene import forces_of, is_moving, nodal_forces
+from verify.solvers.supports_of_scene import initial_path, motion_of_supports
 from verify.solvers.xfem_account import Account
 from verify.solvers.xfem_answer import Answer, penalised
-from verify.solvers.xfem_cuts import cuts_of
-from verify.solvers.xfem_loads import forces_of, is_moving, nodal_forces
 from verify.solvers.xfem_openings import opening_times, stops_of
 from verify.solvers.xfem_steps import MASSES, integrator_of, largest_step
-from verify.solvers.xfem_supports import initial_path, motion_of_supports
 from verify.xfem.body import DynamicBody, Integrator, MotionState, RayleighDamping
 from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.equilibrium import static_equilibrium

@@ -11,10 +11,10 @@ from verify.accelerated import FAST
 from verify.scene import Scene
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import material_of
+from verify.solvers.loads_of_scene import loads_of
+from verify.solvers.supports_of_scene import path_of_supports, supports_of
 from verify.solvers.xfem_answer import penalised
 from verify.solvers.xfem_bases import solve_in_basis
-from verify.solvers.xfem_loads import loads_of
-from verify.solvers.xfem_supports import path_of_supports, supports_of
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells

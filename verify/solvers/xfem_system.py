@@ -7,9 +7,9 @@ from scipy.sparse import csr_array, identity, kron
 from verify.errors import InputError
 from verify.scene import Scene
 from verify.solvers.body_of_scene import density_of
+from verify.solvers.supports_of_scene import supports_of
 from verify.solvers.xfem_bases import held_in_basis
 from verify.solvers.xfem_steps import MASSES
-from verify.solvers.xfem_supports import supports_of
 from verify.system import System
 from verify.xfem.assembly import body_pattern
 from verify.xfem.bases import transformed_matrix

@@ -130,10 +130,12 @@ def measured_families(
 
 
 def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
+    from reference.exact import exact_of
+
     solution = handed_over(solver.solve(scene, level, repetitions=1, **variant.parameters))
     record = SolveRecord(scene.name, variant.solver, level, Status.SOLVED, size=solution.size)
     solutions = {variant.solver: {level: solution}}
-    result = assess_accuracy(scene, [record], solutions, _exact_of(scene))
+    result = assess_accuracy(scene, [record], solutions, exact_of(scene))
     (measured,) = result.solves
     if measured.status is not Status.SOLVED:
         raise NotMeasuredError(measured.reason)
@@ -155,15 +157,6 @@ def _solved(solver: Solver, variant: Variant, scene: Scene, level: int) -> Itera
             yield name, "", None, why
     if not np.isfinite(solution.displacement).all():
         yield "solution", "", None, "not finite"
-
-
-def _exact_of(scene: Scene) -> Any:
-    """Return the exact solution that a scene names, or None."""
-    if scene.exact is None:
-        return None
-    from reference.exact import exact_solution
-
-    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
 
 
 def missing_solutions(topic: str, own: Sequence[Measurement]) -> Iterator[Finding]:

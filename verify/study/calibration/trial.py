@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from reference.exact import ExactSolution, exact_of
 from verify.assess.quantities import Measured
 from verify.assess.reference import (
-    ExactField,
     conforming_reference,
     exact_reference,
     size_of,
@@ -73,7 +73,8 @@ def trials(family: Family, index: int) -> list[Trial]:
     scene = family.scene(index)
     solver = find_solver("reference")
     solutions = {k: solver.solve(scene, k, 0) for k in range(solver.levels(scene))}
-    law, exact = law_of(scene), _exact(scene)
+    law, exact = law_of(scene), exact_of(scene)
+    assert exact is not None
     body = body_of(scene, exact.singular_points)
     truth = exact_reference(scene, exact, body, law)
     found = []
@@ -91,7 +92,7 @@ def _judged(
     levels: Mapping[int, Solution],
     body: AnyBody,
     law: Law,
-    exact: ExactField,
+    exact: ExactSolution,
     values: Mapping[str, tuple[float, float]],
 ) -> list[Trial]:
     finest = levels[max(levels)]
@@ -120,11 +121,3 @@ def _left_out(one: Trial) -> str:
     if one.known > _SURE * one.true:
         return f"the true error {one.true:.1e} is known to {one.known:.1e} only"
     return ""
-
-
-def _exact(scene: Scene) -> ExactField:
-    from reference.exact import exact_solution
-
-    assert scene.exact is not None
-    found: ExactField = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
-    return found

@@ -11,7 +11,7 @@ from verify.scene import Scene
 from verify.scene.history import factor_at, first_factor
 from verify.scene.parts import copies_on_part, lie_on_part
 from verify.scene.prescribed import PrescribedMotion
-from verify.solvers.xfem_boundary import boundary_nodes, facet_parts, own_corners
+from verify.solvers.boundary_of_scene import Boundary
 from verify.xfem.body import MovingSupports
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports
@@ -19,13 +19,14 @@ from verify.xfem.supports import Supports
 __all__ = ["initial_path", "motion_of_supports", "path_of_supports", "supports_of"]
 
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class _Held(PrescribedMotion):
     """Motion that a support prescribes, and of which unknowns (k,) and components."""
 
-    unknowns: NDArray[np.int64]
+    unknowns: _Ints
     components: tuple[int, ...]
 
 
@@ -91,10 +92,10 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
     what is behind it.
     """
     mesh = phantom.mesh
-    unknowns, parts = facet_parts(phantom)
-    at_node = own_corners(phantom)
+    unknowns, parts = _facet_parts(phantom)
+    at_node = _own_corners(phantom)
     outer = np.zeros(len(mesh.points), dtype=bool)
-    outer[boundary_nodes(mesh)] = True
+    outer[Boundary(mesh.points, mesh.cells, mesh.boundary_facets).nodes] = True
     own = np.flatnonzero(at_node & outer[phantom.node_parent])
     number = np.full(len(at_node), -1)
     number[own] = np.arange(len(own))
@@ -116,3 +117,52 @@ def _held(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[_Held]:
         points, near = phantom.node_points[at], phantom.node_piece_points[at]
         found.append(_Held(support, points, near, field, at, components))
     return found
+
+
+def _own_corners(phantom: PhantomMesh) -> NDArray[np.bool_]:
+    """(N,) whether the node of an unknown lies in the material that the unknown moves.
+
+    Behind a cut it does not: the unknown belongs to a node that is beyond.
+    """
+    piece, barycentric, _ = phantom.solid_simplices
+    own = np.zeros(phantom.corners.node_count, dtype=bool)
+    simplex, vertex = np.nonzero(barycentric.max(axis=2) == 1.0)
+    own[phantom.cells[piece[simplex], barycentric[simplex, vertex].argmax(axis=1)]] = True
+    return own[phantom.node_corner]
+
+
+def _facet_parts(phantom: PhantomMesh) -> tuple[_Ints, _Floats]:
+    """Boundary facets, of those that are cut the parts, each for every unknown that moves it.
+
+    Returns
+    -------
+    unknowns : (k,) int array
+        Dof nodes at the nodes of a facet, on the side of the part; nodes that follow a root
+        cell have none.
+    points : (k, space) array
+        Centroid of the part, m.
+    """
+    mesh = phantom.mesh
+    piece, in_cell, _ = phantom.solid_simplices
+    facets = mesh.boundary_facets
+    outer = np.zeros(len(mesh.cells), dtype=bool)
+    outer[facets[:, 0]] = True
+    mine = outer[phantom.parent[piece]]
+    piece, cell, in_cell = piece[mine], phantom.parent[piece[mine]], in_cell[mine]
+    unknowns, points = [], []
+    corners = mesh.dim + 1
+    for local in range(corners):
+        wanted = np.zeros(len(mesh.cells), dtype=bool)
+        wanted[facets[facets[:, 1] == local, 0]] = True
+        here = np.flatnonzero(wanted[cell])
+        rest = [k for k in range(corners) if k != local]
+        for opposite in range(corners):
+            side = [k for k in range(corners) if k != opposite]
+            on_facet = here[(in_cell[here][:, side, local] == 0.0).all(axis=1)]
+            middle = in_cell[on_facet][:, side].mean(axis=1)
+            nodes = mesh.points[mesh.cells[cell[on_facet]]]
+            centroid = np.einsum("ki,kij->kj", middle, nodes)
+            unknowns.append(phantom.cells[piece[on_facet]][:, rest].ravel())
+            points.append(np.repeat(centroid, mesh.dim, axis=0))
+    node = phantom.corner_node[np.concatenate(unknowns)]
+    return node[node >= 0], np.concatenate(points)[node >= 0]

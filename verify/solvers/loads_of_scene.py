@@ -1,0 +1,152 @@
+"""Loads of a scene: force densities at points, and consistent nodal forces of a cut body."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.scene import BodyForce, CutFaces, Gravity, Scene, Traction, is_uniform
+from verify.scene.physics import Load
+from verify.solvers.body_of_scene import volumetric_mass
+from verify.solvers.boundary_of_scene import Boundary
+from verify.solvers.cut_face_loads import face_forces
+from verify.xfem.loads import body_force, traction
+from verify.xfem.phantom import PhantomMesh
+
+__all__ = ["ForceDensity", "NodalForces", "forces_of", "is_moving", "loads_of", "nodal_forces"]
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ForceDensity:
+    """Force per volume (N/m³) or per area (Pa) of a load at a time, without its history's factor.
+
+    Attributes
+    ----------
+    scene : Scene
+    load : BodyForce, Traction or Gravity
+    exact : object or None
+        The exact solution at that time.
+    time : float
+        In s.
+    """
+
+    scene: Scene
+    load: BodyForce | Traction | Gravity
+    exact: Any = None
+    time: float = 0.0
+
+    def uniform(self, centroids: _Floats) -> _Floats | None:
+        """Value (d,) that holds everywhere, or values (m, d) by cell; None if neither does.
+
+        Only the weight differs by cell, where materials do: by that at the centroids (m, d).
+        """
+        if isinstance(self.load, Gravity):
+            density = volumetric_mass(self.scene, centroids)
+            return np.multiply.outer(density, np.asarray(self.load.acceleration))
+        given = self.load.traction if isinstance(self.load, Traction) else self.load.force
+        return np.asarray(given, dtype=float) if is_uniform(given) else None
+
+    def at(
+        self, points: _Floats, near: _Floats | None = None, normals: _Floats | None = None
+    ) -> _Floats:
+        """Values (q, d) at points (q, d).
+
+        Parameters
+        ----------
+        points : (q, d) array
+            m.
+        near : (q, d) array, optional
+            Points of the material, which say on which side of a cut the points are; default: on
+            their own.
+        normals : (q, d) array, optional
+            Outward, for the traction of an exact solution.
+        """
+        assert not isinstance(self.load, Gravity)
+        if not self.load.exact:
+            return np.asarray(self.load.values(points, self.time))
+        if isinstance(self.load, Traction):
+            assert normals is not None
+            return np.einsum("qij,qj->qi", self.exact.stress(points, near), normals)
+        return np.asarray(self.exact.body_force(points, near))
+
+
+class NodalForces(NamedTuple):
+    """A load of the scene and its nodal forces (N, d), N (per metre of thickness in 2D)."""
+
+    load: Load
+    forces: _Floats
+
+
+def loads_of(scene: Scene, phantom: PhantomMesh, exact: Any) -> _Floats:
+    """Return the consistent nodal forces (N, d) of all loads, N (per metre in 2D)."""
+    total = np.zeros_like(phantom.node_points)
+    for one in nodal_forces(scene, phantom, exact):
+        total += one.forces
+    return total
+
+
+def nodal_forces(scene: Scene, phantom: PhantomMesh, exact: Any) -> list[NodalForces]:
+    """Return the nodal forces of every load at the time 0, in the order of the scene.
+
+    Those of a membrane are times its thickness: forces per volume and per area stay what they
+    are.
+    """
+    return [
+        NodalForces(entry, forces_of(scene, i, phantom, exact))
+        for i, entry in enumerate(scene.loads)
+    ]
+
+
+def is_moving(load: Load, exact: Any) -> bool:
+    """Whether a load is another field at every time, apart from the factor of its history."""
+    if isinstance(load, Gravity):
+        return False
+    return bool(load.timed or (load.exact and exact.moves))
+
+
+def forces_of(scene: Scene, i: int, phantom: PhantomMesh, exact: Any, time: float = 0.0) -> _Floats:
+    """Return the nodal forces (N, d) of a load at a time, without the factor of its history, N."""
+    entry = scene.loads[i]
+    if isinstance(entry, CutFaces):
+        forces = face_forces(scene, phantom, i, time)
+    else:
+        density = ForceDensity(scene, entry, None if exact is None else exact.at(time), time)
+        if isinstance(entry, Traction):
+            forces = _traction(phantom, density, f"loads[{i}].where")
+        else:
+            mesh = phantom.mesh
+            uniform = density.uniform(mesh.points[mesh.cells].mean(axis=1))
+            given: Any = uniform if uniform is not None else _of_points(density)
+            forces = body_force(phantom, given)
+    return np.asarray((scene.material.thickness or 1.0) * forces)
+
+
+def _traction(phantom: PhantomMesh, density: ForceDensity, key: str) -> _Floats:
+    """Nodal forces (N, d); those of an exact field by facets of one direction after the other."""
+    load, mesh = density.load, phantom.mesh
+    assert isinstance(load, Traction)
+    boundary = Boundary(mesh.points, mesh.cells, mesh.boundary_facets)
+    chosen = boundary.facets_on(density.scene, load.where, key)
+    facets = boundary.facets[chosen]
+    if not load.exact:
+        given: Any = load.traction if is_uniform(load.traction) else _of_points(density)
+        return traction(phantom, facets, given)
+    normals = boundary.outward_normals(chosen)
+    forces = np.zeros_like(phantom.node_points)
+    distinct, group = np.unique(np.round(normals, 12), axis=0, return_inverse=True)
+    for k, normal in enumerate(distinct):
+        forces += traction(phantom, facets[group.ravel() == k], _of_points(density, normal))
+    return forces
+
+
+def _of_points(density: ForceDensity, normal: _Floats | None = None) -> Any:
+    """Return the density as the library takes it: of points and their sides, on one direction."""
+
+    def at(points: _Floats, sides: NDArray[np.int8]) -> _Floats:
+        normals = None if normal is None else np.broadcast_to(normal, points.shape)
+        return density.at(points, normals=normals)
+
+    return at
