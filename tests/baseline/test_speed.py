@@ -2,11 +2,10 @@
 
 import re
 
-import numpy as np
 import pytest
 import runs
 
-from verify.calibration import KERNEL, calibration_note, kernel_seconds, seconds_of_note
+from verify.calibration import KERNEL
 
 NOISY = f"kernel {KERNEL}: 0.010 0.016 0.012 0.019 0.011"
 
@@ -38,10 +37,6 @@ def test_a_slower_machine_is_not_a_slower_solver(saved, tmp_path):
     kernel = f"kernel {KERNEL}: 0.0200 0.0202 0.0200 0.0202 0.0200"
     slow = runs.solve(seconds=(0.200, 0.201, 0.202), calibration=kernel)
     assert checked(saved, tmp_path / "new", slow) == ("PASS", "")
-
-
-def test_a_faster_solver_passes(saved, tmp_path):
-    assert checked(saved, tmp_path / "new", runs.solve(seconds=(0.01, 0.01, 0.01)))[0] == "PASS"
 
 
 @pytest.mark.parametrize(
@@ -93,28 +88,3 @@ def test_speeds_move_only_by_name_and_keep_their_limit(saved, tmp_path):
     assert (code, answer["moved"]) == (0, 1)
     assert '"slower_at_most": 1.7' in saved.file.read_text()
     assert speed(saved("check", new)[1])[0] == "PASS"
-
-
-def test_the_kernel_is_a_fixed_piece_of_work_that_takes_milliseconds():
-    seconds = kernel_seconds(3)
-    assert len(seconds) == 3
-    # about 8 ms on a machine of 2024; a factor of 50 either way for any that runs this
-    assert all(2e-4 < second < 0.4 for second in seconds)
-    assert len(seconds_of_note(calibration_note())) == 5
-
-
-def test_the_kernel_takes_no_memory_while_it_is_timed():
-    """Else fresh pages are timed as well, of which there are more or less with what ran before."""
-    resource = pytest.importorskip("resource", reason="page faults are counted by POSIX systems")
-
-    def faults():
-        return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-
-    def clock():
-        seen.append(faults())
-        return float(len(seen))
-
-    seen: list[int] = []
-    kernel_seconds(4, clock=clock)
-    within = np.diff(seen)[1::2]  # from the start to the end of each call that counts
-    assert within.max() < 20  # 2300 in the first kernel

@@ -5,8 +5,6 @@ import json
 import pytest
 import runs
 
-from verify.cli import main
-
 
 def rows(answer, axis=None):
     return {
@@ -124,21 +122,6 @@ def test_update_refuses_a_value_that_contradicts_the_independent_one(baseline, t
     assert baseline.file.read_bytes() == before
 
 
-def test_saving_again_adds_what_is_new_and_keeps_what_is_there(baseline, tmp_path):
-    baseline("save", runs.run(tmp_path / "old"))
-    before = stored(baseline)
-    other = runs.result(runs.solve(energy=2.005), scene={"title": "other words"})
-    _, answer = baseline("save", runs.run(tmp_path / "new", other))
-    assert answer["added"] == 0
-    assert stored(baseline) == before
-
-
-def test_a_value_that_contradicts_the_independent_one_is_said_when_it_is_saved(baseline, tmp_path):
-    code, answer = baseline("save", runs.run(tmp_path / "a", runs.result(runs.solve(energy=2.2))))
-    assert code == 1
-    assert rows(answer) == {("xfem/1/strain_energy", "independent"): "FAIL"}
-
-
 def test_another_scene_is_not_compared_and_never_passes(baseline, tmp_path):
     baseline("save", runs.run(tmp_path / "old"))
     soft = {"material": {"young": 0.9, "poisson": 0.3, "plane": "strain"}}
@@ -199,15 +182,3 @@ def test_bad_input_is_one_line(baseline, tmp_path):
     assert "not a run" in baseline("check", tmp_path)[1]
     going_on = runs.run(tmp_path / "going-on", finished=None)
     assert "has not finished" in baseline("check", going_on)[1]
-
-
-def test_a_person_reads_what_changed_and_by_how_much(baseline, tmp_path, capsys):
-    baseline("save", runs.run(tmp_path / "old"))
-    new = runs.run(tmp_path / "new", runs.result(runs.solve(energy=2.2)))
-    assert main(["baseline", "check", str(new), "--file", str(baseline.file)]) == 1
-    said = capsys.readouterr().out
-    assert (
-        "FAIL      own         a/case:xfem/1/strain_energy: 2.2, stored 2.001: changed by" in said
-    )
-    assert "allowed 0.02; a book" in said
-    assert "own          2 PASS, 1 FAIL" in said

@@ -3,8 +3,6 @@
 import runs
 from runs import verdict
 
-from verify.cli import main
-
 OLD = [
     verdict("error", "sag", "PASS", 0.01),
     verdict("rate", "energy_norm", "UNDECIDED"),
@@ -42,11 +40,3 @@ def test_the_second_of_two_equal_checks_is_told_from_the_first(baseline, tmp_pat
     new_run = runs.run(tmp_path / "new", runs.result(verdicts=new))
     (change,) = baseline("diff", old_run, new_run)[1]["changes"]
     assert change["check"] == "value of strain_energy (xfem) #2"
-
-
-def test_runs_without_a_change_say_so(baseline, tmp_path, capsys):
-    old = runs.run(tmp_path / "old", runs.result(verdicts=OLD))
-    assert main(["baseline", "diff", str(old), str(old)]) == 0
-    out = capsys.readouterr().out
-    assert out.splitlines()[-1] == "no verdict changed"
-    assert "c0ffee" in out

@@ -23,15 +23,6 @@ BROKEN_CASES = {
         "mean 'conforming'?",
     ),
 }  # fmt: skip
-BROKEN_MESHES = {
-    "not there": (None, "geometry.file: no mesh file 'body.vtk'"),
-    "not a mesh": ("a shopping list\n", "not a mesh that meshio can read"),
-    "not simplicial": (
-        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n"
-        "0 0 0 1 0 0 1 1 0 0 1 0\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n9\n",
-        "not simplicial: has quad; expected triangles",
-    ),
-}
 
 BROKEN_LINES = {
     "case": (["statics/f1_pach"], "no case 'statics/f1_pach'; did you mean 'statics/f1_patch'?"),
@@ -87,36 +78,11 @@ def test_a_broken_case_file_is_refused(tmp_path, monkeypatch, capsys, command, f
     assert [path.name for path in tmp_path.iterdir()] == ["own.toml"]
 
 
-@pytest.mark.parametrize("fault", BROKEN_MESHES)
-def test_a_broken_mesh_file_is_refused(tmp_path, monkeypatch, capsys, fault):
-    content, said = BROKEN_MESHES[fault]
-    rectangle = 'kind = "rectangle"\nlower = [0.0, 0.0]\nupper = [1.0, 1.0]'
-    levels = "cells = [[8, 8], [16, 16]]"
-    assert rectangle in PATCH
-    assert levels in PATCH
-    text = PATCH.replace(rectangle, 'kind = "file"\nfile = "body.vtk"')
-    (tmp_path / "own.toml").write_text(text.replace(levels, 'pattern = "given"'))
-    if content is not None:
-        (tmp_path / "body.vtk").write_text(content)
-    before = sorted(tmp_path.iterdir())
-    code = run_here(tmp_path, monkeypatch, "own.toml")
-    assert_refused(code, capsys.readouterr(), said)
-    assert sorted(tmp_path.iterdir()) == before
-
-
 @pytest.mark.parametrize("fault", BROKEN_LINES)
 def test_a_broken_command_line_is_refused(tmp_path, monkeypatch, capsys, fault):
     arguments, said = BROKEN_LINES[fault]
     code = run_here(tmp_path, monkeypatch, *arguments)
     assert_refused(code, capsys.readouterr(), said)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("words", [["no_such_case"], ["statics/f3_inclined", "--solver", "xfen"]])
-def test_a_study_that_cannot_begin_leaves_nothing_behind(tmp_path, monkeypatch, capsys, words):
-    monkeypatch.chdir(tmp_path)
-    code = main(["study", "cost", *words, "--out", "studies"])
-    assert_refused(code, capsys.readouterr(), "no ")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -137,19 +103,6 @@ def test_check_says_a_line_for_every_file(tmp_path, monkeypatch, capsys):
     captured = capsys.readouterr()
     assert captured.out.startswith("good.toml: ok (F1 patch")
     assert captured.err.count("\n") == 2
-
-
-@pytest.mark.parametrize(
-    "make, said",
-    [
-        (lambda folder: None, "not a run (it has no run.json)"),
-        (lambda folder: folder.mkdir(), "not a run (it has no run.json)"),
-        (lambda folder: folder.write_text("x"), "not a run (it has no run.json)"),
-    ],
-)
-def test_report_of_what_is_no_run_is_refused(tmp_path, capsys, make, said):
-    make(tmp_path / "out")
-    assert_refused(main(["report", str(tmp_path / "out")]), capsys.readouterr(), said)
 
 
 def test_no_command_is_a_usage_error(verify):

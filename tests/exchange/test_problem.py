@@ -102,13 +102,6 @@ def test_the_later_of_two_supports_wins():
     np.testing.assert_array_equal(value[left], np.tile([0.1, 0.5], (left.sum(), 1)))
 
 
-def test_lame_constants_of_plane_stress_are_those_of_the_plane_problem():
-    stress = scene(material={"young": 2.0, "poisson": 0.25, "plane": "stress"})
-    lam, mu = problem_of(stress, 0).lame()
-    # uniaxial tension: σ = E ε needs λ + 2μ − λ²/(λ + 2μ) = E in the plane
-    assert lam + 2 * mu - lam**2 / (lam + 2 * mu) == pytest.approx(2.0, rel=1e-14)
-
-
 def test_a_given_mesh_in_space_conforms_without_a_cut_and_is_refused_with_one(tmp_path):
     import meshio
 
@@ -139,14 +132,6 @@ def test_a_conforming_mesh_in_space_is_torn_along_the_cut():
     assert area == pytest.approx(2.0 * np.hypot(1.0, 0.1 / 1.2), rel=1e-9)
     np.testing.assert_allclose(problem.nodal_forces().sum(axis=0), [0, 0, -6.0], atol=1e-12)
     assert len(problem.free_pieces()) == 0  # both halves reach the left face, which is held
-
-
-@needs_gmsh
-def test_a_conforming_mesh_along_an_arc_is_made_anew():
-    arc = {"kind": "arc", "centre": [1.0, 0.5], "radius": 0.2}
-    problem = problem_of(scene(cuts=[arc]), 0, conforming=True)
-    radius = np.linalg.norm(problem.cut_facets - [1.0, 0.5], axis=2)
-    np.testing.assert_allclose(radius, 0.2, rtol=1e-9)
 
 
 def test_loads_and_supports_carry_their_history():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from verify.errors import InputError
-from verify.solution import Solution, read_solution, write_solution
+from verify.solution import read_solution
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 CELLS = np.array([[0, 1, 2], [0, 2, 3]])
@@ -35,30 +35,6 @@ def test_four_keys_and_a_displacement_are_enough(answer):
     assert solution.cut_facets.shape == (0, 2, 2)
     assert (solution.ledger, solution.timings, solution.unknowns) == ({}, {}, 0)
     assert np.isnan(solution.size)
-
-
-def test_nothing_is_lost_on_the_way_through_files(tmp_path):
-    rng = np.random.default_rng(3)
-    one = Solution(
-        points=POINTS[:, :2].copy(),
-        cells=CELLS,
-        displacement=rng.standard_normal((2, 4, 2)),
-        velocity=rng.standard_normal((2, 4, 2)),
-        times=np.array([0.0, 0.25]),
-        ledger={"strain": np.array([0.1, 0.2])},
-        quantities={"opening": 0.3},
-        timings={"solve": [0.1, 0.2]},
-        cut_facets=rng.standard_normal((3, 2, 2)),
-    )
-    write_solution(one, tmp_path / "solution")
-    # strict JSON: other programs' readers know no NaN, and the size is not known here
-    json.loads((tmp_path / "solution.json").read_text(), parse_constant=pytest.fail)
-    other = read_solution(tmp_path / "solution")
-    for name in ("points", "cells", "displacement", "velocity", "times", "cut_facets"):
-        np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
-    assert other.ledger["strain"].tolist() == [0.1, 0.2]
-    assert (other.quantities, other.timings) == (one.quantities, one.timings)
-    assert np.isnan(other.size)
 
 
 @pytest.mark.parametrize("key", list(LEAST))
@@ -118,8 +94,3 @@ def test_points_that_move_with_the_displacement_are_refused(answer):
     record = LEAST | {"files": ["u.vtu", "v.vtu"], "times": [0.0, 1.0]}
     with pytest.raises(InputError, match="the same material mesh at all times"):
         read_solution(answer(record))
-
-
-def test_lines_and_points_beside_the_cells_do_no_harm(answer):
-    cells = [("line", [[0, 1]]), ("triangle", CELLS), ("vertex", [[0]])]
-    assert len(read_solution(answer(LEAST, cells=cells)).cells) == 2

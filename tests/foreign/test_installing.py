@@ -59,14 +59,6 @@ def test_nothing_is_left_of_an_installation_that_fails(locked, fault, capsys):
     assert state_of(foreign_solver("fake")).python == ""
 
 
-def test_a_python_that_is_too_old_or_missing_is_said(add_example, capsys):
-    add_example("fake", kind="packages", python="99.1")
-    with pytest.raises(InputError, match=r"99\.1 or later"):
-        install("fake")
-    assert main(["solvers", "install", "fake", "--python", "no-such-python"]) == 2
-    assert "--python" in capsys.readouterr().err
-
-
 def test_a_system_package_is_found_where_it_is_and_else_the_way_to_it_is_said(add_example):
     add_example("here", module="numpy")
     add_example("elsewhere", module="no_such_module_anywhere")
@@ -77,9 +69,3 @@ def test_a_system_package_is_found_where_it_is_and_else_the_way_to_it_is_said(ad
     assert not mark_of("elsewhere").exists()
     install("here", sys.executable)  # remembers this Python
     assert mark_of("here").is_file()
-
-
-def test_an_unknown_name_is_said_with_the_nearest(add_example, capsys):
-    add_example("ngs")
-    assert main(["solvers", "install", "ngz"]) == 2
-    assert "ngs" in capsys.readouterr().err

@@ -16,7 +16,7 @@ from verify.foreign import foreign_solvers
 from verify.foreign.records import PROGRAMS
 from verify.runner.survey import survey
 from verify.scene import load_scene, scene_content
-from verify.solvers import check_parameters, find_solver, solver_names
+from verify.solvers import find_solver, solver_names
 
 TALKS = """
 from exchange_files import RefusedError, run
@@ -58,13 +58,6 @@ def test_parameters_and_repetitions_are_handed_over(talks):
     assert (found.unknowns, len(found.timings["solve"])) == (4, 4)
     assert np.all(found.displacement == 2.5)
     assert np.all(talks.solve(load_scene(CASE), 0).displacement == 1.0)  # the default
-
-
-def test_an_unknown_parameter_is_said_before_anything_runs(talks):
-    with pytest.raises(InputError, match="weight"):
-        check_parameters("talks", talks, ["wight"])
-    with pytest.raises(InputError, match="weight"):
-        talks.solve(load_scene(CASE), 0, wight=1.0)
 
 
 def test_a_refusal_and_a_failure_of_the_program_come_through(talks):
@@ -177,8 +170,3 @@ def test_the_reader_reads_what_meshio_writes(values, compressed, tmp_path):
     np.testing.assert_array_equal(back.cells_dict["triangle"], cells)
     np.testing.assert_array_equal(back.points[:, :2], points[:, :2])
     np.testing.assert_array_equal(back.point_data["displacement"][:, :2], points[:, :2])
-
-
-def test_the_page_on_foreign_solvers_names_each():
-    page = (PROGRAMS.parents[2] / "docs/guide/foreign-solvers.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"^\| `(\w+)`", page, re.MULTILINE)) == set(foreign_solvers())

@@ -83,25 +83,6 @@ def test_python_of_a_version_manager_is_found_in_the_home(root, tmp_path, progra
     assert os.access(found.stdout.strip(), os.X_OK)
 
 
-def test_python_is_found_beside_the_shims_that_refuse(root, tmp_path, programs):
-    put, _ = programs
-    for tool in ("bash", "env", "timeout", "awk", "ls", "sed", "sh"):
-        (tmp_path / "bin" / tool).symlink_to(f"/usr/bin/{tool}")
-    shims = tmp_path / "elsewhere/shims"
-    shims.mkdir(parents=True)
-    for name in ("python3", "python3.12", "python3.13", "python3.14", "python"):
-        put(name, REFUSING_SHIM).rename(shims / name)
-    python = tmp_path / "elsewhere/versions/3.12.9/bin/python3"
-    python.parent.mkdir(parents=True)
-    python.write_text(passing_on_to_this_python())
-    python.chmod(0o755)
-    home = tmp_path / "an empty home"
-    home.mkdir()
-    found = find_python(root, f"{shims}:{tmp_path / 'bin'}", home)
-    assert found.returncode == 0, found.stderr
-    assert os.access(found.stdout.strip(), os.X_OK)
-
-
 @pytest.mark.parametrize(
     ("version", "reason"), [((3, 11, 7), "is Python 3.11"), ((3, 15, 0), "is Python 3.15")]
 )
@@ -114,15 +95,6 @@ def test_named_python_that_does_not_fit_is_refused_with_its_version(
     assert refused.returncode == 2
     assert reason in refused.stderr
     assert "needed: CPython 3.12 to 3.14" in refused.stderr
-
-
-def test_named_python_is_taken_before_any_other(root, tmp_path, programs):
-    put, path = programs
-    put("python3", REFUSING_SHIM)
-    found = find_python(root, path, tmp_path, VERIFY_PYTHON=sys.executable)
-    assert found.returncode == 0
-    # The base of a virtual environment, so that an active one is no trap.
-    assert os.path.realpath(found.stdout.strip()) == os.path.realpath(sys._base_executable)
 
 
 def test_system_dolfinx_asks_for_a_python_that_has_it(root, tmp_path, programs):

@@ -71,9 +71,3 @@ def test_every_direct_dependency_says_its_licence_in_the_guide():
     first_column = " ".join(row.split("|")[1] for row in table.splitlines() if row.startswith("|"))
     words = {normal(word) for word in re.findall(r"[\w.-]+", first_column)}
     assert asked_for("gmsh", "fenicsx", "test", "dev") <= words
-
-
-def test_one_version_everywhere():
-    verify = (ROOT / "verify/__init__.py").read_text()
-    (version,) = re.findall(r'^__version__ = "(.+)"', verify, re.MULTILINE)
-    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()

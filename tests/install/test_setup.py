@@ -5,7 +5,6 @@ continuous integration begins with.
 """
 
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -66,30 +65,6 @@ def test_interrupted_setup_is_begun_again(checkout):
     assert "removing the unfinished" in recovered.stdout
 
 
-# Removes a little of the old environment and then kills the set-up that called it.
-DEADLY_RM = """#!/bin/bash
-[ -e "${@: -1}" ] || exit 0
-/bin/rm -f "${@: -1}/pyvenv.cfg" "${@: -1}/unfinished"
-kill -9 $PPID
-"""
-
-
-def test_setup_killed_while_it_removes_the_old_environment_is_begun_again(checkout, tmp_path):
-    place, environment = checkout
-    set_up(checkout)
-    (place / ".ci/requirements.lock").open("a").write("\n# changed\n")
-    (place / ".venv/stale").touch()
-    (tmp_path / "deadly").mkdir()
-    (tmp_path / "deadly/rm").write_text(DEADLY_RM)
-    (tmp_path / "deadly/rm").chmod(0o755)
-    killed = set_up(checkout, PATH=f"{tmp_path}/deadly:{environment['PATH']}")
-    assert killed.returncode == -signal.SIGKILL
-    recovered = set_up(checkout)
-    assert recovered.returncode == 0, recovered.stderr
-    assert not (place / ".venv/stale").exists()
-    assert not (place / ".venv.removed").exists()
-
-
 def test_changed_lock_rebuilds_and_changed_project_file_reinstalls_only_the_project(checkout):
     place, _ = checkout
     set_up(checkout)
@@ -99,24 +74,6 @@ def test_changed_lock_rebuilds_and_changed_project_file_reinstalls_only_the_proj
     (place / ".ci/requirements.lock").open("a").write("\n# changed\n")
     assert set_up(checkout).returncode == 0
     assert [("--editable" in call) for call in pip_calls(checkout)[3:]] == [False, True]
-
-
-def test_two_setups_at_once_do_the_work_once(checkout):
-    place, environment = checkout
-    both = [
-        subprocess.Popen(
-            [place / ".ci/setup"],
-            env=environment | {"STAND_IN_PIP_SECONDS": "0.5"},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        for _ in range(2)
-    ]
-    said = [process.communicate(timeout=60)[0] for process in both]
-    assert [process.returncode for process in both] == [0, 0]
-    assert len(pip_calls(checkout)) == 2
-    assert sum("waiting for another set-up" in words for words in said) == 1
 
 
 def test_directory_that_is_no_environment_is_never_removed(checkout):
@@ -136,12 +93,6 @@ def test_system_dolfinx_takes_the_lock_without_dolfinx_and_a_gmsh_that_is_there(
     # The stand-in has every module that it is asked for, so gmsh too.
     (gmsh,) = re.findall(r"^gmsh==.*\n(?: .*\n)+", full, re.MULTILINE)
     assert installed_lock(checkout) == full.replace(gmsh, "")
-
-
-def test_switching_dolfinx_rebuilds(checkout):
-    set_up(checkout, DOLFINX="system")
-    assert set_up(checkout).returncode == 0
-    assert installed_lock(checkout) == (ROOT / ".ci/requirements.lock").read_text()
 
 
 @pytest.mark.parametrize(
@@ -197,20 +148,6 @@ def test_missing_library_stops_a_plain_user_with_the_line_to_run(user, tmp_path)
         f"setup: run:  sudo apt-get update && sudo {APT_LINE}"
     )
     assert not (tmp_path / "apt.log").exists()
-
-
-def test_missing_library_is_installed_when_root(user, tmp_path):
-    done = set_up(user(0))
-    assert done.returncode == 0, done.stderr
-    updated, installed = (tmp_path / "apt.log").read_text().splitlines()
-    assert updated.startswith("update")
-    assert f"apt-get {installed}".startswith(APT_LINE)
-
-
-def test_failing_apt_stops_with_the_line(user):
-    stopped = set_up(user(0, apt_exit=100))
-    assert stopped.returncode == 1
-    assert stopped.stderr.splitlines()[-1].endswith(f"Needed:  apt-get update && {APT_LINE}")
 
 
 @pytest.mark.timing

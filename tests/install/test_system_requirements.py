@@ -1,7 +1,6 @@
 """Missing system libraries are asked of the loader and named with the apt line that brings them."""
 
 import importlib.util
-import sys
 from pathlib import Path
 
 import pytest
@@ -38,10 +37,6 @@ def complete(headers):
             "has_module": lambda _: True}  # fmt: skip
 
 
-def test_complete_machine_lacks_nothing(requirements, complete):
-    assert requirements.missing(**complete) == {}
-
-
 def test_every_library_is_asked_for_and_led_to_its_package(requirements, complete):
     for library, (package, _) in requirements.LIBRARIES.items():
         lacking = requirements.missing(**complete | {"load": loader_without(library)})
@@ -56,29 +51,6 @@ def test_missing_libraries_lead_to_the_exact_apt_line(requirements, complete):
     assert requirements.apt_line(lacking) == (
         "apt-get install -y --no-install-recommends libegl1 libglu1-mesa"
     )
-
-
-def test_missing_compiler_headers_and_ensurepip_are_named(requirements, complete, tmp_path):
-    lacking = requirements.missing(
-        **complete
-        | {
-            "which": lambda _: None,
-            "include": tmp_path / "nowhere",
-            "has_module": lambda name: name != "ensurepip",
-        }
-    )
-    version = f"python3.{sys.version_info.minor}"
-    assert {"gcc", f"{version}-dev", f"{version}-venv"} <= set(lacking)
-    assert "Python.h" in lacking[f"{version}-dev"]
-
-
-def test_headers_of_a_hand_made_python_are_not_promised_from_apt(requirements):
-    (sentence,) = requirements.missing_beyond_apt(
-        ("glibc", "2.36"), "/opt/python", ["python3.12-dev", "libegl1"]
-    )
-    assert "/opt/python" in sentence
-    assert "VERIFY_PYTHON" in sentence
-    assert requirements.missing_beyond_apt(("glibc", "2.36"), "/usr", ["python3.12-dev"]) == []
 
 
 @pytest.mark.parametrize(

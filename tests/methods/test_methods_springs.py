@@ -1,7 +1,6 @@
 """Mass–spring: what springs can be fitted to, and what not."""
 
 from itertools import combinations
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.errors import XfemError
-from verify.xfem.internal_force import TangentKind
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
@@ -158,51 +156,6 @@ def test_force_and_stiffness_are_derivatives_of_the_energy(dim, kinematics):
     # central differences of step 1e-6: 1e-12 of truncation, 1e-10 of round-off
     assert np.abs(gradient - found).max() < 1e-8
     assert np.abs(np.array(columns).T - K).max() < 1e-8
-
-
-@pytest.mark.parametrize("kind", get_args(TangentKind))
-def test_springs_have_every_stiffness_that_solvers_ask_for_and_one_alone_is_indefinite(kind):
-    mesh = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.3, 0.8]], [[0, 1, 2]])
-    force = SpringForce(cut_mesh(mesh, []), Material(np.array(0.4), np.array(0.7)))
-    u = -0.4 * mesh.points  # compressed: a spring gives way across
-    force.evaluate(u)
-    pattern = block_pattern(mesh.cells, 3)
-    blocks = np.zeros((len(pattern.columns), 2, 2))
-    force.add_stiffness(pattern, blocks, 1.0, kind, u)
-    lowest = np.linalg.eigvalsh(pattern.matrix(blocks).toarray())[0]
-    # of numbers of the size of a spring, 1
-    assert (lowest < -0.1) if kind == "consistent" else (lowest > -1e-14)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_the_kernels_are_what_numpy_says(dim):
-    rng = np.random.default_rng(7)
-    mesh = rectangle_mesh((2, 3)) if dim == 2 else box_mesh((2, 1, 2))
-    cut = Plane(np.full(dim, 0.45), np.array([0.2, 1.0, 0.3])[:dim])
-    phantom = cut_by("virtual_node", mesh, [cut]).phantom
-    force = SpringForce(phantom, Material(np.array(0.4), np.array(0.7)))
-    u, v = 0.05 * rng.normal(size=(2, *phantom.node_points.shape))
-    pairs = [np.array(pair) for pair in combinations(range(dim + 1), 2)]
-    ends = np.stack([phantom.cells[:, pair] for pair in pairs], axis=1)
-    assert np.array_equal(ends[0], phantom.cells[0][np.array(pairs)])
-    rest = np.diff(phantom.node_points[ends], axis=2)[:, :, 0]
-    now = rest + np.diff(u[ends], axis=2)[:, :, 0]
-    stretch = np.linalg.norm(now, axis=2) - np.linalg.norm(rest, axis=2)
-    t = now / np.linalg.norm(now, axis=2, keepdims=True)
-    along = (t * np.diff(v[ends], axis=2)[:, :, 0]).sum(axis=2)
-    found, energy = force.evaluate(u)
-    assert energy == pytest.approx(0.5 * (force.springs * stretch**2).sum(), rel=1e-12)
-    product = np.zeros_like(u)
-    force.add_tangent_product(v, 2.0, product)
-    for got, pull in ((found, stretch), (product, 2.0 * along)):
-        wanted = np.zeros_like(u)
-        for side, sign in ((0, -1.0), (1, 1.0)):
-            np.add.at(wanted, ends[:, :, side], sign * (force.springs * pull)[:, :, None] * t)
-        assert np.abs(got - wanted).max() < 1e-13
-    # pieces of cut cells bear their share only
-    whole = SpringForce(cut_mesh(mesh, []), Material(np.array(0.4), np.array(0.7))).springs
-    shares = phantom.fraction[:, None] * whole[phantom.parent]
-    assert force.springs == pytest.approx(shares, rel=1e-14)
 
 
 def test_springs_of_a_body_that_turns_and_opens_rigidly_bear_nothing():

@@ -2,18 +2,13 @@
 
 import json
 import random
-from dataclasses import replace
 
-import numpy as np
 import pytest
-from synthetic_run import cut_square, make_run, write_error_field
+from synthetic_run import make_run
 
 from verify.report import render
-from verify.report.figures.colour_bar import colour_bar
 from verify.report.pictures import case_pictures
 from verify.report.run_directory import load_run
-from verify.report.view import View
-from verify.solution import write_solution
 
 ABSURD = (
     0.0, -0.0, 1.0, -1.0, 1e300, -1e300, 1.7976931348623157e308, 5e-324, 1e-300, 1e17, 10**30, -5,
@@ -64,32 +59,6 @@ def assert_whole(text):
 def test_numbers_of_any_size_are_reported(tmp_path, seed):
     root = make_run(tmp_path / "run", pictures=False)
     spoil(root, seed)
-    assert_whole(render(root).read_text())
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(6, 120))
-def test_numbers_of_any_size_are_reported_again_and_again(tmp_path, seed):
-    root = make_run(tmp_path / "run", pictures=False)
-    spoil(root, seed)
-    assert_whole(render(root).read_text())
-
-
-@pytest.mark.parametrize("largest", [0.0, 5e-324, 1e-300, 1.0, 1e99, 1e300, np.inf, np.nan])
-def test_a_colour_bar_takes_any_limit(largest):
-    view = View((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 1, 0, 1), (9, 9), "cividis", (0.0, largest))
-    assert "displacement" in colour_bar(view, "displacement").body
-
-
-@pytest.mark.parametrize("factor", [0.0, 1e-320, 1e-200, 1e95])
-def test_pictures_are_described_whatever_the_displacements(tmp_path, factor):
-    root = make_run(tmp_path / "run", pictures=False)
-    body = cut_square(4)
-    wild = replace(body, displacement=body.displacement * factor)
-    for folder in root.glob("cases/*"):
-        for level in (2, 3):
-            write_solution(wild, folder / f"xfem-{level}" / "solution")
-        write_error_field(wild, folder / "error_field.vtu", np.full(len(body.points), factor))
     assert_whole(render(root).read_text())
 
 

@@ -105,19 +105,6 @@ def test_the_browser_test_would_see_an_overflow_a_broken_image_and_an_error(brow
     assert any("seen" in line for line in console)
 
 
-A4 = (718, 1047)  # what is printed on, in px: 190 mm × 277 mm
-
-
-def test_no_case_takes_more_than_two_pages_of_paper(browser, pictured_run, tmp_path):
-    page = probed(pictured_run / "report.html", tmp_path / "source")
-    text = page.read_text(encoding="utf-8").replace("@media print", "@media all")
-    page.write_text(text.replace("@media (max-width", "@media not all and (max-width"))
-    found, _ = opened(browser, page, A4[0], tmp_path)
-    assert len(found["cases"]) == 3
-    assert max(found["cases"]) < 2 * A4[1]
-    assert found["content"] <= A4[0]
-
-
 def test_the_print_has_no_empty_page_and_two_pages_a_case_at_most(browser, pictured_run, tmp_path):
     target = tmp_path / "report.pdf"
     print_page(pictured_run / "report.html", target)

@@ -108,13 +108,6 @@ def test_a_case_without_solves_checks_or_levels_renders(root):
     assert "No reference is recorded" in text
 
 
-def test_a_single_level_is_drawn(root):
-    result = json.loads(result_of(root).read_text())
-    result["solves"] = result["solves"][:1]
-    result_of(root).write_text(json.dumps(result))
-    assert "F3" in said(root)
-
-
 @pytest.mark.parametrize("content", [None, "{", "[]", '{"schema": 7}', '{"schema": 1, "cases": 5}'])
 def test_results_without_a_usable_run_record_are_still_reported(root, content):
     (root / "run.json").unlink()

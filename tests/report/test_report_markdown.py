@@ -14,7 +14,7 @@ from verify.cli import main
 from verify.errors import InputError
 from verify.report import render_markdown, render_pdf
 from verify.report.printing import BROWSERS
-from verify.report.template_sets import PICTURES, in_markdown
+from verify.report.template_sets import PICTURES
 
 
 @pytest.fixture(scope="module")
@@ -60,32 +60,6 @@ def test_words_of_a_case_file_cannot_become_markup(tmp_path):
     text = render_markdown(root).read_text(encoding="utf-8")
     assert "<script" not in text
     assert "&lt;script&gt;" in text
-
-
-@pytest.mark.parametrize(
-    ("text", "written"),
-    [
-        ("a | b", "a \\| b"),
-        ("`rm -rf`", "\\`rm -rf\\`"),
-        ("[x](http://evil)", "\\[x\\](http://evil)"),
-        ("*no* \\ <b>", "\\*no\\* \\\\ &lt;b&gt;"),
-        ("one\n\n# two", "one # two"),
-        ("# head", "\\# head"),
-        ("> said", "\\> said".replace(">", "&gt;")),
-        ("1. first", "1\\. first"),
-        ("- item", "\\- item"),
-    ],
-)
-def test_marks_of_markdown_are_escaped(text, written):
-    assert in_markdown(text) == written
-
-
-def test_pictures_of_an_earlier_rendering_do_not_stay(tmp_path):
-    root = make_run(tmp_path / "run", pictures=False)
-    (root / PICTURES).mkdir()
-    (root / PICTURES / "999.png").write_bytes(b"old")
-    render_markdown(root)
-    assert not (root / PICTURES / "999.png").exists()
 
 
 def test_without_a_browser_pdf_is_refused_in_one_line(tmp_path, monkeypatch, capsys):

@@ -11,7 +11,7 @@ from page_parser import parsed
 from synthetic_run import make_run
 
 from verify.cli.verdict_text import verdict_lines
-from verify.report import render, render_markdown
+from verify.report import render
 from verify.result import Notice, NoticeKind, read_result, write_result
 
 CLOSED = "its faces overlap by up to 18.5 mm at (0.05, 0.05) m"
@@ -38,15 +38,6 @@ def test_notices_are_read_as_they_were_written(warned):
     assert result.warnings[0].text == CLOSED
 
 
-def test_a_result_of_before_has_no_notices(tmp_path):
-    root = make_run(tmp_path / "run", pictures=False)
-    file = root / "cases" / "statics__f3_inclined" / "result.json"
-    record = json.loads(file.read_text())
-    del record["notices"]
-    file.write_text(json.dumps(record))
-    assert read_result(file).notices == []
-
-
 def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge(warned):
     page = (warned[0] / "report.html").read_text()
     top, case = page.index("Warned of"), page.index('id="case-1"')
@@ -60,14 +51,6 @@ def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge
     assert CLOSED in inside[banner : banner + 400]
     assert inside.index("1 warning") < banner
     parsed(page)
-
-
-def test_what_cannot_be_had_is_a_row_of_the_table_with_its_reason(warned):
-    page = (warned[0] / "report.html").read_text()
-    numbers = page[page.index("Numbers: value ± uncertainty") :]
-    row = numbers[: numbers.index("</table>")]
-    assert "is not available" in row
-    assert NO_TIP in row
 
 
 def test_notices_stand_on_the_terminal_below_the_verdict(warned):
@@ -86,12 +69,3 @@ def test_notices_stand_in_every_export(warned):
     assert document["cases"][0]["result"]["notices"][1]["text"] == NO_TIP
     out = ElementTree.parse(root / "junit.xml").getroot().find(".//system-out").text
     assert CLOSED in out
-
-
-def test_a_warning_is_a_quotation_in_markdown(warned):
-    root, _ = warned
-    text = render_markdown(root).read_text(encoding="utf-8")
-    assert any(
-        line.startswith(">") and CLOSED.replace("[", "\\[") in line for line in text.splitlines()
-    )
-    assert NO_TIP in text

@@ -64,41 +64,12 @@ def test_reference_and_solvers_are_in_one_figure_with_the_band(drawn):
     assert "at most 0.002 m of the normal jump" in figure.caption
 
 
-def test_an_exact_reference_is_named_so_and_has_no_uncertainty(drawn):
-    shown = profile(curve("reference", None, band=[0.0] * 4), curve("xfem"))
-    (figure,), ((lines, _),) = drawn(shown)
-    assert "exact" in lines
-    assert "has no uncertainty" in figure.caption
-
-
-def test_a_cut_that_stays_closed_is_said_in_words(drawn):
-    (figure,), panels = drawn(profile(curve("reference", 2, 1e-16), curve("xfem", 1, 0.0)))
-    assert panels == figure.panels == []
-    assert "zero along the whole cut" in figure.caption
-
-
-def test_no_solver_is_left_out_where_there_are_many(drawn):
-    names = [f"solver{k}" for k in range(10)]
-    _, ((lines, _),) = drawn(profile(curve("reference", 2), *(curve(name) for name in names)))
-    assert list(lines) == ["reference", *names]
-
-
-def test_times_are_named_with_their_reason(drawn):
-    (figure,), _ = drawn(profile(curve("xfem"), time=0.25, why="largest opening"))
-    assert "slit, at 0.25 s (largest opening)" in figure.caption
-    assert "no reference" in figure.caption
-
-
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e300])
 def test_a_solver_that_blew_up_is_named_and_does_not_hide_the_others(drawn, value):
     odd = replace(curve("guest"), normal=[0.0, value, -value, 0.0])
     (figure,), ((lines, _),) = drawn(profile(curve("reference", 2), curve("xfem"), odd))
     assert list(lines) == ["reference", "XFEM"]
     assert "left out: guest" in figure.caption
-
-
-def test_a_result_without_profiles_has_no_figure(result):
-    assert opening_figures(result, Palette()) == []
 
 
 def test_profiles_are_read_as_they_were_written(result, tmp_path):

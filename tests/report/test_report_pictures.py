@@ -15,7 +15,7 @@ from verify.report.bodies import Body, deformed_body, error_body
 from verify.report.drawn_bodies import draw
 from verify.report.pictures import case_pictures
 from verify.report.view import common_view
-from verify.solution import Solution, write_solution
+from verify.solution import Solution
 
 
 def tetrahedra() -> Solution:
@@ -37,16 +37,6 @@ def lengths(body: Body) -> float:
 def test_the_outline_is_the_boundary_with_both_faces_of_the_cut(order):
     body = deformed_body(cut_square(8, order), 0.0)
     assert lengths(body) == pytest.approx(4 + 2 * np.hypot(1, 1 / 3), rel=1e-12)
-
-
-def test_the_outline_of_an_edge_cut_ends_at_its_tip():
-    body = deformed_body(cut_square(8, slender=True), 0.0)
-    assert lengths(body) == pytest.approx(2 * (0.02 + 0.1) + 2 * 0.01, rel=1e-12)
-
-
-def test_only_the_outer_facets_of_a_solid_are_drawn():
-    body = deformed_body(tetrahedra(), 1.0)
-    assert len(body.triangles) == 6
 
 
 def test_all_bodies_of_a_case_fit_into_one_view():
@@ -122,34 +112,6 @@ def test_a_solution_outside_the_run_directory_is_not_read(tmp_path):
     assert "outside the run directory" in shown.notes[0]
 
 
-def test_the_error_of_each_solver_is_drawn_the_largest_first_at_one_scale(tmp_path):
-    root = make_run(tmp_path / "run")
-    folder = root / "cases" / "statics__griffith_inside"
-    shown = load_run(root).entries[1].result
-    assert shown.failing == ["xfem"]
-    names = ["xfem", "conforming", "a:A", "b:B", "still:Still"]
-    result = json.loads((folder / "result.json").read_text())
-    body = cut_square(4)
-    for size, name in enumerate(names, 1):
-        file = folder / f"error_field_{size}.vtu"
-        write_error_field(body, file, np.full(len(body.points), float(size)))
-        result["pictures"][f"error_field of {name}"] = f"cases/{folder.name}/{file.name}"
-        if size > 2:
-            result["solves"].append({**result["solves"][0], "solver": name})
-    (folder / "result.json").write_text(json.dumps(result))
-    found = case_pictures(root, load_run(root).entries[1])
-    assert [picture.title for picture in found.error] == [
-        "error of still:Still, at most 5.00 m",
-        "error of b:B, at most 4.00 m",
-        "error of a:A, at most 3.00 m",
-        "error of conforming P1, at most 2.00 m",
-    ]
-    assert {picture.view.limits for picture in found.error} == {(0.0, 5.0)}
-    assert "Without picture of the error, 4 being shown: XFEM." in found.notes
-    # who fails is drawn before who does not, whatever the order of the solvers
-    assert "still:Still" in " ".join(note for note in found.notes if "deformed" in note)
-
-
 def test_an_error_field_that_is_zero_or_not_finite_is_handled(tmp_path):
     solution = cut_square(4)
     n = len(solution.points)
@@ -159,13 +121,3 @@ def test_an_error_field_that_is_zero_or_not_finite_is_handled(tmp_path):
     write_error_field(solution, tmp_path / "nan.vtu", np.full(n, np.nan))
     with pytest.raises(ValueError, match="not finite"):
         error_body(tmp_path / "nan.vtu")
-
-
-def test_bodies_at_rest_are_drawn_at_true_scale(tmp_path):
-    root = make_run(tmp_path / "run")
-    folder = root / "cases" / "statics__f3_inclined"
-    for solver in ("xfem", "conforming"):
-        write_solution(cut_square(8, opening=0.0), folder / f"{solver}-3" / "solution")
-    shown = case_pictures(root, load_run(root).entries[0])
-    assert shown.scale == 1.0
-    assert len(shown.deformed) == 2

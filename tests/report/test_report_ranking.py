@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 from page_parser import parsed
-from synthetic_run import HOSTILE, make_run
+from synthetic_run import make_run
 
 from verify.cli import run_ranking as runner_ranking
 from verify.cli.run_ranking import rank_run
@@ -95,16 +95,6 @@ def test_the_suite_runs_unasked_only_for_more_than_two_solvers(tmp_path, suite):
     assert len(suite) == 2
 
 
-def test_a_single_solver_is_not_ranked(tmp_path):
-    root = make_run(tmp_path / "run", pictures=False)
-    ranked(root)
-    (strip,) = [r for r in load_run(root).results if "strip" in r.case]
-    alone = [s for s in strip.solves if s.solver in ("xfem", "reference")]
-    strip.solves[:] = alone
-    assert rank_run(root, [strip], {}, True, 10.0, lambda text: None) is None
-    assert not (root / "ranking.json").exists()
-
-
 @pytest.mark.parametrize("content", ["", "[]", '{"schema": 2}', '{"schema": 1, "cases": [1]}'])
 def test_a_damaged_ranking_is_a_note_and_no_crash(tmp_path, content):
     root = make_run(tmp_path / "run", pictures=False)
@@ -112,24 +102,6 @@ def test_a_damaged_ranking_is_a_note_and_no_crash(tmp_path, content):
     said = text_of(root)
     assert "ranking.json cannot be read" in said
     assert "solvers on" not in said
-
-
-def test_a_ranking_of_other_cases_is_not_shown(tmp_path):
-    root = make_run(tmp_path / "run", pictures=False)
-    rank_run(root, load_run(root).results[:2], {}, False, 10.0, lambda text: None)
-    assert "of other cases" in text_of(root)
-
-
-def test_hostile_words_of_a_ranking_stay_text(tmp_path):
-    root = make_run(tmp_path / "run", pictures=False)
-    file = ranked(root)
-    record = json.loads(file.read_text())
-    for entry in record["left_out"]:
-        entry["reason"] = HOSTILE
-    file.write_text(json.dumps(record))
-    page = parsed(render(root).read_text(encoding="utf-8"))
-    assert len(page.all("script")) == 1
-    assert "<script>alert('x')</script>" in page.text
 
 
 def test_a_solver_that_solved_nothing_is_not_asked_for_more(tmp_path, suite):

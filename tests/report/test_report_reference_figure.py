@@ -1,7 +1,6 @@
 """Claims about the plot of a reference's time to accuracy: what is drawn lies where it belongs."""
 
 import json
-import math
 
 import numpy as np
 import pytest
@@ -54,12 +53,6 @@ def test_every_bound_of_every_level_lies_where_its_number_says(drawn):
         assert nodes[:, 1] == pytest.approx(row)
 
 
-def test_quantities_and_norms_have_panels_of_their_own(drawn):
-    figure, panels = drawn(levels_of((*NORMS, *QUANTITIES)))
-    assert [len(panel) for panel in panels] == [len(QUANTITIES), len(NORMS)]
-    assert len(figure.panels) == 2
-
-
 def test_a_level_without_a_time_or_with_a_bound_of_zero_is_a_gap_and_not_bridged(drawn):
     _, (untimed,) = drawn(levels_of(QUANTITIES, (True, False, True)))
     for nodes in untimed:
@@ -68,20 +61,6 @@ def test_a_level_without_a_time_or_with_a_bound_of_zero_is_a_gap_and_not_bridged
     exact["level 2"]["strain_energy"] = 0.0
     _, (panel,) = drawn(exact)
     assert [np.isfinite(nodes).all(axis=1).tolist() for nodes in panel] == [[True, True, False]]
-
-
-@pytest.mark.parametrize(
-    "levels",
-    [
-        {},
-        levels_of(QUANTITIES, (False, False, False)),
-        levels_of(()),
-        {"level 0": {"unknowns": 3, "seconds": math.nan, "opening": math.inf}},
-        {"level 0": {"unknowns": 3, "seconds": "soon", "opening": None}},
-    ],
-)
-def test_without_a_time_or_a_bound_there_is_no_plot(levels):
-    assert accuracy_figure(levels) is None
 
 
 def test_the_page_has_the_plot_above_the_table_of_the_same_numbers(tmp_path):

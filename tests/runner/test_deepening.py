@@ -5,7 +5,6 @@ from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
-import numpy as np
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
@@ -68,12 +67,6 @@ def test_the_finest_solution_of_every_solver_sets_the_measure(scene):
     assert worst[1]["ratio"] == pytest.approx(0.2)
     assert other[1]["ratio"] == pytest.approx(0.01)
     assert sufficiency(scene, [coarse], "reference", 3)["suffices"]
-
-
-def test_what_is_said_of_measures_in_numpys_numbers_can_be_stored(scene):
-    told = [sufficiency(scene, [solve("xfem", 0, kind(1.1), kind(0.001))], "reference", 3)
-            for kind in (float, np.float64)]  # fmt: skip
-    assert json.loads(json.dumps(told[1])) == told[0]
 
 
 def test_a_solution_that_is_exact_needs_no_better_reference(scene):

@@ -1,12 +1,9 @@
 """A run directory belongs to one run; whatever else is given is refused and left as it was."""
 
-import os
-
 import pytest
 from test_resume import SLOW, wait_for
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
 from verify.runner.directory import RunDirectory, claimed
 
 IDENTITY = {"cases": ["a"], "options_of_result": {"repetitions": 1}}
@@ -58,22 +55,6 @@ def test_a_directory_that_is_not_a_run_is_refused(verify):
     assert [p.name for p in (verify.folder / "out").iterdir()] == ["thesis.tex"]
 
 
-def test_a_file_is_refused_as_a_directory(verify):
-    said = refused(verify, "square.toml", "--solver=fake_solvers:Instant", "--out", "square.toml")
-    assert "is a file; expected a directory" in said
-    below = refused(
-        verify, "square.toml", "--solver=fake_solvers:Instant", "--out", "square.toml/a"
-    )
-    assert "is a file; expected a directory" in below
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_directory_that_may_not_be_written_is_refused(verify):
-    verify.folder.chmod(0o555)
-    said = refused(verify, "square.toml", "--solver=fake_solvers:Instant", "--out", "out")
-    assert "cannot be written" in said
-
-
 def test_a_run_that_died_before_its_first_word_is_started_afresh(tmp_path):
     (tmp_path / ".lock").touch()
     with claimed(tmp_path, IDENTITY) as directory:
@@ -102,10 +83,3 @@ def test_every_case_has_a_folder_of_its_own_below_the_run(tmp_path, name):
     folder = RunDirectory(tmp_path).solve_folder(name, "my.module:Solver", 3)
     assert folder.resolve().parent.parent == tmp_path / "cases"
     assert folder.name == "my.module_Solver-3"
-
-
-def test_what_has_no_word_in_json_is_null(tmp_path):
-    import numpy as np
-
-    write_json({"a": [float("nan"), np.float64(2.0), np.arange(2)], 3: True}, tmp_path / "a.json")
-    assert read_json(tmp_path / "a.json") == {"a": [None, 2.0, [0, 1]], "3": True}

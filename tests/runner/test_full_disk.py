@@ -3,16 +3,14 @@
 import json
 
 import pytest
-from small_disk import in_this_process, named_until_it_fits, small_disk
+from small_disk import small_disk
 
-from verify.json_files import read_json, write_json
+from verify.json_files import read_json
 from verify.result import Status
 from verify.runner.job import Job
-from verify.runner.reference_bundle import ReferenceBundle, write_bundle
 from verify.runner.reference_cache import ReferenceCache
 from verify.scene import load_scene
 from verify.solution import write_solution
-from verify.study.record import write_study
 
 RUN = ("run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "1", "--out")
 
@@ -99,34 +97,3 @@ def test_a_reference_that_does_not_fit_the_cache_is_not_kept_and_not_found(
             disk.resize("4m")
             assert cache.keep(scene, job, record) == ""
             assert cache.take(scene, job) is not None
-
-
-def test_a_bundle_that_does_not_fit_is_named_and_leaves_no_half(tmp_path, case_text, monkeypatch):
-    from fake_solvers import Instant
-
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    (tmp_path / "square.toml").write_text(case_text + '[reference]\nkind = "conforming"\n')
-    scene = load_scene(tmp_path / "square.toml")
-    cache = ReferenceCache(tmp_path / "cache")
-    for level in range(scene.reference.levels):
-        job = Job("square", "reference", level, 1, "any", tmp_path / f"solve-{level}")
-        write_solution(Instant().field(8, 1), job.folder / "solution")
-        assert cache.keep(scene, job, job.blank(Status.SOLVED, "")) == ""
-    with small_disk(tmp_path / "disk", "2m") as disk:
-        write = in_this_process(lambda: write_bundle(disk.root / "r.zip", [scene], cache))
-        assert set(named_until_it_fits(disk, write)) == {"r.zip"}
-        assert ReferenceBundle(disk.root / "r.zip").levels(scene) == scene.reference.levels
-
-
-def test_a_record_of_a_study_and_any_other_that_does_not_fit_leave_the_one_before(tmp_path):
-    with small_disk(tmp_path / "disk", "256k") as disk:
-        write_json({"is": "old"}, disk.root / "a.json")
-        write_study(disk.root, "energy", {"is": "old"}, [{"a": 1}], "verify")
-        disk.fill()
-        with pytest.raises(OSError, match="No space left"):
-            write_json({"is": "new" * 9000}, disk.root / "a.json")
-        with pytest.raises(OSError, match="No space left"):
-            write_study(disk.root, "energy", {"is": "new" * 9000}, [{"a": 2}], "verify")
-        assert read_json(disk.root / "a.json") == {"is": "old"}
-        assert read_json(disk.root / "energy.json")["is"] == "old"
-        assert not list(disk.root.glob("*.partial"))

@@ -104,12 +104,6 @@ def test_a_cache_that_cannot_be_written_does_not_stop_a_run(scene, kept, tmp_pat
     assert said.startswith("not kept in the reference cache")
 
 
-def test_failures_are_not_kept(scene, cache, tmp_path):
-    job = job_of(tmp_path / "solve", 0)
-    assert cache.keep(scene, job, job.blank(Status.FAILED, "diverged")) == ""
-    assert cache.entries() == []
-
-
 def test_a_bundle_gives_the_references_back_and_is_the_same_file_twice(scene, kept, tmp_path):
     one, two = tmp_path / "one.zip", tmp_path / "two.zip"
     assert len(write_bundle(one, [scene], kept)) == LEVELS
@@ -121,15 +115,6 @@ def test_a_bundle_gives_the_references_back_and_is_the_same_file_twice(scene, ke
     job = job_of(tmp_path / "again", 2)
     assert "from the bundle one.zip" in bundle.take(scene, job).notes["cache"]
     assert len(read_solution(job.folder / "solution").points) == 81
-
-
-def test_a_bundle_without_the_scene_says_what_it_holds(scene, kept, tmp_path):
-    write_bundle(tmp_path / "one.zip", [scene], kept)
-    scene.file.write_text(scene.file.read_text().replace("young = 1.0", "young = 2.0"))
-    with pytest.raises(
-        InputError, match=r"no reference for the physics of 'square' .*a scene that"
-    ):
-        ReferenceBundle(tmp_path / "one.zip").levels(load_scene(scene.file))
 
 
 def test_a_bundle_needs_every_level(scene, kept, tmp_path):

@@ -70,22 +70,3 @@ def test_runs_that_share_a_cache_never_take_half_an_entry(tmp_path, case_text, m
     cache.remove_damaged()
     for entry in cache.entries():
         assert entry.files.keys() == {"solution.json", "solution.vtu"}
-
-
-def test_two_whole_runs_that_share_a_cache_say_the_same_and_both_end_well(verify):
-    """Both start with an empty cache, and may solve the same reference at the same time."""
-    text = (verify.folder / "square.toml").read_text()
-    (verify.folder / "square.toml").write_text(text + '[reference]\nkind = "conforming"\n')
-    run = ("run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "1", "--out")
-    shared = {"VERIFY_CACHE": str(verify.folder / "shared")}
-    both = [verify.start(*run, out, **shared) for out in ("one", "two")]
-    for process in both:
-        _, said = process.communicate(timeout=120)
-        assert process.returncode == 0, said
-        assert "Traceback" not in said
-    one, two = (verify.records(out) for out in ("one", "two"))
-    assert one.keys() == two.keys()
-    assert {level for solver, level in one if solver == "reference"} == {0, 1, 2}
-    assert all(one[key]["status"] == "solved" for key in one)
-    assert [one[key]["metrics"] for key in one] == [two[key]["metrics"] for key in one]
-    assert not list((verify.folder / "shared").glob(".partial-*"))

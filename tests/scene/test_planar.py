@@ -25,27 +25,6 @@ def length(parts):
     return sum(float(np.linalg.norm(b - a)) for a, b in parts)
 
 
-def test_a_cut_through_a_tiny_corner_is_inside():
-    # 1e-4 of the corner of a body of size 1, by a cut of length 2000
-    cut = np.array([[-1000.0, 1000.0 + 1e-4], [1000.0 + 1e-4, -1000.0]])
-    assert length(inner_parts(cut, SQUARE)) == pytest.approx(np.sqrt(2) * 1e-4, rel=1e-6)
-
-
-def test_a_cut_through_a_notch_has_two_inner_parts():
-    parts = inner_parts(np.array([[-1.0, 1.5], [4.0, 1.5]]), NOTCHED)
-    assert [np.round([a[0], b[0]], 12).tolist() for a, b in parts] == [[0, 1], [2, 3]]
-
-
-def test_a_cut_along_the_boundary_has_no_inner_part():
-    assert inner_parts(np.array([[-1.0, 0.0], [2.0, 0.0]]), SQUARE) == []
-    along_the_notch = inner_parts(np.array([[0.5, 1.0], [2.5, 1.0]]), NOTCHED)
-    assert length(along_the_notch) == pytest.approx(1.0, abs=1e-12)
-
-
-def test_a_cut_through_a_corner_point_only_cuts_nothing():
-    assert inner_parts(np.array([[-1.0, 1.0], [1.0, -1.0]]), SQUARE) == []
-
-
 @given(
     st.tuples(*[st.floats(-2, 3) for _ in range(4)]).filter(
         lambda v: np.hypot(v[2] - v[0], v[3] - v[1]) > 1e-3

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from verify.calibration import kernel_seconds
-from verify.simulator import PHASES, Session, StepRecord, quality_of
+from verify.simulator import Session, quality_of
 from verify.simulator.timings import timings_of
 from verify.xfem.cuts import ToolPath
 
@@ -31,15 +31,6 @@ def test_the_hand_is_that_of_the_thesis(hand) -> None:
     # "in all the analyzed meshes the number of cut elements does not exceed 50" for 6 cm
     length = np.linalg.norm(np.diff(hand.strokes[0].blades[:, 0], axis=0), axis=1).sum()
     assert 0.058 < length <= 0.06
-
-
-def test_every_step_says_what_each_of_its_phases_took(opened) -> None:
-    session, _ = opened
-    assert len(session.records) == session.stage.steps
-    for record in session.records:
-        assert tuple(record.seconds) == PHASES
-        assert record.seconds["motion"] > 0.0
-        assert (record.seconds["assembly"] > 0.0) or record.newly_split == 0
 
 
 def test_volume_and_surfaces_are_sound_at_every_step(opened) -> None:
@@ -109,31 +100,6 @@ def slashed(hand):
         tips = np.array([[x, -0.042, 0.04], [x + 0.006, 0.042, 0.04]])
         strokes.append(ToolPath.of_tip(tips, [0.4 * k, 0.4 * k + 0.4], [0.0, 0.0, -0.07]))
     return replace(hand, strokes=strokes, hooks=[], duration=2.0)
-
-
-def of_seconds(seconds: float, split: int) -> StepRecord:
-    phases = dict.fromkeys(PHASES, 0.0) | {"motion": seconds}
-    rest = dict.fromkeys(("time", "kinetic", "strain", "potential", "work", "dissipated"), 0.0)
-    return StepRecord(
-        step=1, seconds=phases, split=split, newly_split=split, unknowns=3, delay=np.empty(0),
-        contacts=0, **rest,
-    )  # fmt: skip
-
-
-def test_timings_are_the_quantiles_of_steps_that_cut_and_of_those_that_do_not() -> None:
-    seconds = 1e-3 * np.arange(1, 101)
-    records = [of_seconds(s, int(k >= 60)) for k, s in enumerate(seconds)]
-    timings = timings_of(records)
-    assert (timings.step.count, timings.resting.count, timings.cutting.count) == (100, 60, 40)
-    assert timings.step.median == pytest.approx(50.5e-3)
-    assert timings.step.most == pytest.approx(95.05e-3)
-    assert timings.step.largest == pytest.approx(0.1)
-    assert timings.resting.largest == pytest.approx(60e-3)
-    assert timings.step.within == {"1 ms": 0.01, "2 ms": 0.02, "1/60 s": 0.16}
-    assert timings.phases["motion"][1].median == pytest.approx(80.5e-3)
-    assert timings.phases["cutting"][0].largest == 0.0
-    assert timings_of(records[:9]).cutting.count == 0
-    assert "cutting (" not in timings_of(records[:9]).table
 
 
 THESIS_STEP = 2.78515 / 2  # s: Table 4.4, 1000 tetrahedra, 200 cuts, one second in steps of 0.5 s

@@ -7,9 +7,9 @@ import pytest
 from verify.errors import InputError
 from verify.scene import Skin
 from verify.simulator.anatomy.plane_mesh import mesh_of_about, plane_mesh
-from verify.simulator.anatomy.procedural import procedural_face, procedural_hand
+from verify.simulator.anatomy.procedural import procedural_face
 from verify.simulator.anatomy.skin_mesh import skin_mesh, skin_surface
-from verify.simulator.anatomy.surface_file import border_loops, outer_border, read_surface
+from verify.simulator.anatomy.surface_file import border_loops, read_surface
 from verify.simulator.anatomy.thicken import closed_shell, thicken, vertex_normals
 from verify.xfem.mesh import SimplexMesh
 
@@ -46,12 +46,6 @@ def test_the_face_has_openings_for_eyes_and_mouth_and_the_nodes_of_the_thesis() 
     for x, y in expected:
         assert min(np.hypot(m[0] - x, m[1] - y) for m in middles) < 2e-3
     assert np.ptp(points, axis=0)[1] == pytest.approx(0.204, rel=0.01)
-
-
-def test_the_same_formula_gives_the_same_mesh() -> None:
-    first, second = (procedural_hand().triangulate(300) for _ in range(2))
-    np.testing.assert_array_equal(first[0], second[0])
-    np.testing.assert_array_equal(first[1], second[1])
 
 
 @pytest.mark.parametrize("wanted", [200, 400, 600, 800, 1000])
@@ -131,17 +125,3 @@ def test_a_bad_surface_file_is_one_clear_line(tmp_path) -> None:
     meshio.write(tmp_path / "fin.vtu", meshio.Mesh(points, [("triangle", fin)]))
     with pytest.raises(InputError, match="more than two triangles"):
         read_surface(tmp_path / "fin.vtu")
-
-
-def test_a_closed_surface_has_no_border() -> None:
-    import pyvista
-
-    sphere = pyvista.Icosphere(nsub=1)
-    assert not outer_border(np.asarray(sphere.points), sphere.regular_faces.astype(np.int64)).any()
-
-
-def test_too_coarse_a_mesh_is_refused() -> None:
-    """Openings nearer to each other and to the border than an element is long."""
-    slits = [HOLE * [1.0, 0.02] + [0.0, y] for y in (0.01, 0.02, 0.03)]
-    with pytest.raises(InputError, match="too coarse"):
-        plane_mesh(SQUARE, slits, 0.3)

@@ -149,43 +149,6 @@ def test_what_cannot_be_solved_is_said_in_one_line(tmp_path, changes, said):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("parameters", [{"basis": "plain"}, {"tip": "nowhere"}])
-def test_an_unknown_parameter_is_named(tmp_path, parameters):
-    with pytest.raises(InputError, match="expected one of"):
-        XfemSolver().solve(scene(tmp_path), 0, **parameters)
-
-
-@pytest.mark.parametrize("level", [-1, 2])
-def test_a_level_that_is_not_there_is_refused(tmp_path, level):
-    with pytest.raises(InputError, match=r"expected 0\.\.1"):
-        XfemSolver().solve(scene(tmp_path), level)
-
-
-BOX = """title = "A box"
-requirement = "It shall be meshed."
-[geometry]
-kind = "box"
-lower = [0.0, 0.0, 0.0]
-upper = [1.0, 1.0, 1.0]
-[mesh]
-sizes = [0.5]
-pattern = "unstructured"
-[material]
-young = 1.0
-poisson = 0.3
-[[supports]]
-where = "boundary"
-displacement = [0.0, 0.0, 0.0]
-"""
-
-
-def test_what_the_adapter_does_not_offer_is_refused_before_and_while_solving(tmp_path):
-    asked = scene(tmp_path, base=BOX)
-    assert "structured way only" in XfemSolver().refuses(asked)
-    with pytest.raises(UnsupportedSceneError):
-        XfemSolver().solve(asked, 0)
-
-
 @pytest.mark.parametrize("basis", ["shifted", "heaviside"])
 def test_the_other_bases_are_for_linear_statics(tmp_path, basis):
     asked = scene(

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
-from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
 
@@ -236,19 +235,6 @@ def test_what_compiles_is_not_timed_and_every_phase_is(tmp_path):
     assert {len(found.timings[phase]) for phase in phases - {"meshing"}} == {2}
 
 
-@pytest.mark.parametrize(
-    "name, value", [("scheme", "leapfrog"), ("mass", "lumped"), ("step_factor", 0.0)]
-)
-def test_an_unknown_choice_is_named(tmp_path, name, value):
-    with pytest.raises(InputError, match=f"{name} '?{value}"):
-        solve(tmp_path, SQUARE + HELD + WEIGHT, **{name: value})
-
-
-def test_a_motion_in_another_basis_is_refused(tmp_path):
-    with pytest.raises(UnsupportedSceneError, match="linear statics only"):
-        solve(tmp_path, SQUARE + HELD + WEIGHT, basis="shifted")
-
-
 @pytest.mark.parametrize("height", [0.99, 0.95, 0.876])
 @pytest.mark.parametrize("scheme", ["newmark", "central_differences"])
 def test_what_a_cut_frees_beside_its_support_falls_too(tmp_path, height, scheme):
@@ -277,16 +263,3 @@ def test_cuts_that_cross_open_in_any_order_and_no_energy_is_lost(tmp_path, times
     assert slivers != "keep" or np.abs(ledger["algorithmic"]).max() <= 1e-8 * scale
     assert np.abs(ledger["algorithmic"]).max() <= 1e-2 * scale
     assert len(np.unique(found.cell_sides)) >= 4
-
-
-def test_a_lumping_or_a_scheme_that_does_not_suit_the_scene_is_refused(tmp_path):
-    text = SQUARE + HELD + WEIGHT + CUT
-    with pytest.raises(UnsupportedSceneError, match=r"mass = 'thesis': node .* has 3 unknowns"):
-        solve(
-            tmp_path,
-            text + SECOND.replace("[0.47, -0.1], [0.52, 1.1]", "[-0.1, 0.46], [1.1, 0.42]"),
-            mass="thesis",
-        )
-    moved = HELD + "history = [[0.0, 0.0], [1.0, 1.0]]\n"
-    with pytest.raises(UnsupportedSceneError, match="scheme = 'central_differences': explicit"):
-        solve(tmp_path, SQUARE + moved + CUT, mass="consistent", scheme="central_differences")

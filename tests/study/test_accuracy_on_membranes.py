@@ -9,12 +9,7 @@ from cut_meshes import grid
 from judged_fields import Quadratic, judged
 from membrane_meshes import bowl, layers, line, membrane, roof
 
-from verify.assess.changed_scenes import with_kinematics
-from verify.compare.hooke import law_of
-from verify.errors import UnsupportedSceneError
-from verify.report.bodies import deformed_body, error_body
 from verify.result import Verdict
-from verify.runner.error_field import nodal_error, write_error_field
 from verify.scene import load_scene
 
 CASE = """
@@ -54,7 +49,6 @@ component = "y"
 [[quantities]]
 kind = "maximum_displacement"
 """
-NAMES = ("displacement_l2", "energy_norm", "jump_l2", "displacement_max", "opening_max")
 
 
 def above(points):
@@ -112,33 +106,6 @@ def test_interpolants_on_a_membrane_converge_to_the_exact_field(sheet):
     assert energy.uncertainty < 1e-4 * energy.reference
 
 
-def test_conforming_levels_on_a_membrane_judge_as_the_exact_field_does(sheet):
-    fine = {k: interpolant(6 * 2**k, flip=True) for k in range(3)}
-    true = judged(sheet(EXACT), {"xfem": {0: interpolant(4)}}, TRUTH)
-    against = judged(sheet(), {"xfem": {0: interpolant(4)}, "reference": fine})
-    for name in NAMES:
-        measured, truth = against.solves[0].metric(name), true.solves[0].metric(name)
-        assert abs(measured.value - truth.value) <= measured.uncertainty + truth.uncertainty, name
-    named = {metric.name: metric for metric in against.solves[0].metrics}
-    for name in ("strain_energy", "opening", "corner"):
-        exact = true.solves[0].metric(name).reference
-        assert abs(named[name].reference - exact) <= named[name].uncertainty + 1e-9
-
-
-def test_a_reference_that_is_no_finer_than_what_it_judges_cannot_tell(sheet):
-    coarse = {k: interpolant(n, flip=True) for k, n in enumerate((2, 4, 6))}
-    result = judged(
-        sheet(limit("jump_l2", 0.02)), {"xfem": {0: interpolant(8)}, "reference": coarse}
-    )
-    assert result.verdicts[0].verdict is Verdict.UNDECIDED
-
-
-def test_swapped_sides_of_a_membrane_fail(sheet):
-    checks = EXACT + limit("jump_l2", 0.05) + limit("displacement_l2", 0.05)
-    result = judged(sheet(checks), {"xfem": {0: interpolant(8)}}, Quadratic(above, swapped=True))
-    assert [v.verdict for v in result.verdicts] == [Verdict.FAIL] * 2
-
-
 def test_another_surface_or_a_part_of_one_is_an_error(sheet):
     scene, whole = sheet(EXACT + limit("jump_l2", 0.1)), interpolant(4)
     part = replace(whole, cells=whole.cells[:-3])
@@ -158,28 +125,3 @@ def test_a_finer_triangulation_of_a_curved_membrane_is_compared_and_says_how_far
     own = judged(scene, {"xfem": {0: interpolant(12, bowl)}}, TRUTH)
     ratio = [r.solves[0].metric("jump_l2").value for r in (own, result)]
     assert 0.1 * ratio[0] < ratio[1] < ratio[0]
-
-
-def test_the_error_of_a_membrane_is_drawn(tmp_path):
-    solution = interpolant(6)
-    error = nodal_error(solution, TRUTH)
-    # nodes carry the exact values; a hundredth of the way into a cell little is lost
-    assert 0 < error.max() < 1e-3
-    write_error_field(solution, TRUTH, tmp_path / "error.vtu")
-    for body in (error_body(tmp_path / "error.vtu"), deformed_body(solution, 1.0)):
-        assert len(body.triangles) == len(solution.cells)
-        assert body.points.shape == (len(solution.points), 3)
-        rim, cut, ridge = 4 * 6, 2 * 6, 6  # the cut's two faces are also ends of the surface
-        assert len(body.edges) == rim + cut + ridge
-    # which corner of a triangle comes first is the solver's business
-    mixed = solution.cells.copy()
-    mixed[::3] = mixed[::3, ::-1]
-    body = deformed_body(replace(solution, cells=mixed), 1.0)
-    assert len(body.edges) == rim + cut + ridge
-
-
-def test_a_membrane_has_no_error_budget(sheet):
-    scene = sheet()
-    assert law_of(scene).shear == pytest.approx(0.01 / 2.6)
-    with pytest.raises(UnsupportedSceneError, match="membrane is not taken apart"):
-        with_kinematics(scene, "linear")

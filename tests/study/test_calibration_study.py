@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from verify.report.figures.style import Palette
 from verify.report.study_page import render_study
 from verify.result import Verdict
 from verify.study.calibration.families import families
@@ -118,10 +117,3 @@ def test_norms_of_a_smooth_field_are_covered_and_drawn(tmp_path):
     page = render_study(tmp_path, "calibration").read_text(encoding="utf-8")
     drawn = sum(t.true > 0 and t.stated > 0 and not t.left_out for t in found)
     assert f"{drawn} marks, {sum(not t.covered for t in found)} not covered" in page
-
-
-def test_every_family_has_a_mark_of_its_own_in_the_figure():
-    names = [family.name for family in families(quick=False)]
-    palette = Palette()
-    styles = {(palette[name].colour, palette[name].marker) for name in names}
-    assert len(styles) == len(names)

@@ -67,13 +67,6 @@ def test_the_findings_say_from_which_setting_on(found):
     assert "has 8 iterations and substeps 1: 8 s" in out
 
 
-def test_the_page_shows_every_setting(found):
-    with open("studies/iterations.html") as page:
-        text = page.read()
-    assert text.count("seven is too many") >= 2
-    assert "Iterations against error" in text
-
-
 def test_what_does_not_move_is_bad_input(tmp_path, capsys):
     words = ["study", "iterations", "statics/f1_patch", "--solver", "xfem", "--truth", "xfem"]
     assert main([*words, "--out", str(tmp_path / "studies")]) == 2

@@ -1,7 +1,5 @@
 """Claims about rankings: ranks from intervals, nothing averaged away, nothing ranked alone."""
 
-import math
-
 import pytest
 
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
@@ -197,36 +195,12 @@ def test_of_energy_the_worst_case_counts_and_round_off_is_as_good_as_zero():
     assert (by["z"]["rank"], by["z"]["value"], by["z"]["where"]) == (3, 1e-3, "a")
 
 
-def test_order_of_cases_and_solvers_does_not_matter():
-    names, cases = ("x", "y", "z"), ("a", "b", "c")
-    number = {(c, n): 0.01 * (1 + i) * (2 + j) for i, c in enumerate(cases)
-              for j, n in enumerate(names)}  # fmt: skip
-
-    def ranks(cases, names):
-        results = [case_of(c, [solve(c, n, 0, number[c, n], 0.001) for n in names]) for c in cases]
-        _, by = compared(rank_solvers(results))
-        return {n: (s["rank"], round(math.log(s["value"]), 12)) for n, s in by.items()}
-
-    assert ranks(cases, names) == ranks(cases[::-1], names[::-1])
-
-
 def test_undecided_checks_and_the_reference_are_never_ranked():
     open_ = VerdictRecord("error", "x", "jump_l2", Verdict.UNDECIDED, 1, 0, 2, "at most 1", "why")
     solves = [solve("a", n, 0, 0.1) for n in ("x", "y", "reference")]
     ranking = rank_solvers([case_of("a", solves, [open_])])
     assert ranking["solvers"] == ["x", "y"]
     assert [e["reason"] for e in ranking["left_out"]] == ["error jump_l2 UNDECIDED: why"]
-
-
-def test_a_case_without_any_error_is_named_with_its_reason():
-    notes = {"comparison": "the reference has 0 solved levels"}
-    solves = [solve("a", name, 0, notes=notes) for name in ("x", "y")]
-    (entry,) = rank_solvers([case_of("a", solves)])["left_out"]
-    assert entry == {
-        "case": "a",
-        "solver": "",
-        "reason": f"no error is measured: {notes['comparison']}",
-    }
 
 
 def test_profiles_count_what_a_solver_has_not_done_as_never_done():

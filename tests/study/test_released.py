@@ -8,8 +8,6 @@ from verify.assess.released import advance, released_metrics
 from verify.compare.difference_energy import difference_energy, short_wave_energy
 from verify.compare.hooke import Hooke, law_of
 from verify.errors import InputError
-from verify.report.released_line import released_line
-from verify.result import Metric, SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution
 
@@ -159,14 +157,3 @@ def test_a_solution_without_a_ledger_or_velocities_says_what_is_missing():
     assert "ledger" in notes["released_to_scheme"]
     assert "no velocities" in notes["released_to_short_waves"]
     assert released_metrics(strip(cuts=[]), still, 0.01, law, None, None) == ([], {})
-
-
-def test_the_line_of_a_report_gives_shares_of_what_is_released():
-    values = {"released": 0.36, "released_to_scheme": 0.2556, "released_to_damping": 0.0,
-              "released_to_kinetic": 0.0936}  # fmt: skip
-    metrics = [Metric(name, value, "J/m²") for name, value in values.items()]
-    solve = SolveRecord("strip", "xfem", 0, Status.SOLVED, metrics=metrics)
-    assert released_line(solve) == (
-        "XFEM: of the 0.360 J/m² released per unit advance of the blade: 71 % dissipated by the "
-        "scheme, 0 % by damping, 26 % left as kinetic energy beside the exact field."
-    )

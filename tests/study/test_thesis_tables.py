@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from verify.report.study_page import render_study
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene, load_scenes
 from verify.simulator.thesis.added_nodes import count_face, count_strips
-from verify.simulator.thesis.delays import SPEEDS, delays, with_other_frames
+from verify.simulator.thesis.delays import delays, with_other_frames
 from verify.simulator.thesis.published import published_rows
 from verify.simulator.thesis.real_time import LIMITS, RealTime
 from verify.simulator.thesis.step_times import CUTS, TETRAHEDRA, StepTime, step_times
-from verify.study.record import write_study
 from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import MethodOnCase, compare_methods
 from verify.study.thesis.sliver_systems import exponent, sliver_systems
-from verify.study.thesis.study import ThesisStudy
 from verify.study.thesis.verdicts_on_cost import verdicts_on_cost
 from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
 
@@ -255,45 +252,3 @@ def test_a_verdict_falls_with_its_evidence(measured) -> None:
     assert verdict(replace(measured, methods=unclear), "accuracy") is Verdict.UNDECIDED
     nothing = [row for row in measured.methods if row.solver != "xfem"]
     assert verdict(replace(measured, methods=nothing), "accuracy") is Verdict.UNDECIDED
-
-
-def test_a_missed_limit_is_undecided_only_where_a_busy_machine_may_explain_it(measured) -> None:
-    topic = "real time: every step within 1 ms"
-    shares = {**measured.hand.within, "1 ms": 0.5}
-    missed = replace(
-        measured.hand, within=shares, within_spread=shares, slowest=1.5e-3, slowest_spread=1.5e-3
-    )
-    assert verdict(replace(measured, hand=missed), topic) is Verdict.FAIL
-    assert verdict(replace(measured, hand=missed, contended="busy"), topic) is Verdict.UNDECIDED
-    # cuts done at once are no excuse, and no charge
-    at_once = replace(measured.hand, within=shares, slowest=9e-3)
-    assert verdict(replace(measured, hand=at_once), topic) is Verdict.PASS
-    spread = replace(measured.hand, within_spread=shares, slowest_spread=9e-3)
-    assert verdict(replace(measured, hand=spread), topic) is Verdict.FAIL
-    far = replace(
-        measured, hand=replace(missed, slowest=9e-3, slowest_spread=9e-3), contended="busy"
-    )
-    assert verdict(far, topic) is Verdict.FAIL
-
-
-def test_the_page_shows_the_thesis_numbers_beside(measured, tmp_path) -> None:
-    study = ThesisStudy(measured, verdicts_on_cost(measured), True, 1.0)
-    write_study(tmp_path, "thesis", study.as_record(), study.rows(), "verify study thesis")
-    page = render_study(tmp_path, "thesis").read_text(encoding="utf-8")
-    for text in (
-        "Figure 4.11",
-        "Figure 4.25",
-        "Figure 4.26",
-        "CINVESTAV",
-        "0.7124",
-        "thesis, XFEM",
-    ):
-        assert text in page
-    table = (tmp_path / "thesis.csv").read_text(encoding="utf-8").splitlines()
-    assert table[0] == "table,row,column,here,thesis,unit"
-    assert (
-        f"4.3,{measured.face[-1].cuts},xfem,{measured.face[-1].added['xfem']},112,nodes added"
-        in (table)
-    )
-    assert len({line.split(",")[0] for line in table[1:]}) == 4
-    assert set(SPEEDS) <= {line.split(",")[2] for line in table if line.startswith("4.6")}

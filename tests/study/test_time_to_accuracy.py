@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from verify.assess.time_to_accuracy import time_to_accuracy
-from verify.report.tables import reference_tables
 from verify.solution import Solution
 
 TRIANGLE = Solution(np.eye(3)[:, :2], np.array([[0, 1, 2]]), np.zeros((1, 3, 2)))
@@ -35,21 +34,6 @@ def test_levels_that_were_not_timed_and_quantities_that_vanish_say_nothing():
     levels = {level: replace(one, timings={}) for level, one in LEVELS.items()}
     rows = time_to_accuracy(levels, {"u": {"values": [0.0] * 3, "uncertainty": 1e-9}})
     assert [(row["seconds"], row["u"]) for row in rows.values()] == [(None, None)] * 3
-
-
-def test_the_report_shows_cost_and_bounds_with_the_levels_side_by_side():
-    rows = time_to_accuracy(LEVELS, {"strain_energy": {"values": [1.1, 1.01, 1.0],
-                                                       "uncertainty": 1e-3}})  # fmt: skip
-    (table,) = reference_tables({"kind": "conforming", "time_to_accuracy": rows})
-    assert "Reference: time to accuracy" in table.caption
-    assert [cell.text for cell in table.head] == ["", "level 0", "level 1", "level 2"]
-    written = [[cell.text for cell in row] for row in table.rows]
-    for name, *cells in [
-        ("unknowns", "10", "40", "160"),
-        ("wall time", "2 s", "3 s", "3 s"),
-        ("relative error of the strain energy", "0.10", "0.011", "0.0010"),
-    ]:
-        assert [name, *cells] in written
 
 
 @pytest.mark.parametrize("finest", [1.0, -1.0])

@@ -203,32 +203,6 @@ def test_a_linear_motion_is_inherited_as_it_is():
             inherit_state(old, v, state)
 
 
-def test_inherited_twice_what_is_aggregated_stays_where_it_is():
-    """The same cuts once more: nothing changes."""
-    body = moving(split(2))
-    v = body.force.phantom
-    random = np.random.default_rng(0)
-    state = MotionState(*random.normal(scale=0.02, size=(2, *body.shape)))
-    after = inherit_state(v, v, state, body)
-    assert np.array_equal(after.displacement, state.displacement)
-    assert after.velocity == pytest.approx(state.velocity, abs=1e-12)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_linearised_step_has_the_force_and_the_stiffness_of_the_body(dim):
-    body = moving(split(dim))
-    force, pattern = body.force, body.pattern
-    random = np.random.default_rng(3)
-    u, w = 0.02 * random.normal(size=(2, *body.shape))
-    blocks, got = np.empty((len(pattern.columns), dim, dim)), np.empty(body.shape)
-    force.linearise(pattern, u, w, 0.3, 2.0, got, blocks)
-    want = force.evaluate(u)[0]
-    K = pattern.matrix(force.stiffness(pattern, u, "rotation-fixed"))
-    want = want + 0.3 * (K @ w.ravel()).reshape(body.shape)
-    assert got == pytest.approx(want, rel=1e-10, abs=1e-10 * np.abs(want).max())
-    assert np.abs(pattern.matrix(blocks) - 2.0 * K).max() < 1e-10 * np.abs(K).max()
-
-
 def test_an_explicit_step_moves_supports_that_no_root_shares_and_refuses_others():
     phantom = split(2)
     treated = moving(phantom)

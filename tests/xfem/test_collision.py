@@ -5,12 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verify.simulator.collision.bounding_tree import BoundingTree
 from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
 from verify.xfem.nearest_points import nearest_on_facet
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
@@ -159,47 +157,3 @@ def test_a_penalty_on_a_contact_does_the_work_on_the_unknowns_that_it_does_on_th
         nodal = body.surface.facet_force(int(facet), at, push, np.zeros_like(motion))
         on_surface = push @ (at @ velocity[body.surface.facets.rows[facet]])
         assert (nodal * motion).sum() == pytest.approx(on_surface, rel=1e-12)
-
-
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 64, 100])
-def test_a_refitted_tree_holds_every_simplex(count) -> None:
-    rng = np.random.default_rng(count)
-    points, cells = rng.normal(size=(40, 3)), rng.integers(0, 40, (count, 4))
-    tree = BoundingTree(points, cells)
-    for scale in (1.0, 3.0):
-        tree.refit(scale * points)
-        low, high = np.array([-0.5, -0.2, -1.0]), np.array([0.4, 0.3, 0.2])
-        found = np.sort(tree.meeting_box(low, high))
-        corners = scale * points[cells]
-        meets = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
-        np.testing.assert_array_equal(found, np.flatnonzero(meets))
-
-
-def test_bad_input_is_refused_with_its_reason() -> None:
-    _, _, collider, *_ = _model(2, 6)
-    with pytest.raises(XfemError, match="query points of shape"):
-        collider.nearest([[0.0, 0.0, 0.0]])
-    with pytest.raises(XfemError, match="query points of shape"):
-        collider.pierced([0.0, np.nan], [1.0, 1.0])
-    with pytest.raises(XfemError, match="radius -1"):
-        collider.touched([0.0, 0.0], [1.0, 1.0], -1.0)
-    tree = BoundingTree(np.eye(3), np.array([[0, 1, 2]]))
-    with pytest.raises(XfemError, match="2 points; expected more than 2"):
-        tree.refit(np.eye(3)[:2])
-
-
-def test_following_known_positions_is_refitting_to_their_displacement() -> None:
-    mesh = box_mesh((3, 3, 3))
-    cutter = SemiProgressiveCutter(mesh)
-    surface = BodySurface(cutter.body).surface
-    displacement = 0.1 * np.random.default_rng(4).normal(size=mesh.points.shape)
-    refitted, following = SurfaceCollider(surface), SurfaceCollider(surface)
-    refitted.refit(displacement)
-    following.follow(surface.positions(displacement))
-    tool = ([0.5, 0.5, -0.5], [0.4, 0.6, 1.5], 0.1)
-    ours, theirs = (collider.touched(*tool) for collider in (following, refitted))
-    assert len(ours.facet) > 0
-    np.testing.assert_array_equal(ours.facet, theirs.facet)
-    np.testing.assert_array_equal(ours.distance, theirs.distance)
-    with pytest.raises(XfemError, match="positions of shape"):
-        following.follow(np.zeros((2, 3)))

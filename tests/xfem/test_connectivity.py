@@ -145,14 +145,6 @@ def test_nodes_of_the_edge_that_holds_the_tip_are_not_enriched():
     assert len(points) == 4  # two columns of nodes above and below: x = 0 and 0.25
 
 
-def test_a_strip_of_cut_triangles_enriches_two_nodes_more_than_it_has_triangles():
-    """Table 4.3 of the thesis: n cut triangles enrich n + 2 nodes."""
-    phantom = cut_mesh(rectangle_mesh((16, 5)), [line(-1.0, 0.5, 2.0, 0.5)])
-    cut_cells = len(np.unique(phantom.parent[phantom.split]))
-    assert cut_cells == 32
-    assert len(phantom.enriched_nodes) == cut_cells + 2
-
-
 def test_the_turns_of_a_spiral_do_not_disturb_each_other():
     """Between two turns the level set changes its sign without a cut: nothing may split there."""
     angle = np.linspace(0.0, 5.0 * np.pi, 400)

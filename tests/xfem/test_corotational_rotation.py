@@ -78,17 +78,3 @@ def test_collapsed_and_inverted_pieces_have_a_rotation_that_attains_the_largest_
         assert np.abs(R.T @ R - np.eye(3)).max() < 1e-14
         assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-13)
         assert np.trace(R.T @ F) == pytest.approx(most, rel=1e-13, abs=1e-14 * s[2])
-
-
-def test_the_start_does_not_change_the_rotation():
-    rng = np.random.default_rng(3)
-    F = np.eye(3) + 0.4 * rng.normal(size=(3, 3))
-    for _ in range(200):
-        start = rng.normal(size=4)
-        assert np.abs(_rotation(F, start / np.linalg.norm(start)) - _rotation(F)).max() < 1e-14
-
-
-def test_what_is_not_finite_ends_without_hanging():
-    _rotation(np.full((3, 3), np.nan))
-    _by_eigenvector(np.full((3, 3), np.nan))
-    _rotation(np.full((2, 2), np.inf))

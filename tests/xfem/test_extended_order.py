@@ -10,7 +10,6 @@ from verify.xfem.cuts import Plane, ToolPath
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.pieces import split_cells
-from verify.xfem.sides import PieceSides, node_sides
 from verify.xfem.structured_meshes import box_mesh
 
 ROUND_OFF = 1e-10  # relative residual: thousands of operations on numbers within 1e4 of each other
@@ -60,39 +59,6 @@ def test_a_solver_extended_at_every_cut_still_solves_its_system() -> None:
     assert anew.factor_entries < solver.factor_entries
 
 
-@pytest.mark.parametrize("new_are_held", [True, False])
-def test_held_nodes_are_left_out_and_what_couples_them_is_not_read(new_are_held) -> None:
-    """Blocks that are not numbers there, at every cut, also where the strokes cut held nodes."""
-    cutter, rng = under_the_knife(), np.random.default_rng(6)
-    at_end = cutter.mesh.points[:, 1] < 0.2
-    pattern, _ = system(cutter, rng)
-    solver = Cholesky(pattern, 3, at_end)
-    cuts, from_held = 0, 0
-    for time in np.linspace(0.1, 3.0, 24):
-        increment = cutter.advance(time)
-        if increment is None:
-            continue
-        pattern, blocks = system(cutter, rng)
-        held = at_end[cutter.phantom_mesh().node_parent]
-        if not new_are_held:
-            held[len(at_end) :] = False
-        solver = solver.extended(pattern, increment.source, held)
-        rows = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
-        unread = (rows != pattern.columns) & (held[rows] | held[pattern.columns])
-        blocks[unread] = np.nan
-        solver.factorize(blocks)
-        load = rng.standard_normal((pattern.node_count, 3))
-        blocks[unread] = 0.0
-        error = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
-        assert np.linalg.norm(error) < ROUND_OFF * np.linalg.norm(load)
-        cuts += 1
-        from_held += at_end[cutter.phantom_mesh().node_parent[increment.nodes_before :]].sum()
-    assert cuts > 12
-    assert from_held > 4
-    anew = [Cholesky(pattern, 3, some).factor_entries for some in (held, None)]
-    assert anew[0] < anew[1]
-
-
 @pytest.mark.parametrize("tip", ["inside", "through"])
 def test_a_cut_splits_as_it_does_beside_one_that_meets_nothing(tip) -> None:
     mesh = box_mesh((3, 3, 3))
@@ -109,18 +75,3 @@ def test_a_cut_splits_as_it_does_beside_one_that_meets_nothing(tip) -> None:
             np.testing.assert_allclose(mine, getattr(among.simplices, name), rtol=1e-14, atol=1e-16)
         np.testing.assert_allclose(alone.points.positions, among.points.positions, atol=1e-15)
         np.testing.assert_array_equal(alone.points.ends, among.points.ends)
-
-
-def test_the_side_of_an_unknown_is_that_of_its_pieces_if_they_agree_else_of_its_node() -> None:
-    rng = np.random.default_rng(2)
-    for _ in range(20):
-        cells = rng.integers(0, 12, (15, 4))
-        label = rng.integers(-1, 2, (15, 3)).astype(np.int8)
-        values = rng.standard_normal((12, 3))
-        none = PieceSides(np.zeros(0, np.int64), np.zeros((0, 3), np.int8), np.zeros(0))
-        side = node_sides(values, np.arange(12), cells, label, none)
-        for node in range(12):
-            for cut in range(3):
-                seen = {int(s) for s in label[(cells == node).any(axis=1), cut] if s != 0}
-                own = 1 if values[node, cut] >= 0.0 else -1
-                assert side[node, cut] == (seen.pop() if len(seen) == 1 else own)

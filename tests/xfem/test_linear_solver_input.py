@@ -105,16 +105,6 @@ def test_blocks_and_loads_of_another_body_are_refused(kind):
     assert np.array_equal(solver.solve(ones), solver.solve(np.asfortranarray(ones, dtype=float)))
 
 
-def test_a_first_guess_that_does_not_fit_is_refused():
-    pattern, blocks, load = system("block")
-    solver = ConjugateGradients(pattern, 3)
-    solver.factorize(blocks)
-    with pytest.raises(XfemError, match="first guess of shape"):
-        solver.solve(load, load[:-1])
-    with pytest.raises(XfemError, match="first guess is not finite"):
-        solver.solve(load, np.full_like(load, np.nan))
-
-
 @pytest.mark.parametrize("name", MESHES)
 def test_conjugate_gradients_that_break_down_say_so(name):
     """Where the residual stagnates at round-off, their recurrence once divided by zero."""

@@ -9,7 +9,6 @@ from scipy.sparse.linalg import spsolve
 
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.accelerated.minimum_degree import minimum_degree
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.errors import NotConvergedError, SingularStiffnessError
 from verify.xfem.linear_solvers import BlockJacobiCG, SparseLU
@@ -59,17 +58,6 @@ def test_solutions_equal_those_of_superlu(method, name, block):
     assert np.abs(solver.solve(load) - want).max() < tolerance * np.abs(want).max()
 
 
-def test_a_kept_analysis_serves_other_values():
-    mesh = MESHES["block"]
-    pattern, _, load = random_system(mesh.cells, len(mesh.points), 3)
-    solver = Cholesky(pattern, 3)
-    for seed in range(3):
-        _, blocks, _ = random_system(mesh.cells, len(mesh.points), 3, seed)
-        solver.factorize(blocks)
-        residual = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
-        assert np.abs(residual).max() < 1e-11
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_irregular_and_disconnected_graphs_are_factorised(seed):
     rng = np.random.default_rng(seed)
@@ -83,30 +71,6 @@ def test_irregular_and_disconnected_graphs_are_factorised(seed):
     solver.factorize(blocks)
     residual = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
     assert np.abs(residual).max() < 1e-10 * np.abs(blocks).max()
-
-
-def dense_fill(pattern, order):
-    """Nodal entries of the factor, by elimination on a dense pattern."""
-    full = pattern.matrix(np.ones((len(pattern.columns), 1, 1))).toarray() > 0
-    full = full[np.ix_(order, order)]
-    for k in range(len(order)):
-        below = np.flatnonzero(full[k + 1 :, k]) + k + 1
-        full[np.ix_(below, below)] = True
-    return int(np.tril(full).sum())
-
-
-def test_minimum_degree_gives_about_the_fill_of_superlu_s():
-    mesh = rectangle_mesh((20, 20))
-    pattern = block_pattern(mesh.cells, len(mesh.points))
-    order, bounds = minimum_degree(pattern.starts, pattern.columns)
-    assert np.array_equal(np.sort(order), np.arange(len(mesh.points)))
-    assert (np.diff(bounds) > 0).all()
-    assert bounds[-1] == len(order)
-    matrix = sparse.csc_matrix(pattern.matrix(np.ones((len(pattern.columns), 1, 1))))
-    matrix.setdiag(50.0)
-    lu = sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    # both are heuristics with ties; the natural order would give 441·21 ≈ 9000 entries
-    assert dense_fill(pattern, order) <= 1.15 * lu.L.nnz
 
 
 def test_a_badly_scaled_matrix_loses_no_digits():
@@ -172,14 +136,3 @@ def test_conjugate_gradients_say_so_when_they_do_not_converge():
         solver.factorize(blocks)
         with pytest.raises(NotConvergedError, match="after 3 iterations"):
             solver.solve(load)
-
-
-def test_a_warm_start_at_the_solution_needs_no_iteration():
-    mesh = MESHES["plate"]
-    pattern, blocks, load = random_system(mesh.cells, len(mesh.points), 2)
-    solver = ConjugateGradients(pattern, 2, tolerance=1e-8)
-    solver.factorize(blocks)
-    direct = Cholesky(pattern, 2)
-    direct.factorize(blocks)
-    solver.solve(load, direct.solve(load))
-    assert solver.iterations == 0

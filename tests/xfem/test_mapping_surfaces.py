@@ -1,13 +1,10 @@
 """Separate visual and collision surfaces: embedded in pieces, split with them, in equilibrium."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 from surface_measures import loose_edges
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.alternative_mesh import virtual_elements
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
 from verify.simulator.mapping.pull_back import pull_back
@@ -173,23 +170,6 @@ def test_each_vertex_belongs_to_the_piece_that_contains_it() -> None:
     assert upper == loose_edges(facets[facet_lift[:, 0] < 0]) > 0
 
 
-def test_only_facets_near_a_cut_are_looked_at_again() -> None:
-    points, facets = _sphere(4, 0.5, 0.45)
-    mesh = box_mesh((10, 10, 10))
-    cutter = SemiProgressiveCutter(mesh)
-    embedded = EmbeddedSurface(cutter, points, facets)
-    before = len(embedded.surface.facets)
-    cutter.begin(
-        ToolPath.of_tip([[0.05, 0.5, 0.97], [0.25, 0.5, 0.97]], [0.0, 1.0], [0.0, 0.0, -0.94])
-    )
-    increment = cutter.advance(1.0)
-    embedded.update(increment)
-    looked_at = embedded.surface.retired
-    assert 0 < looked_at < 0.35 * before
-    far = points[facets[:, 0], 0] > 0.6
-    assert (embedded.surface.facets.rows[:before][far, 0] >= 0).all()
-
-
 def test_virtual_work_is_the_same_on_the_surface_and_on_the_unknowns() -> None:
     points, facets = _sphere(3, 0.5, 0.45)
     cutter, body, embedded = _cut(box_mesh((4, 4, 4)), PATHS, points, facets)
@@ -214,22 +194,6 @@ def test_virtual_work_is_the_same_on_the_surface_and_on_the_unknowns() -> None:
         nodal = surface.facet_force(facet, at, push, np.zeros_like(motion))
         moved = at @ velocity[surface.facets.rows[facet]]
         assert (nodal * motion).sum() == pytest.approx(push @ moved, rel=1e-12)
-
-
-def test_a_step_of_the_mapping_allocates_nothing() -> None:
-    points, facets = _sphere(3, 0.5, 0.45)
-    cutter, _, embedded = _cut(box_mesh((4, 4, 4)), PATHS[:1], points, facets)
-    displacement = np.zeros((cutter.body.node_count, 3))
-    out, forces = np.empty_like(embedded.surface.material.rows), np.zeros_like(displacement)
-    embedded.surface.positions(displacement, out)
-    embedded.surface.nodal_forces(out, forces)
-    tracemalloc.start()
-    for _ in range(50):
-        embedded.surface.positions(displacement, out)
-        embedded.surface.nodal_forces(out, forces)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 0.2 * out.nbytes  # views and call frames only
 
 
 def test_a_tool_in_the_deformed_body_is_found_in_the_material() -> None:
@@ -288,17 +252,6 @@ def _neighbour(cutter, piece):
     return int(others[0]) if len(others) else piece
 
 
-def test_virtual_elements_are_whole_elements_where_their_unknowns_are() -> None:
-    cutter, _, _ = _cut(box_mesh((2, 2, 3)), PATHS[:1])
-    body, mesh = cutter.body, cutter.mesh
-    displacement = np.random.default_rng(10).normal(size=(body.node_count, 3))
-    elements = virtual_elements(body, displacement)
-    moved = elements - mesh.points[mesh.cells[body.piece_parent.rows]]
-    np.testing.assert_allclose(moved, displacement[body.piece_cells.rows], atol=1e-15)
-    with pytest.raises(XfemError, match="displacement of shape"):
-        virtual_elements(body, displacement[1:])
-
-
 def test_bad_input_is_refused_with_its_reason() -> None:
     cutter = SemiProgressiveCutter(box_mesh((1, 1, 1)))
     points, facets = _sphere(0, 0.5, 0.4)
@@ -326,26 +279,3 @@ def _facets_in_any_order(surface, displacement):
     first = [min(range(3), key=lambda k, c=c: tuple(c[k])) for c in places]
     rows = [np.roll(c, -k, axis=0).ravel() for c, k in zip(places, first, strict=True)]
     return np.array(sorted(rows, key=tuple))
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_facets_divided_by_one_cut_are_those_that_the_general_division_gives(
-    seed, monkeypatch
-) -> None:
-    """The kernel for a single cut against the way that takes any number of them."""
-    mesh, rng = box_mesh((4, 4, 4)), np.random.default_rng(seed)
-    points, facets = _sphere(3, np.full(3, 0.5), 0.47)
-    tips, blade = np.array([[-0.1, 0.3, 1.2], [0.8, 0.5, 1.2]]), np.array([0.1, 0.0, -0.8])
-    if seed == 2:  # some vertices exactly on the cut
-        points, facets = mesh.points, _own_boundary(mesh)
-        tips, blade = np.array([[-0.2, 0.15, 1.3], [0.8, 0.65, 1.3]]), np.array([0.0, 0.0, -1.6])
-    else:
-        tips, blade = tips + 0.1 * rng.random(3), blade + 0.2 * rng.random(3)
-    path = ToolPath.of_tip(tips, [0.0, 1.0], blade)
-    cutter, _, quick = _cut(mesh, [path], points, facets)
-    monkeypatch.setattr(EmbeddedSurface, "_divided_by_one", EmbeddedSurface._divided_by_several)
-    _, _, general = _cut(mesh, [path], points, facets)
-    displacement = rng.normal(size=(cutter.body.node_count, 3))
-    found, expected = (_facets_in_any_order(s.surface, displacement) for s in (quick, general))
-    assert len(found) > len(facets)
-    np.testing.assert_allclose(found, expected, atol=1e-8)

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from verify.xfem.clip import staircase
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
@@ -124,30 +123,6 @@ def test_volume_shares_of_a_two_two_split_match_the_product_formula():
     assert plus == pytest.approx([want], rel=1e-15)
 
 
-@pytest.mark.parametrize("corners", [2, 3, 4])
-def test_staircases_fill_the_simplex_with_the_determinants_that_they_claim(corners):
-    rng = np.random.default_rng(0)
-    stairs = staircase(corners)
-    for pattern in range(1, 2**corners - 1):
-        plus = np.array([pattern >> k & 1 for k in range(corners)], dtype=bool)
-        phi = np.where(plus, 1.0, -1.0) * rng.uniform(0.1, 1.0, corners)
-        total = 0.0
-        for entry in range(stairs.start[pattern], stairs.start[pattern + 1]):
-            rows = []
-            for p, m in zip(stairs.plus[entry], stairs.minus[entry], strict=True):
-                share = 0.0 if p == m else phi[p] / (phi[p] - phi[m])
-                rows.append((1 - share) * np.eye(corners)[p] + share * np.eye(corners)[m])
-            determinant = abs(np.linalg.det(rows))
-            claimed = 1.0
-            for kind, p, m in stairs.factors[entry]:
-                if p != m:
-                    claimed *= (phi[p] if kind == 0 else -phi[m]) / (phi[p] - phi[m])
-            assert claimed == pytest.approx(determinant, rel=1e-12)
-            assert np.sign(np.mean(rows, axis=0) @ phi) == stairs.side[entry]
-            total += claimed
-        assert total == pytest.approx(1.0, rel=1e-14)
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_subdivision_is_watertight_and_fills_the_body(dim, seed):
@@ -221,11 +196,6 @@ def test_what_was_snapped_and_dropped_is_counted():
     assert phantom.snapped + (phantom.level_sets == 0.0).sum() >= 5
     # the plus side of every cell below the line has no volume: eight cells touch it from below
     assert phantom.dropped == 8
-
-
-def test_a_level_set_that_is_not_finite_is_refused():
-    with pytest.raises(XfemError, match="cut 0: level set"):
-        cut_mesh(MESHES[2], [ImplicitCut(lambda x: np.full(len(x), np.nan))])
 
 
 def test_an_unknown_tip_rule_is_refused():

@@ -8,22 +8,12 @@ from cut_bodies import DENSITY, cut_cube, material
 
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
-from verify.accelerated.conjugate_gradient_kernels import invert_blocks
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.accelerated.symmetric_sweep_kernels import (
-    add_lower_product,
-    solve_lower,
-    solve_upper,
-    take_upper,
-    upper_pattern,
-)
-from verify.xfem.block_pattern import block_pattern, symmetric_product
 from verify.xfem.body import DynamicBody, MovingSupports, StepFailedError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 
 STEP = 2e-3
@@ -121,48 +111,3 @@ def test_a_penalised_solid_is_swept_to_the_force_and_stiffness_of_evaluation_and
     assert np.abs(internal - expected).max() < 1e-12 * np.abs(expected).max()
     assert np.abs(blocks - stiffness).max() < 1e-12 * np.abs(stiffness).max()
     assert np.abs(force.ghost.matrix @ u).max() > 1e-3 * np.abs(expected).max()
-
-
-@pytest.mark.parametrize("size", [1, 2, 3])
-def test_sweeps_over_the_upper_half_are_those_of_dense_triangles(size):
-    mesh = box_mesh((2, 2, 2)) if size == 3 else rectangle_mesh((4, 4))
-    pattern = block_pattern(mesh.cells, len(mesh.points))
-    rng = np.random.default_rng(size)
-    blocks = rng.normal(size=(len(pattern.columns), size, size))
-    blocks += blocks[pattern.mirror].transpose(0, 2, 1)
-    blocks[pattern.diagonal] += 50.0 * np.eye(size)
-    K = pattern.matrix(blocks).toarray()
-    rows = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
-    unread = pattern.columns < rows
-    blocks[unread] = np.nan
-    inverse = np.zeros((pattern.node_count, size, size))
-    assert invert_blocks(blocks, pattern.diagonal, inverse) == -1
-    parts = np.where(unread[:, None, None], 0.0, blocks)
-    upper = pattern.matrix(parts).toarray()  # D + Lᵀ
-    parts[pattern.columns != rows] = 0.0
-    D = pattern.matrix(parts).toarray()
-    matrix = (pattern.starts, pattern.columns, pattern.diagonal, blocks)
-    places = upper_pattern(*matrix[:3])
-    above = np.empty((len(places[1]), size, size))
-    take_upper(pattern.starts, pattern.diagonal, blocks, above)
-    half = (*places, above)
-
-    p = rng.normal(size=(pattern.node_count, size))
-    t, e, u, s, out = (np.full_like(p, np.nan) for _ in range(5))
-
-    def is_close(given, wanted):
-        return np.abs(given.ravel() - wanted).max() < 1e-13 * np.abs(wanted).max()
-
-    solve_upper(*half, inverse, p, t, e, u)
-    assert is_close(t, np.linalg.solve(upper, p.ravel()))
-    assert is_close(u, D @ t.ravel())
-    assert is_close(e, (upper - D) @ t.ravel())
-    g = p.copy()
-    solve_lower(*half, inverse, g, s)
-    assert is_close(s, np.linalg.solve(upper.T, p.ravel()))
-    assert is_close(g, D @ s.ravel())
-    symmetric_product(*matrix, p, out)
-    assert is_close(out, K @ p.ravel())
-    out[:] = 0.0
-    add_lower_product(*half, p, out)
-    assert is_close(out, (upper - D).T @ p.ravel())

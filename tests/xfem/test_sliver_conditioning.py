@@ -16,7 +16,6 @@ from verify.xfem.bases import transformed_matrix
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
@@ -143,15 +142,3 @@ def test_a_ghost_penalty_costs_less_than_half_a_percent_of_accuracy_and_nothing_
         assert solution.residual < 1e-9
         assert 0.0 < solution.penalty_energy < 1e-3 * solution.strain_energy
     assert errors[1:] == pytest.approx([errors[0]] * 2, rel=5e-3)
-
-
-def test_a_ghost_penalty_ties_no_halves_together():
-    phantom = body(2, 1e-3)
-    ghost = GhostPenalty(phantom, isotropic(1.0, 0.3, "plane strain"))
-    lifted = np.where(phantom.node_side > 0, 1.0, 0.0) * np.ones(2)
-    assert np.abs(ghost.force(lifted)[0]).max() < 1e-15
-
-
-def test_a_ghost_penalty_needs_a_positive_factor():
-    with pytest.raises(XfemError, match="positive"):
-        GhostPenalty(body(2, 0.5), isotropic(1.0, 0.3, "plane strain"), -1.0)

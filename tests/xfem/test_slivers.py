@@ -5,13 +5,8 @@ import pytest
 import xfem_exact_fields as exact
 from xfem_bodies import boundary_nodes, scaled_dense_stiffness
 
-from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.xfem.assembly import constrain
-from verify.xfem.block_pattern import block_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
-from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -47,26 +42,6 @@ def test_the_scaled_condition_number_does_not_see_slivers(dim):
         assert scaled_condition_number(body(dim, size)) < 2.0 * conforming
     # and it tends to it, instead of growing like 1/size²
     assert scaled_condition_number(body(dim, 1e-9)) == pytest.approx(conforming, rel=1e-6)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_conjugate_gradients_need_no_more_iterations_with_slivers(dim):
-    def iterations(phantom):
-        pattern = block_pattern(phantom.cells, phantom.node_count)
-        stiffness = InternalForce(phantom, isotropic(1e4, 0.3, "solid"), "linear")
-        blocks = stiffness.stiffness(pattern)
-        supports = clamped(phantom)
-        constrain(pattern, supports.fixed, blocks)
-        solver = ConjugateGradients(pattern, dim, tolerance=1e-8)
-        solver.factorize(blocks)
-        load = body_force(phantom, np.full(dim, -1.0))
-        solver.solve(np.where(supports.fixed, 0.0, load))
-        return solver.iterations
-
-    mesh = body(dim, 0.5).mesh
-    uncut = iterations(cut_mesh(mesh, []))
-    for size in SIZES:
-        assert iterations(body(dim, size)) <= 2 * uncut
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from cut_bodies import DENSITY, cut_membrane, material
+from cut_bodies import DENSITY, material
 
 from verify.accelerated import FAST, solver_by_cost
 from verify.accelerated.cholesky import Cholesky
@@ -122,34 +122,6 @@ def test_supports_that_move_are_followed_on_both_sides_of_the_turn():
     assert not found.solver.is_iterative
     size = np.abs(other.displacement).max()
     assert state.displacement == pytest.approx(other.displacement, abs=1e-7 * size)
-
-
-def test_small_bodies_are_always_factorised():
-    for body in (_body((3, 3, 3)), _body((10, 10))):
-        assert not RealTimeEuler(body, 1e-6).solver.is_iterative
-    v = cut_membrane()
-    sheet = DynamicBody(InternalForce(v, material(2), kernels=FAST), side_wise_mass(v, DENSITY))
-    assert not Trapezoidal(sheet, 1e-6)._solver.is_iterative
-
-
-def test_the_matrix_of_linear_motion_is_factorised_once_for_a_step_and_damping(monkeypatch):
-    from verify.xfem.body import RayleighDamping
-
-    body = _body((4, 4), kinematics="linear")
-    counted = []
-    factorize = SolverByCost.factorize
-    monkeypatch.setattr(
-        SolverByCost, "factorize", lambda self, blocks: (counted.append(1), factorize(self, blocks))
-    )
-    scheme, state = Trapezoidal(body, 0.01), body.rest()
-    for _ in range(5):
-        scheme.step(state)
-    assert len(counted) == 1
-    body.damping = RayleighDamping(1.0, 0.0)
-    scheme.step(state)
-    scheme.step_size = 0.02
-    scheme.step(state)
-    assert len(counted) == 3
 
 
 def test_without_memory_for_a_factor_it_goes_on_with_iterations(monkeypatch):

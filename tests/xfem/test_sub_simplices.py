@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
-from degenerate_strokes import body, strokes
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem import clip
 from verify.xfem.cuts import Plane
 from verify.xfem.join import join_parts
-from verify.xfem.phantom import cut_mesh
 from verify.xfem.pieces import split_cells
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.subdivision import subdivide
 
 # products of the same factors, taken in another order: a few ulp
 ROUND_OFF = 4e-15
@@ -31,48 +27,6 @@ def one_by_one(zero, order, points, fraction):
             parts.append((half, fraction[has] * share))
         points, fraction = (np.concatenate(x) for x in zip(*parts, strict=True))
     return points, fraction
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_bisection_at_once_is_that_at_one_point_after_the_other(dim, monkeypatch) -> None:
-    given = []
-
-    def noted(simplices, zero, numbers):
-        given.append((simplices, zero, zero.in_order(numbers)))
-        return clip.bisected(simplices, zero, numbers)
-
-    monkeypatch.setattr("verify.xfem.pieces.bisected", noted)
-    monkeypatch.setattr("verify.xfem.subdivision.bisected", noted)
-    more = 0
-    for seed in range(25):
-        rng = np.random.default_rng([dim, seed, 1])
-        mesh = body(rng, dim)
-        subdivide(cut_mesh(mesh, [path.sweep for path in strokes(rng, mesh, 3)]))
-    for simplices, zero, order in given:
-        found = clip.bisected(simplices, zero, order)
-        points, share = one_by_one(zero, order, simplices.points, simplices.fraction)
-        mine, twin = (
-            np.lexsort([f, *np.sort(p, axis=1).T])
-            for p, f in ((found.points, found.fraction), (points, share))
-        )
-        np.testing.assert_array_equal(
-            np.sort(found.points[mine], axis=1), np.sort(points[twin], axis=1)
-        )
-        np.testing.assert_allclose(found.fraction[mine], share[twin], rtol=ROUND_OFF)
-        more += len(found) - len(simplices)
-    assert more > 10
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_signs_of_sub_simplices_are_those_of_their_determinants(dim) -> None:
-    for seed in range(25):
-        rng = np.random.default_rng([dim, seed, 1])
-        mesh = body(rng, dim)
-        sub = split_cells(mesh, [path.sweep for path in strokes(rng, mesh, 3)]).simplices
-        determinant = np.linalg.det(sub.barycentric)
-        thick = np.abs(determinant) > 1e-12
-        np.testing.assert_array_equal(np.sign(determinant[thick]), sub.sign[thick])
-        np.testing.assert_allclose(np.abs(determinant[thick]), sub.fraction[thick], rtol=1e-2)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
