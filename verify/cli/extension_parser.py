@@ -18,8 +18,9 @@ __all__ = ["add_extension_commands"]
 
 
 def add_extension_commands(add: Add) -> None:
-    """Add ``export``, ``import``, ``solvers``, ``conform`` and ``baseline``."""
+    """Add ``export``, ``paraview``, ``import``, ``solvers``, ``conform`` and ``baseline``."""
     _add_export(add)
+    _add_paraview(add)
     _add_import(add)
     _add_solvers(add)
     _add_conform(add)
@@ -50,6 +51,34 @@ def _add_export(add: Add) -> None:
         "--template", choices=("python",),
         help="also write a program that answers the case, on a reader and writer that need "
         "numpy alone (with --conforming)",
+    )  # fmt: skip
+    add_json(command, "print the files as JSON")
+
+
+def _add_paraview(add: Add) -> None:
+    command = add(
+        "paraview",
+        "write the solutions of a run for ParaView: displacement, strain, stress over time",
+        "examples:\n  verify paraview out\n"
+        "  verify paraview out --solver xfem --level 0 --reference --out fields\n\n"
+        "Open the .pvd files; Warp By Vector with `displacement` shows the deformed body.",
+    )
+    add_run(command)
+    command.add_argument(
+        "--out", metavar="DIR", type=Path,
+        help="directory to write into (default: the folder paraview in the run)",
+    )  # fmt: skip
+    command.add_argument(
+        "--solver", metavar="NAME", dest="solvers", action="append", default=[],
+        help="only of this solver; repeat for several (default: all, and the reference)",
+    )  # fmt: skip
+    command.add_argument(
+        "--level", metavar="K", type=int,
+        help="mesh level, 0 is the coarsest (default: the finest of each solver)",
+    )  # fmt: skip
+    command.add_argument(
+        "--reference", dest="with_reference", action="store_true",
+        help="add the displacement of the reference and the error against it",
     )  # fmt: skip
     add_json(command, "print the files as JSON")
 

@@ -2,11 +2,13 @@
 
 `problem_of` turns a scene into arrays for a solver in Python, `export_case` writes them as files,
 `ProgramSolver` runs any program on those files, and `read_answers` reads what it answered.
+`export_fields` writes the solutions of a run for ParaView.
 """
 
 from verify.exchange.answers import Answers, read_answers
 from verify.exchange.export import export_case
 from verify.exchange.layout import problem_of
+from verify.exchange.paraview import export_fields
 from verify.exchange.problem import HeldNodes, Load, Problem
 from verify.exchange.program import ProgramSolver
 
@@ -17,6 +19,7 @@ __all__ = [
     "Problem",
     "ProgramSolver",
     "export_case",
+    "export_fields",
     "problem_of",
     "read_answers",
 ]

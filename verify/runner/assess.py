@@ -18,9 +18,6 @@ from verify.assess.accuracy import assess_accuracy
 from verify.assess.adequacy import adequacy_notice
 from verify.assess.closing import with_openings
 from verify.compare.body import body_of
-from verify.compare.locate import Field
-from verify.compare.motion import ExactMotion
-from verify.compare.realised import cut_deviation, field_of
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.printable import words_of
@@ -35,7 +32,7 @@ from verify.result import (
 )
 from verify.runner.childhood import JUDGING, die_with_parent
 from verify.runner.directory import folder_name
-from verify.runner.error_field import write_error_field
+from verify.runner.error_field import truth_of, write_error_field
 from verify.runner.job import check_files, load_record
 from verify.scene import Scene, restore_scene
 from verify.solution import Solution, read_solution
@@ -173,22 +170,17 @@ def _error_pictures(
     scene: Scene, solutions: dict[str, dict[int, Solution]], exact: Any, folder: Path
 ) -> dict[str, Path]:
     """Write the error field of the finest solution of each solver, if there is a reference."""
-    references = solutions.get(REFERENCE, {})
-    truth: Field | None = None
     body = body_of(scene)
-    if scene.judged_by_exact:
-        truth = ExactMotion(exact).at(scene.analysis.duration)
-    elif references:
-        judged = (own for solver, own in solutions.items() if solver != REFERENCE)
-        deviation = max((cut_deviation(own[max(own)], body) for own in judged), default=0.0)
-        truth = field_of(references[max(references)], body, deviation=deviation)
+    judged = [own[max(own)] for solver, own in solutions.items() if solver != REFERENCE]
+    truth = truth_of(scene, solutions.get(REFERENCE, {}), judged, exact)
     pictures: dict[str, Path] = {}
     for solver, own in solutions.items():
         if solver == REFERENCE or truth is None:
             continue
         path = folder / f"error_field_{folder_name(solver)}.vtu"
         try:
-            write_error_field(own[max(own)], truth, path, body)
+            finest = own[max(own)]
+            write_error_field(finest, truth(float(finest.times[-1])), path, body)
         except Exception:  # a solution that cannot be drawn costs nobody else a picture
             traceback.print_exc()
             continue

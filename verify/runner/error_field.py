@@ -1,28 +1,68 @@
-"""The error of a solution at its own nodes, as a file for pictures."""
+"""The error of a solution at its own nodes, and what it is the error against."""
 
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.compare.body import AnyBody
+from verify.compare.body import AnyBody, body_of
 from verify.compare.locate import Field, SolutionField
-from verify.compare.realised import field_of
+from verify.compare.motion import ExactMotion
+from verify.compare.realised import cut_deviation, field_of
 from verify.compare.simplices import simplices
+from verify.errors import InputError
+from verify.scene import Scene
 from verify.solution import Solution
 from verify.whole_files import whole_file
 
-__all__ = ["nodal_error", "write_error_field"]
+__all__ = ["Truth", "nodal_differences", "nodal_error", "truth_of", "write_error_field"]
+
+Array = NDArray[np.float64]
+Truth = Callable[[float], Field]  # the reference or exact field at an output time, s
 
 # A node on the cut has no side, a point this share of the way into one of its cells has. The
 # direction to the centre of a slender cell is no help: it runs along the cut.
 _INTO_CELL = 0.01
+_SAME_TIME = 1e-9  # of the last output time
 
 
-def nodal_error(
-    solution: Solution, truth: Field, body: AnyBody | None = None
-) -> NDArray[np.float64]:
-    """Magnitude of the displacement error at the nodes of `solution`, m.
+def truth_of(
+    scene: Scene, references: Mapping[int, Solution], judged: Sequence[Solution], exact: Any
+) -> Truth | None:
+    """Return the field that a scene is judged by, over time; None without one.
+
+    Parameters
+    ----------
+    scene : Scene
+    references : mapping of int to Solution
+        Solutions of the reference by level; the finest counts where no exact one is asked.
+    judged : sequence of Solution
+        Whose cuts may deviate from the cuts as asked.
+    exact : object with ``displacement`` and ``gradient``, or None
+    """
+    if scene.judged_by_exact:
+        return ExactMotion(exact).at
+    if not references:
+        return None
+    body, reference = body_of(scene), references[max(references)]
+    deviation = max((cut_deviation(own, body) for own in judged), default=0.0)
+    field = field_of(reference, body, deviation=deviation)
+
+    def at(time: float) -> Field:
+        step = int(np.argmin(np.abs(reference.times - time)))
+        if abs(reference.times[step] - time) > _SAME_TIME * reference.times[-1]:
+            raise InputError(f"the reference has no output at {time:.6g} s")
+        return field.with_nodal(reference.displacement[step])
+
+    return at
+
+
+def nodal_differences(
+    solution: Solution, truth: Truth, body: AnyBody | None = None, steps: Sequence[int] = (-1,)
+) -> Array:
+    """Displacement of a solution less the true one, at its nodes, m.
 
     Both fields are taken a hundredth of the way from the node to the centre of its largest cell,
     so that a node on the cut is compared on its own side.
@@ -30,16 +70,17 @@ def nodal_error(
     Parameters
     ----------
     solution : Solution
-        Its last output time counts.
-    truth : Field
-        The reference or exact field.
+    truth : callable
+        The reference or exact field at a time, s.
     body : Body, SolidBody or MembraneBody, optional
         Its cuts as asked: where they are not as realised, the truth is asked on the side of the
         solution's cell.
+    steps : sequence of int
+        Output times that are looked at; default the last.
 
     Returns
     -------
-    (n,) array
+    (k, n, d) array
         0 at nodes that no cell uses.
     """
     points, cells = solution.points, solution.cells
@@ -51,11 +92,18 @@ def nodal_error(
     centre = shape.corners.mean(axis=1)[owner[used]]
     inside = points[used] + _INTO_CELL * (centre - points[used])
     field = SolutionField(solution) if body is None else field_of(solution, body)
-    own, _ = field.in_cells(inside, owner[used])
-    error = np.zeros(len(points))
     beside = field.inner_points(owner[used])
-    error[used] = np.linalg.norm(own - truth.displacement(inside, beside), axis=1)
-    return error
+    difference = np.zeros((len(steps), *points.shape))
+    for k, step in enumerate(steps):
+        own, _ = field.with_nodal(solution.displacement[step]).in_cells(inside, owner[used])
+        true = truth(float(solution.times[step])).displacement(inside, beside)
+        difference[k, used] = own - true
+    return difference
+
+
+def nodal_error(solution: Solution, truth: Field, body: AnyBody | None = None) -> Array:
+    """Magnitude (n,) of the displacement error at the last output time, as `nodal_differences`."""
+    return np.linalg.norm(nodal_differences(solution, lambda _: truth, body)[0], axis=1)
 
 
 def write_error_field(
