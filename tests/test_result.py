@@ -129,7 +129,7 @@ def damaged(change):
         (lambda path: path.unlink(), "no such file"),
         (lambda path: path.write_text(path.read_text()[:100]), "not a JSON file"),
         (lambda path: path.write_bytes(b"\xff\xff"), "not a JSON file"),
-        (lambda path: path.write_text("[]"), "not a JSON object"),
+        (lambda path: path.write_text("[]"), "object"),
         (damaged(lambda r: r.update(schema=2)), "not a result of schema version 1"),
         (damaged(lambda r: r.pop("solves")), "not a readable result"),
         (

@@ -278,7 +278,7 @@ def test_a_known_finding_fails_with_its_reason_and_passes_with_a_hint():
     assert (xfem.known, xfem.counts_as_failed) == ("", True)
     (mine,) = verdicts(BOUND, [solve(0, 0.01, solver="mine")], known_findings=known())
     assert mine.verdict is Verdict.PASS
-    assert "the entry can go" in mine.reason
+    assert "entry" in mine.reason
 
 
 @pytest.mark.parametrize(

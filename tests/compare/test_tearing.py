@@ -62,9 +62,9 @@ def test_where_the_blade_does_not_advance_there_is_no_intensity():
 
 
 def test_mode_3_says_what_it_needs():
-    with pytest.raises(ValueError, match="a radius belongs to mode III"):
+    with pytest.raises(ValueError, match="radius"):
         StressIntensityQuantity(kind="stress_intensity", name="K", end="end", mode="III")
-    with pytest.raises(ValueError, match="at the blade: end = 'end'"):
+    with pytest.raises(ValueError, match="blade"):
         StressIntensityQuantity(kind="stress_intensity", name="K", end="start", mode="III",
                                 radius=0.1)  # fmt: skip
 

@@ -67,5 +67,5 @@ def test_what_cannot_be_checked_is_bad_input_in_one_line(capsys, arguments, said
 def test_a_solver_that_cannot_be_loaded_is_bad_input_and_not_a_finding(tmp_path, monkeypatch):
     (tmp_path / "brittle.py").write_text("raise RuntimeError('no licence')\n")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="could not be loaded: RuntimeError: no licence"):
+    with pytest.raises(InputError, match="RuntimeError"):
         conform("brittle:Solver", only=["uncut-2d"])

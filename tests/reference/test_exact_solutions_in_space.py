@@ -176,7 +176,7 @@ def test_known_energies_in_cubes():
 def test_energies_of_parts_add_up(name):
     u = solution(name)
     if name == "penny":  # boxes around it, whose surfaces it does not reach
-        with pytest.raises(InputError, match="does the crack reach it"):
+        with pytest.raises(InputError, match="crack"):
             u.strain_energy(np.array([[0, 0, 0], [0.4, 1, 1.0]]))
         # with the tension reversed all strains are: the energy is the same
         other = exact_solution("penny", SOLUTIONS["penny"] | {"tension": -1.5}, SOLID)

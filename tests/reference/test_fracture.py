@@ -62,7 +62,7 @@ def test_the_intensity_does_not_depend_on_the_axes():
 def test_a_domain_that_does_not_fit_is_refused():
     field = interpolated_tip((1.0, 0.0))
     for radius in (1e-3, 5.0, -1.0):
-        with pytest.raises(InputError, match="a domain of radius"):
+        with pytest.raises(InputError, match="domain"):
             stress_intensity(field, STRAIN, ORIGIN, ALONG_X, [radius])
 
 

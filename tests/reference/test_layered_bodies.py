@@ -78,10 +78,10 @@ def test_layers_that_do_not_fit_are_refused(patch) -> None:
     case, _ = patch
     assert case.exact is not None
     parameters = {**case.exact.parameters, "interface_slope": 2.0}
-    with pytest.raises(InputError, match="differ across the interface"):
+    with pytest.raises(InputError, match="interface"):
         exact_solution("layers", parameters, case.material)
     other = case.material.model_copy(update={"poisson": 0.3})
-    with pytest.raises(InputError, match="along the interface the materials strain"):
+    with pytest.raises(InputError, match="interface"):
         exact_solution("layers", case.exact.parameters, other)
     with pytest.raises(InputError, match="one material"):
         exact_solution("linear", {"matrix": [[1.0, 0], [0, 0]]}, case.material)

@@ -164,5 +164,5 @@ def test_what_is_not_offered_for_membranes_is_said(tmp_path):
     with pytest.raises(InputError, match="cut"):
         solve(tmp_path, [2, 2], bowl, text + beside)
     exact = "[exact]\nsolution = 'linear'\nparameters = {matrix = [[0, 0, 0]], shift = [0, 0, 0]}\n"
-    with pytest.raises(UnsupportedSceneError, match="exact fields on membranes"):
+    with pytest.raises(UnsupportedSceneError, match="membranes"):
         solve(tmp_path, [2, 2], bowl, text + exact)

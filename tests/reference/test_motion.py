@@ -252,5 +252,5 @@ def test_a_block_in_space_vibrates_without_losing_energy():
 
 
 def test_an_unknown_scheme_is_named():
-    with pytest.raises(InputError, match="scheme 'leapfrog'; expected one of newmark"):
+    with pytest.raises(InputError, match="leapfrog"):
         solved(moving(), scheme="leapfrog")

@@ -82,9 +82,9 @@ def test_timings_of_solves_that_ran_side_by_side_are_marked(verify):
 @pytest.mark.parametrize(
     "solver, said",
     [
-        ("fake_solvers:Brittle", "could not be loaded: RuntimeError: no licence"),
-        ("fake_solvers:Nobody", "no 'Nobody' in module 'fake_solvers'"),
-        ("no_such_module:Solver", "needs 'no_such_module', which is not installed"),
+        ("fake_solvers:Brittle", "RuntimeError"),
+        ("fake_solvers:Nobody", "fake_solvers"),
+        ("no_such_module:Solver", "no_such_module"),
     ],
 )
 def test_a_solver_that_was_asked_for_and_does_not_work_is_bad_input(verify, solver, said):

@@ -43,10 +43,10 @@ def test_a_region_inherits_what_it_does_not_name_and_the_last_one_counts() -> No
         ([{"where": "x > -1", "young": 2.0}], "[material] is that of no part"),
         (
             [{"where": "x > 0.5", "young": 2.0}, {"where": "x > 0.4", "young": 3.0}],
-            "material.regions[0].where: no part of the body lies in 'x > 0.5' alone",
+            "material.regions[0].where",
         ),
         ([{"where": "x > 0.5", "density": 2.0}], "material.density is missing"),
-        ([{"where": "x > 0.5"}], "expected young, poisson or density"),
+        ([{"where": "x > 0.5"}], "poisson"),
         ([{"where": "x > 0.5", "young": -2.0}], "greater than 0"),
         ([{"where": "x > 0.5", "plane": "stress"}], "plane"),
     ],

@@ -71,7 +71,7 @@ def test_blade_that_turns_out_of_a_plane_is_refused_with_its_reason() -> None:
         points=[[0.3, 0.0, 1.0], [0.3, 1.0, 1.0]],
         direction=[[0.5, 0, -1], [-0.5, 0, -1]], depth=0.5, speed=1.0,
     )  # fmt: skip
-    with pytest.raises(InputError, match=r"not plane.*keeps its direction"):
+    with pytest.raises(InputError, match="direction"):
         path.whole()
 
 

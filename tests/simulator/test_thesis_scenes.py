@@ -127,7 +127,7 @@ def test_a_thousand_cuts_into_the_face_cost_about_a_node_each() -> None:
         ('kind = "dynamic"', 'kind = "static"', "duration"),
         ("time_step = 0.005\n", "", "time_step"),
         ("speed = 1.0", "speed = 1.0\ntimes = [0.0, 1.0]", "either times or a speed"),
-        ("speed = 1.0", "speed = 0.01", "after the end of the analysis"),
+        ("speed = 1.0", "speed = 0.01", "analysis"),
         ("[[-0.02, 0.03], [0.12, 0.036]]", "[[0.1, 0.1], [0.1, 0.1]]", "does not move"),
         ("[[-0.02, 0.03], [0.12, 0.036]]", "[[0.1, 0.1, 0.0], [0.2, 0.1, 0.0]]", "depth"),
         ("[replay]\n", "[replay]\nvisual = 100\n", "its own surface"),

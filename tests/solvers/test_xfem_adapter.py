@@ -182,5 +182,5 @@ def test_a_part_may_end_at_a_cut_inside_an_element(tmp_path):
     wanted = np.where(above[:, None, None], [1e-4, 0.0], [0.0, 0.0])
     np.testing.assert_allclose(moved, np.broadcast_to(wanted, moved.shape), atol=1e-15)
     # of the two unknowns of a node one side is held alone: which the shifted ones cannot say
-    with pytest.raises(UnsupportedSceneError, match="one side of a cut element and not the other"):
+    with pytest.raises(UnsupportedSceneError, match="element"):
         XfemSolver().solve(strip, 0, 0, basis="heaviside")

@@ -86,5 +86,5 @@ def test_the_static_answer_beside_a_motion_is_that_of_the_last_loads() -> None:
         adequacy={"motion": True},
     )
     assert other_scene(moving, "motion").analysis.kind == "static"
-    with pytest.raises(ValidationError, match=r"adequacy\.motion: belongs to a dynamic"):
+    with pytest.raises(ValidationError, match="dynamic"):
         scene(adequacy={"motion": True})

@@ -50,7 +50,7 @@ def test_both_errors_are_those_of_the_solver(found):
     assert ("8", "2") not in rows  # sixteen in a step
     for (count, parts), row in rows.items():
         if count == "7":
-            assert "seven is too many" in row["reason"]
+            assert "seven" in row["reason"]
             continue
         late = 0.5 ** int(count) if count else 0.0
         assert float(row["iteration_error"]) == pytest.approx(late / 1.005, abs=1e-12)

@@ -53,7 +53,7 @@ def test_record_table_and_page_are_written_and_agree(written, kind):
 
 
 def test_a_damaged_record_is_one_line(written, tmp_path):
-    with pytest.raises(InputError, match="the slivers study has not run"):
+    with pytest.raises(InputError, match="slivers"):
         render_study(tmp_path, "slivers")
 
 
@@ -104,7 +104,7 @@ def test_a_solver_that_raises_is_a_row_and_a_failed_finding(monkeypatch):
     rows = [scene_content(scene) for scene in load_scenes("slivers/plane_edges_quick")]
     measured = measured_scenes(Variant("broken", "broken"), rows)
     assert [m.size for m in measured] == [0.5, 1e-12, 0.0]
-    assert all(m.value is None and "the pivot is zero" in m.reason for m in measured)
+    assert all(m.value is None and "pivot" in m.reason for m in measured)
     (finding,) = findings(measured, [])
     assert finding.verdict is Verdict.FAIL
     assert "No solution at 0.5, 1e-12, 0" in finding.sentence

@@ -100,10 +100,10 @@ MOTION = {"kind": "dynamic", "duration": 1.0, "outputs": 5}
             "meets another cut",
         ),
         ({"analysis": {"kinematics": "corotational"}}, {}, "linear kinematics"),
-        ({"analysis": MOTION | {"damping": [0, 0.1]}}, {}, "damping by the stiffness"),
+        ({"analysis": MOTION | {"damping": [0, 0.1]}}, {}, "stiffness"),
         ({"analysis": MOTION}, {"time": 0.4}, "no output time"),
-        ({"analysis": MOTION}, {"time": 0.0}, "has not opened yet"),
-        ({"analysis": MOTION, "cuts": OPENS_LATER}, {"time": 0.5}, "has not opened yet"),
+        ({"analysis": MOTION}, {"time": 0.0}, "opened"),
+        ({"analysis": MOTION, "cuts": OPENS_LATER}, {"time": 0.5}, "opened"),
         (
             {
                 "analysis": MOTION,

@@ -162,5 +162,5 @@ def test_sizes_that_do_not_match_are_refused():
     with pytest.raises(XfemError, match="dof nodes"):
         critical_step(_stiffness(v), side_wise_mass(cut_mesh(_mesh(2), []), 1.0))
     mass = side_wise_mass(v, 1.0)
-    with pytest.raises(XfemError, match="every component is fixed"):
+    with pytest.raises(XfemError, match="component"):
         critical_step(_stiffness(v), mass, np.ones(v.node_points.shape, dtype=bool))

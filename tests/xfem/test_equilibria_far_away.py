@@ -143,8 +143,8 @@ def test_statics_refuses_what_makes_no_sense_in_one_sentence() -> None:
     for options, message in (
         ({"load": nothing + np.nan}, "load of shape"),
         ({"start": nothing[:2]}, "start of shape"),
-        ({"prescribed": lambda s: nothing + np.inf}, "prescribed displacement of shape"),
-        ({"prescribed": lambda s: nothing[:, 0]}, "prescribed displacement of shape"),
+        ({"prescribed": lambda s: nothing + np.inf}, "displacement"),
+        ({"prescribed": lambda s: nothing[:, 0]}, "displacement"),
         ({"iterations": 0}, "0 iterations"),
         ({"tolerance": 0.0}, "tolerance 0"),
         ({"tolerance": np.nan}, "tolerance nan"),

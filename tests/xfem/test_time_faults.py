@@ -78,5 +78,5 @@ def test_bodies_that_do_not_fit_are_refused():
     driven = np.zeros(v.node_points.shape, dtype=bool)
     driven[rows[rows != columns][0]] = True  # one of two unknowns that the mass couples
     moving = MovingSupports(driven, lambda t: (np.zeros(driven.shape), np.zeros(driven.shape)))
-    with pytest.raises(XfemError, match="the mass couples to free ones"):
+    with pytest.raises(XfemError, match="couples"):
         CentralDifferences(DynamicBody(InternalForce(v, material(2)), mass, supports=moving), 0.1)

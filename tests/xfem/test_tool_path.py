@@ -96,7 +96,7 @@ def test_a_move_of_round_off_size_does_not_change_the_sweep(move, at) -> None:
         ([[0, 0], [1, 0], [0.5, 0]], [0, 1, 2], None, "turns back"),
         ([[0, 0], [1, 0], [1, 1], [0.5, -1]], [0, 1, 2, 3], None, "intersect"),
         ([[0, 0, 0], [1, 0, 0]], [0, 1], [0.0, 0.0, 0.0], "in one place"),
-        ([[0, 0, 0], [1, 0, 0]], [0, 1], None, "blade of one point"),
+        ([[0, 0, 0], [1, 0, 0]], [0, 1], None, "blade"),
         ([[0, 0, 0], [1, 0, 0], [0.2, 0, 0]], [0, 1, 2], [0, 0, 1.0], "turns back"),
         ([[0, np.nan], [1, 0]], [0, 1], None, "not finite"),
         ([[0, 0, 0, 0]], [0], None, "blades of shape"),

@@ -117,8 +117,8 @@ def test_the_critical_step_is_found_by_running_where_there_is_no_system(scene):
 def test_a_solver_that_takes_its_own_step_has_none_by_running(scene):
     solver = Explicit()
     solver.own_step = 0.5 * critical_step(find_solver("xfem").system(scene, 0))
-    with pytest.raises(InputError, match="implicit, or takes its own"):
+    with pytest.raises(InputError, match="implicit"):
         step_by_running(solver, scene, 0, 0.01, {})
     solver.own_step *= 8.0
-    with pytest.raises(InputError, match="every run blows up"):
+    with pytest.raises(InputError, match="blows"):
         step_by_running(solver, scene, 0, 10.0, {})
