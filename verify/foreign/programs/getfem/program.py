@@ -1,31 +1,38 @@
 """XFEM in GetFEM: level sets with tips, values of both sides.
 
 A cut is a level set that ends where a second one is positive. Elements that it divides wholly have
-values of each side; those where it ends have none, so that it ends at the facet before.
+values of each side; those where it ends have none, so that it ends at the facet before. With
+``tip = functions`` there are functions of the tips around its ends, and it ends where it does.
 """
 
 import getfem as gf
 import numpy as np
 from cut_body import CutBody, forces, prescribed
 from exchange_files import RefusedError, loose_parts, run
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags, hstack
 from scipy.sparse.linalg import splu
 from split_cells import SplitMesh
+from tip_functions import RULES, SHARE, TipAreas
+from tip_mesh import TipMesh
 
 PULLED = 1e-3  # share by which points of evaluation are drawn into their own cell
+PULLED_AT_TIPS = 1e-6  # where what is evaluated is not linear in it
 
 
 class Space:
-    """The enriched space on the scene's mesh, scalar and of displacements."""
+    """The enriched spaces on the scene's mesh, scalar and of displacements.
 
-    def __init__(self, case, body):
+    ``areas`` are those around tips that have functions, None without any.
+    """
+
+    def __init__(self, case, body, areas):
         d = case.dimension
         name = {2: "TRIANGLE", 3: "TETRAHEDRON"}[d]
         self.mesh = gf.Mesh("empty", d)
         linear = gf.GeoTrans(f"GT_PK({d},1)")
         self.mesh.add_convex(linear, np.asfortranarray(case.points[case.cells].transpose(2, 1, 0)))
         element = gf.Fem(f"FEM_PK({d},1)")
-        rule = gf.Integ(f"IM_{name}(2)")
+        rules = [gf.Integ(text) for text in (RULES if areas else [f"IM_{name}(2)"])]
         self.cuts = gf.MeshLevelSet(self.mesh)
         self.levels = []
         for cut in body.cuts:
@@ -36,11 +43,16 @@ class Space:
             self.levels.append(level)
         if self.levels:
             self.cuts.adapt()
-            self.rule = gf.MeshIm("levelset", self.cuts, "all", rule)
-            self.rule.set_integ(rule)
+            self.rule = gf.MeshIm("levelset", self.cuts, "all", *rules)
+            self.rule.set_integ(rules[0])
         else:
-            self.rule = gf.MeshIm(self.mesh, rule)
+            self.rule = gf.MeshIm(self.mesh, rules[0])
         self.scalar, self.vector = (self._enriched(element, size) for size in (1, d))
+        self.areas, self.tips = areas, ()
+        if areas:
+            hats = gf.MeshFem(self.mesh, 1)
+            hats.set_fem(element)
+            self.tips = areas.spaces(case, self, hats)
 
     def _enriched(self, element, size):
         plain = gf.MeshFem(self.mesh, 1)
@@ -60,8 +72,8 @@ def matrix_of(found):
     return csr_matrix((values, rows, starts), shape=(size[1], size[0])).T.tocsr()
 
 
-def evaluation(space, answer):
-    """Values at the nodes of the answer of the scalar space, as a matrix.
+def evaluation(answer, scalar, pulled):
+    """Values at the nodes of the answer of a scalar space, as a matrix.
 
     Each is that of one of its cells, from within: on a cut a point belongs to both sides. With
     them come the values at the middles of the cells.
@@ -69,12 +81,12 @@ def evaluation(space, answer):
     cell = np.zeros(len(answer.points), dtype=int)
     cell[answer.cells] = np.arange(len(answer.cells))[:, None]
     middles = answer.points[answer.cells].mean(axis=1)
-    inside = answer.points + PULLED * (middles[cell] - answer.points)
+    inside = answer.points + pulled * (middles[cell] - answer.points)
     near, middle = (
-        matrix_of(gf.asm_interpolation_matrix(space.scalar, np.asfortranarray(at.T)))
+        matrix_of(gf.asm_interpolation_matrix(scalar, np.asfortranarray(at.T)))
         for at in (inside, middles)
     )
-    return ((near - PULLED * middle[cell]) / (1 - PULLED)).tocsr(), middle
+    return ((near - pulled * middle[cell]) / (1 - pulled)).tocsr(), middle
 
 
 def unknown_of_groups(case, body, answer, space, middle):
@@ -92,7 +104,12 @@ def unknown_of_groups(case, body, answer, space, middle):
 
 def solve(case):
     """Solve linear statics and write the answer."""
-    d, body = case.dimension, CutBody(case, wholly=True)
+    d, tip = case.dimension, case.parameters.get("tip", "cells")
+    if tip not in ("cells", "functions"):
+        raise RefusedError(f"tip = {tip!r}; expected 'cells' or 'functions'")
+    if tip == "functions" and d == 3:
+        raise RefusedError("tip = 'functions' is offered in the plane")
+    body = CutBody(case, wholly=True)
     held, value = prescribed(case, body)
     side = np.where(body.side == 0, 2, (body.side + 1) // 2)
     answer = SplitMesh(case.points, case.cells, body.phi, body.cut, side, body.group)
@@ -107,11 +124,14 @@ def solve(case):
                 raise RefusedError("body forces in formulas are not offered")
             weight += load["uniform"]
 
-    space = case.timed("enrichment", lambda: Space(case, body))
+    areas = TipAreas(case, body) if tip == "functions" else None
+    if areas and not len(areas.tips):
+        areas = None  # cuts that go through, or none
+    space = case.timed("enrichment", lambda: Space(case, body, areas))
     count = space.scalar.nbdof()
     if space.vector.nbdof() != d * count:
         raise RuntimeError("the displacement has another space than its components")
-    values, middle = evaluation(space, answer)
+    values, middle = evaluation(answer, space.scalar, PULLED)
     unknown = unknown_of_groups(case, body, answer, space, middle)
     if not np.array_equal(np.sort(unknown[answer.used(body.count)]), np.arange(count)):
         raise RefusedError("two level sets do not end this cut where it ends: it turns too far")
@@ -124,31 +144,46 @@ def solve(case):
     def assembled():
         found = gf.asm_linear_elasticity(space.rule, space.vector, data, lame * ones, shear * ones)
         load = gf.asm_volumic_source(space.rule, space.vector, data, np.outer(weight, ones))
-        return matrix_of(found), np.asarray(load).ravel()
+        found, load = matrix_of(found), np.asarray(load).ravel()
+        if not areas:
+            return found, load
+        fields = space.rule, space.vector, space.tips[1]
+        more, added = areas.stiffness(*fields, lame, shear), areas.load(*fields, weight)
+        found.resize(added.size, added.size)
+        return found + matrix_of(more), np.pad(load, (0, added.size - load.size)) + added
 
     stiffness, load = case.timed("assembly", assembled)
-    load = load.reshape(count, d).copy()
-    np.add.at(load, unknown, outer * (unknown >= 0)[:, None])
+    there, size = unknown >= 0, stiffness.shape[0] // d
+    load = load.reshape(size, d).copy()
+    np.add.at(load, unknown[there], outer[there])
     load = load.ravel()
-    u, free = np.zeros((count, d)), np.ones((count, d), dtype=bool)
-    there = unknown >= 0
+    u, free = np.zeros((size, d)), np.ones((size, d), dtype=bool)
     free[unknown[there]] = ~held[there]
     u[unknown[there]] = np.where(held[there], value[there], 0.0)
     free, u = free.ravel(), u.ravel()
+    scale = 1.0 / np.sqrt(stiffness.diagonal()[free])  # of functions that are much alike
 
     def solved():
         rest = load - stiffness @ u
-        found = u.copy()
-        found[free] += splu(stiffness[free][:, free].tocsc()).solve(rest[free])
+        found, inner = u.copy(), diags(scale) @ stiffness[free][:, free] @ diags(scale)
+        found[free] += scale * splu(inner.tocsc()).solve(scale * rest[free])
         return found
 
     u = case.timed("solve", solved)
     energy = 0.5 * u @ (stiffness @ u)
+    facets = answer.facets(body.on_a_cut)
+    notes = {"method": "XFEM, values of both sides", "getfem": gf.getfem_env("version")}
+    if areas:
+        answer = TipMesh(case, body, answer, areas)
+        gf.util_warning_level(1)  # says of each point that it is outside of the tips' areas
+        values = hstack([evaluation(answer, one, PULLED_AT_TIPS)[0]
+                         for one in (space.scalar, space.tips[0])]).tocsr()  # fmt: skip
+        facets = answer.facets()
+        notes |= {"tips": f"{len(areas.tips)} with functions, up to {SHARE:g} of the cut's length",
+                  "answer": "linear on cells that shrink towards the tips"}  # fmt: skip
     case.answer(
-        answer.points, answer.cells, values @ u.reshape(count, d), unknowns=count * d,
-        cut_facets=answer.facets(body.on_a_cut),
-        ledger={"strain": [energy]},
-        notes={"method": "XFEM, values of both sides", "getfem": gf.getfem_env("version")},
+        answer.points, answer.cells, values @ u.reshape(size, d), unknowns=size * d,
+        cut_facets=facets, ledger={"strain": [energy]}, notes=notes,
     )  # fmt: skip
 
 
