@@ -7,7 +7,7 @@ one value for each group.
 """
 
 import numpy as np
-from exchange_files import RefusedError, parts
+from exchange_files import RefusedError, factor_at, parts
 from split_cells import place, split_cells
 
 __all__ = ["Cut", "CutBody", "forces", "prescribed"]
@@ -210,8 +210,8 @@ class CutBody:
         return np.vstack(pairs)
 
 
-def prescribed(case, body):
-    """Which components of which groups are held, and their values."""
+def prescribed(case, body, time=0.0):
+    """Which components of which groups are held, and their values at a time."""
     d = case.dimension
     held, value = np.zeros((body.count, d), dtype=bool), np.zeros((body.count, d))
     boundary = np.array(case.problem["boundary"])
@@ -235,16 +235,19 @@ def prescribed(case, body):
                 continue  # along the cut, of either side
             if (key := (node, 0 if level < 0 else 1)) in chosen:
                 chosen[key] = entry["values"]
+        if support.get("rotation") and support.get("history"):
+            raise RefusedError("supports that turn in time are not offered")
+        factor = factor_at(support.get("history"), time)
         for (node, s), values in chosen.items():
             at = body.group[s, node], support["components"]
-            held[at], value[at] = True, values
+            held[at], value[at] = True, factor * np.asarray(values)
     return held, value
 
 
-def forces(case, body):
-    """Return the forces (groups, d) of the tractions."""
+def forces(case, body, loads=None):
+    """Return the forces (groups, d) of the tractions, of all of them or of some `loads`."""
     force = np.zeros((body.count, case.dimension))
-    for load in case.problem["loads"]:
+    for load in case.problem["loads"] if loads is None else loads:
         if load["kind"] != "traction":
             continue
         facets = np.array(load["facets"])

@@ -43,17 +43,10 @@ class Stage:
         _, self.first, self.node = np.unique(names, return_index=True, return_inverse=True)
         self.points, self.cells = case.points[self.first], self.node[case.cells]
         self.held = self._gathered(case.held()[0], np.logical_or)
-        supports, loads = case.problem["held"], case.problem["loads"]
+        supports = case.problem["held"]
         self.still = None if any(one.get("history") for one in supports) else self._values(0.0)
-        self.loads = [(one.get("history"), _uniform(case, one)) for one in loads if _even(one)]
-        rest = np.array(case.problem["nodal_forces"], dtype=float)
-        rest -= sum(share for _, share in self.loads)
-        tables = [one.get("history") for one in loads if not _even(one)]
-        if any(table != tables[0] for table in tables):
-            raise RefusedError("loads that vary in space and each in their own way in time")
-        self.loads = [
-            (t, self._gathered(f)) for t, f in [*self.loads, *((t, rest) for t in tables[:1])]
-        ]
+        loads = case.nodal_loads() if hasattr(case, "nodal_loads") else _nodal_loads(case)
+        self.loads = [(table, self._gathered(force)) for table, force in loads]
 
     def _gathered(self, values, add=np.add):
         found = np.zeros(self.points.shape, dtype=values.dtype)
@@ -75,6 +68,18 @@ class Stage:
         """Consistent nodal forces (n, d) of the loads at a time, N."""
         shares = (factor_at(table, instant) * share for table, share in self.loads)
         return sum(shares, np.zeros(self.points.shape))
+
+
+def _nodal_loads(case):
+    """History and consistent forces (N, d) of each load."""
+    loads = case.problem["loads"]
+    found = [(one.get("history"), _uniform(case, one)) for one in loads if _even(one)]
+    rest = np.array(case.problem["nodal_forces"], dtype=float)
+    rest -= sum(share for _, share in found)
+    tables = [one.get("history") for one in loads if not _even(one)]
+    if any(table != tables[0] for table in tables):
+        raise RefusedError("loads that vary in space and each in their own way in time")
+    return [*found, *((table, rest) for table in tables[:1])]
 
 
 def _even(load):
