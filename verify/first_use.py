@@ -29,9 +29,6 @@ from verify.compare.locate_kernels import evaluate_linear, evaluate_quadratic, f
 from verify.compare.overlap import OverlapSearch
 from verify.compare.simplices import simplices
 from verify.compile_times import compile_times
-from verify.simulator.mapping.pull_back import pull_back
-from verify.simulator.session import Session
-from verify.simulator.stage import Stage
 from verify.solution import Solution
 from verify.threads import ONE_THREAD
 from verify.xfem.body import DynamicBody
@@ -123,6 +120,11 @@ def _without_slivers(
 
 def _scalpel(mesh: SimplexMesh, kind: State) -> None:
     """Move a blade through a body in motion, with its skin, an inner surface and collision."""
+    # who loads the kernels of solves does not wait for the simulator
+    from verify.simulator.mapping.pull_back import pull_back
+    from verify.simulator.session import Session
+    from verify.simulator.stage import Stage
+
     path = ToolPath.of_tip([[-0.5, 0.4, -0.2], [1.5, 0.5, -0.2]], [0.0, 1.0], [0, 0, 1.5])
     session = Session(
         Stage(

@@ -9,6 +9,7 @@ import platform
 import re
 import subprocess
 from datetime import UTC, datetime
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,7 @@ def provenance() -> dict[str, Any]:
     return {
         "commit": commit,
         "dirty": dirty,
-        "versions": versions(),
+        "versions": dict(versions()),
         "cpu": _cpu(),
         "cores": len(os.sched_getaffinity(0)),
         "memory": os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"),
@@ -56,8 +57,12 @@ def provenance() -> dict[str, Any]:
     }
 
 
+@cache
 def versions() -> dict[str, str]:
-    """Return the versions of the project, of Python and of what the solvers stand on."""
+    """Return the versions of the project, of Python and of what the solvers stand on.
+
+    Of what is installed when it is asked first; what is installed later has not been imported.
+    """
     found = {"verify": verify.__version__, "python": platform.python_version()}
     for name, distributions in _DISTRIBUTIONS.items():
         for distribution in distributions:

@@ -1,9 +1,22 @@
 """Form of ``ranking.json``, for who writes and who reads it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-__all__ = ["Comparison", "LeftOut", "Profile", "Ranking", "StabilityStanding", "Standing"]
+from verify.result import CaseResult
+
+__all__ = [
+    "Comparison",
+    "LeftOut",
+    "Profile",
+    "Ranking",
+    "StabilityStanding",
+    "Standing",
+    "ranked_solvers",
+]
+
+_REFERENCE = "reference"
 
 
 @dataclass(frozen=True)
@@ -164,3 +177,9 @@ class Ranking:
     left_out: list[LeftOut]
     contended: list[str]
     profiles: list[Profile] = field(default_factory=list)
+
+
+def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:
+    """Return the solvers of a run that can be ranked: all but the reference."""
+    names = dict.fromkeys(solve.solver for result in results for solve in result.solves)
+    return [name for name in names if name != _REFERENCE]

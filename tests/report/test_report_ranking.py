@@ -36,7 +36,7 @@ def suite(monkeypatch):
             CheckResult("refusals", "it does not crash", State.KEPT),
         ]
 
-    monkeypatch.setattr(runner_ranking, "conform", conform)
+    monkeypatch.setattr("verify.conformance.conform", conform)
     return asked
 
 

@@ -9,14 +9,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from verify.conformance import conform, exit_code_of
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.printable import words_of
+from verify.ranking import ranked_solvers
 from verify.result import CaseResult, Status
 from verify.runner.fingerprint import code_of_solver, digest_of
 from verify.solvers import solver_names
-from verify.study.ranking import rank_solvers, ranked_solvers
 
 __all__ = ["RANKING_FILE", "rank_run"]
 
@@ -58,6 +57,8 @@ def rank_run(
     if len(solvers) < 2:
         target.unlink(missing_ok=True)
         return None
+    from verify.study.ranking import rank_solvers  # a run of one solver does not wait for it
+
     wanted = len(solvers) > _UNASKED if conformance is None else conformance
     before = _stored(target)
     answered = {s.solver for r in results for s in r.solves if s.status is Status.SOLVED}
@@ -103,6 +104,8 @@ def _stored(target: Path) -> dict[str, Any]:
 
 
 def _checked(solver: str, parameters: dict[str, Any], timeout: float) -> dict[str, Any]:
+    from verify.conformance import conform, exit_code_of  # most runs do without
+
     try:
         results = conform(solver, parameters, timeout)
     except InputError as problem:

@@ -98,6 +98,7 @@ def code_of_solver(name: str) -> str:
     return digest_of([versions(), _sources(parts, _PACKAGE.parent / "reference")])
 
 
+@cache
 def code_of_comparison() -> str:
     """Return the hash of the sources that a verdict depends on, given the solutions."""
     reference = _PACKAGE.parent / "reference"

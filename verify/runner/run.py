@@ -21,7 +21,7 @@ from verify.runner.deepening import further_level, take_up_known_levels
 from verify.runner.directory import RunDirectory, claimed, emptied, write_run
 from verify.runner.engine import Engine, LocalEngine, Running
 from verify.runner.families import Families
-from verify.runner.fingerprint import code_of_comparison, digest_of
+from verify.runner.fingerprint import code_of_comparison, code_of_solver, digest_of
 from verify.runner.interruption import StopRequest, listening
 from verify.runner.job import Job, load_record, store_record, stored_record
 from verify.runner.options import Options
@@ -106,11 +106,13 @@ def run_cases(
     cluster = (
         ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
     )
-    own = any(is_built_in(name) for scene in scenes for name in solvers_of(scene, options))
-    with listening() as stop, warm_parent() if own else nullcontext():
+    names = {name for scene in scenes for name in solvers_of(scene, options)}
+    with listening() as stop, warm_parent() if any(map(is_built_in, names)) else nullcontext():
+        origin = provenance()
+        for name in names:  # asked below; the process to fork from is still loading
+            code_of_solver(name)
         survey = survey_solvers(scenes, options, stop, bundle)
         with claimed(out, identity) as directory:
-            origin = provenance()
             record: dict[str, Any] = {
                 **identity,
                 "command": command,

@@ -9,9 +9,11 @@ Between both there is a keeper. The kernel makes it the parent of whatever that 
 leaves behind, so that all of it is found and ended with it.
 """
 
+import atexit
 import contextlib
 import ctypes
 import gc
+import itertools
 import json
 import os
 import random
@@ -22,7 +24,7 @@ import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from verify.runner.child import descendants
 from verify.runner.childhood import die_with_parent
@@ -30,18 +32,15 @@ from verify.warm import LONGEST_REQUEST, PARENT_VARIABLE
 
 __all__ = ["main"]
 
-_NEEDED = (
-    "numpy.random",
-    "verify.calibration",
-    "verify.runner.assess",
-    "verify.runner.solve",
-    "verify.runner.survey",
-    "verify.solvers.methods_adapter",
-    "verify.solvers.xfem",
-    "verify.first_use",
-    "meshio",
-    "reference.exact",
-)
+# by what is asked for, in the order in which a run asks; each needs the modules before it too
+_NEEDED = {
+    "verify.runner.survey": ("verify.runner.survey", "verify.solvers.xfem"),
+    "verify.runner.solve": (
+        "numpy.random", "verify.calibration", "verify.runner.solve", "meshio", "reference.exact",
+    ),
+    "verify.runner.assess": ("verify.runner.assess",),
+}  # fmt: skip
+_LATER = ("verify.solvers.methods_adapter",)
 _IF_THERE = ("ufl", "basix.ufl", "ffcx.main", "reference.elasticity")
 _PR_SET_CHILD_SUBREAPER = 36
 
@@ -49,33 +48,55 @@ _PR_SET_CHILD_SUBREAPER = 36
 def main(descriptor: int) -> None:
     """Fork a process for every request until the runner hangs up; returns in the forked ones."""
     die_with_parent()
-    for name in _NEEDED:
-        import_module(name)
-    for name in _IF_THERE:
-        with contextlib.suppress(ImportError):
-            import_module(name)
-    gc.collect()
-    gc.freeze()  # what all share is not touched by their collections
+    gc.disable()  # imports make objects that live on
     signal.signal(signal.SIGCHLD, lambda *_: _reap())  # waited for, their times are counted
-    kernels = _kernels()
+    preparations = _preparations()
     with socket.socket(fileno=descriptor) as runner:
         while True:
-            while not select.select([runner], [], [], 0.0)[0] and next(kernels, False):
+            while not select.select([runner], [], [], 0.0)[0] and next(preparations, False):
                 pass
-            if len(os.listdir("/proc/self/task")) > 1:
-                os._exit(1)  # a fork would lack that thread, and keep the locks that it holds
             said, files, _, _ = socket.recv_fds(runner, LONGEST_REQUEST, 2)
             if not said:
                 os._exit(0)
+            _import_for(json.loads(said)["module"])
+            if len(os.listdir("/proc/self/task")) > 1:
+                os._exit(1)  # a fork would lack that thread, and keep the locks that it holds
+            gc.freeze()  # what all share is not touched by their collections
             if (keeper := os.fork()) == 0:
                 runner.close()
                 break
             for file in files:
                 os.close(file)
             runner.send(str(keeper).encode())
+    gc.enable()
     request = json.loads(said)
     _keep(request, *files)
     _work(request)
+    if "mpi4py.MPI" not in sys.modules:  # MPI is left in order
+        _leave()
+
+
+def _import_for(module: str) -> None:
+    """Import what those need that run `module`: all, if it is none of those that are known."""
+    for asked, names in _NEEDED.items():
+        for name in names:
+            import_module(name)
+        if asked == module:
+            return
+
+
+def _preparations() -> Iterator[bool]:
+    """Import and load one thing after another, in the order in which they may be needed."""
+    for name in [name for names in _NEEDED.values() for name in names]:
+        import_module(name)
+        yield True
+    kernels = _kernels()
+    yield from itertools.islice(kernels, 2)
+    for name in (*_LATER, *_IF_THERE):
+        with contextlib.suppress(ImportError):
+            import_module(name)
+        yield True
+    yield from kernels
 
 
 def _kernels() -> Iterator[bool]:
@@ -91,7 +112,8 @@ def _kernels() -> Iterator[bool]:
         def on_end(self, event_: Any) -> None:
             pass
 
-    for stage in (call for name, call in STAGES.items() if "scalpel" not in name):
+    asked_first = sorted(STAGES, key=lambda name: name != "plane: statics")
+    for stage in (STAGES[name] for name in asked_first if "scalpel" not in name):
         with (
             contextlib.suppress(_NotCompiledError),
             event.install_listener("numba:compile", Refusing()),
@@ -157,6 +179,16 @@ def _work(request: dict[str, Any]) -> None:
     random.seed()
     sys.argv = [request["module"], request["argument"]]
     import_module(request["module"]).main(Path(request["argument"]))
+
+
+def _leave() -> NoReturn:
+    """End in order, but without taking apart what all have imported, which takes its time."""
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(Exception):  # the work may have closed it
+            stream.flush()
+    ctypes.CDLL(None).fflush(None)
+    os._exit(0)
 
 
 if __name__ == "__main__":

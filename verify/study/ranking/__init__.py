@@ -1,5 +1,5 @@
 """Rankings of the solvers of a run by accuracy, robustness, energy and cost."""
 
-from verify.study.ranking.ranking import rank_solvers, ranked_solvers
+from verify.study.ranking.ranking import rank_solvers
 
-__all__ = ["rank_solvers", "ranked_solvers"]
+__all__ = ["rank_solvers"]

@@ -6,7 +6,7 @@ from typing import Any
 
 from verify.assess.energy_account import ACCOUNT
 from verify.assess.intervals import ERROR_METRICS
-from verify.ranking import LeftOut, Ranking
+from verify.ranking import LeftOut, Ranking, ranked_solvers
 from verify.result import CaseResult, Status, Verdict
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
@@ -14,15 +14,9 @@ from verify.study.ranking.energy import energy_comparisons
 from verify.study.ranking.profiles import data_profiles, performance_profile
 from verify.study.ranking.stability import stability_standings
 
-__all__ = ["rank_solvers", "ranked_solvers"]
+__all__ = ["rank_solvers"]
 
 _REFERENCE = "reference"
-
-
-def ranked_solvers(results: Sequence[CaseResult]) -> list[str]:
-    """Return the solvers of a run that can be ranked: all but the reference."""
-    names = dict.fromkeys(solve.solver for result in results for solve in result.solves)
-    return [name for name in names if name != _REFERENCE]
 
 
 def rank_solvers(
