@@ -11,7 +11,7 @@ from case_texts import body_text, cut_text, support_text, weight_text
 from verify.assess.sufficiency import sufficiency
 from verify.errors import InputError
 from verify.result import CaseResult, Metric, SolveRecord, Status
-from verify.runner.deepening import further_level
+from verify.runner.deepening import further_level, levels_in_vain
 from verify.runner.job import Job
 from verify.runner.plan import CasePlan
 from verify.scene import Scene, load_scene
@@ -93,6 +93,22 @@ def test_no_level_follows_one_that_was_not_solved(scene):
     assert further_level(plan(scene), judged(scene, poor, failed)) is None
     unjudged = replace(judged(scene), reference={"kind": "none", "reason": "too few levels"})
     assert further_level(plan(scene), unjudged) is None
+
+
+@pytest.mark.parametrize("status", [Status.TIMEOUT, Status.MEMORY, Status.FAILED])
+def test_levels_wait_in_vain_when_fewer_than_three_can_have_an_answer(scene, status):
+    levels = [Job("slit", "reference", level, 1, "key", Path()) for level in range(4)]
+    others = [Job("slit", "xfem", 0, 1, "key", Path()), Job("other", "reference", 2, 1, "", Path())]
+    waiting = [others[0], *levels[1:3], others[1]]
+    three = CasePlan(scene, ["xfem", "reference"], jobs=[others[0], *levels[:3]])
+    in_vain = levels_in_vain(three, levels[0], levels[0].blank(status, "why"), waiting)
+    assert [job for job, _ in in_vain] == levels[1:3]
+    assert all(record.status is Status.FAILED for _, record in in_vain)
+    assert all("level 0" in record.reason for _, record in in_vain)
+    four = CasePlan(scene, ["xfem", "reference"], jobs=levels)
+    assert not levels_in_vain(four, levels[0], levels[0].blank(status, "why"), levels[1:])
+    assert not levels_in_vain(three, levels[0], levels[0].blank(Status.SOLVED, ""), waiting)
+    assert not levels_in_vain(three, others[0], others[0].blank(status, "why"), waiting)
 
 
 def test_fewer_levels_at_most_than_at_least_are_refused(tmp_path):

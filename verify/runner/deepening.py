@@ -1,11 +1,15 @@
 """Levels that a reference gets beside those that its scene names, as long as they are needed."""
 
-from verify.result import CaseResult, Status
+from collections.abc import Collection
+
+from verify.result import CaseResult, SolveRecord, Status
 from verify.runner.job import Job, stored_record
 from verify.runner.plan import CasePlan
 from verify.runner.reference_cache import REFERENCE
 
-__all__ = ["further_level", "take_up_known_levels"]
+__all__ = ["further_level", "levels_in_vain", "take_up_known_levels"]
+
+_FEWEST = 3  # levels from which a reference has an error bar
 
 
 def further_level(plan: CasePlan, result: CaseResult) -> Job | None:
@@ -34,3 +38,38 @@ def take_up_known_levels(plan: CasePlan) -> None:
     """Make jobs of the spare levels that an interrupted or earlier run has solved already."""
     while plan.spare and stored_record(plan.spare[0]) is not None:
         plan.jobs.append(plan.spare.pop(0))
+
+
+def levels_in_vain(
+    plan: CasePlan, failed: Job, record: SolveRecord, waiting: Collection[Job]
+) -> list[tuple[Job, SolveRecord]]:
+    """List the levels of a reference that need not be solved, each with a record that says so.
+
+    Those that wait when one has failed, and too few are left for the reference to have an error
+    bar: nothing is judged by it then.
+
+    Parameters
+    ----------
+    plan : CasePlan
+        Whose own reference it is; those of other models and of exact cases are not looked at.
+    failed : Job
+    record : SolveRecord
+        Of `failed`.
+    waiting : collection of Job
+        Of all cases.
+    """
+    if (
+        failed.solver != REFERENCE
+        or record.status is Status.SOLVED
+        or plan.scene.judged_by_exact
+        or failed not in plan.jobs
+    ):
+        return []
+    levels = [job for job in plan.jobs if job.solver == REFERENCE]
+    if len(levels) > _FEWEST:
+        return []
+    reason = (
+        f"not tried: level {failed.level} has no answer ({record.status}), and a reference "
+        f"needs {_FEWEST} levels"
+    )
+    return [(job, job.blank(Status.FAILED, reason)) for job in levels if job in waiting]

@@ -17,7 +17,7 @@ from verify.runner.checking import check_scene
 from verify.runner.child import POLL_SECONDS, Ending
 from verify.runner.cluster import ClusterEngine
 from verify.runner.comparing import Comparison, stored_result
-from verify.runner.deepening import further_level, take_up_known_levels
+from verify.runner.deepening import further_level, levels_in_vain, take_up_known_levels
 from verify.runner.directory import RunDirectory, claimed, emptied, write_run
 from verify.runner.engine import Engine, LocalEngine, Running
 from verify.runner.families import Families
@@ -298,6 +298,10 @@ class _Work:
     def _solve_done(self, job: Job, record: SolveRecord, reused: bool) -> None:
         self.progress.solved(job.label, record, reused)
         self.open[job.case] -= 1
+        for other, without in levels_in_vain(self.plans[job.case], job, record, self.waiting):
+            self.waiting.remove(other)
+            self.open[job.case] -= 1
+            self.progress.solved(other.label, self._kept(other, without), reused=False)
         if not self.open[job.case]:
             self.to_judge.append(job.case)
 
