@@ -7,7 +7,7 @@ from thesis_stages import CASES, stage
 from verify.scene import load_scene
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.solvers.cuts_of_scene import cuts_of
-from verify.solvers.xfem_openings import opening_times
+from verify.solvers.openings_of_scene import opening_times
 from verify.xfem.phantom import cut_mesh
 
 

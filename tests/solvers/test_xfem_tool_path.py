@@ -16,8 +16,8 @@ from tool_path_scenes import (
 )
 
 from verify.scene import load_scene
+from verify.solvers.openings_of_scene import opening_times
 from verify.solvers.xfem import XfemSolver
-from verify.solvers.xfem_openings import opening_times
 from verify.solvers.xfem_steps import SCHEMES
 from verify.xfem.cuts import Polyline
 from verify.xfem.phantom import cut_mesh

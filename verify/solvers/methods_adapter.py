@@ -21,14 +21,16 @@ from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import (
     across_interfaces,
     background_mesh,
+    density_of,
     material_of,
 )
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.loads_of_scene import loads_of
-from verify.solvers.methods_motion import MethodMover
+from verify.solvers.methods_motion import MethodOpening
+from verify.solvers.motion_of_scene import Marching, Motion
+from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.supports_of_scene import path_of_supports, supports_of
 from verify.solvers.xfem import XfemSolver
-from verify.solvers.xfem_motion import MotionChoice
 from verify.solvers.xfem_static import dismissed_equilibria, path_notes
 from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_system import system_of
@@ -36,6 +38,7 @@ from verify.system import System
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import solve_static
 from verify.xfem.supports import check_bodies
@@ -56,7 +59,7 @@ class _Choice:
     """Parameters of a solve that do not concern the cut."""
 
     load_steps: int
-    motion: MotionChoice
+    marching: Marching
 
 
 @dataclass(frozen=True)
@@ -147,8 +150,7 @@ class MethodSolver:
                 f"at least 0, a positive number, one of {', '.join(_SCHEMES)}"
             )
         self._check(scene, scheme, parameters)
-        motion = MotionChoice(scheme, "sidewise", step_factor, "inside", "keep", spectral_radius)
-        choice = _Choice(load_steps, motion)
+        choice = _Choice(load_steps, Marching(scheme, step_factor, spectral_radius))
         try:
             start = perf_counter()
             mesh, size = background_mesh(scene, level)
@@ -215,18 +217,18 @@ class MethodSolver:
         if scene.analysis.kind == "dynamic":
             forces: list[InternalForce] = []
 
-            def law(body: CutBody) -> InternalForce:
-                material = material_of(scene, body.resisting.mesh)
+            def inertia(body: CutBody) -> tuple[InternalForce, Mass]:
+                mesh = body.resisting.mesh
+                material, density = material_of(scene, mesh), density_of(scene, mesh)
                 forces.append(self._force(body.resisting, material, kinematics, kernels=FAST))
-                return forces[-1]
+                return forces[-1], side_wise_mass(body.phantom, density)
 
-            mover = MethodMover(
-                self._method, parameters, law, scene, mesh, size, exact, choice.motion
-            )
-            moved = mover.run(trial)
+            openings = openings_of(scene, size)
+            opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
+            moved = Motion(scene, openings, opening, choice.marching, exact).run(trial)
             return _Run(
-                mover.final, moved.times, moved.displacement, moved.velocity, moved.acceleration,
-                moved.ledger, moved.timings, moved.iterations, moved.notes,
+                opening.final, moved.times, moved.displacement, moved.velocity,
+                moved.acceleration, moved.ledger, moved.timings, moved.iterations, moved.notes,
                 getattr(forces[-1], "clamped", 0),
             )  # fmt: skip
         body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)

@@ -1,4 +1,4 @@
-"""Motion of a body that another way to cut has cut, or cuts as time goes on."""
+"""A moving body that another way to cut has cut, or cuts as time goes on."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,16 +9,17 @@ from numpy.typing import NDArray
 from verify.methods.catalogue import METHODS
 from verify.methods.cut_body import CutBody, make_body
 from verify.methods.opening import Seams, seams_of, welded
-from verify.solvers.xfem_answer import Answer
-from verify.solvers.xfem_motion import Mover
-from verify.solvers.xfem_openings import opening_times, seam_times
+from verify.solution import Regularisation
+from verify.solvers.openings_of_scene import Openings
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.errors import XfemError
 from verify.xfem.inherit import ancestors
 from verify.xfem.internal_force import InternalForce
+from verify.xfem.mass import Mass
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["MethodMover"]
+__all__ = ["MethodOpening"]
 
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
@@ -36,8 +37,8 @@ _RULES = {
 }
 
 
-class MethodMover(Mover):
-    """Motion of a body cut by one of the methods.
+class MethodOpening:
+    """A body cut by one of the methods, as `verify.solvers.motion_of_scene.OpeningBody`.
 
     Virtual nodes and removal cut again at every opening, what the cuts have opened by then. A
     mesh that is prepared for the whole cut is welded at first, and opens facet by facet.
@@ -48,61 +49,49 @@ class MethodMover(Mover):
         One of `METHODS`.
     parameters : dict
         Its own.
-    law : callable
-        Internal force of a cut body.
-    further parameters
-        Those of `Mover`.
+    inertia : callable
+        Internal force and mass of a cut body.
+    mesh : SimplexMesh
+    openings : Openings
 
     Attributes
     ----------
     final : CutBody
-        With all cuts open.
+        With all cuts open; made by `events`.
     """
 
     final: CutBody
+    mass = "sidewise"
+    phase = "cutting"
 
     def __init__(
         self,
         method: str,
         parameters: dict[str, Any],
-        law: Callable[[CutBody], InternalForce],
-        *of_mover: Any,
+        inertia: Callable[[CutBody], tuple[InternalForce, Mass]],
+        mesh: SimplexMesh,
+        openings: Openings,
     ) -> None:
         self.removal = method.startswith("removal")
-        super().__init__(*of_mover)
-        self._method, self._parameters, self._internal_force = method, parameters, law
+        self.rule = _RULES.get(method, "cells as a whole, when the blade has crossed them through")
+        self.mesh, self.openings = mesh, openings
+        self._method, self._parameters, self._inertia = method, parameters, inertia
         self._bodies: dict[int, CutBody] = {}  # by the identity of their mesh
         self._seams: Seams | None = None
         self._seam_times = np.empty(0)
-        self.rule = _RULES.get(method, "cells as a whole, when the blade has crossed them through")
-
-    def run(self, trial: bool) -> Answer:
-        """Run from the first to the last output time; `trial` stops after one step."""
-        answer = super().run(trial)
-        answer.timings["cutting"] = self.timings.pop("enrichment")
-        return answer
-
-    def _events(self) -> _Floats:
         self._opening = np.empty((0, 0))
+
+    def events(self) -> _Floats:
+        """Return the times at which something opens, s."""
         self.final = self._kept_body(self._made(np.inf))
         if self._method in _WELDED:
             self._seams = seams_of(self.final.phantom)
-            self._seam_times = seam_times(self.asked, self.cuts, self._seams.points, self.opens)
+            self._seam_times = self.openings.of_seams(self._seams.points)
             return np.unique(self._seam_times)
         return np.unique(self._opening[~np.isnan(self._opening)])
 
-    def _made(self, time: float) -> CutBody:
-        """Make the body that the method cuts as far as the cuts have come at a time."""
-        if self._method in (*_WELDED, "uncut"):
-            return METHODS[self._method](self.mesh, self.cuts, **self._parameters)
-
-        def opened(cut: PhantomMesh) -> _Bools:
-            self._opening = opening_times(self.asked, cut, self.opens)
-            return self._opening <= time
-
-        return METHODS[self._method](self.mesh, self.cuts, **self._parameters, opened=opened)
-
-    def _cut_at(self, time: float) -> PhantomMesh:
+    def at(self, time: float) -> PhantomMesh:
+        """Return the body as far as the cuts have come at a time."""
         if self._seams is not None:
             closed = self._seam_times > time
             if not closed.any():
@@ -115,20 +104,16 @@ class MethodMover(Mover):
             return self.final.phantom
         return self._kept_body(self._made(time)).phantom
 
-    def _kept_body(self, body: CutBody) -> CutBody:
-        self._bodies[id(body.phantom)] = body
-        return body
+    def inertia(self, phantom: PhantomMesh) -> tuple[InternalForce, Mass]:
+        """Return elasticity and mass of a body that `at` has returned."""
+        return self._inertia(self._bodies[id(phantom)])
 
-    def _law(self, phantom: PhantomMesh) -> InternalForce:
-        return self._internal_force(self._bodies[id(phantom)])
-
-    def _inherited(
-        self, phantom: PhantomMesh, state: MotionState, further: DynamicBody
-    ) -> MotionState:
-        source = self._source(phantom, further.force.phantom)
+    def inherited(self, old: PhantomMesh, state: MotionState, further: DynamicBody) -> MotionState:
+        """Hand a state on to the body that is cut further."""
+        source = self.source(old, further.force.phantom)
         return MotionState(state.displacement[source], state.velocity[source], state.time)
 
-    def _source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
+    def source(self, old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
         """Dof node (N,) of an old body from which each of a new one comes, cell by cell."""
         if old is new:
             return np.arange(new.node_count)
@@ -143,3 +128,23 @@ class MethodMover(Mover):
         source = np.zeros(new.node_count, dtype=np.int64)
         source[new.cells] = old.cells[place]
         return source
+
+    def regularisations(self) -> list[Regularisation]:
+        """Return nothing: what a method changed is said by its body."""
+        return []
+
+    def _made(self, time: float) -> CutBody:
+        """Make the body that the method cuts as far as the cuts have come at a time."""
+        given = (self.mesh, self.openings.cuts)
+        if self._method in (*_WELDED, "uncut"):
+            return METHODS[self._method](*given, **self._parameters)
+
+        def opened(cut: PhantomMesh) -> _Bools:
+            self._opening = self.openings.of_cells(cut)
+            return self._opening <= time
+
+        return METHODS[self._method](*given, **self._parameters, opened=opened)
+
+    def _kept_body(self, body: CutBody) -> CutBody:
+        self._bodies[id(body.phantom)] = body
+        return body

@@ -13,9 +13,11 @@ from verify.scene import Box, Scene, Skin
 from verify.solution import Solution
 from verify.solvers.body_of_scene import background_mesh, material_of
 from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.motion_of_scene import Marching, Motion
+from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.supports_of_scene import supports_of
-from verify.solvers.xfem_answer import Answer, joined, solution_of
-from verify.solvers.xfem_motion import MotionChoice, move
+from verify.solvers.xfem_answer import Answer, joined, solution_of, treated
+from verify.solvers.xfem_motion import Cutting, XfemOpening
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
 from verify.solvers.xfem_system import system_of
@@ -39,18 +41,17 @@ class _Choice:
     """The parameters of a solve."""
 
     basis: str
-    tip: str
-    slivers: str
     load_steps: int
-    motion: MotionChoice
+    cutting: Cutting
+    marching: Marching
 
     def notes(self) -> dict[str, str]:
         """Say them, for the report."""
         return {
             "method": "P1 XFEM, element-wise cut",
             "basis": self.basis,
-            "tip": self.tip,
-            "slivers": self.slivers,
+            "tip": self.cutting.tip,
+            "slivers": self.cutting.slivers,
             "timed": "every phase as listed; first call (compilation) excluded; writing excluded",
         }
 
@@ -153,10 +154,9 @@ class XfemSolver:
             raise UnsupportedSceneError(f"the {basis} basis is offered for linear statics only")
         if slivers == "penalise":
             _check_penalty(scene, basis, mass)
-        motion = MotionChoice(
-            scheme, mass, step_factor, tip, slivers, spectral_radius, _KERNELS[kernels]
-        )
-        return _solve(scene, level, repetitions, _Choice(basis, tip, slivers, load_steps, motion))
+        cutting = Cutting(tip, slivers, mass, _KERNELS[kernels])
+        marching = Marching(scheme, step_factor, spectral_radius)
+        return _solve(scene, level, repetitions, _Choice(basis, load_steps, cutting, marching))
 
     def system(
         self,
@@ -247,13 +247,15 @@ def _run(
     """Cut, load, solve: all of it, nothing kept from the run before."""
     mesh = SimplexMesh(mesh.points, mesh.cells)
     if scene.analysis.kind == "dynamic":
-        return move(scene, mesh, size, exact, choice.motion, trial)
-    start = perf_counter()
-    phantom, slivers, specks = _cut(scene, mesh, size, exact, choice.tip, choice.slivers)
+        openings = openings_of(scene, size)
+        opening = XfemOpening(scene, mesh, openings, exact, choice.cutting)
+        return Motion(scene, openings, opening, choice.marching, exact).run(trial)
+    start, cutting = perf_counter(), choice.cutting
+    phantom, slivers, specks = _cut(scene, mesh, size, exact, cutting.tip, cutting.slivers)
     enrichment = perf_counter() - start
-    penalise = choice.slivers == "penalise"
+    penalise = cutting.slivers == "penalise"
     found = solve_equilibrium(
-        scene, phantom, exact, choice.basis, choice.load_steps, penalise, choice.motion.kernels
+        scene, phantom, exact, choice.basis, choice.load_steps, penalise, cutting.kernels
     )
     return Answer(
         phantom=phantom,
@@ -265,7 +267,6 @@ def _run(
         timings={"enrichment": enrichment, **found.timings},
         iterations=found.iterations,
         notes=found.notes,
-        slivers=slivers,
         unknowns=found.displacement.size,
-        further=[*found.regularisations, *joined(specks)],
+        further=[*treated(slivers), *found.regularisations, *joined(specks)],
     )

@@ -14,7 +14,7 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import SliverReport, Specks
 from verify.xfem.subdivision import Subdivision, subdivide
 
-__all__ = ["Answer", "joined", "penalised", "solution_of"]
+__all__ = ["Answer", "joined", "penalised", "solution_of", "treated"]
 
 _Floats = NDArray[np.float64]
 
@@ -32,7 +32,6 @@ class Answer:
     timings: dict[str, float]
     iterations: dict[str, int]
     notes: dict[str, str]
-    slivers: SliverReport | None
     unknowns: int
     further: list[Regularisation] = field(default_factory=list)
 
@@ -75,7 +74,6 @@ def solution_of(
         iterations=answer.iterations,
         regularisations=[
             *_regularisations(scene, phantom, body),
-            *_treated(answer.slivers),
             *answer.further,
             *across_interfaces(scene, phantom.mesh),
         ],
@@ -89,6 +87,22 @@ def penalised(ghost: GhostPenalty | None, share: float | None = None) -> list[Re
         return []
     size, unit = (ghost.factor, "factor") if share is None else (share, "of the strain energy")
     return [Regularisation("face with a ghost penalty", len(ghost.weights), size, unit)]
+
+
+def treated(report: SliverReport | None) -> list[Regularisation]:
+    """Report what was done to slivers, each kind with its largest volume fraction."""
+    if report is None:
+        return []
+    counts = {
+        "sliver that follows a root cell (aggregation)": report.aggregated,
+        "sliver absorbed across the cut": report.dropped,
+        "sliver without a root cell, kept": report.rootless,
+    }
+    return [
+        Regularisation(kind, count, report.largest, "volume fraction")
+        for kind, count in counts.items()
+        if count
+    ]
 
 
 def joined(specks: Specks) -> list[Regularisation]:
@@ -129,22 +143,6 @@ def _regularisations(scene: Scene, phantom: PhantomMesh, body: Subdivision) -> l
         kind = "end of a cut moved to an element edge"
         entries.append(Regularisation(kind, len(moved), max(moved), "m"))
     return entries
-
-
-def _treated(report: SliverReport | None) -> list[Regularisation]:
-    """Report what was done to slivers, each kind with its largest volume fraction."""
-    if report is None:
-        return []
-    counts = {
-        "sliver that follows a root cell (aggregation)": report.aggregated,
-        "sliver absorbed across the cut": report.dropped,
-        "sliver without a root cell, kept": report.rootless,
-    }
-    return [
-        Regularisation(kind, count, report.largest, "volume fraction")
-        for kind, count in counts.items()
-        if count
-    ]
 
 
 def _moved_ends(scene: Scene, body: Subdivision) -> list[float]:

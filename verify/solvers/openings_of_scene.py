@@ -1,6 +1,7 @@
 """Times of a motion: from which on cuts have opened what, and at which steps have to end."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,12 +9,73 @@ from numpy.typing import NDArray
 
 from verify.scene import Scene, ToolPathCut
 from verify.scene.history import jumps
+from verify.solvers.cuts_of_scene import cuts_of
 from verify.xfem.cuts import Cut
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["opening_times", "seam_times", "stops_of"]
+__all__ = ["Openings", "opening_times", "openings_of", "seam_times", "stops_of"]
 
 _Floats = NDArray[np.float64]
+_SAME = 1e-12  # of the duration: times that close are one
+_DUE = 1e-9  # of the duration: steps added up are off by less than that
+
+
+@dataclass(frozen=True)
+class Openings:
+    """The cuts of a moving scene in the order in which they open.
+
+    What is cut further keeps what is cut already: those that open first come first.
+
+    Attributes
+    ----------
+    asked : list
+        The cuts of the scene.
+    cuts : list of Cut
+        The same as level sets.
+    times : list of float
+        When each opens as a whole, s; of a tool path not read.
+    outputs : (t,) array
+        Output times, s.
+    due : float
+        What is due so much later is due now, s.
+    """
+
+    asked: list[Any]
+    cuts: list[Cut]
+    times: list[float]
+    outputs: _Floats
+    due: float
+
+    def of_cells(self, phantom: PhantomMesh) -> _Floats:
+        """Return `opening_times` of the mesh with all the cuts."""
+        return opening_times(self.asked, phantom, self.times)
+
+    def of_seams(self, seams: _Floats) -> _Floats:
+        """Return `seam_times` of seams (k, d, space)."""
+        return seam_times(self.asked, self.cuts, seams, self.times)
+
+
+def openings_of(scene: Scene, size: float) -> Openings:
+    """Return when the cuts of a moving scene open on a mesh of a size, in m.
+
+    A time that is an output time up to round-off is that one.
+    """
+    outputs = np.array(scene.analysis.output_times)
+    end = float(outputs[-1])
+
+    def snapped(time: float) -> float:
+        nearest = float(outputs[np.abs(outputs - time).argmin()])
+        return nearest if abs(nearest - time) <= _SAME * end else time
+
+    times = [snapped(float(getattr(cut, "opens_at", 0.0))) for cut in scene.cuts]
+    order, cuts = np.argsort(times, kind="stable"), cuts_of(scene, size)
+    return Openings(
+        [scene.cuts[k] for k in order],
+        [cuts[k] for k in order],
+        [times[k] for k in order],
+        outputs,
+        _DUE * end,
+    )
 
 
 def opening_times(cuts: Sequence[Any], phantom: PhantomMesh, times: Sequence[float]) -> _Floats:
@@ -93,21 +155,18 @@ def seam_times(
     return found
 
 
-def stops_of(scene: Scene, outputs: _Floats, openings: Sequence[float], apart: float) -> _Floats:
+def stops_of(scene: Scene, openings: Openings) -> _Floats:
     """Return the times at which a step has to end, s: outputs, whole cuts, and jumps.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its loads and supports may jump.
-    outputs : (t,) float array
-    openings : sequence of float
-        Of the cuts that open as a whole.
-    apart : float
-        A jump that is nearer to an output is at that output, s.
+    A jump of a load or support that is due at an output is at that output.
     """
-    parts = [*scene.supports, *scene.loads]
+    whole = [
+        time
+        for cut, time in zip(openings.asked, openings.times, strict=True)
+        if not isinstance(cut, ToolPathCut)
+    ]
+    outputs, parts = openings.outputs, [*scene.supports, *scene.loads]
     leaps = [t for part in parts for t in jumps(getattr(part, "history", None))]
-    leaps = [t for t in leaps if np.abs(outputs - t).min() > apart]
-    found = np.unique([*outputs, *openings, *leaps])
+    leaps = [t for t in leaps if np.abs(outputs - t).min() > openings.due]
+    found = np.unique([*outputs, *whole, *leaps])
     return found[(found >= 0.0) & (found <= outputs[-1])]
