@@ -13,6 +13,7 @@ from typing import Any
 from verify.errors import InputError
 from verify.json_files import plain, read_json, write_json
 from verify.printable import one_line, words_of
+from verify.regularisation import Regularisation
 
 __all__ = [
     "COMPILING",
@@ -47,6 +48,9 @@ def _closed[Kind](kind: Kind) -> Kind:
     """Have unknown keys refused where a record is made from plain values."""
     kind.__pydantic_config__ = {"extra": "forbid"}  # type: ignore[attr-defined]
     return kind
+
+
+_closed(Regularisation)
 
 
 class Status(StrEnum):
@@ -154,7 +158,7 @@ class SolveRecord:
     peak_memory: float | None = None  # bytes, of the solving process
     wall: float | None = None  # seconds, of the solving process, start-up included
     iterations: dict[str, int] = field(default_factory=dict)
-    regularisations: list[dict[str, Any]] = field(default_factory=list)
+    regularisations: list[Regularisation] = field(default_factory=list)
     notes: dict[str, str] = field(default_factory=dict)
     solution: str | None = None  # path of the stored solution, relative to the run directory
     # relative errors over time, by metric, with "time" in s; empty for a static scene

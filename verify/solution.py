@@ -22,6 +22,7 @@ from verify.errors import InputError
 from verify.handed_over import check_accounts, check_cells, check_field, check_vectors
 from verify.json_files import read_json
 from verify.read_mesh import read_with_meshio
+from verify.regularisation import Regularisation
 from verify.whole_files import whole_file, write_whole
 
 __all__ = [
@@ -45,28 +46,6 @@ _OPTIONAL = (
     "iterations", "regularisations", "notes",
 )  # fmt: skip
 _NODES_PER_CELL = {"triangle": 3, "triangle6": 6, "tetra": 4, "tetra10": 10}
-
-
-@dataclass(frozen=True)
-class Regularisation:
-    """Something the solver dropped, snapped, clamped, scaled or floored.
-
-    Parameters
-    ----------
-    kind : str
-        What was done, e.g. ``"zero-volume piece dropped"``.
-    count : int
-        How often.
-    size : float
-        Its largest contribution, in the unit of `unit`.
-    unit : str
-        Unit of `size`, e.g. ``"volume fraction"``.
-    """
-
-    kind: str
-    count: int
-    size: float
-    unit: str
 
 
 @dataclass(frozen=True)

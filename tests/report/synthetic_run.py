@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from verify.regularisation import Regularisation
 from verify.result import (
     CaseResult,
     Metric,
@@ -264,12 +265,7 @@ def _solve(
     if solver == "conforming":
         phases["meshing"] = 2e-5 * n
     timings = {name: [t * r for r in (1.0, 1.04, 1.3)] for name, t in phases.items()}
-    dropped = {
-        "kind": "zero-volume piece dropped",
-        "count": 2,
-        "size": 1e-13,
-        "unit": "volume fraction",
-    }
+    dropped = Regularisation("zero-volume piece dropped", 2, 1e-13, "volume fraction")
     return SolveRecord(
         case,
         solver,

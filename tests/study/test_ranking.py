@@ -2,6 +2,7 @@
 
 import pytest
 
+from verify.regularisation import Regularisation
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
 from verify.study.ranking import rank_solvers
 
@@ -169,7 +170,7 @@ def test_stability_counts_what_was_lost_and_forgives_refusals():
         solve("a", "x", 0, 0.1),
         solve("a", "x", 1, status=Status.REFUSED, reason="not in space"),
         solve("a", "y", 0, 0.1, metrics=[worst]),
-        solve("a", "y", 1, 0.1, regularisations=[{"kind": "node moved", "count": 3}]),
+        solve("a", "y", 1, 0.1, regularisations=[Regularisation("node moved", 3, 0.1, "m")]),
         solve("a", "z", 0, status=Status.TIMEOUT, reason="60 s"),
         solve("a", "z", 1, 0.1, notes={"pieces inside out": "2"}),
     ]

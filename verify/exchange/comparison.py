@@ -173,7 +173,7 @@ def _record(job: Job, solution: Solution) -> SolveRecord:
         unknowns=solution.unknowns or None,
         timings=solution.timings,
         iterations=solution.iterations,
-        regularisations=[vars(entry) for entry in solution.regularisations],
+        regularisations=list(solution.regularisations),
         notes={**solution.notes, "imported": "from files; its timings are what it says itself"},
     )
 

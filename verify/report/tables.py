@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
+from verify.regularisation import Regularisation
 from verify.report.blocks import Cell, Table, plain_table
 from verify.report.curves import duration, metric_names
 from verify.report.notation import (
@@ -174,17 +175,15 @@ def orders_table(result: CaseResult) -> Table | None:
 
 def regularisations_table(result: CaseResult) -> Table | None:
     """Return all that the solvers dropped, snapped, clamped, scaled or floored."""
-    groups: dict[tuple[str, str], list[tuple[int, dict[str, Any]]]] = {}
+    groups: dict[tuple[str, str], list[tuple[int, Regularisation]]] = {}
     for solve in _ordered(result):
         for entry in solve.regularisations:
-            key = (solve.solver, str(entry.get("kind", "–")))
-            groups.setdefault(key, []).append((solve.level, entry))
+            groups.setdefault((solve.solver, entry.kind), []).append((solve.level, entry))
     rows = []
     for (solver, kind), found in groups.items():
-        sizes = [e["size"] for _, e in found if isinstance(e.get("size"), int | float)]
-        unit = found[0][1].get("unit", "")
-        counts = ", ".join(f"{number(e.get('count'))} (level {n})" for n, e in found)
-        largest = f"{number(float(max(sizes)), 2)} {unit}" if sizes else "–"
+        sizes = [entry.size for _, entry in found if entry.size is not None]
+        counts = ", ".join(f"{number(entry.count)} (level {n})" for n, entry in found)
+        largest = f"{number(max(sizes), 2)} {found[0][1].unit}" if sizes else "–"
         rows.append([solver_title(solver), kind, counts, largest])
     head = ["solver", "what was done", "how often", "largest contribution"]
     return plain_table("Regularisations", head, rows, "prose") if rows else None

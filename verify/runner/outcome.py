@@ -5,7 +5,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json
-from verify.result import SolveRecord, Status
+from verify.result import SolveRecord, Status, checked
 from verify.runner.child import Ending
 from verify.runner.log import telling_line
 
@@ -19,11 +19,11 @@ def outcome_in(folder: Path) -> dict[str, Any] | None:
     """
     try:
         outcome = read_json(folder / "outcome.json")
-        outcome["status"] = Status(outcome["status"])
-        SolveRecord(case="", solver="", level=0, **outcome)
-    except (InputError, KeyError, TypeError, ValueError):
+        blank = {"case": "", "solver": "", "level": 0}
+        record = checked(SolveRecord, {**blank, **outcome}, "outcome", str(folder))
+    except InputError:
         return None
-    return outcome
+    return {name: getattr(record, name) for name in outcome}
 
 
 def death(log: Path, ending: Ending, timeout: float, memory: float) -> tuple[Status, str]:

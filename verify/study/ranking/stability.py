@@ -24,8 +24,7 @@ def stability_standings(
         ended = [solve.status for solve in solves]
         counts: dict[str, int] = {}
         for entry in (e for solve in solves for e in solve.regularisations):
-            kind, count = str(entry.get("kind", "unnamed")), entry.get("count", 1)
-            counts[kind] = counts.get(kind, 0) + (count if isinstance(count, int) else 1)
+            counts[entry.kind] = counts.get(entry.kind, 0) + entry.count
         share = lost[name]
         standings.append(
             StabilityStanding(

@@ -83,9 +83,9 @@ def _summed_up(
     if not reason and displacement is None:
         reason = record.notes.get("comparison", "not compared")
     changed = "; ".join(
-        f"{one['kind']}: {one['count']}, {one['size']:.2g} {one['unit']}"
+        f"{one.kind}: {one.count}, {one.size:.2g} {one.unit}"
         for one in record.regularisations
-        if one["size"]
+        if one.size
     )
     return MethodOnCase(
         case, record.solver, record.level, record.size, record.unknowns, displacement,
