@@ -1,6 +1,5 @@
 """Adapters of the other ways to cut (`verify.methods`): a scene in, a neutral solution out."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from inspect import signature
@@ -29,6 +28,14 @@ from verify.solvers.loads_of_scene import loads_of
 from verify.solvers.methods_motion import MethodOpening
 from verify.solvers.motion_of_scene import Marching, Motion
 from verify.solvers.openings_of_scene import openings_of
+from verify.solvers.runs import (
+    Answer,
+    Repeated,
+    check_choices,
+    errors_of_scene,
+    repeated,
+    solution_on,
+)
 from verify.solvers.supports_of_scene import path_of_supports, supports_of
 from verify.solvers.xfem import XfemSolver
 from verify.solvers.xfem_static import dismissed_equilibria, path_notes
@@ -36,7 +43,6 @@ from verify.solvers.xfem_steps import SCHEMES
 from verify.solvers.xfem_system import system_of
 from verify.system import System
 from verify.xfem.equilibrium import static_equilibrium
-from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
@@ -55,28 +61,11 @@ _EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
 
 
 @dataclass(frozen=True)
-class _Choice:
-    """Parameters of a solve that do not concern the cut."""
-
-    load_steps: int
-    marching: Marching
-
-
-@dataclass(frozen=True)
-class _Run:
-    """A cut body and its fields (t, N, d)."""
+class _Answer(Answer):
+    """An answer, the body that it is of, and how many springs a fit left out."""
 
     body: CutBody
-    times: _Floats
-    displacement: _Floats
-    velocity: _Floats | None
-    acceleration: _Floats | None
-    ledger: dict[str, _Floats]
-    timings: dict[str, float]
-    iterations: dict[str, int]
-    notes: dict[str, str]
-    clamped: int
-    further: Sequence[Regularisation] = ()
+    left_out: int
 
 
 class MethodSolver:
@@ -142,30 +131,20 @@ class MethodSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        if not 0 <= level < self.levels(scene):
-            raise InputError(f"mesh level {level}; expected 0..{self.levels(scene) - 1}")
         if load_steps < 0 or not step_factor > 0.0 or scheme not in _SCHEMES:
             raise InputError(
                 f"load_steps {load_steps}, step_factor {step_factor}, scheme '{scheme}'; expected "
                 f"at least 0, a positive number, one of {', '.join(_SCHEMES)}"
             )
         self._check(scene, scheme, parameters)
-        choice = _Choice(load_steps, Marching(scheme, step_factor, spectral_radius))
-        try:
-            start = perf_counter()
-            mesh, size = background_mesh(scene, level)
-            meshing = perf_counter() - start
-            if repetitions:  # what compiles, compiles here
-                self._run(scene, mesh, size, choice, parameters, trial=True)
-            runs = [
-                self._run(scene, mesh, size, choice, parameters) for _ in range(max(1, repetitions))
-            ]
-        except XfemError as error:
-            raise InputError(str(error), str(scene.file or scene.name)) from None
-        timings: dict[str, list[float]] = {}
-        if repetitions:
-            timings = {phase: [run.timings[phase] for run in runs] for phase in runs[0].timings}
-        return _solution(scene, self.name, runs[-1], size, {"meshing": [meshing], **timings})
+        marching = Marching(scheme, step_factor, spectral_radius)
+
+        def run(mesh: SimplexMesh, size: float, trial: bool) -> _Answer:
+            if scene.analysis.kind == "dynamic":
+                return self._moved(scene, mesh, size, marching, parameters, trial)
+            return self._at_rest(scene, mesh, size, load_steps, parameters)
+
+        return _solution(scene, self.name, repeated(scene, level, repetitions, run))
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
         """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.
@@ -179,14 +158,11 @@ class MethodSolver:
             raise UnsupportedSceneError(reason)
         taken = list(signature(METHODS[self._method]).parameters)[2:]
         own = {name: value for name, value in parameters.items() if name in taken}
-        exact = exact_of(scene)
-        try:
+        with errors_of_scene(scene):
             mesh, size = background_mesh(scene, level)
             body = METHODS[self._method](mesh, cuts_of(scene, size), **own)
             material = material_of(scene, body.resisting.mesh)
-            return system_of(scene, body.phantom, body.resisting, material, exact)
-        except XfemError as error:
-            raise InputError(str(error), str(scene.file or scene.name)) from None
+            return system_of(scene, body.phantom, body.resisting, material, exact_of(scene))
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
         _, _, *offered = signature(METHODS[self._method]).parameters.values()
@@ -202,75 +178,76 @@ class MethodSolver:
                 "critical step; expected weights = 'share'"
             )
 
-    def _run(
+    def _moved(
         self,
         scene: Scene,
         mesh: SimplexMesh,
         size: float,
-        choice: _Choice,
+        marching: Marching,
         parameters: dict[str, Any],
-        trial: bool = False,
-    ) -> _Run:
-        """Cut, load, solve: all of it, nothing kept from the run before."""
-        mesh = SimplexMesh(mesh.points, mesh.cells)
-        exact, kinematics = exact_of(scene), scene.analysis.kinematics
-        if scene.analysis.kind == "dynamic":
-            forces: list[InternalForce] = []
+        trial: bool,
+    ) -> _Answer:
+        """Cut, load, move."""
+        forces: list[InternalForce] = []
 
-            def inertia(body: CutBody) -> tuple[InternalForce, Mass]:
-                mesh = body.resisting.mesh
-                material, density = material_of(scene, mesh), density_of(scene, mesh)
-                forces.append(self._force(body.resisting, material, kinematics, kernels=FAST))
-                return forces[-1], side_wise_mass(body.phantom, density)
+        def inertia(body: CutBody) -> tuple[InternalForce, Mass]:
+            forces.append(self._law(scene, body))
+            return forces[-1], side_wise_mass(body.phantom, density_of(scene, body.phantom.mesh))
 
-            openings = openings_of(scene, size)
-            opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
-            moved = Motion(scene, openings, opening, choice.marching, exact).run(trial)
-            return _Run(
-                opening.final, moved.times, moved.displacement, moved.velocity,
-                moved.acceleration, moved.ledger, moved.timings, moved.iterations, moved.notes,
-                getattr(forces[-1], "clamped", 0),
-            )  # fmt: skip
-        body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
-        material = material_of(scene, body.resisting.mesh)
+        openings = openings_of(scene, size)
+        opening = MethodOpening(self._method, parameters, inertia, mesh, openings)
+        moved = Motion(scene, openings, opening, marching, exact_of(scene)).run(trial)
+        return _Answer(**vars(moved), body=opening.final, left_out=_left_out(forces[-1]))
+
+    def _at_rest(
+        self,
+        scene: Scene,
+        mesh: SimplexMesh,
+        size: float,
+        load_steps: int,
+        parameters: dict[str, Any],
+    ) -> _Answer:
+        """Cut, load, solve."""
+        body, exact = (
+            METHODS[self._method](mesh, cuts_of(scene, size), **parameters),
+            exact_of(scene),
+        )
         start = perf_counter()
         supports = supports_of(scene, body.phantom, exact)
         load = loads_of(scene, body.phantom, exact)
         timings = {**body.seconds, "loading": perf_counter() - start}
+        iterations: dict[str, int] = {}
         notes: dict[str, str] = {}
         further: list[Regularisation] = []
-        if kinematics == "linear" and self._force is InternalForce:
+        left_out = 0
+        if scene.analysis.kinematics == "linear" and self._force is InternalForce:
+            material = material_of(scene, body.resisting.mesh)
             static = solve_static(body.resisting, material, supports, load, kernels=FAST)
-            u, energy, iterations, clamped = static.displacement, static.strain_energy, {}, 0
+            u, energy = static.displacement, static.strain_energy
             timings |= static.timings
         else:
             check_bodies(body.resisting, supports)
             start = perf_counter()
-            force = self._force(body.resisting, material, kinematics, kernels=FAST)
-
-            path = path_of_supports(scene, body.phantom, exact)
+            force, path = self._law(scene, body), path_of_supports(scene, body.phantom, exact)
             found = static_equilibrium(
-                force, supports.fixed, lambda s: path(s).values, load, choice.load_steps or 1
+                force, supports.fixed, lambda s: path(s).values, load, load_steps or 1
             )
-            u, energy, clamped = found.displacement, found.energy, getattr(force, "clamped", 0)
+            u, energy, left_out = found.displacement, found.energy, _left_out(force)
             steps = len(found.iterations)
             iterations = {"newton": sum(found.iterations), "load steps": steps}
             notes, further = path_notes(found), dismissed_equilibria(found)
             timings["solve"] = perf_counter() - start
-        ledger = {"strain": np.array([energy])}
-        return _Run(
-            body,
-            np.zeros(1),
-            u[None],
-            None,
-            None,
-            ledger,
-            timings,
-            iterations,
-            notes,
-            clamped,
-            further,
-        )
+        return _Answer(
+            body.phantom, np.zeros(1), u[None], None, None, {"strain": np.array([energy])},
+            timings, iterations, notes, u.size, further, body, left_out,
+        )  # fmt: skip
+
+    def _law(self, scene: Scene, body: CutBody) -> InternalForce:
+        """Return the internal force of a cut body."""
+        material = material_of(scene, body.resisting.mesh)
+        kinematics = scene.analysis.kinematics
+        force: InternalForce = self._force(body.resisting, material, kinematics, kernels=FAST)
+        return force
 
 
 class MassSpringSolver(MethodSolver):
@@ -301,10 +278,7 @@ class MassSpringSolver(MethodSolver):
         **parameters: Any,
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
-        given = (("cut", cut, tuple(METHODS)), ("fit", fit, ("fitted", "van_gelder")))
-        for name, value, known in given:
-            if value not in known:
-                raise InputError(f"{name} '{value}'; expected one of {', '.join(known)}")
+        check_choices(("cut", cut, METHODS), ("fit", fit, ("fitted", "van_gelder")))
         self._method = cut
         self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
         return super().solve(
@@ -331,43 +305,26 @@ class MassSpringSolver(MethodSolver):
             )
 
 
-def _solution(
-    scene: Scene, name: str, run: _Run, size: float, timings: dict[str, list[float]]
-) -> Solution:
-    body, shown, counts = run.body, run.body.conforming, run.body.counts
+def _left_out(force: InternalForce) -> int:
+    """Count the springs that the fit would make negative; elements have none."""
+    return int(getattr(force, "clamped", 0))
+
+
+def _solution(scene: Scene, name: str, done: Repeated[_Answer]) -> Solution:
+    body = done.answer.body
+    counts = body.counts
     regularisations = [
         Regularisation(change.kind, change.count, change.size, change.unit)
         for change in body.changes
     ]
-    regularisations += [*run.further, *across_interfaces(scene, body.phantom.mesh)]
-    if run.clamped:
+    regularisations += [*done.answer.further, *across_interfaces(scene, body.phantom.mesh)]
+    if done.answer.left_out:
         kind = "spring that the fit would make negative left out"
-        regularisations.append(Regularisation(kind, run.clamped, 0.0, "N/m"))
-    return Solution(
-        points=shown.points,
-        cells=shown.cells,
-        displacement=np.stack([shown.interpolation @ one for one in run.displacement]),
-        times=run.times,
-        velocity=_at_points(body, run.velocity),
-        acceleration=_at_points(body, run.acceleration),
-        cut_facets=shown.cut_facets,
-        ledger=run.ledger,
-        unknowns=run.displacement[0].size,
-        size=size,
-        timings=timings,
-        iterations=run.iterations,
-        regularisations=regularisations,
-        notes={
-            "method": name,
-            "nodes": f"{counts.nodes_before} before the cut, {counts.nodes} after",
-            "elements": f"{counts.elements_before} before the cut, {counts.elements} after",
-            "smallest volume fraction": f"{body.smallest_fraction:.3g}",
-            "timed": "every phase as listed; first call (compilation) excluded; writing excluded",
-            **run.notes,
-        },
-    )
-
-
-def _at_points(body: CutBody, values: _Floats | None) -> _Floats | None:
-    at = body.conforming.interpolation
-    return None if values is None else np.stack([at @ one for one in values])
+        regularisations.append(Regularisation(kind, done.answer.left_out, 0.0, "N/m"))
+    notes = {
+        "method": name,
+        "nodes": f"{counts.nodes_before} before the cut, {counts.nodes} after",
+        "elements": f"{counts.elements_before} before the cut, {counts.elements} after",
+        "smallest volume fraction": f"{body.smallest_fraction:.3g}",
+    }
+    return solution_on(body.conforming, done, None, regularisations, notes)

@@ -15,8 +15,8 @@ from verify.solution import Regularisation
 from verify.solvers.body_in_motion import body_in_motion, initial_state
 from verify.solvers.body_of_scene import density_of, material_of
 from verify.solvers.openings_of_scene import Openings, stops_of
+from verify.solvers.runs import Answer
 from verify.solvers.xfem_account import Account
-from verify.solvers.xfem_answer import Answer
 from verify.solvers.xfem_steps import integrator_of, largest_step
 from verify.xfem.body import DynamicBody, Integrator, MotionState
 from verify.xfem.energy_balance import BalanceRecorder

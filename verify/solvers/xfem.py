@@ -15,14 +15,14 @@ from verify.solvers.body_of_scene import background_mesh, material_of
 from verify.solvers.cuts_of_scene import cuts_of
 from verify.solvers.motion_of_scene import Marching, Motion
 from verify.solvers.openings_of_scene import openings_of
+from verify.solvers.runs import Answer, check_choices, errors_of_scene, repeated
 from verify.solvers.supports_of_scene import supports_of
-from verify.solvers.xfem_answer import Answer, joined, solution_of, treated
+from verify.solvers.xfem_answer import joined, solution_of, treated
 from verify.solvers.xfem_motion import Cutting, XfemOpening
 from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
 from verify.solvers.xfem_system import system_of
 from verify.system import System
-from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.kernels import PLAIN
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
@@ -52,7 +52,6 @@ class _Choice:
             "basis": self.basis,
             "tip": self.cutting.tip,
             "slivers": self.cutting.slivers,
-            "timed": "every phase as listed; first call (compilation) excluded; writing excluded",
         }
 
 
@@ -133,7 +132,7 @@ class XfemSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        given = (
+        check_choices(
             ("basis", basis, _BASES),
             ("tip", tip, _TIPS),
             ("slivers", slivers, _POLICIES),
@@ -141,14 +140,9 @@ class XfemSolver:
             ("mass", mass, MASSES),
             ("kernels", kernels, _KERNELS),
         )
-        for name, value, known in given:
-            if value not in known:
-                raise InputError(f"{name} '{value}'; expected one of {', '.join(known)}")
         if load_steps < 0 or not step_factor > 0.0:
             text = f"load_steps {load_steps}, step_factor {step_factor}"
             raise InputError(f"{text}; expected at least 0, and a positive number")
-        if not 0 <= level < self.levels(scene):
-            raise InputError(f"mesh level {level}; expected 0..{self.levels(scene) - 1}")
         linear_static = scene.analysis.kind == "static" and scene.analysis.kinematics == "linear"
         if basis != "sidewise" and not linear_static:
             raise UnsupportedSceneError(f"the {basis} basis is offered for linear statics only")
@@ -156,7 +150,12 @@ class XfemSolver:
             _check_penalty(scene, basis, mass)
         cutting = Cutting(tip, slivers, mass, _KERNELS[kernels])
         marching = Marching(scheme, step_factor, spectral_radius)
-        return _solve(scene, level, repetitions, _Choice(basis, load_steps, cutting, marching))
+        choice, exact = _Choice(basis, load_steps, cutting, marching), exact_of(scene)
+        done = repeated(
+            scene, level, repetitions,
+            lambda mesh, size, trial: _run(scene, mesh, size, exact, choice, trial),
+        )  # fmt: skip
+        return solution_of(scene, done, choice.notes())
 
     def system(
         self,
@@ -178,17 +177,13 @@ class XfemSolver:
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
         exact = exact_of(scene)
-        try:
+        with errors_of_scene(scene):
             mesh, size = background_mesh(scene, level)
             phantom = _cut(scene, mesh, size, exact, tip, slivers)[0]
             return system_of(
                 scene, phantom, phantom, material_of(scene, phantom.mesh), exact, mass, basis,
                 slivers == "penalise",
             )  # fmt: skip
-        except BasisError as error:
-            raise UnsupportedSceneError(str(error)) from None
-        except XfemError as error:
-            raise InputError(str(error), str(scene.file or scene.name)) from None
 
 
 def _cut(
@@ -217,35 +212,15 @@ def _check_penalty(scene: Scene, basis: str, mass: str) -> None:
         raise UnsupportedSceneError("slivers = 'penalise' in motion is for the sidewise mass")
 
 
-def _solve(scene: Scene, level: int, repetitions: int, choice: _Choice) -> Solution:
-    exact = exact_of(scene)
-    try:
-        start = perf_counter()
-        mesh, size = background_mesh(scene, level)
-        meshing = perf_counter() - start
-        if repetitions:  # what compiles, compiles here
-            _run(scene, mesh, size, exact, choice, trial=True)
-        runs = [_run(scene, mesh, size, exact, choice) for _ in range(max(1, repetitions))]
-    except BasisError as error:  # another basis can do the scene
-        raise UnsupportedSceneError(str(error)) from None
-    except XfemError as error:
-        raise InputError(str(error), str(scene.file or scene.name)) from None
-    timings: dict[str, list[float]] = {}
-    if repetitions:
-        timings = {phase: [run.timings[phase] for run in runs] for phase in runs[0].timings}
-    return solution_of(scene, runs[-1], size, {"meshing": [meshing], **timings}, choice.notes())
-
-
 def _run(
     scene: Scene,
     mesh: SimplexMesh,
     size: float,
     exact: Any,
     choice: _Choice,
-    trial: bool = False,
+    trial: bool,
 ) -> Answer:
-    """Cut, load, solve: all of it, nothing kept from the run before."""
-    mesh = SimplexMesh(mesh.points, mesh.cells)
+    """Cut, load, solve."""
     if scene.analysis.kind == "dynamic":
         openings = openings_of(scene, size)
         opening = XfemOpening(scene, mesh, openings, exact, choice.cutting)

@@ -1,6 +1,4 @@
-"""Answer of the compact XFEM solver as a neutral solution, with everything that it changed."""
-
-from dataclasses import dataclass, field
+"""Answer of the XFEM solver as a neutral solution, with everything that it changed."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,75 +7,37 @@ from verify.scene import Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import across_interfaces
+from verify.solvers.runs import Answer, Repeated, solution_on
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import SliverReport, Specks
 from verify.xfem.subdivision import Subdivision, subdivide
 
-__all__ = ["Answer", "joined", "penalised", "solution_of", "treated"]
-
-_Floats = NDArray[np.float64]
+__all__ = ["joined", "penalised", "solution_of", "treated"]
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Displacements and their rates (t, N, d) of the unknowns of a cut mesh at output times."""
-
-    phantom: PhantomMesh
-    times: _Floats
-    displacement: _Floats
-    velocity: _Floats | None
-    acceleration: _Floats | None
-    ledger: dict[str, _Floats]
-    timings: dict[str, float]
-    iterations: dict[str, int]
-    notes: dict[str, str]
-    unknowns: int
-    further: list[Regularisation] = field(default_factory=list)
-
-
-def solution_of(
-    scene: Scene,
-    answer: Answer,
-    size: float,
-    timings: dict[str, list[float]],
-    notes: dict[str, str],
-) -> Solution:
+def solution_of(scene: Scene, done: Repeated[Answer], notes: dict[str, str]) -> Solution:
     """Put an answer on the conforming mesh of its cut body.
 
     Parameters
     ----------
     scene : Scene
-    answer : Answer
-    size : float
-        Element size, m.
-    timings : dict of str to list of float
-        Of all repetitions.
+    done : Repeated
     notes : dict of str to str
         Choices of the solver, beside those of the answer.
     """
-    phantom = answer.phantom
+    phantom, further = done.answer.phantom, done.answer.further
     body = subdivide(phantom)
-    return Solution(
-        points=body.points,
-        cells=body.cells,
-        displacement=np.stack([body.interpolation @ one for one in answer.displacement]),
-        times=answer.times,
-        velocity=_at_points(body, answer.velocity),
-        acceleration=_at_points(body, answer.acceleration),
-        cut_facets=body.cut_facets,
-        cell_sides=_side_labels(phantom.label[body.cell_piece]),
-        ledger=answer.ledger,
-        unknowns=answer.unknowns,
-        size=size,
-        timings=timings,
-        iterations=answer.iterations,
-        regularisations=[
+    return solution_on(
+        body,
+        done,
+        _side_labels(phantom.label[body.cell_piece]),
+        [
             *_regularisations(scene, phantom, body),
-            *answer.further,
+            *further,
             *across_interfaces(scene, phantom.mesh),
         ],
-        notes={**notes, **answer.notes},
+        notes,
     )
 
 
@@ -111,10 +71,6 @@ def joined(specks: Specks) -> list[Regularisation]:
         return []
     kind = "loose part of round-off size joined to its neighbour"
     return [Regularisation(kind, specks.count, specks.largest, "volume fraction")]
-
-
-def _at_points(body: Subdivision, values: _Floats | None) -> _Floats | None:
-    return None if values is None else np.stack([body.interpolation @ one for one in values])
 
 
 def _side_labels(label: NDArray[np.int8]) -> NDArray[np.int64]:
