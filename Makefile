@@ -7,7 +7,7 @@
 SHELL := /bin/bash
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test heavy bench check results size clean lock
+.PHONY: help setup demo test heavy bench check docs results size clean lock
 
 BIN := $(or $(VERIFY_VENV),.venv)/bin
 JOBS ?= $(shell nproc)
@@ -61,6 +61,12 @@ check: setup ## ruff, format, types, layers
 
 lock: ## resolve the lock files again from pyproject.toml (needs uv; UPGRADE=1 takes new versions)
 	@.ci/lock $(if $(UPGRADE),--upgrade)
+
+# What the site needs beyond .venv is installed into it once, by hash.
+docs: setup ## build the documentation site, build/docs/index.html
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary :all: \
+	    --require-hashes --requirement .ci/requirements-docs.lock
+	@$(BIN)/python .ci/docs
 
 # One solve after the other, for their times are compared; JOBS=2 is faster, and no time is ranked.
 results: setup ## run the protocol of the method comparison and write docs/results (hours)

@@ -9,7 +9,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 FULL = ROOT / ".ci/requirements.lock"
 WITHOUT_DOLFINX = ROOT / ".ci/requirements-system-dolfinx.lock"
-BOTH = pytest.mark.parametrize("lock", [FULL, WITHOUT_DOLFINX], ids=lambda lock: lock.name)
+DOCS = ROOT / ".ci/requirements-docs.lock"
+EACH = pytest.mark.parametrize("lock", [FULL, WITHOUT_DOLFINX, DOCS], ids=lambda lock: lock.name)
 
 
 def normal(name):
@@ -46,17 +47,22 @@ def test_lock_for_a_system_dolfinx_covers_all_but_dolfinx():
     assert not names & {"dolfinx-solver-real", "fenics-basix", "fenics-ufl", "mpi4py", "mpich"}
 
 
-def test_the_two_locks_agree_on_every_version():
+def test_the_locks_agree_on_every_version():
     full = pinned(FULL)
     assert all(full[name] == entry for name, entry in pinned(WITHOUT_DOLFINX).items())
+    assert all(full.get(name, entry) == entry for name, entry in pinned(DOCS).items())
 
 
-@BOTH
+def test_lock_of_the_documentation_covers_its_extra():
+    assert asked_for("docs") - asked_for() <= set(pinned(DOCS))
+
+
+@EACH
 def test_every_pin_has_a_hash(lock):
     assert [name for name, (_, hashes) in pinned(lock).items() if hashes == 0] == []
 
 
-@BOTH
+@EACH
 def test_lock_holds_no_address_option_or_path(lock):
     text = lock.read_text()
     assert "://" not in text
@@ -70,4 +76,4 @@ def test_every_direct_dependency_says_its_licence_in_the_guide():
     table = guide.split("\n## Licences\n")[1].split("\n## ")[0]
     first_column = " ".join(row.split("|")[1] for row in table.splitlines() if row.startswith("|"))
     words = {normal(word) for word in re.findall(r"[\w.-]+", first_column)}
-    assert asked_for("gmsh", "fenicsx", "test", "dev") <= words
+    assert asked_for("gmsh", "fenicsx", "test", "dev", "docs") <= words

@@ -1,0 +1,48 @@
+"""The tutorial's notebook runs, and is the page."""
+
+import json
+import re
+import shutil
+from importlib.machinery import SourceFileLoader
+from importlib.util import find_spec, module_from_spec, spec_from_loader
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+GUIDE = ROOT / "docs/guide"
+
+
+@pytest.fixture(scope="module")
+def tutorial():
+    loader = SourceFileLoader("tutorial", str(ROOT / ".ci/tutorial"))
+    module = module_from_spec(spec_from_loader("tutorial", loader))
+    loader.exec_module(module)
+    return module
+
+
+def test_the_notebook_is_the_page(tutorial):
+    page = (GUIDE / "tutorial.md").read_text("utf-8")
+    assert (GUIDE / "tutorial.ipynb").read_text("utf-8") == tutorial.notebook(page)
+
+
+@pytest.mark.skipif(find_spec("skfem") is None, reason="needs scikit-fem")
+def test_every_cell_of_the_notebook_runs_and_the_wrong_solver_alone_fails(tutorial, tmp_path):
+    shutil.copytree(ROOT / "docs/examples", tmp_path / "docs/examples")
+    content = json.loads((GUIDE / "tutorial.ipynb").read_text("utf-8"))
+    code = ["".join(cell["source"]) for cell in content["cells"] if cell["cell_type"] == "code"]
+    lines = [re.findall(r"^!(.*)", text, flags=re.MULTILINE) for text in code]
+    said = [tutorial.run("\n".join(each), tmp_path, ROOT) for each in lines]
+    runs = [text for text in said if "report.html" in text]
+    assert len(runs) == 2
+    assert re.match(r"statics/f3_inclined +PASS ", runs[0])
+    assert re.match(r"statics/f3_inclined +FAIL ", runs[1])
+    for name in ("mine", "wrong"):
+        assert (tmp_path / f"build/tutorial/{name}/report.html").is_file()
+    shown = next(text for text in said if "cut-patch" in text)
+    assert re.search(r"^free-fall +refused", shown, re.MULTILINE)
+
+
+def test_a_command_of_the_tutorial_that_crashes_is_an_error(tutorial, tmp_path):
+    with pytest.raises(RuntimeError, match="exit code 2"):
+        tutorial.run("verify run no/such_case --solver xfem", tmp_path, ROOT)
