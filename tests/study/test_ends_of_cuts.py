@@ -147,6 +147,15 @@ def test_what_a_rule_costs_against_conforming_elements_depends_on_where_the_ends
     assert np.median(inside) > 1.5 * np.median(through)
 
 
+@levels
+def test_nodes_at_the_ends_cost_no_more_than_those_of_the_conforming_elements(count):
+    """The limit: both have a node at the end and elements about as large around it."""
+    for crack, answers in cracks(count):
+        found, conforming = crack.solve("xfem", tip="partial"), answers["conforming"]
+        assert found.error < 1.15 * conforming.error
+        assert found.released < 1.15**2 * conforming.released  # the square of the energy norm
+
+
 @pytest.mark.parametrize("solver, elements", [("xfem", -0.45), ("conforming", -0.35)])
 def test_the_same_place_in_an_element_shifts_the_end_by_as_much_on_every_level(solver, elements):
     """The ends of `statics/griffith_edges`: 1.24 = 0.44/0.35. The solver's last edge is whole, that

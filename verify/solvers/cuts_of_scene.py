@@ -1,10 +1,11 @@
 """Cuts of a scene as the level sets of the compact XFEM solver."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.errors import UnsupportedSceneError
 from verify.scene import (
     ArcCut,
     CylinderCut,
@@ -15,9 +16,13 @@ from verify.scene import (
     SweptCut,
     ToolPathCut,
 )
+from verify.solution import Regularisation
+from verify.xfem.crossing import AT_END, TipRule
 from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath, TriangulatedSurface
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.tips import with_tip_nodes
 
-__all__ = ["cuts_of"]
+__all__ = ["ToCut", "cuts_of", "to_cut"]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +32,35 @@ _ARC_SEGMENTS_PER_CELL = 8
 def cuts_of(scene: Scene, size: float) -> list[Cut]:
     """Return the cuts as the solver's own; an arc that ends is sampled finely against `size`."""
     return [_cut(cut, size) for cut in scene.cuts]
+
+
+class ToCut(NamedTuple):
+    """What the library is to cut, by what, by which rule, and what was moved for that."""
+
+    mesh: SimplexMesh
+    cuts: list[Cut]
+    rule: TipRule
+    moved: list[Regularisation]
+
+
+def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
+    """Prepare a mesh for the tip rule `tip`.
+
+    Raises
+    ------
+    UnsupportedSceneError
+        If the rule is "partial" and the body a solid.
+    """
+    if tip != "partial":
+        return ToCut(mesh, cuts, tip, [])
+    if mesh.dim == 3:
+        raise UnsupportedSceneError(
+            "tip = 'partial' in a solid; it is offered for triangles, other tip rules are for both"
+        )
+    nodes = with_tip_nodes(mesh, cuts)
+    moved = nodes.moved[nodes.moved > AT_END * mesh.extent]
+    said = [Regularisation("end of a cut moved to a node", len(moved), moved.max(initial=0.0), "m")]
+    return ToCut(nodes.mesh, nodes.cuts, "inside", said if len(moved) else [])
 
 
 def _cut(cut: Any, size: float) -> Cut:

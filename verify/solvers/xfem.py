@@ -10,9 +10,9 @@ from reference.exact import exact_of
 from verify.accelerated import FAST
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
-from verify.solution import Solution
+from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import background_mesh, material_of
-from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.cuts_of_scene import cuts_of, to_cut
 from verify.solvers.motion_of_scene import Marching, Motion
 from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.runs import Answer, check_choices, errors_of_scene, repeated
@@ -31,7 +31,7 @@ from verify.xfem.slivers import join_specks, treat_slivers
 __all__ = ["XfemSolver"]
 
 _BASES = ("sidewise", "shifted", "heaviside")
-_TIPS = ("inside", "through", "nearest")
+_TIPS = ("inside", "through", "nearest", "partial")
 _KERNELS = {"fast": FAST, "plain": PLAIN}
 _POLICIES = ("keep", "merge", "drop", "penalise")
 
@@ -65,9 +65,9 @@ class XfemSolver:
     basis : {"sidewise", "shifted", "heaviside"}
         Unknowns of the enrichment; all give the same displacements up to round-off. The last two
         are for linear statics.
-    tip : {"inside", "through", "nearest"}
-        What happens to an element in which a cut ends; see
-        `verify.xfem.pieces.split_cells`.
+    tip : {"inside", "through", "nearest", "partial"}
+        What happens to an element in which a cut ends: see `verify.xfem.pieces.split_cells`; the
+        last, for triangles, divides it so that the end is a node (`verify.xfem.tips`).
     slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
         `verify.xfem.slivers`; "merge" is cell aggregation. A direct static solve does not mind
@@ -188,17 +188,17 @@ class XfemSolver:
 
 def _cut(
     scene: Scene, mesh: SimplexMesh, size: float, exact: Any, tip: str, slivers: str
-) -> tuple[PhantomMesh, Any, Any]:
-    """Cut the mesh and treat its slivers; report what was treated, and what was joined."""
-    rule: Any = tip
+) -> tuple[PhantomMesh, Any, list[Regularisation]]:
+    """Cut the mesh and treat its slivers; report what was treated, and what was moved or joined."""
     policy: Any = slivers
-    phantom = cut_mesh(mesh, cuts_of(scene, size), rule)
+    asked = to_cut(mesh, cuts_of(scene, size), tip)
+    phantom = cut_mesh(asked.mesh, asked.cuts, asked.rule)
     phantom, specks = join_specks(phantom, supports_of(scene, phantom, exact))
     report = None
     if slivers in ("merge", "drop"):
         held = supports_of(scene, phantom, exact).fixed.any(axis=1)
         phantom, report = treat_slivers(phantom, policy, held=held)
-    return phantom, report, specks
+    return phantom, report, [*asked.moved, *joined(specks)]
 
 
 def _check_penalty(scene: Scene, basis: str, mass: str) -> None:
@@ -226,7 +226,7 @@ def _run(
         opening = XfemOpening(scene, mesh, openings, exact, choice.cutting)
         return Motion(scene, openings, opening, choice.marching, exact).run(trial)
     start, cutting = perf_counter(), choice.cutting
-    phantom, slivers, specks = _cut(scene, mesh, size, exact, cutting.tip, cutting.slivers)
+    phantom, slivers, changes = _cut(scene, mesh, size, exact, cutting.tip, cutting.slivers)
     enrichment = perf_counter() - start
     penalise = cutting.slivers == "penalise"
     found = solve_equilibrium(
@@ -243,5 +243,5 @@ def _run(
         iterations=found.iterations,
         notes=found.notes,
         unknowns=found.displacement.size,
-        further=[*treated(slivers), *found.regularisations, *joined(specks)],
+        further=[*treated(slivers), *found.regularisations, *changes],
     )

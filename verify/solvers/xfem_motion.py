@@ -10,6 +10,7 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.solution import Regularisation
 from verify.solvers.body_of_scene import density_of, material_of
+from verify.solvers.cuts_of_scene import to_cut
 from verify.solvers.openings_of_scene import Openings
 from verify.solvers.supports_of_scene import motion_of_supports
 from verify.solvers.xfem_answer import penalised, treated
@@ -60,21 +61,23 @@ class XfemOpening:
     def __init__(
         self, scene: Scene, mesh: SimplexMesh, openings: Openings, exact: Any, cutting: Cutting
     ) -> None:
-        self.scene, self.mesh, self.openings, self.exact = scene, mesh, openings, exact
+        self.scene, self.openings, self.exact = scene, openings, exact
         self.cutting, self.mass = cutting, cutting.mass
-        self._tip: Any = cutting.tip
+        self._to_cut = to_cut(mesh, openings.cuts, cutting.tip)
         self._opening = np.empty((0, 0))
         self._slivers: list[Regularisation] = []
         self._penalised: list[Regularisation] = []
 
     def events(self) -> _Floats:
         """Return the times at which something opens, s."""
-        self._opening = self.openings.of_cells(cut_mesh(self.mesh, self.openings.cuts, self._tip))
+        mesh, cuts, rule, _ = self._to_cut
+        self._opening = self.openings.of_cells(cut_mesh(mesh, cuts, rule))
         return np.unique(self._opening[~np.isnan(self._opening)])
 
     def at(self, time: float) -> PhantomMesh:
         """Cut the mesh where the cuts have opened it at a time, and treat its slivers."""
-        phantom = cut_mesh(self.mesh, self.openings.cuts, self._tip, self._opening <= time)
+        mesh, cuts, rule, _ = self._to_cut
+        phantom = cut_mesh(mesh, cuts, rule, self._opening <= time)
         policy: Any = self.cutting.slivers
         if policy in ("merge", "drop"):
             held = motion_of_supports(self.scene, phantom, self.exact).fixed.any(axis=1)
@@ -122,5 +125,5 @@ class XfemOpening:
         return ancestors(old, new)
 
     def regularisations(self) -> list[Regularisation]:
-        """Return what was done to slivers."""
-        return [*self._slivers, *self._penalised]
+        """Return what was done to ends of cuts and to slivers."""
+        return [*self._to_cut.moved, *self._slivers, *self._penalised]

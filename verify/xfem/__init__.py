@@ -6,8 +6,9 @@ reading:
 
 `mesh`, `flat_cuts`, `faceted_cuts`, `tool_path`; `cuts` names them all
     simplices; what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
-`zero_points`, `clip`, `partition`, `crossing`, `junctions`, `pieces`
-    exact division of cells at zero points of level sets; parts of the cells that cuts go through
+`zero_points`, `clip`, `partition`, `crossing`, `junctions`, `pieces`, `tips`
+    exact division of cells at zero points of level sets; parts of the cells that cuts go through;
+    nodes at ends of cuts
 `join`, `sides`, `phantom`
     which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
     the result: standard finite elements with weights

@@ -31,7 +31,7 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.partition import Partition
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["ROUND_OFF", "Held", "split_cells"]
+__all__ = ["ROUND_OFF", "Held", "nodal_values", "split_cells"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -97,7 +97,7 @@ def split_cells(
         raise XfemError(
             f"opened cells of shape {opened.shape}; expected ({len(mesh.cells)}, {len(cuts)})"
         )
-    values, snapped = _nodal_values(mesh, cuts)
+    values, snapped = nodal_values(mesh, cuts)
     plus = values[mesh.cells] >= 0.0
     crossed = np.flatnonzero((plus.any(axis=1) & ~plus.all(axis=1)).any(axis=1))
     sizes = np.zeros(len(mesh.cells))
@@ -128,7 +128,14 @@ def split_cells(
     return replace(partition, tied=tied_pieces(partition, cuts, sizes, cells))
 
 
-def _nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
+def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
+    """Level sets (n, cuts) at the nodes, zero within round-off; how many were made zero.
+
+    Raises
+    ------
+    XfemError
+        If one is no cut, or its level set of a wrong shape or not finite.
+    """
     values = np.empty((len(mesh.points), len(cuts)))
     for index, cut in enumerate(cuts):
         if not hasattr(cut, "level_set"):

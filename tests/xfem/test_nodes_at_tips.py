@@ -1,0 +1,220 @@
+"""Ends of cuts inside elements as nodes of the mesh: where they are, and that nothing else changes.
+
+Cracks lie at random in meshes with shaken nodes: every end has its own place in its element.
+"""
+
+import numpy as np
+import pytest
+from test_sliver_policies import shaken
+from test_tips_beside_cuts import exterior, facet_measures
+from xfem_bodies import boundary_nodes, scaled_dense_stiffness, sparse_stiffness, zero_modes
+
+from verify.errors import UnsupportedSceneError
+from verify.scene import load_scene
+from verify.solvers import find_solver
+from verify.xfem.critical_step import critical_step
+from verify.xfem.cuts import Polyline
+from verify.xfem.elasticity import isotropic
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import side_wise_mass
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.phantom import cut_mesh
+from verify.xfem.statics import solve_static
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.subdivision import subdivide
+from verify.xfem.supports import Supports
+from verify.xfem.tips import with_tip_nodes
+
+SOFT = isotropic(1.0, 0.3, "plane strain")
+SEEDS = range(25)
+LEAST = 0.15  # share of each part in its element
+
+
+def crack(seed):
+    """A shaken mesh of 8 × 8 squares and the ends of a crack in it."""
+    random = np.random.default_rng(seed)
+    turn, centre = random.uniform(0.0, np.pi), random.uniform(0.4, 0.6, 2)
+    along = 0.3 * np.array([np.cos(turn), np.sin(turn)])
+    ends = centre + random.uniform(0.7, 1.0, (2, 1)) * [-along, along]
+    return shaken(rectangle_mesh((8, 8)), seed, 0.2 * (seed % 2)), ends
+
+
+def tipped(seed):
+    mesh, ends = crack(seed)
+    nodes = with_tip_nodes(mesh, [Polyline(ends)])
+    return mesh, ends, nodes, cut_mesh(nodes.mesh, nodes.cuts)
+
+
+def held(phantom, field):
+    supports = Supports.none(phantom)
+    return supports.prescribe(phantom, boundary_nodes(phantom.mesh), field)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_both_ends_become_nodes_and_no_part_is_small(seed):
+    mesh, ends, nodes, _ = tipped(seed)
+    longest = mesh.longest_edges(np.arange(len(mesh.cells))).max()
+    assert len(nodes.moved) == 2
+    for end in ends:
+        place = min(nodes.cuts[0].ends, key=lambda one: np.linalg.norm(one - end))
+        assert (nodes.mesh.points == place).all(axis=1).sum() == 1
+        off = place - end
+        # to the nearest edge and along it, at worst; ahead four times as far costs as much
+        limit = np.hypot(LEAST, LEAST) * longest
+        ahead = off @ (end - ends.mean(axis=0)) >= 0.0
+        assert np.linalg.norm(off) <= (4.0 if ahead else 1.0) * limit
+    assert nodes.mesh.measures.sum() == pytest.approx(mesh.measures.sum(), rel=1e-13)
+    assert nodes.mesh.measures.min() >= 0.999 * LEAST * mesh.measures.min()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_jump_is_zero_at_the_end_and_linear_up_to_it(seed):
+    """Behind its end the cut goes through one triangle, whose corner at the end is one unknown."""
+    _, _, nodes, phantom = tipped(seed)
+    split = np.flatnonzero(phantom.fraction < 1.0)
+    for place in nodes.cuts[0].ends:
+        tip = int(np.flatnonzero((nodes.mesh.points == place).all(axis=1))[0])
+        one, other = split[(nodes.mesh.cells[phantom.parent[split]] == tip).any(axis=1)]
+        assert phantom.parent[one] == phantom.parent[other]
+        joined = phantom.cells[one] == phantom.cells[other]
+        assert joined.tolist() == (nodes.mesh.cells[phantom.parent[one]] == tip).tolist()
+        assert (phantom.node_parent == tip).sum() == 1
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_free_body_has_its_rigid_motions_only_and_nothing_hangs(seed):
+    _, _, _, phantom = tipped(seed)
+    zero, gap = zero_modes(phantom)
+    assert zero == 3
+    assert gap > 1e-6
+    divided = subdivide(phantom)
+    torn = facet_measures(divided.cut_facets).sum()
+    assert exterior(divided) == pytest.approx(4.0 + 2.0 * torn, abs=1e-9)
+
+
+def straight(nodes, ends):
+    """Whether the cut is not bent at its ends: both nodes are on its line."""
+    return np.abs(Polyline(ends).level_set(nodes.cuts[0].ends)).max() < 1e-12
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_pull_along_the_crack_is_linear_to_round_off(seed):
+    """Uniaxial stress along the crack leaves its faces free and closed: no jump, a linear field."""
+    _, ends, nodes, phantom = tipped(seed)
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    across = np.array([-along[1], along[0]])
+    share = SOFT.lam / (SOFT.lam + 2.0 * SOFT.mu)
+    strain = np.outer(along, along) - share * np.outer(across, across)
+    if not straight(nodes, ends):  # the last facet is not along the pull; the field still is
+        strain = np.array([[0.0, -1.0], [1.0, 0.0]])
+    solution = solve_static(phantom, SOFT, held(phantom, lambda x, _sides=None: x @ strain.T))
+    assert solution.displacement == pytest.approx(phantom.node_points @ strain.T, abs=1e-11)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_opens_further_stores_less(seed):
+    """The space contains that of the rule "inside": the same held outline has less energy."""
+    mesh, ends, nodes, phantom = tipped(seed)
+    turn = ends[1] - ends[0]
+    pull = np.outer([-turn[1], turn[0]], [-turn[1], turn[0]])
+
+    def energy(body):
+        return solve_static(body, SOFT, held(body, lambda x, _sides=None: x @ pull)).strain_energy
+
+    if straight(nodes, ends):
+        assert energy(phantom) < energy(cut_mesh(mesh, [Polyline(ends)]))
+
+
+def test_some_of_these_cracks_are_straight_and_some_are_not():
+    """About half of all ends are nearer to a place beside the line than to one on it."""
+    found = [straight(nodes, ends) for _, ends, nodes, _ in map(tipped, SEEDS)]
+    assert 4 < sum(found) < len(found) - 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_turned_frame_changes_nothing(seed):
+    mesh, ends, _, phantom = tipped(seed)
+    turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    nodes = with_tip_nodes(SimplexMesh(mesh.points @ turn.T, mesh.cells), [Polyline(ends @ turn.T)])
+    turned = cut_mesh(nodes.mesh, nodes.cuts)
+    assert np.array_equal(turned.cells, phantom.cells)
+    field = np.random.default_rng(seed).normal(size=(2, 2))
+
+    def energy(body, back):
+        def pulled(points, _sides=None):
+            return points @ back @ field @ back.T
+
+        return solve_static(body, SOFT, held(body, pulled)).strain_energy
+
+    assert energy(turned, turn) == pytest.approx(energy(phantom, np.eye(2)), rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_scaled_conditioning_is_at_most_twice_that_without_the_nodes(seed):
+    """Parts are at least 0.15 of an element, and the scaled matrix does not see their size."""
+
+    def condition(phantom):
+        values = np.linalg.eigvalsh(scaled_dense_stiffness(phantom))
+        return values[-1] / values[3]
+
+    mesh, ends, _, phantom = tipped(seed)
+    assert condition(phantom) < 2.0 * condition(cut_mesh(mesh, [Polyline(ends)]))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_mass_is_kept_and_the_critical_step_falls_with_the_height_of_the_parts_at_most(seed):
+    mesh, ends, _, phantom = tipped(seed)
+    mass, before = (side_wise_mass(one, 2.0) for one in (phantom, cut_mesh(mesh, [Polyline(ends)])))
+    assert mass.weights.sum() == pytest.approx(2.0, rel=1e-12)
+    assert mass.weights @ phantom.node_points == pytest.approx([1.0, 1.0], rel=1e-2)
+    steps = [
+        critical_step(sparse_stiffness(body), inertia)
+        for body, inertia in ((phantom, mass), (cut_mesh(mesh, [Polyline(ends)]), before))
+    ]
+    assert LEAST * steps[1] < steps[0] <= 1.001 * steps[1]
+
+
+def test_ends_at_nodes_on_edges_and_outside_need_no_division_of_elements():
+    mesh = rectangle_mesh((4, 4))
+    nodes = with_tip_nodes(mesh, [Polyline([[-1.0, 0.5], [0.75, 0.5]])])
+    assert np.array_equal(nodes.mesh.points, mesh.points)
+    assert nodes.moved.max() < 1e-12
+    nodes = with_tip_nodes(mesh, [Polyline([[-1.0, 0.45], [0.66, 0.45]])])
+    assert len(nodes.mesh.points) == len(mesh.points) + 1
+    through = [Polyline([[0.0, 0.4], [1.0, 0.6]])]  # from outline to outline
+    assert len(with_tip_nodes(mesh, through).moved) == 0
+    assert len(with_tip_nodes(mesh, []).moved) == 0
+
+
+def test_an_end_on_an_edge_becomes_a_node_of_both_neighbours():
+    mesh = rectangle_mesh((4, 4))
+    nodes = with_tip_nodes(mesh, [Polyline([[-1.0, 0.35], [0.5, 0.35]])])
+    assert nodes.moved == pytest.approx([0.0], abs=1e-12)
+    assert len(nodes.mesh.cells) == len(mesh.cells) + 2
+    assert nodes.mesh.points[-1] == pytest.approx([0.5, 0.35])
+
+
+def test_a_branch_keeps_its_end_on_the_cut_from_which_it_leaves():
+    mesh = rectangle_mesh((8, 8))
+    stem, branch = Polyline([[0.2, 0.53], [0.83, 0.53]]), Polyline([[0.51, 0.53], [0.51, 0.83]])
+    nodes = with_tip_nodes(mesh, [stem, branch])
+    assert len(nodes.moved) == 3
+    assert (np.linalg.norm(nodes.cuts[1].ends - [0.51, 0.83], axis=1) < 0.1).all()
+    asked, given = cut_mesh(nodes.mesh, nodes.cuts), cut_mesh(mesh, [stem, branch])
+    assert len(np.unique(asked.bodies)) == len(np.unique(given.bodies)) == 1
+    assert zero_modes(asked)[0] == 3
+
+
+def test_an_arc_ends_at_nodes_too():
+    turn = np.linspace(0.3, 2.2, 60)
+    arc = Polyline(0.5 + 0.31 * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    nodes = with_tip_nodes(shaken(rectangle_mesh((10, 10)), 3), [arc])
+    assert len(nodes.moved) == 2
+    assert zero_modes(cut_mesh(nodes.mesh, nodes.cuts))[0] == 3
+
+
+def test_solids_are_refused_by_library_and_solver():
+    with pytest.raises(XfemError, match="tetrahedra"):
+        with_tip_nodes(box_mesh((1, 1, 1)), [])
+    with pytest.raises(UnsupportedSceneError, match="partial"):
+        find_solver("xfem").solve(load_scene("curved/penny"), 0, 1, tip="partial")

@@ -1,0 +1,266 @@
+"""Ends of cuts inside elements of the plane: each becomes a node of the mesh.
+
+Left to the rule of the thesis an element in which a cut ends stays whole, and the cut is as much
+shorter. Here the element is divided into three at the end of the cut, or into two together with
+its neighbour if the end is near an edge; if it is near a node, the cut ends there. Behind its end
+the cut goes through one of these parts and stops at their common node. So the jump falls linearly
+from the nodes of the edge by which the cut comes in to zero at its end: the partially cut element
+of Rabczuk, Zi, Gerstenberger & Wall (Int. J. Numer. Meth. Engng 75, 2008), whose end is a node.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verify.xfem.crossing import AT_END, REACH, level_and_depth
+from verify.xfem.errors import XfemError
+from verify.xfem.flat_cuts import Cut
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.pieces import nodal_values
+
+__all__ = ["EndingCut", "TipNodes", "with_tip_nodes"]
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+
+_LEAST = 0.15  # share in an element or an edge that each part of it has at least
+# Linear elements act as if a cut ended 0.4 elements behind the node at its end (the study of
+# ends of cuts): a place ahead of the end costs less than one as far behind it.
+_BEHIND = 4.0
+_HALVINGS = 52
+_ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class EndingCut:
+    """A cut that ends exactly at some nodes.
+
+    Attributes
+    ----------
+    cut : Cut
+        As asked for.
+    ends : (k, space) float array
+        The nodes, in metres. Level set and depth are zero there.
+    """
+
+    cut: Cut
+    ends: _Floats
+
+    def level_set(self, points: _Floats) -> _Floats:
+        """Level set of the cut, zero at the ends."""
+        return np.where(self._at_end(points), 0.0, self.cut.level_set(points))
+
+    def depth(self, points: _Floats) -> _Floats:
+        """Depth of the cut, zero at the ends."""
+        return np.where(self._at_end(points), 0.0, self.cut.depth(points))
+
+    def _at_end(self, points: _Floats) -> _Bools:
+        found = np.zeros(len(points), dtype=bool)
+        for end in self.ends:
+            found |= (points == end).all(axis=1)
+        return found
+
+
+class TipNodes(NamedTuple):
+    """A mesh with nodes at the ends of cuts.
+
+    Attributes
+    ----------
+    mesh : SimplexMesh
+        Nodes keep their numbers, new ones follow. The first part of a divided cell keeps its
+        number, the others follow.
+    cuts : list of Cut
+        The cuts as they end at nodes of `mesh`, to be applied by the tip rule "inside".
+    moved : (k,) float array
+        Distance of each of these ends from where it was asked for, in metres.
+    """
+
+    mesh: SimplexMesh
+    cuts: list[Cut]
+    moved: _Floats
+
+
+class _Chord(NamedTuple):
+    """Way of a cut through the element in which it ends.
+
+    Attributes
+    ----------
+    cell : int
+    entry, end, exit : (3,) float array
+        Barycentric coordinates of where it comes in, ends, and would go out.
+    """
+
+    cell: int
+    entry: _Floats
+    end: _Floats
+    exit: _Floats
+
+
+def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
+    """Make the ends of cuts inside elements nodes of the mesh.
+
+    The node is at the end if that leaves each part at least 0.15 of its element, else at a place
+    beside it that does, and rather ahead of the end than behind it. Ends on other cuts, and those
+    for which only the outline of the body has a place, stay as they are.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+        Triangles.
+    cuts : sequence of Cut
+
+    Raises
+    ------
+    XfemError
+        If the mesh is of a solid, or a cut bad.
+    """
+    if mesh.dim != 2:
+        raise XfemError("nodes at the ends of cuts in a mesh of tetrahedra; expected triangles")
+    values = nodal_values(mesh, cuts)[0]
+    met = [_met(mesh, cut, values[:, k]) for k, cut in enumerate(cuts)]
+    times_met = np.zeros(len(mesh.cells), dtype=int)
+    for cells, _ in met:
+        times_met += cells
+    division = _Division(mesh, times_met > 1)
+    ending: list[Cut] = []
+    for cut, (_, chords) in zip(cuts, met, strict=True):
+        places = [place for chord in chords if (place := division.end_at(chord)) is not None]
+        ending.append(EndingCut(cut, np.array(places)) if places else cut)
+    return TipNodes(division.mesh(), ending, np.array(division.moved))
+
+
+def _met(mesh: SimplexMesh, cut: Cut, values: _Floats) -> tuple[_Bools, list[_Chord]]:
+    """Which cells (m,) a cut with nodal values (n,) meets, and its way through those it ends in."""
+    plus = values[mesh.cells] >= 0.0
+    cells = np.flatnonzero(plus.any(axis=1) & ~plus.all(axis=1))
+    plus, rows = plus[cells], np.arange(len(cells))
+    lone = (plus == (plus.sum(axis=1) == 1)[:, None]).argmax(axis=1)
+    corners, size = mesh.points[mesh.cells[cells]], mesh.longest_edges(cells)
+    ways, inside = np.zeros((2, len(cells), 3)), np.zeros((2, len(cells)), dtype=bool)
+    for turn, at in enumerate(ways):
+        other = (lone + turn + 1) % 3
+        here, there = (values[mesh.cells[cells, k]] for k in (lone, other))
+        at[rows, lone], at[rows, other] = there / (there - here), here / (here - there)
+        level, depth = level_and_depth(cut, np.einsum("qi,qid->qd", at, corners))
+        inside[turn] = (depth >= -AT_END * size) & (np.abs(level) <= REACH * size)
+    meets = np.zeros(len(mesh.cells), dtype=bool)
+    meets[cells] = inside.any(axis=0)
+    ending = inside[0] != inside[1]
+    first = np.where(inside[0, ending], 0, 1)
+    some = np.flatnonzero(ending)
+    if len(some) == 0:
+        return meets, []
+    low, out = ways[first, some], ways[1 - first, some]
+    entry, high = low, out
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        depth = level_and_depth(cut, np.einsum("qi,qid->qd", middle, corners[some]))[1]
+        within = (depth >= 0.0)[:, None]
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    return meets, [
+        _Chord(*each) for each in zip(cells[some].tolist(), entry, low, out, strict=True)
+    ]
+
+
+class _Division:
+    """A mesh some of whose cells are divided, each once.
+
+    Parameters
+    ----------
+    mesh : SimplexMesh
+    taken : (m,) bool array
+        Cells that are not to be divided, nor are ends to be at their nodes.
+    """
+
+    def __init__(self, mesh: SimplexMesh, taken: _Bools) -> None:
+        self._mesh, self._taken = mesh, taken
+        self._points, self._cells = list(mesh.points), mesh.cells.copy()
+        self._more: list[_Ints] = []
+        self.moved: list[float] = []
+        self._inner = np.ones(len(mesh.points), dtype=bool)
+        for cell, opposite in mesh.boundary_facets:
+            self._inner[np.delete(mesh.cells[cell], opposite)] = False
+
+    def mesh(self) -> SimplexMesh:
+        """Return the mesh with the cells divided so far."""
+        return SimplexMesh(self._points, np.concatenate([self._cells, *self._more]))
+
+    def end_at(self, chord: _Chord) -> _Floats | None:
+        """Divide cells where a cut ends; the place of its end, if there is a good one."""
+        corners = self._mesh.points[self._mesh.cells[chord.cell]]
+        ahead = (chord.exit - chord.entry) @ corners
+        best, least = None, np.inf
+        for at in _places(chord, corners):
+            cells = self._around(chord.cell, at)
+            if cells is None or self._taken[cells].any():
+                continue
+            if at[at > 0.0].min() < (1.0 - _ROUND_OFF) * _LEAST:
+                continue
+            off = (at - chord.end) @ corners
+            cost = np.linalg.norm(off) * (_BEHIND if off @ ahead < 0.0 else 1.0)
+            if cost < least:
+                best, least = (at, cells), cost
+        if best is None:
+            return None
+        at, cells = best
+        self._taken[cells] = True
+        self.moved.append(float(np.linalg.norm((at - chord.end) @ corners)))
+        if (at > 0.0).sum() == 1:
+            return np.asarray(corners[at.argmax()])
+        nodes = self._mesh.cells[chord.cell]
+        replaced, number = nodes[at > 0.0], len(self._points)
+        self._points.append(at @ corners)
+        for cell in cells:
+            parts = [
+                np.where(self._cells[cell] == node, number, self._cells[cell])
+                for node in np.intersect1d(self._cells[cell], replaced)
+            ]
+            self._cells[cell] = parts[0]
+            self._more.append(np.array(parts[1:]))
+        return np.asarray(self._points[number])
+
+    def _around(self, cell: int, at: _Floats) -> list[int] | None:
+        """Cells around a place in a cell; None on the outline of the body."""
+        mesh = self._mesh
+        match int((at > 0.0).sum()):
+            case 1:
+                node = mesh.cells[cell, at.argmax()]
+                starts, cells = mesh.node_cells
+                return (
+                    cells[starts[node] : starts[node + 1]].tolist() if self._inner[node] else None
+                )
+            case 2:
+                across = int(mesh.neighbours[cell, at.argmin()])
+                return [cell, across] if across >= 0 else None
+        return [cell]
+
+
+def _places(chord: _Chord, corners: _Floats) -> Iterator[_Floats]:
+    """Barycentric coordinates of places in an element at which a cut may end."""
+    way = chord.exit - chord.entry
+    # of the way through the element, where all parts are large enough
+    low, high = 0.0, 1.0
+    for start, slope in zip(chord.entry, way, strict=True):
+        if slope > 0.0:
+            low = max(low, (_LEAST - start) / slope)
+        elif slope < 0.0:
+            high = min(high, (_LEAST - start) / slope)
+        elif start < _LEAST:
+            high = -1.0
+    if low <= high:
+        share = (chord.end - chord.entry) @ way / (way @ way)
+        yield chord.entry + np.clip(share, low, high) * way
+    yield chord.entry
+    yield chord.exit
+    yield from np.eye(3)
+    end = chord.end @ corners
+    for k in range(3):
+        a, b = (corners[(k + turn) % 3] for turn in (1, 2))
+        share = np.clip((end - a) @ (b - a) / ((b - a) @ (b - a)), _LEAST, 1.0 - _LEAST)
+        foot = np.zeros(3)
+        foot[(k + 1) % 3], foot[(k + 2) % 3] = 1.0 - share, share
+        yield foot
