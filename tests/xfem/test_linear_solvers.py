@@ -7,8 +7,10 @@ import pytest
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
+from verify.accelerated import direct_by_size
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.accelerated.direct_by_size import DirectBySize
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.errors import NotConvergedError, SingularStiffnessError
 from verify.xfem.linear_solvers import BlockJacobiCG, SparseLU
@@ -58,6 +60,29 @@ def test_solutions_equal_those_of_superlu(method, name, block):
     assert np.abs(solver.solve(load) - want).max() < tolerance * np.abs(want).max()
 
 
+@pytest.mark.parametrize(("cells", "ours"), [((9, 7), [8]), ((70, 70), [0])])
+def test_few_factorisations_of_a_small_matrix_wait_for_no_loops_of_ours(cells, ours, monkeypatch):
+    """A new `Cholesky` before the ninth one of a small matrix, and at once of a large one."""
+    made = []
+
+    def noted(*problem):
+        made.append(done)
+        return Cholesky(*problem)
+
+    monkeypatch.setattr(direct_by_size, "Cholesky", noted)
+    mesh, done = rectangle_mesh(cells), 0
+    pattern, blocks, load = random_system(mesh.cells, len(mesh.points), 2)
+    want = Cholesky(pattern, 2)
+    solver = DirectBySize(pattern, 2)
+    for done in range(10):
+        scaled = (1.0 + done) * blocks
+        want.factorize(scaled)
+        solver.factorize(scaled)
+        expected = want.solve(load)
+        assert np.abs(solver.solve(load) - expected).max() < 1e-11 * np.abs(expected).max()
+    assert made == ours
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_irregular_and_disconnected_graphs_are_factorised(seed):
     rng = np.random.default_rng(seed)
@@ -93,7 +118,7 @@ def test_an_indefinite_matrix_is_refused_by_the_node_where_it_shows():
     mesh = MESHES["plate"]
     pattern, blocks, _ = random_system(mesh.cells, len(mesh.points), 2)
     blocks[pattern.diagonal[17]] *= -1.0
-    for method in (Cholesky, ConjugateGradients, LU, BlockJacobiCG):
+    for method in (Cholesky, ConjugateGradients, DirectBySize, LU, BlockJacobiCG):
         solver = method(pattern, 2)
         with pytest.raises(SingularStiffnessError, match="not positive definite"):
             solver.factorize(blocks)

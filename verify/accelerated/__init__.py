@@ -1,7 +1,7 @@
 """Operations of `verify.xfem` at the speed of the machine, equal to the plain ones to round-off."""
 
-from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
+from verify.accelerated.direct_by_size import DirectBySize
 from verify.accelerated.nearly_symmetric import NearlySymmetric
 from verify.accelerated.one_pass import OnePassTetrahedra
 from verify.accelerated.solver_by_cost import SolverByCost
@@ -9,4 +9,4 @@ from verify.xfem.kernels import Kernels
 
 __all__ = ["FAST"]
 
-FAST = Kernels(Cholesky, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra)
+FAST = Kernels(DirectBySize, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra)

@@ -78,9 +78,12 @@ def _eliminate_band(panel, begin, end, diagonal):
 
 
 @njit(cache=True)
-def _subtract_product(panel, begin, end, first, into, room):
-    """Take from `into` the product of columns `begin` to `end` of a panel, rows from `first` on."""
-    depth, rows, columns = end - begin, panel.shape[1] - first, len(into)
+def _subtract_product(panel, begin, end, first, into, at, room):
+    """Take the product of columns `begin` to `end` of a panel, rows from `first` on.
+
+    It is taken from the rows and columns of `into` from `at` on.
+    """
+    depth, rows, columns = end - begin, panel.shape[1] - first, len(into) - at
     numbers = room[: depth * rows].reshape(depth, rows)
     for k in range(depth):
         for i in range(rows):
@@ -95,7 +98,7 @@ def _subtract_product(panel, begin, end, first, into, room):
     product = room[used : used + columns * rows].reshape(columns, rows)
     np.dot(left.T, numbers, product)
     for j in range(columns):
-        own, taken = into[j], product[j]
+        own, taken = into[at + j, at:], product[j]
         for i in range(j, rows):
             own[i] -= taken[i]
 
@@ -110,7 +113,7 @@ def _eliminate(panel, diagonal, room):
         if failed >= 0:
             return failed
         if end < width:
-            _subtract_product(panel, begin, end, end, panel[end:, end:], room)
+            _subtract_product(panel, begin, end, end, panel, end, room)
     return -1
 
 
@@ -139,6 +142,7 @@ def factorise_fronts(
     """
     size = blocks.shape[1]
     waiting_front, waiting = np.empty(len(parent), dtype=np.int64), 0
+    none = np.int64(0)  # as a constant it would have the product compiled once more
     tops = np.zeros(2, dtype=np.int64)
     for s in range(len(parent)):
         columns = bounds[s + 1] - bounds[s]
@@ -166,7 +170,7 @@ def factorise_fronts(
         if failed >= 0:
             return bounds[s] * size + failed
         if below > 0:
-            _subtract_product(panel, 0, width, width, update, room)
+            _subtract_product(panel, none, width, width, update, none, room)
             tops[mine] = end
             waiting_front[waiting] = s
             waiting += 1

@@ -113,7 +113,7 @@ def _invert_blocks_3(blocks, diagonal, out):
 @njit(cache=True)
 def conjugate_gradients(
     starts, columns, diagonal, blocks, upper_starts, upper_columns, upper, inverse, load, x,
-    is_zero, work, tolerance, limit,
+    is_zero, work, flat, tolerance, limit,
 ):  # fmt: skip
     """Improve x (N, d) in place until ‖b − Kx‖ ≤ tolerance·‖b‖, in the 2-norm.
 
@@ -136,6 +136,8 @@ def conjugate_gradients(
     is_zero : bool
         Whether x is, so that the first residual is the load.
     work : (8, N, d) float array
+    flat : (8, N·d) float array
+        The same memory.
 
     Returns
     -------
@@ -145,16 +147,17 @@ def conjugate_gradients(
     """
     r, z, p, t, q, u, g = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
     y = work[7]  # the solution
-    flat_y, flat_z, flat_r = y.reshape(-1), z.reshape(-1), r.reshape(-1)
-    flat_p, flat_t, flat_q = p.reshape(-1), t.reshape(-1), q.reshape(-1)
-    flat_u, flat_g = u.reshape(-1), g.reshape(-1)
+    flat_r, flat_z, flat_p, flat_t = flat[0], flat[1], flat[2], flat[3]
+    flat_q, flat_u, flat_g, flat_y = flat[4], flat[5], flat[6], flat[7]
     size = 0.0
     for row in range(load.shape[0]):
         for k in range(load.shape[1]):
             y[row, k] = x[row, k]
             size += load[row, k] * load[row, k]
     if size == 0.0:
-        x[:] = 0.0
+        for row in range(load.shape[0]):
+            for k in range(load.shape[1]):
+                x[row, k] = 0.0
         return 0, 0.0
     if is_zero:
         flat_z[:] = 0.0

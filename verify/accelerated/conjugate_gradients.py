@@ -86,7 +86,7 @@ class ConjugateGradients(LinearSolver):
         iterations, residual = conjugate_gradients(
             pattern.starts, pattern.columns, pattern.diagonal, self._blocks, self._rows,
             self._columns, self._upper, self._inverse, load, x, not x.any(), self._work,
-            self.tolerance, self.limit,
+            self._work.reshape(len(self._work), -1), self.tolerance, self.limit,
         )  # fmt: skip
         if iterations < 0:
             raise SingularStiffnessError(None)

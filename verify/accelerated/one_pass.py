@@ -176,7 +176,8 @@ def _linearise(
     force, blocks,
 ):  # fmt: skip
     """Write force and tangent of a displacement; return the cells without rotational part."""
-    left_out = row = begun = 0
+    left_out = 0
+    row = begun = np.int64(0)  # constants would have what takes them compiled once more
     d = np.empty((3, 3))
     force[:] = 0.0
     for batch in range(len(constants)):
@@ -211,9 +212,9 @@ def _linearise(
                     for entry in range(FORCE, FORCE + 12):
                         v[entry * BATCH + l] = 0.0
                 irregular[start + l] |= v[IRREGULAR * BATCH + l] > 0.0
-        last = np.uint32(0)
+        last = row
         for l in range(BATCH):
-            last = max(last, nodes[start + l, 2])
+            last = max(last, np.int64(nodes[start + l, 2]))
         begun = _begin(begun, last, starts, diagonal, blocks)
         for l in range(BATCH):
             for corner in range(4):

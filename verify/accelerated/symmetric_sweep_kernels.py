@@ -26,13 +26,9 @@ def take_upper(starts, diagonal, blocks, upper):
     size, count = blocks.shape[1], 0
     for row in range(len(diagonal)):
         for at in range(diagonal[row] + 1, starts[row + 1]):
-            if size == 3:
-                for k in range(3):
-                    upper[count, k, 0] = blocks[at, k, 0]
-                    upper[count, k, 1] = blocks[at, k, 1]
-                    upper[count, k, 2] = blocks[at, k, 2]
-            else:
-                upper[count] = blocks[at]
+            for k in range(size):
+                for l in range(size):
+                    upper[count, k, l] = blocks[at, k, l]
             count += 1
 
 

@@ -223,9 +223,10 @@ def holding_cells(points, lower, upper, cells, corners, normals, centres, tolera
     n, d = points.shape
     found, nowhere = np.empty(n, dtype=np.int64), np.zeros(d)
     no_wish, no_sides = np.zeros(0, dtype=np.int8), np.zeros((len(corners), 0), dtype=np.int8)
+    sided = np.bool_(False)  # as a constant it would have the search compiled once more
     for i in range(n):
         found[i] = _containing(
-            points[i], nowhere, False, no_wish, lower, upper, cells, corners, normals, centres,
+            points[i], nowhere, sided, no_wish, lower, upper, cells, corners, normals, centres,
             no_sides, tolerance,
         )  # fmt: skip
     return found

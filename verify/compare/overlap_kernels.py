@@ -172,64 +172,68 @@ def nearest_before(points, lower, upper, cells, facets, normals):
 @njit(cache=True)
 def _measure(simplex):
     """Area or volume of a simplex, whatever its orientation."""
-    e = simplex[1:] - simplex[0]
-    if e.shape[0] == 2:
-        return 0.5 * abs(e[0, 0] * e[1, 1] - e[0, 1] * e[1, 0])
+    if len(simplex) == 3:
+        ex, ey = simplex[1, 0] - simplex[0, 0], simplex[1, 1] - simplex[0, 1]
+        fx, fy = simplex[2, 0] - simplex[0, 0], simplex[2, 1] - simplex[0, 1]
+        return 0.5 * abs(ex * fy - ey * fx)
     det = 0.0
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
-        det += e[0, a] * (e[1, b] * e[2, c] - e[1, c] * e[2, b])
+        fb, fc = simplex[2, b] - simplex[0, b], simplex[2, c] - simplex[0, c]
+        gb, gc = simplex[3, b] - simplex[0, b], simplex[3, c] - simplex[0, c]
+        det += (simplex[1, a] - simplex[0, a]) * (fb * gc - fc * gb)
     return abs(det) / 6.0
 
 
 @njit(cache=True)
-def _kept(simplex, depth, parts, count):
+def _write_corner(simplex, depth, i, j, corner):
+    """Write where the edge from corner i, inside, to corner j is met, or corner i if j is i."""
+    share = 0.0 if i == j else depth[i] / (depth[i] - depth[j])
+    for a in range(len(corner)):
+        corner[a] = simplex[i, a] + share * (simplex[j, a] - simplex[i, a])
+
+
+@njit(cache=True)
+def _kept(simplex, depth, order, parts, count):
     """Append to `parts` the part of a simplex where a linear function is positive.
 
-    `depth` (d + 1,) are its values at the corners. The part with k positive corners is a simplex
-    (k = 1), a simplex less one (k = d), or in space a wedge (k = 2).
+    `depth` (d + 1,) are its values at the corners, `order` (d + 1,) is room for the corners, those
+    inside first. The part with k positive corners is a simplex (k = 1), a simplex less one
+    (k = d), or in space a wedge (k = 2): as many corners as a simplex has, of the corners inside
+    and the points met, in a fan, the staircase triangulation of the product of two simplices.
     """
-    size = depth.shape[0]
-    order = np.argsort(-depth)
-    positive = 0
+    size = len(depth)
+    positive, outside = 0, size
     for i in range(size):
-        positive += depth[i] > 0.0
+        if depth[i] > 0.0:
+            order[positive] = i
+            positive += 1
+        else:
+            outside -= 1
+            order[outside] = i
     if positive == 0:
         return count
-    if positive == size:
-        parts[count] = simplex
+    a = order[0]
+    if positive == size or positive == 1:
+        for k in range(size):
+            i = k if positive == size else a
+            _write_corner(simplex, depth, i, order[k] if positive == 1 else i, parts[count, k])
         return count + 1
-    inside, outside = order[:positive], order[positive:]
-    # cut[i, j]: where the edge from inside corner i to outside corner j is met
-    cut = np.empty((positive, size - positive, size - 1))
-    for i in range(positive):
-        for j in range(size - positive):
-            share = depth[inside[i]] / (depth[inside[i]] - depth[outside[j]])
-            cut[i, j] = simplex[inside[i]] + share * (simplex[outside[j]] - simplex[inside[i]])
-    # as many corners as a simplex has, of the corners inside and the cut points, in a fan: the
-    # staircase triangulation of the product of two simplices
-    if positive == 1:
-        parts[count, 0] = simplex[inside[0]]
-        for j in range(size - 1):
-            parts[count, j + 1] = cut[0, j]
-        return count + 1
-    if size - positive == 1:
+    if positive == size - 1:
+        out = order[positive]
         for first in range(positive):
             for k in range(first + 1):
-                parts[count, k] = cut[k, 0]
+                _write_corner(simplex, depth, order[k], out, parts[count, k])
             for k in range(first, positive):
-                parts[count, k + 1] = simplex[inside[k]]
+                _write_corner(simplex, depth, order[k], order[k], parts[count, k + 1])
             count += 1
         return count
-    a, b = simplex[inside[0]], simplex[inside[1]]
-    wedge = np.empty((6, 3))
-    wedge[0], wedge[1], wedge[2] = a, cut[0, 0], cut[0, 1]
-    wedge[3], wedge[4], wedge[5] = b, cut[1, 0], cut[1, 1]
+    b = order[1]
     for first in range(3):
         for k in range(first + 1):
-            parts[count, k] = wedge[3 + k]
+            _write_corner(simplex, depth, b, order[k + 1] if k > 0 else b, parts[count, k])
         for k in range(first, 3):
-            parts[count, k + 1] = wedge[k]
+            _write_corner(simplex, depth, a, order[k + 1] if k > 0 else a, parts[count, k + 1])
         count += 1
     return count
 
@@ -258,17 +262,21 @@ def _common(one, other, inward, tolerance):
     """
     size, d = one.shape
     parts, cut = np.empty((_MOST, size, d)), np.empty((_MOST, size, d))
-    parts[0], count = one, 1
-    depth = np.empty(size)
+    for i in range(size):
+        for a in range(d):
+            parts[0, i, a] = one[i, a]
+    none = np.int64(0)  # as a constant it would have `_kept` compiled once more
+    count = none + 1
+    depth, order = np.empty(size), np.empty(size, dtype=np.int64)
     for facet in range(size):
         on_it = other[(facet + 1) % size]
-        kept = 0
+        kept = none
         for p in range(count):
             for i in range(size):
                 depth[i] = -tolerance
                 for a in range(d):
                     depth[i] += inward[facet, a] * (parts[p, i, a] - on_it[a])
-            kept = _kept(parts[p], depth, cut, kept)
+            kept = _kept(parts[p], depth, order, cut, kept)
         parts, cut, count = cut, parts, kept
         if count == 0:
             return 0.0

@@ -132,7 +132,7 @@ def _corotational(
 def _said(solver: str, kernels: Kernels) -> str:
     """Say which linear solver has solved."""
     if kernels is FAST:
-        return {"direct": "own sparse Cholesky", "iterative": "own conjugate gradients"}[solver]
+        return {"direct": "factorisation", "iterative": "own conjugate gradients"}[solver]
     return {"direct": "SciPy SuperLU", "iterative": "SciPy conjugate gradients"}[solver]
 
 
