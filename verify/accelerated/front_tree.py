@@ -65,9 +65,10 @@ def levels(parent: _Ints, entries: _Ints) -> tuple[_Ints, tuple[int, int]]:
 def _merge(width, parent, below):
     """Front into which each front goes in the end (itself if it stays)."""
     count = len(parent)
-    group = np.arange(count)
+    group, zeros = np.empty(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
     columns = width.copy()
-    zeros = np.zeros(count, dtype=np.int64)
+    for front in range(count):
+        group[front] = front
     for front in range(count):
         above = parent[front]
         if above < 0:

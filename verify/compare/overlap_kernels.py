@@ -86,7 +86,10 @@ def first_exits(points, ways, lower, upper, cells, facets, normals):
                 facet = cells[k]
                 if facet < 0:
                     break
-                if np.dot(normals[facet], ways[i]) <= 0.0:
+                along = 0.0
+                for a in range(points.shape[1]):
+                    along += normals[facet, a] * ways[i, a]
+                if along <= 0.0:
                     continue
                 t = _crossing(points[i], ways[i], facets[facet])
                 if 0.0 <= t < distance[i]:

@@ -115,7 +115,9 @@ def _newton(F, q, R):
         q[1] = q1 + 0.5 * (q0 * x + q2 * z - q3 * y)
         q[2] = q2 + 0.5 * (q0 * y + q3 * x - q1 * z)
         q[3] = q3 + 0.5 * (q0 * z + q1 * y - q2 * x)
-        q /= np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+        length = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+        for k in range(4):
+            q[k] /= length
         if x * x + y * y + z * z <= _SMALL_ANGLE:
             return True
     return False
@@ -131,7 +133,10 @@ def largest_eigenvector(F, q):
         form[k + 1, k + 1] = F[k, k] - F[l, l] - F[m, m]
         form[0, k + 1] = form[k + 1, 0] = F[m, l] - F[l, m]
         form[l + 1, m + 1] = form[m + 1, l + 1] = F[l, m] + F[m, l]
-    vectors = np.eye(4)
+    vectors = np.empty((4, 4))
+    for i in range(4):
+        for k in range(4):
+            vectors[i, k] = 1.0 if i == k else 0.0
     for _ in range(_JACOBI_SWEEPS):
         for i in range(3):
             for j in range(i + 1, 4):
@@ -152,4 +157,8 @@ def largest_eigenvector(F, q):
     for i in range(1, 4):
         if form[i, i] > form[best, best]:
             best = i
-    q[:] = vectors[:, best] / np.linalg.norm(vectors[:, best])
+    square = 0.0
+    for k in range(4):
+        square += vectors[k, best] ** 2
+    for k in range(4):  # not as rows: numba would compile its words for a misfit
+        q[k] = vectors[k, best] / np.sqrt(square)
