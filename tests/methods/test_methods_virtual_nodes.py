@@ -89,5 +89,19 @@ def test_copies_that_resist_as_whole_cells_add_the_volume_of_the_cut_cells():
 
 
 def test_unknown_weights_are_named():
-    with pytest.raises(XfemError, match="'half'; expected share or whole"):
+    with pytest.raises(XfemError, match="weights of copies 'half'"):
         cut_by("virtual_node", TRIANGLE, [], weights="half")
+
+
+def test_raised_copies_weigh_a_thousandth_of_their_cell_at_least_and_the_body_stays():
+    mesh, cut = rectangle_mesh((6, 6)), Polyline([[-1.0, 0.5 + 1e-7], [2.0, 0.5 + 1e-7]])
+    body = cut_by("virtual_node_arbitrary", mesh, [cut], weights="raised")
+    plain = cut_by("virtual_node_arbitrary", mesh, [cut])
+    small = plain.phantom.fraction < 1e-3
+    assert small.any()
+    np.testing.assert_allclose(body.phantom.fraction[small], 1e-3, rtol=1e-12)
+    assert np.array_equal(body.phantom.fraction[~small], plain.phantom.fraction[~small])
+    assert body.resisting is body.phantom
+    corners = body.conforming.points[body.conforming.cells]
+    areas = 0.5 * np.linalg.det(corners[:, 1:] - corners[:, :1])
+    assert areas.sum() == pytest.approx(1.0, rel=1e-12)

@@ -1,4 +1,4 @@
-"""Condition number and critical explicit step of a linear system.
+"""Condition number, critical explicit step and lowest frequency of a linear system.
 
 Slivers of ε = 1e-12 make the raw condition number 1e24: its smallest eigenvalue comes from the
 inverse of the matrix scaled by its diagonal, whose own condition number is small.
@@ -14,10 +14,14 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 from verify.errors import InputError
 from verify.system import System
 
-__all__ = ["CONDITION", "SCALED", "STEP", "condition_numbers", "critical_step"]
+__all__ = [
+    "CONDITION", "FREQUENCY", "SCALED", "STEP", "condition_numbers", "critical_step",
+    "lowest_frequency",
+]  # fmt: skip
 
 CONDITION, SCALED = "condition number", "condition number scaled by the diagonal"
 STEP = "critical explicit step"
+FREQUENCY = "lowest natural frequency"
 
 _TRUSTED = 1e13  # condition number up to which the smallest eigenvalue has two digits and more
 _LEAST_MASS = 1e-13  # eigenvalue of the scaled mass: below, its inverse has no three digits
@@ -84,6 +88,35 @@ def critical_step(system: System) -> float:
     if not largest > 0.0:
         raise InputError("nothing resists: no step is critical")
     return float(2.0 / np.sqrt(largest))
+
+
+def lowest_frequency(system: System) -> float:
+    """Lowest natural frequency ω/2π of the free unknowns, 1/s.
+
+    What a mass that is not the body's own shifts first.
+
+    Raises
+    ------
+    InputError
+        If there is no mass, an unknown without one, or a part that nothing holds.
+    """
+    if system.mass is None:
+        raise InputError("the scene states no density")
+    free = _unknowns(system)
+    stiffness, mass = (csc_array(m)[free][:, free] for m in (system.stiffness, system.mass))
+    if not (stiffness.diagonal() > 0.0).all():
+        raise InputError("an unknown without stiffness: the matrix is singular")
+    scale = diags_array(1.0 / np.sqrt(stiffness.diagonal()))
+    mass, stiffness = (csc_array(scale @ one @ scale) for one in (mass, stiffness))
+    try:
+        inverse = LinearOperator(stiffness.shape, splu(stiffness).solve)
+    except RuntimeError:
+        raise InputError("a part that nothing holds: its lowest frequency is 0") from None
+    start = np.random.default_rng(0).standard_normal(stiffness.shape[0])
+    # M x = μ K x: the largest μ belongs to the lowest frequency
+    common: dict[str, Any] = {"k": 1, "which": "LA", "return_eigenvectors": False, "v0": start}
+    largest = eigsh(mass, M=stiffness, Minv=inverse, tol=_LANCZOS, **common)[0]
+    return float(1.0 / (2.0 * np.pi * np.sqrt(largest)))
 
 
 def _largest_eigenvalue(stiffness: csc_array, mass: csc_array | None) -> float:

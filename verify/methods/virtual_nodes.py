@@ -10,8 +10,9 @@ side-wise unknowns (Hansbo & Hansbo 2004), and so is the first as long as every 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,14 @@ from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
+from verify.xfem.subdivision import subdivide
 
 __all__ = ["CopyWeights", "virtual_node", "virtual_node_arbitrary"]
 
-CopyWeights = Literal["share", "whole"]
+CopyWeights = Literal["share", "raised", "whole"]
+
+_LEAST_SHARE = 1e-3
+_MORE = {"share": "", "raised": f"{_LEAST_SHARE:g} of its cell", "whole": "its whole cell"}
 
 
 def virtual_node(
@@ -48,9 +53,10 @@ def virtual_node(
     cuts : sequence of Cut
     tip : {"inside", "through", "nearest"}
         See `verify.xfem.pieces.split_cells`.
-    weights : {"share", "whole"}
-        Copies resist by their share of the volume, or as whole cells: no sliver is left, but the
-        cut cells count several times.
+    weights : {"share", "raised", "whole"}
+        Copies resist by their share of the volume; by a thousandth at least, as MOOSE has it
+        (idaholab/moose#13824); or as whole cells: no sliver is left, but the cut cells count
+        several times.
     opened : callable, optional
         Without it all cells that the cuts go through are open.
     """
@@ -83,16 +89,25 @@ def virtual_node_arbitrary(
 def _body(
     mesh: SimplexMesh, phantom: PhantomMesh, weights: str, changes: list[Change], start: float
 ) -> CutBody:
-    if weights not in ("share", "whole"):
-        raise XfemError(f"weights of copies '{weights}'; expected share or whole")
+    if weights not in get_args(CopyWeights):
+        raise XfemError(
+            f"weights of copies '{weights}'; expected {' or '.join(get_args(CopyWeights))}"
+        )
     resisting = whole_cells(phantom) if weights == "whole" else phantom
+    weighed = phantom
+    if weights == "raised":  # in all integrals: masses too
+        raised = np.maximum(phantom.fraction, _LEAST_SHARE)
+        weighed = resisting = replace(phantom, fraction=raised)
     extra = float(resisting.volumes.sum() / phantom.volumes.sum() - 1.0)
     copies = int((resisting.fraction > phantom.fraction).sum())
     changes.append(
-        Change("copy that resists as a whole cell; material added", copies, extra, "fraction")
+        Change(f"copy that resists by {_MORE[weights]}; material added", copies, extra, "fraction")
     )
     seconds = {"cutting": perf_counter() - start}
-    return make_body(mesh, phantom, tuple(changes), resisting=resisting, seconds=seconds)
+    return make_body(
+        mesh, weighed, tuple(changes), resisting=resisting, conforming=subdivide(phantom),
+        seconds=seconds,
+    )  # fmt: skip
 
 
 def _parts_with_nodes(cut: PhantomMesh) -> NDArray[np.int64]:

@@ -16,6 +16,8 @@ _GRADES = {"good": "●", "fair": "◐", "poor": "○", "bad": "✕"}
 _NOTHING = Cell("–", grade="none")
 _STEP, _UNCUT = "critical explicit step", "critical explicit step, uncut"
 _SCALED = "condition number scaled by the diagonal"
+_FREQUENCY, _MEASURE = "lowest natural frequency", "conforming"
+_ERRORS = ("displacement_l2", "energy_norm")
 _DRAWN = ("condition number", _SCALED, _STEP)
 _LEAST = (0.9, 0.5, 0.1)  # of the step: what is good, fair and poor
 _MOST = (1e3, 1e4, 1e6)  # of the condition number
@@ -29,7 +31,8 @@ def sliver_families(record: Mapping[str, Any]) -> list[dict[str, Any]]:
         measured = listed(record["measurements"], family=family)
         growths = listed(record["growths"], family=family)
         curves = _curves(measured, growths, palette)
-        families.append({"name": family, "maps": _maps(measured), "curves": curves})
+        maps = [*_worst(measured), *_maps(measured)]
+        families.append({"name": family, "maps": maps, "curves": curves})
     return families
 
 
@@ -82,6 +85,44 @@ def _maps(measured: Records) -> list[tuple[Table, str]]:
             legend = zip(_GRADES.values(), [*ends, last], strict=True)
             maps.append((_map(title, found), "; ".join(f"{sign} {end}" for sign, end in legend)))
     return maps
+
+
+def _worst(measured: Records) -> list[tuple[Table, str]]:
+    """Return the table of what is worst of each solver over ε, beside the conforming mesh."""
+
+    def values(solver: str, quantity: str) -> dict[float, float]:
+        own = listed(measured, solver=solver, quantity=quantity)
+        return {m["size"]: m["value"] for m in own if m["value"] is not None}
+
+    def ratios(solver: str, quantity: str, others: Mapping[float, float]) -> list[float]:
+        own = values(solver, quantity)
+        return [own[e] / others[e] for e in own if others.get(e)]
+
+    rows = []
+    solvers = list(dict.fromkeys(m["solver"] for m in measured))
+    for solver in solvers if _MEASURE in solvers else ():
+        whole = values(solver, _UNCUT)
+        steps = [s / whole[e] for e, s in values(solver, _STEP).items() if whole.get(e)]
+        errors = [ratios(solver, name, values(_MEASURE, name)) for name in _ERRORS]
+        pitch = ratios(solver, _FREQUENCY, values(_MEASURE, _FREQUENCY))
+        scaled = list(values(solver, _SCALED).values())
+        off = max((ratio - 1.0 for ratio in pitch), key=abs, default=None)
+        rows.append([
+            solver_title(solver),
+            _written(min(steps, default=None)),
+            *(_written(max(one, default=None)) for one in errors),
+            Cell("–") if off is None else Cell(f"{off:+.2%}"),
+            _written(max(scaled, default=None)),
+        ])  # fmt: skip
+    heads = ["method", "least step over the uncut body's", "largest L² error over conforming",
+             "largest energy-norm error over conforming", "lowest frequency off conforming",
+             "largest scaled condition number"]  # fmt: skip
+    legend = "errors are of the static field; a mass leaves them as they are and moves frequencies"
+    return [(plain_table("Worst over ε", heads, rows, named=True), legend)] if rows else []
+
+
+def _written(value: float | None) -> Cell:
+    return _NOTHING if value is None else Cell(number(value, 3))
 
 
 def _map(title: str, found: Sequence[tuple[Mapping[str, Any], Cell]]) -> Table:

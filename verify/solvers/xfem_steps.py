@@ -17,6 +17,10 @@ from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.mass_stabilised import (
+    eigenvalue_stabilised_mass,
+    generalised_eigenvalue_stabilised_mass,
+)
 from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["MASSES", "SCHEMES", "integrator_of", "largest_step"]
@@ -33,6 +37,8 @@ SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
 MASSES: dict[str, Callable[[PhantomMesh, ArrayLike], Mass]] = {
     "sidewise": side_wise_mass,
     "consistent": consistent_mass,
+    "evs": eigenvalue_stabilised_mass,
+    "gevs": generalised_eigenvalue_stabilised_mass,
     "row_sum": lambda phantom, density: shifted_mass(phantom, density, "row sum"),
     "hrz": lambda phantom, density: shifted_mass(phantom, density, "weighted diagonal"),
     "thesis": lambda phantom, density: shifted_mass(phantom, density, "enrichment"),

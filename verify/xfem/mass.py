@@ -24,6 +24,7 @@ from verify.xfem.phantom import Aggregation, PhantomMesh
 __all__ = [
     "AggregatedMass",
     "Mass",
+    "assembled_mass",
     "cell_densities",
     "consistent_mass",
     "second_moments",
@@ -263,8 +264,12 @@ def consistent_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     """
     if phantom.aggregation is not None:
         return AggregatedMass.of(consistent_mass(phantom.corners, density), phantom.aggregation)
-    moments = second_moments(phantom)
-    moments *= cell_densities(phantom.mesh, density)[phantom.parent][:, None, None]
+    return assembled_mass(phantom, density, second_moments(phantom))
+
+
+def assembled_mass(phantom: PhantomMesh, density: ArrayLike, moments: _Floats) -> Mass:
+    """Mass whose share of each piece is its density times `moments` (p, d + 1, d + 1)."""
+    moments = moments * cell_densities(phantom.mesh, density)[phantom.parent][:, None, None]
     rows = np.broadcast_to(phantom.cells[:, :, None], moments.shape)
     columns = np.broadcast_to(phantom.cells[:, None, :], moments.shape)
     count = phantom.node_count

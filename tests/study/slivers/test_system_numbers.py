@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import eigh
 from scipy.sparse import csr_array, diags_array
 
-from verify.assess.system_numbers import condition_numbers, critical_step
+from verify.assess.system_numbers import condition_numbers, critical_step, lowest_frequency
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
@@ -32,6 +32,8 @@ def test_a_chain_of_springs_has_the_condition_and_step_of_the_closed_form(n):
     assert raw == pytest.approx(squares.max() / squares.min(), rel=1e-10)
     assert scaled < raw  # the free end has half of the diagonal
     assert critical_step(system) == pytest.approx(2.0 / np.sqrt(5.0 / 3.0 * squares.max()))
+    least = np.sqrt(5.0 / 3.0 * squares.min()) / (2.0 * np.pi)
+    assert lowest_frequency(system) == pytest.approx(least, rel=1e-7)
 
 
 @pytest.mark.parametrize("size", [1e-4, 1e-12])

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from verify.assess.system_numbers import CONDITION, SCALED, STEP
+from verify.assess.system_numbers import CONDITION, FREQUENCY, SCALED, STEP
 from verify.result import Verdict
 from verify.study.energy import account_findings
 from verify.study.finding import Finding
@@ -41,6 +41,8 @@ def findings(
                     others = _values(own, _OTHER, error)
                     yield from _far(topic, error, _values(own, solver, error), others)
             yield from _system(topic, own, solver, growths)
+            if solver != _OTHER:
+                yield from _frequency(topic, own, solver)
             mine = [m for m in own if m.solver == solver]
             yield from account_findings(topic, mine)
             yield from missing_solutions(topic, mine)
@@ -79,6 +81,15 @@ def _far(topic: str, error: str, values: Values, others: Values) -> Iterator[Fin
     text = f"{error} at ε = {worst:g} is {both[worst]:.3f} times that of the conforming mesh."
     verdict = Verdict.PASS if both[worst] <= _FAR_LIMIT else Verdict.FAIL
     yield Finding(topic, text, f"at most {_FAR_LIMIT:g}, for ε > {NEAR:g}", verdict)
+
+
+def _frequency(topic: str, own: Sequence[Measurement], solver: str) -> Iterator[Finding]:
+    values, others = (_values(own, name, FREQUENCY) for name in (solver, _OTHER))
+    both = {e: values[e] / others[e] - 1.0 for e in values if e in others}
+    if both:
+        worst = max(both, key=lambda e: abs(both[e]))
+        text = f"The {FREQUENCY} is {both[worst]:+.2%} off that of the conforming mesh at ε = "
+        yield Finding(topic, f"{text}{worst:g}, where it is most.", "shown", None)
 
 
 def _system(

@@ -9,10 +9,12 @@ import numpy as np
 
 from verify.assess.system_numbers import (
     CONDITION,
+    FREQUENCY,
     SCALED,
     STEP,
     condition_numbers,
     critical_step,
+    lowest_frequency,
 )
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
@@ -108,7 +110,7 @@ def _measured(variant: Variant, rows: list[dict[str, Any]]) -> list[Measurement]
 
 
 def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iterator[Row]:
-    """Measure condition and critical step, from the system or by running."""
+    """Measure condition, critical step and lowest frequency, from the system or by running."""
     if scene.analysis.kinematics != "linear" or scene.analysis.kind != "static":
         return
     system: Any = getattr(solver, "system", None)
@@ -128,11 +130,15 @@ def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iter
         yield SCALED, "", scaled, ""
     except InputError as problem:
         yield SCALED, "", None, str(problem)
-    for name, one in ((STEP, own), (f"{STEP}, uncut", whole)):
+    for name, unit, measure, one in (
+        (STEP, "s", critical_step, own),
+        (f"{STEP}, uncut", "s", critical_step, whole),
+        (FREQUENCY, "1/s", lowest_frequency, own),
+    ):
         try:
-            yield name, "s", critical_step(one), ""
+            yield name, unit, measure(one), ""
         except InputError as problem:
-            yield name, "s", None, str(problem)
+            yield name, unit, None, str(problem)
 
 
 def _by_running(solver: Solver, variant: Variant, scene: Scene, level: int) -> Row:

@@ -1,0 +1,74 @@
+"""Stabilised masses of others: mass of each part, modes of the uncut cell, explicit steps."""
+
+import numpy as np
+import pytest
+from cut_bodies import DENSITY, cut_body, cut_membrane
+from scipy.linalg import eigh
+
+from verify.assess.system_numbers import critical_step, lowest_frequency
+from verify.scene import load_scene
+from verify.solvers import find_solver
+from verify.xfem.mass import consistent_mass
+from verify.xfem.mass_stabilised import (
+    eigenvalue_stabilised_mass,
+    generalised_eigenvalue_stabilised_mass,
+)
+
+BODIES = [lambda: cut_body(2), lambda: cut_body(3), cut_membrane]
+XFEM = find_solver("xfem")
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_generalised_stabilisation_keeps_the_mass_of_every_part_and_raises_none_other(body):
+    v = body()
+    plain = consistent_mass(v, DENSITY).matrix
+    more = generalised_eigenvalue_stabilised_mass(v, DENSITY).matrix
+    np.testing.assert_allclose(
+        more.sum(axis=0), plain.sum(axis=0), atol=1e-12 * abs(plain.sum(axis=0)).max()
+    )
+    least = np.linalg.eigvalsh((more - plain).toarray())[0]
+    assert least > -1e-12 * abs(plain).max()
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_an_eigenvalue_stabilisation_adds_thousandths_of_the_mass_of_the_cut_cells(body):
+    """At most d modes of a part, each with ε_S m (1·φ)² ≤ 1e-3 (d + 1) of the part."""
+    v = body()
+    plain, more = consistent_mass(v, DENSITY), eigenvalue_stabilised_mass(v, DENSITY)
+    added, corners = (more.matrix - plain.matrix).sum(), v.cells.shape[1]
+    assert 0.0 <= added <= 1e-3 * corners * (corners - 1) * DENSITY * v.volumes[v.split].sum()
+
+
+def uncut_bound(scene):
+    """2/ω of K = c ∫|∇u|² against the mass of an uncut cell, where σ:ε ≤ c |∇u|² for any u."""
+    young, poisson = scene.material.young, scene.material.poisson
+    lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+    shear, side = young / (2 * (1 + poisson)), 1 / scene.mesh.cells[0][0]
+    energy = 0.5 * np.array([[2.0, -1.0, -1.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+    mass = scene.material.density * side**2 / 24 * (np.ones((3, 3)) + np.eye(3))
+    largest = eigh(energy, mass, eigvals_only=True)[-1]
+    return 2.0 / np.sqrt((2 * shear + 2 * lame) * largest)
+
+
+@pytest.mark.parametrize("epsilon", ["0.1", "0.0001", "1e-12"])
+@pytest.mark.parametrize("case", ["slivers/plane_edges", "slivers/plane_vertices"])
+def test_no_sliver_makes_the_step_with_a_generalised_stabilisation_less_than_a_cell_may(
+    case, epsilon
+):
+    scene = load_scene(f"{case}[epsilon={epsilon}]")
+    bound = uncut_bound(scene)
+    step = {m: critical_step(XFEM.system(scene, 0, mass=m)) for m in ("gevs", "consistent")}
+    assert step["gevs"] >= bound
+    assert step["consistent"] < bound
+
+
+@pytest.mark.parametrize("mass", ["evs", "gevs"])
+def test_a_stabilised_mass_moves_the_lowest_frequency_less_than_lumping(mass):
+    """By less than the lumped mass does, on the coarse mesh of the family, whatever the sliver."""
+    for epsilon in ("0.1", "1e-06"):
+        scene = load_scene(f"slivers/plane_edges[epsilon={epsilon}]")
+        own, plain, lumped = (
+            lowest_frequency(XFEM.system(scene, 0, mass=name))
+            for name in (mass, "consistent", "sidewise")
+        )
+        assert abs(own - plain) < abs(lumped - plain)

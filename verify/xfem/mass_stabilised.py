@@ -1,0 +1,88 @@
+"""Masses of others against slivers: eigenvalues of the consistent mass of a cut cell are raised.
+
+EVS (Eisenträger, Radtke, Garhuom, Löhnert, Düster, Juhre, Schillinger 2023, arXiv 2310.11935) adds
+a share of φφᵀ for each mode φ of a part's mass whose eigenvalue is nearly zero. GEVS (Bürchner,
+Radtke, Eisenträger, Düster, Rank, Kollmannsberger, Kopp 2025, arXiv 2509.07632) raises the mass in
+the modes of stiffness against mass until none is faster than the uncut cell. Both were proposed
+for finite cells of high order; here they act on the parts of linear cells, one component at a
+time, the gradient's energy in the place of the stiffness. For an isotropic material that bounds
+the step as the stiffness does, up to the same constant as in the uncut body.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+from verify.xfem.mass import Mass, assembled_mass, second_moments
+from verify.xfem.phantom import PhantomMesh
+
+__all__ = ["eigenvalue_stabilised_mass", "generalised_eigenvalue_stabilised_mass"]
+
+_NEARLY_ZERO = 1e-3  # ε_λ: of the largest eigenvalue of the part's mass
+_ADDED = 1e-3  # ε_S: likewise
+_Floats = NDArray[np.float64]
+
+
+def eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
+    """Consistent mass plus ε_S m φφᵀ for the modes of each part below ε_λ m (EVS).
+
+    ε_S = ε_λ = 1e-3, as the paper recommends; m is the largest eigenvalue of the part's own mass,
+    so that both are without units. At that of the uncut cell the nodes of slivers would have mass
+    that nothing holds, and the lowest frequency of the body would go to zero. Mass is added.
+
+    Raises
+    ------
+    XfemError
+        If cells are aggregated: there are no slivers left.
+    """
+    moments = _moments(phantom)
+    values, modes = np.linalg.eigh(moments)
+    largest = values[:, -1:]
+    weak = (values < _NEARLY_ZERO * largest) & phantom.split[:, None]
+    added = np.where(weak, _ADDED * largest, 0.0)
+    return assembled_mass(
+        phantom, density, moments + np.einsum("pik,pk,pjk->pij", modes, added, modes)
+    )
+
+
+def generalised_eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
+    """Consistent mass plus (λ/λ_max − 1) Mφ(Mφ)ᵀ for the modes of each part with λ > λ_max (GEVS).
+
+    Kφ = λMφ with φᵀMφ = 1 and K the energy of the gradient; λ_max is that of the uncut cell. The
+    mass of each part stays, because a constant is orthogonal to these modes.
+
+    Raises
+    ------
+    XfemError
+        If cells are aggregated: there are no slivers left.
+    """
+    moments, count = _moments(phantom), phantom.cells.shape[1]
+    corners = phantom.mesh.points[phantom.mesh.cells[phantom.parent]]
+    slopes = np.linalg.pinv(corners[:, 1:] - corners[:, :1])  # of N_1 …, by columns
+    slopes = np.concatenate([-slopes.sum(axis=2, keepdims=True), slopes], axis=2)
+    energy = np.einsum("pki,pkj->pij", slopes, slopes)
+    whole = (np.ones((count, count)) + np.eye(count)) / (count * (count + 1))
+    limit = _pencil(energy, np.broadcast_to(whole, energy.shape))[0][:, -1]
+    split = phantom.split
+    values, modes = _pencil(energy[split] * phantom.volumes[split, None, None], moments[split])
+    added = np.maximum(values / limit[split, None] - 1.0, 0.0)
+    moments[split] += np.einsum("pik,pk,pjk->pij", modes, added, modes)
+    return assembled_mass(phantom, density, moments)
+
+
+def _moments(phantom: PhantomMesh) -> _Floats:
+    if phantom.aggregation is not None:
+        raise XfemError("a stabilised mass of aggregated cells: they have no slivers left")
+    return second_moments(phantom)
+
+
+def _pencil(energy: _Floats, moments: _Floats) -> tuple[_Floats, _Floats]:
+    """Eigenvalues λ (p, k), ascending, and Mφ (p, i, k) of Kφ = λMφ.
+
+    Scaled to a unit diagonal, the moments of a sliver are as regular as those of a cell.
+    """
+    scale = np.sqrt(np.einsum("pii->pi", moments))
+    factor = np.linalg.cholesky(moments / (scale[:, :, None] * scale[:, None, :]))
+    inner = np.linalg.solve(factor, energy / (scale[:, :, None] * scale[:, None, :]))
+    values, modes = np.linalg.eigh(np.linalg.solve(factor, inner.swapaxes(1, 2)))
+    return values, scale[:, :, None] * (factor @ modes)
