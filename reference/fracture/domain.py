@@ -1,40 +1,17 @@
-"""The J-integral in its domain form on rings of cells around a tip."""
+"""Domains of interaction integrals: rings of cells around a tip."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.exact.hooke import hooke
-from reference.fracture.balance import Force, net_force
 from reference.fracture.cells import CellGradients, cell_gradients
-from reference.fracture.pressure import stress_of
 from verify.errors import InputError
-from verify.scene import Material
 from verify.solution import Solution
 
-__all__ = ["JIntegral", "Ring", "j_integral", "ring"]
+__all__ = ["Ring", "ring"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class JIntegral:
-    """Energy release rate at a tip.
-
-    Attributes
-    ----------
-    value : float
-        Mean over the domains, J/m².
-    spread : float
-        Largest deviation of a domain from the mean, J/m²: how far it depends on the path.
-    domains : (r,) array
-        By domain.
-    """
-
-    value: float
-    spread: float
-    domains: Array
 
 
 @dataclass(frozen=True)
@@ -59,68 +36,6 @@ class Ring:
     q: Array
     grad_q: Array
     near: Array
-
-
-def j_integral(
-    solution: Solution,
-    material: Material,
-    tip: Array,
-    direction: Array,
-    radii: Array,
-    body_force: Force = None,
-    drag: float = 0.0,
-    step: int = -1,
-) -> JIntegral:
-    """Energy release rate of a crack that grows straight on, by several domains.
-
-    J = ∫ (σ_ij u_i,1 − W δ_1j) q_,j dA − ∫ (f_i − ρ (ü_i + α u̇_i)) u_i,1 q dA with q linear in
-    each cell (Li, Shih & Needleman, Eng. Fract. Mech. 21, 1985; Moran & Shih, same journal 27,
-    1987, for a tip that stands still in a motion). The faces are straight in the domain, and free
-    of traction.
-
-    Parameters
-    ----------
-    solution : Solution
-        Plane and linear elastic.
-    material : Material
-    tip : (2,) array
-        m.
-    direction : (2,) array
-        Unit vector in which the crack points.
-    radii : (r,) array
-        Radii of the domains, m.
-    body_force : (2,) array or callable, optional
-        Force per volume, or its values (n, 2) at points (n, 2), N/m³: under gravity the specific
-        weight.
-    drag : float
-        α, Rayleigh's damping by the mass, 1/s.
-    step : int
-        Which output time; default the last.
-
-    Raises
-    ------
-    InputError
-        If a radius is not positive or too small for the mesh, or the field is in motion and
-        carries no accelerations.
-    """
-    law = hooke(material)
-    stresses = stress_of(solution, law, step)
-    force = net_force(solution, material, body_force, drag, step)
-    values = []
-    for radius in np.atleast_1d(radii):
-        around = ring(solution, tip, float(radius), force is not None, step)
-        at = around.at
-        stress = stresses(around.cells, at)
-        energy = 0.5 * np.sum(stress * at.gradient, axis=(2, 3))
-        along = at.gradient @ direction  # u_i,1
-        flux = np.einsum("mqij,mqi->mqj", stress, along) - energy[..., None] * direction
-        density = np.sum(flux * around.grad_q, axis=2)
-        if force is not None:
-            density -= np.sum(force(around.cells, at) * along, axis=2) * around.q
-        values.append(float(np.sum(density * at.weights)))
-    domains = np.array(values)
-    mean = float(domains.mean())
-    return JIntegral(mean, float(np.abs(domains - mean).max()), domains)
 
 
 def ring(

@@ -63,11 +63,31 @@ def stress_intensity(
 
     Parameters
     ----------
-    solution, material, tip, direction, radii, body_force, drag, step
-        As for `reference.fracture.j_integral`. Within the largest radius the crack is straight,
-        or the arc, and free of traction, and nothing else is met.
+    solution : Solution
+        Plane and linear elastic.
+    material : Material
+    tip : (2,) array
+        m.
+    direction : (2,) array
+        Unit vector in which the crack points.
+    radii : (r,) array
+        Radii of the domains, m. Within the largest the crack is straight, or the arc, and free of
+        traction, and nothing else is met.
+    body_force : (2,) array or callable, optional
+        Force per volume, or its values (n, 2) at points (n, 2), N/m³: under gravity the specific
+        weight.
+    drag : float
+        α, Rayleigh's damping by the mass, 1/s.
+    step : int
+        Which output time; default the last.
     arc : ArcCut, optional
         Of which the tip is an end.
+
+    Raises
+    ------
+    InputError
+        If a radius is not positive or too small for the mesh, or the field is in motion and
+        carries no accelerations.
     """
     law = hooke(material)
     stresses = stress_of(solution, law, step)

@@ -78,30 +78,3 @@ def test_two_ranks_keep_the_account_of_one(answers):
         for name, column in ledger.items():
             size = np.abs(column).max() if "momentum" in name else energy
             assert two[motion][0][name] == pytest.approx(column, abs=1e-10 * size), (motion, name)
-
-
-_MODES = """
-from test_dynamics import TISSUE
-from reference.dynamics import LinearMotion, implicit_euler
-from reference.meshing.imprint import imprint, structured_triangles
-from reference.meshing.opening import open_cut
-from reference.space import conforming_space
-from reference.vibration import largest_frequency, lowest_frequencies
-
-slit = np.array([[0.5, 0.1], [1.1, 0.1]])
-mesh = open_cut(*imprint(*structured_triangles((0, 0), (1, 0.2), (10, 3)), [slit]))
-space = conforming_space(mesh, 2, world)
-clamp = np.flatnonzero(space.node_points[:, 0] < 1e-12)
-held = (2 * clamp[:, None] + [0, 1]).ravel().astype(np.int32)
-modes = lowest_frequencies(TISSUE, space, held, 2)
-start = modes.modes[0]
-motion = LinearMotion(TISSUE, space, held, start, 0 * start, damping=(0.1, 1e-3))
-*_, last = motion.run(implicit_euler(), 0.2, 5)
-answer = [*modes.frequencies, largest_frequency(TISSUE, space, held), last.kinetic, last.strain]
-"""
-
-
-def test_two_ranks_vibrate_as_one_does(tmp_path):
-    one, two = (on_ranks(count, _MODES, tmp_path) for count in (1, 2))
-    assert two[:3] == pytest.approx(one[:3], rel=1e-10)
-    assert two[3:] == pytest.approx(one[3:], rel=1e-8)  # of a mode found to a residual of 1e-11

@@ -96,3 +96,16 @@ def test_a_mesh_file_is_looked_at_by_verify_check(tmp_path, capsys):
     load(tmp_path, *given, "x > 0.2 and x < 0.8", "x > 0.5")
     assert main(["check", str(tmp_path / "case.toml")]) == 2
     assert "supports[0].where" in capsys.readouterr().err
+
+
+def test_a_region_of_a_material_that_holds_no_cell_of_a_mesh_file_is_named(tmp_path, capsys):
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    mesh = meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))])
+    mesh.write(tmp_path / "body.vtu")
+    load(tmp_path, 'kind = "file"\nfile = "body.vtu"', 'pattern = "given"', "x < 0.5", "x > 0.5")
+    case = tmp_path / "case.toml"
+    for where, code in (("x > y", 0), ("x > 0.9", 2)):
+        region = f'[[material.regions]]\nwhere = "{where}"\nyoung = 2.0\n'
+        (tmp_path / "layers.toml").write_text(case.read_text() + region)
+        assert main(["check", str(tmp_path / "layers.toml")]) == code
+    assert "material.regions[0].where" in capsys.readouterr().err

@@ -13,7 +13,6 @@ from verify.scene.planar import (
     point_along,
     polygon_defect,
     polyline_defect,
-    polylines_meet,
 )
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -72,14 +71,6 @@ def test_a_closed_polyline_is_simple_and_a_touching_one_is_not():
     assert polyline_defect(ring) is None
     lasso = np.vstack([ring[:-1], [[0.5, 0.0]]])  # its end touches its first segment
     assert "intersects itself" in polyline_defect(lasso)
-
-
-def test_polylines_meet_where_they_cross_or_touch():
-    level = np.array([[0.0, 0.0], [1.0, 0.0]])
-    assert polylines_meet(level, np.array([[0.5, -1.0], [0.5, 1.0]]))
-    assert polylines_meet(level, np.array([[0.5, 0.0], [0.5, 1.0]]))
-    assert not polylines_meet(level, np.array([[0.5, 1e-6], [0.5, 1.0]]))
-    assert not polylines_meet(level, np.array([[0.0, 1e-6], [1.0, 1e-6]]))
 
 
 def test_overlap_is_the_shared_length_and_a_crossing_has_none():

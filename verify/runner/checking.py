@@ -4,6 +4,7 @@ from verify.errors import InputError
 from verify.scene import MeshFile, Scene, read_mesh
 from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.empty_parts import check_parts_of_mesh
+from verify.scene.material_regions import check_regions_of_mesh
 from verify.scene.nearest import nearest
 from verify.solvers import solver_names
 
@@ -15,7 +16,9 @@ def check_scene(scene: Scene) -> None:
     where = str(scene.file or scene.name)
     if isinstance(scene.geometry, MeshFile):
         try:
-            check_parts_of_mesh(scene, *read_mesh(scene))
+            mesh = read_mesh(scene)
+            check_parts_of_mesh(scene, *mesh)
+            check_regions_of_mesh(scene, *mesh)
         except InputError:
             raise
         except ValueError as error:

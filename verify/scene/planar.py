@@ -14,7 +14,6 @@ __all__ = [
     "point_along",
     "polygon_defect",
     "polyline_defect",
-    "polylines_meet",
 ]
 
 Array = NDArray[np.float64]
@@ -106,11 +105,6 @@ def inner_parts(vertices: Array, corners: Array) -> list[tuple[Array, Array]]:
             (a + stops[i] * direction, a + stops[i + 1] * direction) for i in np.flatnonzero(inside)
         ]
     return parts
-
-
-def polylines_meet(p: Array, q: Array) -> bool:
-    """Whether the polylines `p` (n, 2) and `q` (m, 2) share a point."""
-    return any(bool(_meet(a, b, q[:-1], q[1:]).any()) for a, b in pairwise(p))
 
 
 def overlap_length(p: Array, q: Array) -> float:

@@ -1,11 +1,10 @@
 """A finding: one sentence with its numbers, what was expected, and whether it came out so."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from verify.result import Verdict
 
-__all__ = ["Finding", "kept_by_all"]
+__all__ = ["Finding"]
 
 
 @dataclass(frozen=True)
@@ -28,11 +27,3 @@ class Finding:
     sentence: str
     expected: str
     verdict: Verdict | None
-
-
-def kept_by_all(measured: Iterable[bool]) -> Verdict:
-    """Return PASS if every one is kept, FAIL if one is not, UNDECIDED if nothing was measured."""
-    found = list(measured)
-    if not found:
-        return Verdict.UNDECIDED
-    return Verdict.PASS if all(found) else Verdict.FAIL
