@@ -226,3 +226,45 @@ def test_profiles_count_what_a_solver_has_not_done_as_never_done():
     assert coarse["steps"] == {"x": [1.0, 1.0], "y": [3.0, 3.0], "z": [9.0]}
     assert fine["steps"] == {"x": [1.0], "y": [], "z": [9.0]}
     assert fine["items"] == 3  # the protocol: of all cases
+
+
+def strength_of(ranking, solver, question="energy_norm"):
+    (found,) = [
+        s for s in ranking["strengths"] if (s["solver"], s["question"]) == (solver, question)
+    ]
+    return found
+
+
+def test_a_solver_is_best_where_none_is_certainly_better_and_alone_where_all_are_worse():
+    results = [
+        case_of("a", [solve("a", "x", 0, 0.1), solve("a", "y", 0, 0.1 + 1e-9)]),  # the same method
+        case_of("b", [solve("b", "x", 0, 0.1), solve("b", "y", 0, 0.3)]),
+        case_of("c", [solve("c", "x", 0, 0.1), solve("c", "y", 0, 0.104)]),
+        case_of("d", [solve("d", "x", 0, 0.2, 0.01), solve("d", "y", 0, 0.19, 0.01)]),
+        case_of("e", [solve("e", "x", 0, 0.2)]),  # nothing to compare with
+    ]
+    ranking = rank_solvers(results)
+    x, y = (strength_of(ranking, name) for name in "xy")
+    assert [x[k] for k in ("items", "best", "alone", "near")] == [4, 4, 2, 3]
+    assert [y[k] for k in ("items", "best", "alone", "near")] == [4, 2, 0, 3]
+    assert [x[k] for k in ("case", "value", "next_solver", "next_value")] == ["b", 0.1, "y", 0.3]
+    assert y["case"] == ""
+
+
+def test_contended_times_are_less_only_by_a_factor_of_two():
+    def run(name, fast, slow):
+        times = [
+            solve(name, solver, level, error, seconds=seconds * 4**level)
+            for solver, seconds in (("x", fast), ("y", slow))
+            for level, error in ((0, 0.2), (1, 0.1))
+        ]
+        for one in times:
+            one.metrics.append(
+                Metric("displacement_l2", one.metrics[0].value, "1", None, 0.0, "exact")
+            )
+            one.notes["timing"] = "contended: a load"
+        return case_of(name, times)
+
+    results = [run("a", 1.0, 1.5), run("b", 1.0, 3.0)]
+    found = strength_of(rank_solvers(results), "x", "time at equal error")
+    assert (found["best"], found["alone"], found["case"][:1]) == (2, 1, "b")

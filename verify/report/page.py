@@ -17,6 +17,7 @@ from verify.report.ranking_tables import (
     stability_table,
 )
 from verify.report.run_directory import Run
+from verify.report.strength_view import strengths_table
 
 __all__ = ["page_view"]
 
@@ -78,6 +79,7 @@ def _ranking(ranking: dict[str, Any] | None) -> dict[str, Any] | None:
         "solvers": len(ranking["solvers"]),
         "cases": len(ranking["cases"]),
         "profiles": profiles_figure(ranking.get("profiles") or []),
+        "strengths": strengths_table(ranking),
         "conformance": conformance_table(ranking),
         "stability": stability_table(ranking),
         "contended": "; ".join(ranking.get("contended") or []),

@@ -10,7 +10,7 @@ from verify.result import CaseResult
 from verify.study.cost.work import WorkPoint, time_at, work_points
 from verify.study.ranking.standing import Item, compared_by_mean
 
-__all__ = ["common_error", "cost_comparisons", "why_times_are_no_sample"]
+__all__ = ["common_error", "cost_comparisons", "cost_item", "why_times_are_no_sample"]
 
 _METRICS = ("displacement_l2", "energy_norm")
 _SAMPLE = 3  # repetitions: two have a range, but not one that says anything about a third
@@ -27,7 +27,7 @@ def cost_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> l
         for result in results:
             if not any(s.metric(metric) for s in result.solves if s.solver in solvers):
                 continue
-            item = _item(result, metric, solvers)
+            item = cost_item(result, metric, solvers)
             if isinstance(item, LeftOut):
                 left_out.append(item)
             else:
@@ -86,7 +86,8 @@ def common_error(points: Mapping[str, Sequence[WorkPoint]]) -> tuple[float, list
     return found
 
 
-def _item(result: CaseResult, metric: str, solvers: Sequence[str]) -> Item | LeftOut:
+def cost_item(result: CaseResult, metric: str, solvers: Sequence[str]) -> Item | LeftOut:
+    """Take the times of a case at the error at which most solvers can be compared."""
     known = work_points([s for s in result.solves if s.solver in solvers], metric)
     # an error that cannot be told from none, by the reference or by round-off, buys nothing
     sure = [p for p in known if p.low > 0.0 and p.error > ROUND_OFF and p.seconds > 0.0]

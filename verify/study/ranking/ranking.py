@@ -13,6 +13,7 @@ from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
 from verify.study.ranking.energy import energy_comparisons
 from verify.study.ranking.profiles import data_profiles, performance_profile
 from verify.study.ranking.stability import stability_standings
+from verify.study.ranking.strengths import strengths
 
 __all__ = ["rank_solvers"]
 
@@ -47,6 +48,7 @@ def rank_solvers(
         cost=cost_comparisons(results, solvers),
         left_out=_left_out(results),
         contended=_why_times_may_be_off(results, solvers),
+        strengths=strengths(results, solvers),
         profiles=[performance_profile(results, solvers), *data_profiles(results, solvers)],
     )
     return asdict(found)
