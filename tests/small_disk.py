@@ -96,7 +96,7 @@ def _is_whole(file):
 def named_until_it_fits(disk, write):
     """Return the files that `write` named as it failed for want of room, as names on the disk."""
     named = []
-    for pages in (*range(16), 32, 64, 128, 256):
+    for pages in (*range(16), *range(16, 64, 8), 64, 128, 256):
         disk.leave(PAGE * pages)
         failed = write()
         assert all(map(_is_whole, _files_of(disk)))  # a .partial is no whole one

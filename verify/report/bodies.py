@@ -10,9 +10,10 @@ from verify.errors import InputError
 from verify.read_mesh import read_with_meshio
 from verify.solution import Solution, read_solution
 
-__all__ = ["Body", "deformed_body", "error_body", "read_stored"]
+__all__ = ["Body", "deformed_body", "error_body", "read_stored", "zoomed"]
 
 _FEATURE_ANGLE = 30.0  # degrees between facets beyond which a 3D edge is drawn
+_MOST_EDGES = 4000  # of elements that are drawn; more would be too dense to be seen
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Body:
     values : (n,) or (m,) float array
         What is coloured, per node or per triangle.
     element_edges : (k, 2) int array
-        Edges of the elements, empty where they would be too dense to be seen.
+        Edges of the elements.
     material : (n, 3) float array
         Where the nodes are in the undeformed body, m.
     """
@@ -40,6 +41,11 @@ class Body:
     values: NDArray[np.float64]
     element_edges: NDArray[np.int64]
     material: NDArray[np.float64]
+
+    @property
+    def drawn_elements(self) -> NDArray[np.int64]:
+        """Edges of the elements, none where they would be too dense to be seen."""
+        return self.element_edges if len(self.element_edges) <= _MOST_EDGES else self.edges[:0]
 
 
 def read_stored(root: Path, path: str) -> Solution:
@@ -63,9 +69,9 @@ def read_stored(root: Path, path: str) -> Solution:
         raise InputError(f"the solution cannot be read ({error.strerror})", path) from None
 
 
-def deformed_body(solution: Solution, scale: float) -> Body:
-    """Return the body displaced by `scale` times its last displacement, coloured by |u|."""
-    displacement = solution.displacement[-1]
+def deformed_body(solution: Solution, scale: float, step: int = -1) -> Body:
+    """Return the body displaced by `scale` times its displacement at a time, coloured by |u|."""
+    displacement = solution.displacement[step]
     points = solution.points + scale * displacement
     cells = _straight(solution.cells, solution.cell_type)
     values = np.linalg.norm(displacement, axis=1)
@@ -103,6 +109,24 @@ def error_body(path: Path) -> Body:
     return _body(points, cells, np.asarray(per_cell, dtype=float).reshape(-1), cells)
 
 
+def zoomed(body: Body, window: tuple[float, float, float, float]) -> Body:
+    """Return the triangles of a plane body that reach into a window (x0, x1, y0, y1)."""
+    x0, x1, y0, y1 = window
+    low = body.points[body.triangles].min(axis=1)
+    high = body.points[body.triangles].max(axis=1)
+    seen = (high[:, 0] > x0) & (low[:, 0] < x1) & (high[:, 1] > y0) & (low[:, 1] < y1)
+    nodal = len(body.values) == len(body.points)
+    used, index = np.unique(body.triangles[seen], return_inverse=True)
+    new = np.full(len(body.points), -1)
+    new[used] = np.arange(len(used))
+    edges, inner = (
+        kept[(kept >= 0).all(axis=1)] for kept in (new[body.edges], new[body.element_edges])
+    )
+    values = body.values[used] if nodal else body.values[seen]
+    points, material = body.points[used], body.material[used]
+    return Body(points, index.reshape(-1, 3), edges, values, inner, material)
+
+
 def _straight(cells: NDArray[np.int64], kind: str) -> NDArray[np.int64]:
     """Return quadratic triangles as four straight ones, tetrahedra by their corners."""
     if kind == "triangle6":
@@ -137,7 +161,7 @@ def _body(
         triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))
         edges = _creases(drawn, triangles)
         inner = _all_edges(triangles, ((0, 1), (1, 2), (2, 0)))
-    return Body(drawn, triangles, edges, values, inner if len(inner) <= 4000 else inner[:0], still)
+    return Body(drawn, triangles, edges, values, inner, still)
 
 
 def _single(cells: NDArray[np.int64], faces: tuple[tuple[int, ...], ...]) -> NDArray[np.int64]:

@@ -13,7 +13,7 @@ from verify.report.figures.style import Palette
 from verify.report.motion_view import MotionView, motion_view
 from verify.report.notation import ROUND_OFF, error_title, number, number_text, solver_title
 from verify.report.opening_view import opening_figures
-from verify.report.pictures import CasePictures, Picture
+from verify.report.picture import CasePictures, Picture
 from verify.report.problem import problem_facts
 from verify.report.run_directory import CaseEntry
 from verify.report.tables import (
@@ -40,6 +40,11 @@ class PictureRow:
     kind: str
     pictures: list[Picture]
     bar: Drawing
+
+    @property
+    def clipped(self) -> bool:
+        """Whether values are above the scale."""
+        return self.pictures[0].view.beyond
 
 
 @dataclass
@@ -76,6 +81,8 @@ class CaseView:
     checks: Table | None = None
     failures: Table | None = None
     rows: list[PictureRow] = field(default_factory=list)
+    tip_at: str = ""
+    film: list[tuple[str, list[Picture]]] = field(default_factory=list)
     scale: str = ""
     turnable: bool = False
     picture_notes: list[str] = field(default_factory=list)
@@ -87,6 +94,7 @@ class CaseView:
     motion: MotionView | None = None
     orders: Table | None = None
     has_order: bool = False
+    many: bool = False  # more solvers than a table of them has room for beside the figures
     reasons: Table | None = None
     numbers: Table | None = None
     times: Table | None = None
@@ -142,6 +150,7 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     _convergence(view, result, palette)
     view.openings = opening_figures(result, palette)
     view.motion = motion_view(result, palette)
+    view.many = len({solve.solver for solve in result.solves}) > MANY
     view.orders, view.numbers = orders_table(result), numbers_table(result)
     few = len({rate.solver for rate in result.rates}) <= MANY
     view.has_order = few and any(rate.order is not None for rate in result.rates)
@@ -155,9 +164,11 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
 
 def _show(view: CaseView, pictures: CasePictures) -> None:
     view.scale = "" if pictures.scale == 1 else f"× {number(pictures.scale, 1)}"
-    view.picture_notes = pictures.notes
+    view.picture_notes, view.tip_at = pictures.notes, pictures.tip_at
+    view.film = [(own[0].description.partition(" at t")[0], own) for own in pictures.film]
     for kind, group, bar in (("deformed", pictures.deformed, "displacement |u|"),
-                             ("error", pictures.error, "error")):  # fmt: skip
+                             ("error", pictures.error, "error"),
+                             ("tip", pictures.tip, "error")):  # fmt: skip
         if group and group[0].image:
             view.rows.append(PictureRow(kind, group, colour_bar(group[0].view, bar)))
             view.turnable |= any(picture.turned for picture in group)
@@ -218,18 +229,21 @@ def _above_round_off(curves: list[Curve], metric: str) -> tuple[list[Curve], lis
         amount = f"exact to round-off (at most {number(most, 2)})" if most else "exactly zero"
         said.append(f"{title}: {amount} on every level: {', '.join(exact)}.")
     shown = []
+    below: dict[str, list[str]] = {}
     for curve in curves:
         if curve.label in exact:
             continue
         hidden = [p.level for p in curve.points if p.value <= p.uncertainty]
         if hidden:
-            levels = ", ".join(map(str, hidden))
-            said.append(f"{title}: below the uncertainty of the comparison, and not drawn: "
-                        f"{curve.label}, level {levels}.")  # fmt: skip
+            levels = f"level{'s' * (len(hidden) > 1)} {', '.join(map(str, hidden))}"
+            below.setdefault(levels, []).append(curve.label)
             kept = [[p for p in s if p.value > p.uncertainty] for s in curve.stretches]
             curve = replace(curve, stretches=[s for s in kept if s])
         if curve.points:
             shown.append(curve)
+    if below:
+        whose = "; ".join(f"{', '.join(who)}, {levels}" for levels, who in below.items())
+        said.append(f"{title}: below the uncertainty of the comparison, and not drawn: {whose}.")
     return shown, said
 
 

@@ -38,7 +38,7 @@ def draw(body: Body, view: View) -> bytes:
             vmax=view.limits[1],
         )
         for edges, width, colour in (
-            (body.element_edges, 0.5, _ELEMENTS),
+            (body.drawn_elements, 0.5, _ELEMENTS),
             (body.edges, 1.6, _OUTLINE),
         ):
             segments = list(places[edges][:, :, :2])
@@ -61,7 +61,7 @@ def _painted(body: Body, view: View, places: NDArray[np.float64]) -> PolyCollect
     else:
         values = np.repeat(body.values[:, None], 3, axis=1)
     facets = np.concatenate([places[body.triangles], values[:, :, None]], axis=2)
-    lines = [(places[body.element_edges], _ELEMENTS, 0.5), (places[body.edges], _OUTLINE, 1.6)]
+    lines = [(places[body.drawn_elements], _ELEMENTS, 0.5), (places[body.edges], _OUTLINE, 1.6)]
     while 4 * len(facets) <= _FACETS:
         facets = _quartered(facets)
         lines = [(_halved(ends), colour, width) for ends, colour, width in lines]

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from verify.report.blocks import Cell, Drawing, Table, plain_table
 from verify.report.figures.profiles import profile_panel
 from verify.report.figures.style import Palette
 from verify.report.notation import metric_title, number, solver_title, with_interval
-from verify.report.released_line import released_line
+from verify.report.released_table import released_table
 from verify.result import CaseResult, SolveRecord, Status
 
 __all__ = ["BALANCE_METRICS", "MotionView", "motion_view"]
@@ -19,11 +19,19 @@ BALANCE_METRICS = (
     "linear_momentum_drift", "angular_momentum_drift",
     "part_linear_momentum_drift", "part_angular_momentum_drift", "released_mismatch",
 )  # fmt: skip
-# parts of an energy balance, the ones that tell most first; a panel has the first four not zero
-_PARTS = ("kinetic", "strain", "total", "algorithmic", "gravity", "work_of_loads",
-          "work_of_supports", "damping")  # fmt: skip
-_PER_PANEL = 4
-_SHOWN = 4  # solvers whose energies are drawn
+# parts of an energy balance, the ones that tell most first; the first that are not zero are drawn
+_PARTS = ("kinetic", "strain", "algorithmic", "gravity", "work_of_loads", "work_of_supports",
+          "damping")  # fmt: skip
+_SHOWN = 3
+_WORDS = {
+    "kinetic": "kinetic energy",
+    "strain": "strain energy",
+    "algorithmic": "energy that the time scheme took",
+    "gravity": "potential energy of gravity",
+    "work_of_loads": "work of the loads",
+    "work_of_supports": "work of the supports",
+    "damping": "energy that damping took",
+}
 _MOMENTA = (("linear_momentum", "N s"), ("angular_momentum", "N m s"))
 
 
@@ -33,11 +41,9 @@ class MotionView:
 
     panels: list[Drawing]
     cuts: str
-    released: list[str]
+    released: Table | None
     drifts: Table | None
     parts: Table | None
-    shown: int = _SHOWN
-    left_out: list[str] = field(default_factory=list)
 
 
 def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
@@ -47,15 +53,13 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
         return None
     cuts = _cuts(result.scene)
     unit = "J/m" if any("linear_momentum_z" not in s.account for s in moving) else "J"
-    panels = [*_errors(moving, cuts, palette), *_energies(moving, cuts, unit),
+    panels = [*_errors(moving, cuts, palette), *_energies(moving, cuts, unit, palette),
               *_totals(moving, cuts, unit, palette), *_momenta(moving, cuts, palette)]  # fmt: skip
     if not panels:
         return None
-    released = [line for solve in moving if (line := released_line(solve))]
     shown = ", ".join(f"{time:.4g} s" for time in cuts)
-    left_out = [solver_title(solve.solver) for solve in _with_energies(moving)[_SHOWN:]]
-    return MotionView(panels, shown, released, _drifts_table(result, moving), _parts_table(moving),
-                      left_out=left_out)  # fmt: skip
+    return MotionView(panels, shown, released_table(moving), _drifts_table(result, moving),
+                      _parts_table(moving))  # fmt: skip
 
 
 def _finest(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
@@ -85,19 +89,14 @@ def _errors(
         yield from _several(metric_title(name), curves, cuts, palette)
 
 
-def _energies(solves: Sequence[SolveRecord], cuts: list[float], unit: str) -> Iterator[Drawing]:
-    for solve in _with_energies(solves)[:_SHOWN]:
-        found = [
-            (name, solve.account[name])
-            for name in _PARTS
-            if any(value for value in solve.account.get(name, []))
-        ][:_PER_PANEL]
-        title = f"{solver_title(solve.solver)}: energies, {unit}"
-        yield _panel(title, solve.account["time"], found, cuts, None)
-
-
-def _with_energies(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
-    return [s for s in solves if any(any(s.account.get(name, [])) for name in _PARTS)]
+def _energies(
+    solves: Sequence[SolveRecord], cuts: list[float], unit: str, palette: Palette
+) -> Iterator[Drawing]:
+    """Draw each part of the energy that is not zero, of all solvers together."""
+    drawn = [name for name in _PARTS if any(any(s.account.get(name, [])) for s in solves)]
+    for name in drawn[:_SHOWN]:
+        curves = [(s, s.account["time"], s.account[name]) for s in solves if name in s.account]
+        yield from _several(f"{_WORDS.get(name, name)}, {unit}", curves, cuts, palette)
 
 
 def _totals(
@@ -139,7 +138,7 @@ def _several(
 
 def _panel(
     title: str, time: list[float], curves: Sequence[tuple[str, list[float]]], cuts: list[float],
-    palette: Palette | None,
+    palette: Palette,
 ) -> Drawing:  # fmt: skip
     inside = [cut for cut in cuts if time[0] < cut <= time[-1]]
     return profile_panel(title, time, curves, palette, inside)

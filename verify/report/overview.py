@@ -8,7 +8,7 @@ from typing import Any
 from verify.report.blocks import Cell, Drawing, Table
 from verify.report.case_view import CaseView, PictureRow
 from verify.report.notation import bytes_text, number, solver_title
-from verify.report.pictures import Picture
+from verify.report.picture import Picture
 from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import MANY, check_text
 from verify.result import NoticeKind, Status, Verdict, VerdictRecord
@@ -35,7 +35,7 @@ class Overview:
     notes: list[str] = field(default_factory=list)
     matrix: Table | None = None
     names: list[str] = field(default_factory=list)
-    picture: tuple[Picture, str] | None = None
+    picture: tuple[Picture, str, str] | None = None
     plot: tuple[str, str, Drawing] | None = None
 
 
@@ -95,7 +95,7 @@ def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[tuple[str, str]]:
     """Return what is not a plain pass, in lists of at most six entries, failures first."""
     failed = [(e, v) for e, v in judged if v.verdict is Verdict.FAIL]
-    errors = [f"{e.name}: {_clause(v.reason)}" for e, v in judged if v.verdict is Verdict.ERROR]
+    errors = _unjudged(judged)
     errors += [f"{e.name}: {_clause(e.defect)}" for e in run.entries if e.result is None]
     warned: dict[str, list[str]] = {}
     for entry in run.entries:
@@ -116,12 +116,25 @@ def _findings(run: Run, judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[t
             for e, v in judged
             if v.verdict is Verdict.UNDECIDED
         ],
-        "Not judged": list(dict.fromkeys(errors)),
+        "Not judged": errors,
         # the text of each stands on top of its case
         "Warned of": [f"{about} ({', '.join(whose)})" for about, whose in warned.items()],
         "Adequacy of the model": adequacy,
     }
     return [(title, _listed(entries)) for title, entries in lists.items() if entries]
+
+
+def _unjudged(judged: list[tuple[CaseEntry, VerdictRecord]]) -> list[str]:
+    """Say of each solver how many checks could not be judged, and why the first could not."""
+    whose: dict[str, list[str]] = {}
+    for entry, record in judged:
+        if record.verdict is Verdict.ERROR:
+            said = whose.setdefault(record.solver or "nobody", [])
+            said.append(f"{entry.name}: {_clause(record.reason)}")
+    return [
+        f"{solver_title(name)}, {len(said)} check{'s' * (len(said) > 1)}, first {said[0]}"
+        for name, said in whose.items()
+    ]
 
 
 def _by_solver(
@@ -176,8 +189,9 @@ def _show_most(view: Overview, cases: Sequence[CaseView]) -> None:
     ranked = sorted(cases, key=lambda c: (_ORDER.index(str(c.verdict)), -len(c.convergence)))
     for case in ranked:
         if view.picture is None and case.rows:
-            row = case.rows[-1] if case.verdict is Verdict.FAIL else case.rows[0]
-            view.picture = (_telling(row, case.failing), case.anchor)
+            errors = [row for row in case.rows if row.kind == "error" and case.failing]
+            row = (errors or case.rows)[0]
+            view.picture = (_telling(row, case.failing), case.anchor, case.title)
         if view.plot is None and case.lead is not None:
             view.plot = (case.lead[0], case.anchor, case.lead[1])
 

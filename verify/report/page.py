@@ -9,7 +9,7 @@ from verify.report.family_view import FamilyView, family_views
 from verify.report.figures.solver_profiles import profiles_figure
 from verify.report.figures.style import Palette
 from verify.report.overview import origin_facts, overview
-from verify.report.pictures import CasePictures
+from verify.report.picture import CasePictures
 from verify.report.ranking_tables import (
     compared,
     conformance_table,

@@ -1,70 +1,31 @@
-"""Pictures of a run: the reference and the solvers with the cut open, and where each errs."""
+"""Pictures of a case: the reference and the solvers with the cut open, and where each errs."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from verify.applied_checks import REFERENCE
 from verify.errors import InputError
-from verify.report.bodies import Body, deformed_body, error_body, read_stored
-from verify.report.notation import ROUND_OFF, number, number_text, solver_title
+from verify.report.bodies import deformed_body, read_stored
+from verify.report.error_maps import add_error_maps
+from verify.report.notation import number_text, solver_title
+from verify.report.picture import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
-from verify.report.turntable import packed
-from verify.report.view import View, common_view
-from verify.result import CaseResult, SolveRecord, Status, error_picture
+from verify.report.view import common_view
+from verify.result import CaseResult, SolveRecord, Status
 from verify.solution import Solution
 
-__all__ = ["CasePictures", "Picture", "case_pictures"]
+__all__ = ["CasePictures", "case_pictures"]
 
-DISPLACEMENT_COLOURS, ERROR_COLOURS = "cividis", "YlOrBr"
+_COLOURS = "cividis"
 _MOST = 4  # bodies side by side
+_FILMED = 3  # bodies whose output times are shown
+_FRAMES = 6  # of a film
+_FRAME_PIXELS = 110_000
 _STILL = 1e-200  # of the body's diagonal: displacements below are none
 _WILD = 1e3  # times the smallest displacement beside it: what moves farther is not drawn
 _OPENING_SHOWN = 0.15  # of the body's diagonal: what the largest displacement is scaled to
-
-
-@dataclass
-class Picture:
-    """One picture: what it shows, and its image once it is drawn."""
-
-    title: str
-    description: str
-    body: Body
-    view: View
-    image: bytes = b""  # WebP
-    turnable: bool = True  # whether a body in space may be turned in the page
-
-    @cached_property
-    def solid(self) -> dict[str, str]:
-        """What a view that can be turned needs; empty for plane bodies."""
-        return packed(self.body, self.view)
-
-    @property
-    def turned(self) -> dict[str, str]:
-        """The same if the page has room for it."""
-        return self.solid if self.turnable else {}
-
-
-@dataclass
-class CasePictures:
-    """The pictures of a case and what has to be said about them.
-
-    `deformed` share view, colours and `scale` (displacements are drawn that much enlarged).
-    """
-
-    deformed: list[Picture] = field(default_factory=list)
-    error: list[Picture] = field(default_factory=list)
-    scale: float = 1.0
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def all(self) -> list[Picture]:
-        """Every picture of the case."""
-        return [*self.deformed, *self.error]
 
 
 def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
@@ -74,7 +35,7 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         return pictures
     shown: list[tuple[SolveRecord, Solution]] = []
     solves = _finest_solves(entry.result)
-    _say_left_out(pictures, "deformed body", [solve.solver for solve in solves[_MOST:]])
+    pictures.say_left_out("deformed body", [solve.solver for solve in solves[_MOST:]], _MOST)
     for solve in solves[:_MOST]:
         try:
             shown.append((solve, read_stored(root, solve.solution or "")))
@@ -87,9 +48,10 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         pictures.notes.append("No pictures side by side: the solutions differ in dimension.")
     elif shown:
         _deformed(pictures, shown)
+        _film(pictures, shown)
     elif not pictures.notes:
         pictures.notes.append("No pictures: no solution is stored.")
-    _errors(pictures, root, entry.result)
+    add_error_maps(pictures, root, entry.result)
     return pictures
 
 
@@ -135,7 +97,7 @@ def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]])
     moves = largest > _STILL * diagonal
     pictures.scale = _round_scale(_OPENING_SHOWN * diagonal / largest) if moves else 1.0
     bodies = [deformed_body(solution, pictures.scale) for _, solution in shown]
-    view = common_view(bodies, DISPLACEMENT_COLOURS)
+    view = common_view(bodies, _COLOURS)
     for (solve, solution), body in zip(shown, bodies, strict=True):
         title = f"{solver_title(solve.solver)}, level {solve.level}"
         when = "" if len(solution.times) == 1 else f" at t = {solution.times[-1]:.4g} s"
@@ -146,57 +108,27 @@ def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]])
         pictures.deformed.append(Picture(title + when, description, body, view))
 
 
+def _film(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> None:
+    """Show some bodies at the same output times, from the first to the last."""
+    times = shown[0][1].times
+    shown = [one for one in shown if np.array_equal(one[1].times, times)][:_FILMED]
+    if len(times) < 2:
+        return
+    steps = np.unique(np.linspace(0, len(times) - 1, _FRAMES).round().astype(int))
+    bodies = [[deformed_body(own, pictures.scale, step) for step in steps] for _, own in shown]
+    every = [body for own in bodies for body in own]
+    view = common_view(every, _COLOURS, pixels=_FRAME_PIXELS)
+    for (solve, _), own in zip(shown, bodies, strict=True):
+        name = f"{solver_title(solve.solver)}, level {solve.level}"
+        pictures.film.append([
+            Picture(f"{time:.3g} s", f"{name} at t = {time:.4g} s", body, view, turnable=False)
+            for time, body in zip(times[steps], own, strict=True)
+        ])  # fmt: skip
+
+
 def _round_scale(scale: float) -> float:
     """Return 1 for bodies that move visibly by themselves, else 1, 2 or 5 times a power of ten."""
     if 0.7 <= scale < 2:
         return 1.0
     power = 10.0 ** math.floor(math.log10(scale))
     return next(m * power for m in (5, 2, 1) if scale >= m * power * (1 - 1e-12))
-
-
-def _errors(pictures: CasePictures, root: Path, result: CaseResult) -> None:
-    """Prepare the error of each solver, the largest first, in one view and one colour scale."""
-    bodies: dict[str, Body] = {}
-    for solver in dict.fromkeys(solve.solver for solve in result.solves):
-        if (named := result.pictures.get(error_picture(solver))) is None:
-            continue
-        path = root / named
-        if not path.resolve().is_relative_to(root.resolve()) or not path.is_file():
-            pictures.notes.append(f"No picture of the error of {solver_title(solver)}: no file.")
-            continue
-        try:
-            bodies[solver] = error_body(path)
-        except InputError as error:
-            said = f"No picture of the error of {solver_title(solver)}: {error.what}."
-            pictures.notes.append(said)
-    if not bodies:
-        pictures.notes.append("No picture of the error: no error field is stored for this case.")
-        return
-    largest = {solver: float(body.values.max()) for solver, body in bodies.items()}
-    moved = max((float(one.body.values.max()) for one in pictures.deformed), default=0.0)
-    for solver in [name for name, most in largest.items() if most <= ROUND_OFF * moved]:
-        most = number(largest[solver], 2)
-        said = f"Error of {solver_title(solver)}: at most {most} m, which is round-off."
-        pictures.notes.append(said)
-        del bodies[solver]
-    if not bodies:
-        return
-    worst_first = sorted(bodies, key=lambda solver: -largest[solver])
-    shown, rest = worst_first[:_MOST], worst_first[_MOST:]
-    _say_left_out(pictures, "error", rest)
-    view = common_view([bodies[solver] for solver in shown], ERROR_COLOURS)
-    for solver in shown:
-        most = number(largest[solver], 3)
-        title = f"error of {solver_title(solver)}, at most {most} m"
-        title += " (FAIL)" if solver in result.failing else ""
-        description = (
-            f"Error of the displacement of {solver_title(solver)} on the undeformed body; "
-            f"largest {most} m."
-        )
-        pictures.error.append(Picture(title, description, bodies[solver], view))
-
-
-def _say_left_out(pictures: CasePictures, what: str, solvers: Sequence[str]) -> None:
-    if solvers:
-        names = ", ".join(map(solver_title, solvers))
-        pictures.notes.append(f"Without picture of the {what}, {_MOST} being shown: {names}.")

@@ -7,7 +7,8 @@ from verify.printable import words_of
 from verify.report.drawn_bodies import draw
 from verify.report.exports import csv_rows, json_document, junit_document
 from verify.report.page import page_view
-from verify.report.pictures import CasePictures, case_pictures
+from verify.report.picture import CasePictures
+from verify.report.pictures import case_pictures
 from verify.report.printing import print_page
 from verify.report.run_directory import CaseEntry, Run, load_run
 from verify.report.template_sets import as_html, as_markdown
@@ -133,7 +134,7 @@ def _left_out(pictures: list[CasePictures], excess: int) -> str:
             break
         excess -= sum(4 * len(picture.image) // 3 for picture in shown.all)
         dropped += len(shown.all)
-        shown.deformed, shown.error = [], []
+        shown.deformed, shown.error, shown.tip, shown.film = [], [], [], []
         shown.notes.append("Its pictures are left out to keep the page small.")
     said = [f"{stills} bodies are shown as stills"] if stills else []
     said += [f"{dropped} of {total} pictures are left out"] if dropped else []

@@ -39,7 +39,7 @@ def packed(body: Body, view: View) -> dict[str, str]:
         return {}
     inside = _cut_faces(body)
     triangles = np.concatenate([body.triangles[~inside], body.triangles[inside]])
-    edges = np.concatenate([body.edges, body.element_edges])
+    edges = np.concatenate([body.edges, body.drawn_elements])
     used, index = np.unique(np.concatenate([triangles.ravel(), edges.ravel()]), return_inverse=True)
     points = body.points[used]
     low, span = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-300)

@@ -32,6 +32,8 @@ class View:
         Name of the matplotlib colour map.
     limits : (low, high)
         Values at its ends.
+    beyond : bool
+        Whether there are values above `limits`, which have the last colour.
     """
 
     right: tuple[float, ...]
@@ -41,6 +43,7 @@ class View:
     size: tuple[int, int]
     colours: str
     limits: tuple[float, float]
+    beyond: bool = False
 
     def projected(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (n, 3): place in the picture, and depth towards the viewer."""
@@ -49,8 +52,13 @@ class View:
         return result
 
 
-def common_view(bodies: Sequence[Body], colours: str) -> View:
-    """Return the one view in which all `bodies` are seen whole, with one colour scale."""
+def common_view(
+    bodies: Sequence[Body], colours: str, top: float | None = None, pixels: int = _PIXELS
+) -> View:
+    """Return the one view in which all `bodies` are seen whole, with one colour scale.
+
+    It ends at `top`, by default at the largest value.
+    """
     axis = np.eye(3)
     if any(np.ptp(body.points[:, 2]) > 0 for body in bodies):
         e, a = _ELEVATION, _AZIMUTH
@@ -63,8 +71,9 @@ def common_view(bodies: Sequence[Body], colours: str) -> View:
     width, height = (high - low) + 2 * room
     # a very slender body still gets a picture some tens of pixels wide
     ratio = min(max(width / height, 1 / 12), 12.0)
-    size = (round((_PIXELS * ratio) ** 0.5), round((_PIXELS / ratio) ** 0.5))
-    top = max(float(body.values.max()) for body in bodies)
+    size = (round((pixels * ratio) ** 0.5), round((pixels / ratio) ** 0.5))
+    most = max(float(body.values.max()) for body in bodies)
+    top = most if top is None else top
     centre = (low + high) / 2
     half = np.array([max(width, height * ratio), max(height, width / ratio)]) / 2
     (x0, y0), (x1, y1) = centre - half, centre + half
@@ -76,4 +85,5 @@ def common_view(bodies: Sequence[Body], colours: str) -> View:
         size,
         colours,
         (0.0, top if top > 0 else 1.0),
+        beyond=most > top,
     )

@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 
 from verify.report.blocks import Drawing
 from verify.report.figures.style import drawing
@@ -30,12 +31,18 @@ def colour_bar(view: View, title: str) -> Drawing:
         axes = figure.add_axes((0.06, 0.42, 0.88, 0.2))
         axes.imshow(np.linspace(0, 1, 64)[None], aspect="auto", cmap=view.colours,
                     extent=(0.0, top, 0.0, 1.0), interpolation="nearest")  # fmt: skip
+        if view.beyond:  # an arrow of the last colour
+            tip = [(1.0, 0.0), (1.04, 0.5), (1.0, 1.0)]
+            axes.add_patch(Polygon(tip, transform=axes.transAxes, clip_on=False,
+                                   color=colormaps[view.colours](1.0)))  # fmt: skip
         axes.set_yticks([])
         axes.set_xticks(_ticks(top) if drawable else [], [f"{v:.4g}" for v in _ticks(top)]
                         if drawable else [])  # fmt: skip
         unit = f"10{str(power).translate(RAISED)} m" if power else "m"
         axes.set_title(f"{title} ({unit})", fontsize=9, pad=3)
-        return drawing(figure, f"Colours: {title} from 0 to {high:.3g} m", "colour-bar")
+        beyond = " and above" if view.beyond else ""
+        words = f"Colours: {title} from 0 to {high:.3g} m{beyond}"
+        return drawing(figure, words, "colour-bar")
 
 
 def _ticks(high: float) -> list[float]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from verify.report.blocks import Drawing
 from verify.report.figures.style import drawing
 
-__all__ = ["sketch"]
+__all__ = ["cut_lines", "sketch"]
 
 _CUT, _HELD, _LOAD, _BODY = "#b3261e", "#0067a5", "#00785a", "#f1efe9"
 _DEPTH = np.array([0.42, 0.3])  # of the third axis in a cabinet projection
@@ -45,7 +45,7 @@ def sketch(scene: Mapping[str, Any]) -> Drawing | None:
     for load in scene.get("loads") or []:
         _load(axes, load, parts, corners, size)
     for cut in scene.get("cuts") or []:
-        for line in _cut(cut):
+        for line in cut_lines(cut):
             axes.plot(*_flat(line).T, color=_CUT, linewidth=1.6)
     axes.margins(0.08)
     said = "Sketch: body grey, cuts red, supports blue, loads green."
@@ -125,7 +125,7 @@ def _load(
         axes.annotate("", tuple(at + step), tuple(at), arrowprops=arrow)
 
 
-def _cut(cut: Mapping[str, Any]) -> list[Points]:
+def cut_lines(cut: Mapping[str, Any]) -> list[Points]:
     """Return the lines of a cut; none for kinds that a sketch does not know."""
     points = np.asarray(cut.get("points") or [], dtype=float)
     match cut.get("kind"):

@@ -3,6 +3,27 @@
   'use strict';
   const cases = [...document.querySelectorAll('details.case')];
   const form = document.querySelector('.filters');
+  for (const film of document.querySelectorAll('.film')) {  // a strip, until there is a slider
+    const strips = [...film.querySelectorAll('.frames')].map(one => [...one.children]);
+    const bar = document.createElement('p');
+    const last = strips[0].length - 1;
+    bar.className = 'control';
+    bar.innerHTML = '<button type="button">play</button> <label>time <input type="range" min="0"'
+      + ` max="${last}" value="${last}"></label> <label><input type="checkbox"> all times</label>`;
+    const [play, slider, all] = bar.querySelectorAll('button, input');
+    const show = () => strips.forEach(frames => frames.forEach((f, k) => f.classList.toggle('now', k === +slider.value)));
+    let timer = 0;
+    const stop = () => { clearInterval(timer); timer = 0; play.textContent = 'play'; };
+    slider.addEventListener('input', () => { stop(); show(); });
+    play.addEventListener('click', () => {
+      if (timer) { stop(); return; }
+      play.textContent = 'stop';
+      timer = setInterval(() => { slider.value = (+slider.value + 1) % (last + 1); show(); }, 600);
+    });
+    all.addEventListener('change', () => { stop(); film.classList.toggle('live', !all.checked); });
+    film.prepend(bar);
+    film.classList.add('live');
+  }
   let before = [];
   addEventListener('beforeprint', () => { before = cases.map(d => d.open); cases.forEach(d => { d.open = true; }); });
   addEventListener('afterprint', () => cases.forEach((d, i) => { d.open = before[i]; }));
