@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from verify.printable import memory_text
 from verify.provenance import provenance
 from verify.threads import ONE_THREAD
 
@@ -99,7 +100,7 @@ def examine() -> list[Finding]:
         The machine first, then the compact solver's needs, the reference's, the report's.
     """
     machine = provenance()
-    memory = f"{machine['memory'] / 2**30:.1f} GiB"
+    memory = memory_text(machine["memory"])
     found = [
         Finding("verify", True, f"{machine['versions']['verify']} ({_commit(machine)})"),
         _python(),

@@ -6,7 +6,7 @@ could clear the screen, set its title or hide a verdict; a mark of direction cou
 
 import unicodedata
 
-__all__ = ["one_line", "shown", "visible", "words_of"]
+__all__ = ["memory_text", "one_line", "shown", "visible", "words_of"]
 
 _LONGEST = 2000  # characters of a message; more is no message
 # ESC and the like; marks of direction, which reorder what stands beside them; lone surrogates
@@ -54,3 +54,8 @@ def words_of(error: BaseException, longest: int = _LONGEST) -> str:
     except Exception:
         said = ""
     return one_line(f"{type(error).__name__}{': ' if said else ''}{said}", longest)
+
+
+def memory_text(amount: float) -> str:
+    """Return bytes in the units of ``--memory``: MB, or GB from 1 on (powers of ten)."""
+    return f"{amount / 1e6:.0f} MB" if amount < 0.9995e9 else f"{amount / 1e9:.3g} GB"

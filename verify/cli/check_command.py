@@ -3,10 +3,15 @@
 import argparse
 import json
 import sys
+from dataclasses import asdict
+from typing import Any
 
+from verify.cli.cost_text import case_lines, costs_of
 from verify.errors import InputError
 from verify.printable import one_line
 from verify.runner.checking import check_scene
+from verify.runner.cost import LevelCost
+from verify.runner.options import Options
 from verify.scene import load_scenes
 
 __all__ = ["execute"]
@@ -14,7 +19,8 @@ __all__ = ["execute"]
 
 def execute(arguments: argparse.Namespace) -> int:
     """Validate the files; 2 if one is bad."""
-    rows = [_row(file) for file in arguments.files]
+    options = Options()
+    rows = [_row(file, options) for file in arguments.files]
     if arguments.json:
         print(json.dumps(rows, indent=2))
     else:
@@ -23,15 +29,18 @@ def execute(arguments: argparse.Namespace) -> int:
                 print(f"verify: error: {row['error']}", file=sys.stderr)
             else:
                 print(f"{row['file']}: ok ({row['title']})")
+                for line in case_lines([LevelCost(**one) for one in row["cost"]]):
+                    print(f"  {line}")
     return 2 if any(row["error"] for row in rows) else 0
 
 
-def _row(file: str) -> dict[str, str | None]:
+def _row(file: str, options: Options) -> dict[str, Any]:
     try:
         scenes = load_scenes(file)
         for scene in scenes:
             check_scene(scene)
     except InputError as error:
-        return {"file": file, "title": None, "error": one_line(error)}
+        return {"file": file, "title": None, "error": one_line(error), "cost": []}
     rows = f" and {len(scenes) - 1} more rows" if len(scenes) > 1 else ""
-    return {"file": file, "title": f"{scenes[0].title}{rows}", "error": None}
+    cost = [asdict(one) for scene in scenes for one in costs_of(scene, options)]
+    return {"file": file, "title": f"{scenes[0].title}{rows}", "error": None, "cost": cost}

@@ -1,36 +1,16 @@
-"""``verify conform``: a table of what a solver keeps."""
+"""``verify conform``: the process that solves are forked from loads while this one does."""
 
 import argparse
-import json
-from dataclasses import asdict
+from contextlib import nullcontext
+from importlib import import_module
 
-from verify.cli.solver_parameters import of_one_solver
-from verify.conformance import CheckResult, conform, exit_code_of
+from verify.warm import warm_parent
 
 __all__ = ["execute"]
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the suite on one solver and print a line per check."""
-    parameters = of_one_solver(arguments.parameters)
-    results = conform(arguments.solver, parameters, arguments.timeout, arguments.checks)
-    code = exit_code_of(results)
-    if arguments.json:
-        checks = [asdict(result) for result in results]
-        answer = {"solver": arguments.solver, "parameters": parameters, "exit": code}
-        print(json.dumps({**answer, "checks": checks}, indent=2))
+    with nullcontext() if ":" in arguments.solver else warm_parent():
+        code: int = import_module("verify.cli.conformance_table").execute(arguments)
         return code
-    width = max(len(result.name) for result in results)
-    for result in results:
-        print(f"{result.name:<{width}}  {result.state:<8} {_number(result):<19} {result.claim}")
-        if result.reason:
-            print(f"{'':<{width}}  {result.reason}")
-    return code
-
-
-def _number(result: CheckResult) -> str:
-    if result.observed is None or result.limit is None:
-        return ""
-    return f"{result.observed:.1e} ≤ {result.limit:.1e}" if result.state == "kept" else (
-        f"{result.observed:.1e} > {result.limit:.1e}"
-    )  # fmt: skip

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
+from verify.cli.cost_text import costs_of, run_line
 from verify.cli.progress import progress_on
 from verify.cli.run_ranking import rank_run
 from verify.cli.solver_parameters import of_solvers
@@ -50,6 +51,8 @@ def execute(arguments: argparse.Namespace) -> int:
     )
     if not arguments.no_report:
         threading.Thread(target=_load_report).start()  # while processes solve
+    if expected := run_line([(s, costs_of(s, options)) for s in scenes], options.jobs):
+        _announce(expected)
     with progress_on(sys.stderr) as progress:
         try:
             summary = run_cases(

@@ -14,6 +14,7 @@ from verify.runner.child import POLL_SECONDS, Child
 from verify.runner.log import telling_line
 from verify.scene import Scene, scene_content
 from verify.solution import Solution, read_solution
+from verify.solvers.interface import is_built_in
 
 __all__ = ["Outcome", "Trial", "solve_trials"]
 
@@ -103,7 +104,8 @@ def solve_trials(
 def _start(solver: str, parameters: Mapping[str, Any], names: list[str], stem: Path) -> Child:
     batch, log = stem.with_suffix(".json"), stem.with_suffix(".txt")
     write_json({"solver": solver, "parameters": list(parameters), "trials": names}, batch)
-    return Child("verify.conformance.worker", batch, log, _START_SECONDS, float("inf"))
+    own = is_built_in(solver)  # forked from a warm process, if the caller keeps one
+    return Child("verify.conformance.worker", batch, log, _START_SECONDS, float("inf"), own=own)
 
 
 def _watch(child: Child, folders: list[Path], timeout: float) -> tuple[str, Status]:

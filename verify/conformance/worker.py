@@ -31,7 +31,8 @@ def main(batch_file: Path) -> None:
     batch_file.with_suffix(".ready").touch()
     for name in batch["trials"]:
         folder = batch_file.parent / name
-        write_json(solve_job(read_json(folder / "job.json"), folder), folder / "outcome.json")
+        outcome = solve_job(read_json(folder / "job.json"), folder, timed=False)
+        write_json(outcome, folder / "outcome.json")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@ import math
 import re
 from typing import Any
 
+from verify.printable import memory_text
+
 __all__ = [
     "ROUND_OFF",
     "SECONDARY",
@@ -163,4 +165,4 @@ def bytes_text(value: float | None) -> str:
     """Return an amount of memory."""
     if value is None or not math.isfinite(value):
         return _MISSING
-    return f"{value / 2**20:,.0f} MiB".replace(",", "\N{THIN SPACE}")
+    return memory_text(value)

@@ -5,6 +5,7 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json
+from verify.printable import memory_text
 from verify.result import SolveRecord, Status, checked
 from verify.runner.child import Ending
 from verify.runner.log import telling_line
@@ -39,7 +40,7 @@ def death(log: Path, ending: Ending, timeout: float, memory: float) -> tuple[Sta
     if ending.killed_for == "timeout":
         return Status.TIMEOUT, f"killed after {timeout:g} s"
     if ending.killed_for == "memory":
-        return Status.MEMORY, f"killed above {memory / 2**30:.3g} GiB"
+        return Status.MEMORY, f"killed above {memory_text(memory)}"
     if ending.returncode == -9:
         if ending.starved:
             return Status.MEMORY, "killed by the system, which was out of memory"

@@ -49,10 +49,15 @@ def main(job_file: Path) -> None:
         give_up(comm, outcome, folder / "outcome.json")
 
 
-def solve_job(job: dict[str, Any], folder: Path, store: bool = True) -> dict[str, Any]:
-    """Solve and `store`; every way to fail is an outcome with its reason."""
+def solve_job(
+    job: dict[str, Any], folder: Path, store: bool = True, timed: bool = True
+) -> dict[str, Any]:
+    """Solve and `store`; every way to fail is an outcome with its reason.
+
+    Only a solve that is `timed` has the machine timed beside it, and its critical step asked for.
+    """
     try:
-        return _solved(job, folder, store)
+        return _solved(job, folder, store, timed)
     except UnsupportedSceneError as refusal:
         return {"status": Status.REFUSED, "reason": one_line(refusal, _LONGEST)}
     except InputError as error:
@@ -76,8 +81,7 @@ def _leave_traceback() -> None:
         traceback.print_exc()
 
 
-def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
-    from verify.calibration import calibration_note
+def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict[str, Any]:
     from verify.compile_times import compile_times
     from verify.scene import restore_scene
     from verify.solution import handed_over, write_solution
@@ -110,10 +114,19 @@ def _solved(job: dict[str, Any], folder: Path, store: bool) -> dict[str, Any]:
         "peak_memory": peak_memory(),  # of the solve: eigenvalues come after it
         "notes": {
             **solution.notes,
-            "calibration": calibration_note(),
-            **_critical_step(solver, scene, job, solution.unknowns or 0),
+            **(_beside(solver, scene, job, solution.unknowns or 0) if timed else {}),
             **({COMPILING: f"{compiled.whole:.1f} s"} if compiled.whole > _WORTH_SAYING else {}),
         },
+    }
+
+
+def _beside(solver: Any, scene: Any, job: dict[str, Any], unknowns: int) -> dict[str, str]:
+    """Note what is measured after a solve: the speed of the machine, and the critical step."""
+    from verify.calibration import calibration_note
+
+    return {
+        "calibration": calibration_note(),
+        **_critical_step(solver, scene, job, unknowns),
     }
 
 

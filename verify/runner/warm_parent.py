@@ -72,8 +72,7 @@ def main(descriptor: int) -> None:
     request = json.loads(said)
     _keep(request, *files)
     _work(request)
-    if "mpi4py.MPI" not in sys.modules:  # MPI is left in order
-        _leave()
+    _leave()
 
 
 def _import_for(module: str) -> None:
@@ -184,6 +183,9 @@ def _work(request: dict[str, Any]) -> None:
 def _leave() -> NoReturn:
     """End in order, but without taking apart what all have imported, which takes its time."""
     atexit._run_exitfuncs()
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized():
+        mpi.Finalize()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(Exception):  # the work may have closed it
             stream.flush()

@@ -1,0 +1,36 @@
+"""The table of ``verify conform``: what a solver keeps."""
+
+import argparse
+import json
+from dataclasses import asdict
+
+from verify.cli.solver_parameters import of_one_solver
+from verify.conformance import CheckResult, conform, exit_code_of
+
+__all__ = ["execute"]
+
+
+def execute(arguments: argparse.Namespace) -> int:
+    """Run the suite on one solver and print a line per check."""
+    parameters = of_one_solver(arguments.parameters)
+    results = conform(arguments.solver, parameters, arguments.timeout, arguments.checks)
+    code = exit_code_of(results)
+    if arguments.json:
+        checks = [asdict(result) for result in results]
+        answer = {"solver": arguments.solver, "parameters": parameters, "exit": code}
+        print(json.dumps({**answer, "checks": checks}, indent=2))
+        return code
+    width = max(len(result.name) for result in results)
+    for result in results:
+        print(f"{result.name:<{width}}  {result.state:<8} {_number(result):<19} {result.claim}")
+        if result.reason:
+            print(f"{'':<{width}}  {result.reason}")
+    return code
+
+
+def _number(result: CheckResult) -> str:
+    if result.observed is None or result.limit is None:
+        return ""
+    return f"{result.observed:.1e} ≤ {result.limit:.1e}" if result.state == "kept" else (
+        f"{result.observed:.1e} > {result.limit:.1e}"
+    )  # fmt: skip

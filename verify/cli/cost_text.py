@@ -1,0 +1,62 @@
+"""Expected cost of cases in words, before anything is solved."""
+
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+
+from verify.printable import memory_text
+from verify.runner.cost import LevelCost, case_cost
+from verify.runner.options import Options
+from verify.runner.plan import solvers_of
+from verify.scene import Scene
+
+__all__ = ["case_lines", "costs_of", "duration_text", "run_line"]
+
+
+def costs_of(scene: Scene, options: Options) -> list[LevelCost]:
+    """Estimate the solves that a run of `scene` plans."""
+    return case_cost(scene, solvers_of(scene, options), options.repetitions)
+
+
+def case_lines(costs: Sequence[LevelCost]) -> list[str]:
+    """Return a line per solver, and one for the whole; none for what is not estimated."""
+    if not costs:
+        return []
+    lines = []
+    order = list(dict.fromkeys(row.solver for row in costs))  # of a family of scenes, each as one
+    of_solver = sorted(costs, key=lambda row: order.index(row.solver))
+    for solver, group in groupby(of_solver, key=lambda row: row.solver):
+        rows = list(group)
+        unknowns = ", ".join(f"{row.unknowns}" for row in rows)
+        lines.append(f"{solver}: about {unknowns} unknowns, {_spent(rows)}")
+    return [*lines, f"in all {_spent(costs)}; rough, by mesh sizes"]
+
+
+def run_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> str:
+    """Say in a line what a run will take, and which case takes most; empty if nobody knows."""
+    rows = [row for _, group in costs for row in group]
+    if not rows:
+        return ""
+    most, group = max(costs, key=lambda one: _seconds(one[1]))
+    share = _seconds(group) / _seconds(rows)
+    at = f", {share:.0%} of it in {most.name}" if len(costs) > 1 else ""
+    largest = max(rows, key=lambda row: row.unknowns)
+    return (
+        f"expected (rough): {duration_text(_seconds(rows) / jobs)}{at}; at most about "
+        f"{largest.unknowns} unknowns and {memory_text(max(row.memory for row in rows))} a process"
+    )
+
+
+def duration_text(seconds: float) -> str:
+    """Return a rough duration: seconds, minutes or hours, with one or two digits."""
+    for unit, length in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * length:
+            return f"{seconds / length:.2g} {unit}"
+    return f"{max(seconds, 1.0):.2g} s" if seconds < 9.5 else f"{round(seconds, -1):.0f} s"
+
+
+def _spent(rows: Sequence[LevelCost]) -> str:
+    return f"{duration_text(_seconds(rows))}, {memory_text(max(row.memory for row in rows))}"
+
+
+def _seconds(rows: Iterable[LevelCost]) -> float:
+    return sum(row.seconds for row in rows)
