@@ -26,7 +26,7 @@ from verify.xfem.supports import Supports
 from verify.xfem.tips import with_tip_nodes
 
 SOFT = isotropic(1.0, 0.3, "plane strain")
-SEEDS = range(25)
+SEEDS = [*range(10), *(pytest.param(n, marks=pytest.mark.heavy) for n in range(10, 50))]
 LEAST = 0.15  # share of each part in its element
 
 
@@ -127,8 +127,8 @@ def test_what_opens_further_stores_less(seed):
 
 def test_some_of_these_cracks_are_straight_and_some_are_not():
     """About half of all ends are nearer to a place beside the line than to one on it."""
-    found = [straight(nodes, ends) for _, ends, nodes, _ in map(tipped, SEEDS)]
-    assert 4 < sum(found) < len(found) - 4
+    found = [straight(nodes, ends) for _, ends, nodes, _ in map(tipped, range(20))]
+    assert 3 < sum(found) < 17
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -211,6 +211,19 @@ def test_an_arc_ends_at_nodes_too():
     nodes = with_tip_nodes(shaken(rectangle_mesh((10, 10)), 3), [arc])
     assert len(nodes.moved) == 2
     assert zero_modes(cut_mesh(nodes.mesh, nodes.cuts))[0] == 3
+
+
+@pytest.mark.parametrize(
+    "scheme", ["newmark", pytest.param("central_differences", marks=pytest.mark.heavy)]
+)
+def test_a_cut_that_opens_during_a_motion_keeps_the_energy(scheme):
+    """The ends are nodes from the start on; what opens later inherits the fields as they are."""
+    scene = load_scene("dynamics/plate_cut_vibrating")
+    found = find_solver("xfem").solve(scene, 0, 1, tip="partial", scheme=scheme)
+    total = found.ledger["total"]
+    assert total == pytest.approx(np.full(len(total), total[0]), rel=1e-9)
+    kinds = [one.kind for one in found.regularisations]
+    assert "end of a cut made a node" in kinds
 
 
 def test_solids_are_refused_by_library_and_solver():

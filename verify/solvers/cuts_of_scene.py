@@ -17,7 +17,7 @@ from verify.scene import (
     ToolPathCut,
 )
 from verify.solution import Regularisation
-from verify.xfem.crossing import AT_END, TipRule
+from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath, TriangulatedSurface
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tips import with_tip_nodes
@@ -35,12 +35,12 @@ def cuts_of(scene: Scene, size: float) -> list[Cut]:
 
 
 class ToCut(NamedTuple):
-    """What the library is to cut, by what, by which rule, and what was moved for that."""
+    """What the library is to cut, by what, by which rule, and what was done for that."""
 
     mesh: SimplexMesh
     cuts: list[Cut]
     rule: TipRule
-    moved: list[Regularisation]
+    done: list[Regularisation]
 
 
 def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
@@ -58,9 +58,10 @@ def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
             "tip = 'partial' in a solid; it is offered for triangles, other tip rules are for both"
         )
     nodes = with_tip_nodes(mesh, cuts)
-    moved = nodes.moved[nodes.moved > AT_END * mesh.extent]
-    said = [Regularisation("end of a cut moved to a node", len(moved), moved.max(initial=0.0), "m")]
-    return ToCut(nodes.mesh, nodes.cuts, "inside", said if len(moved) else [])
+    said = Regularisation(
+        "end of a cut made a node", len(nodes.moved), float(nodes.moved.max(initial=0.0)), "m"
+    )
+    return ToCut(nodes.mesh, nodes.cuts, "inside", [said] if len(nodes.moved) else [])
 
 
 def _cut(cut: Any, size: float) -> Cut:

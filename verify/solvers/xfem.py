@@ -199,7 +199,7 @@ def _cut(
     if slivers in ("merge", "drop"):
         held = supports_of(scene, phantom, exact).fixed.any(axis=1)
         phantom, report = treat_slivers(phantom, policy, held=held)
-    return phantom, report, [*asked.moved, *joined(specks)]
+    return phantom, report, [*asked.done, *joined(specks)]
 
 
 def _check_penalty(scene: Scene, basis: str, mass: str) -> None:

@@ -126,4 +126,4 @@ class XfemOpening:
 
     def regularisations(self) -> list[Regularisation]:
         """Return what was done to ends of cuts and to slivers."""
-        return [*self._to_cut.moved, *self._slivers, *self._penalised]
+        return [*self._to_cut.done, *self._slivers, *self._penalised]
