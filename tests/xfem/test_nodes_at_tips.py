@@ -231,3 +231,20 @@ def test_solids_are_refused_by_library_and_solver():
         with_tip_nodes(box_mesh((1, 1, 1)), [])
     with pytest.raises(UnsupportedSceneError, match="partial"):
         find_solver("xfem").solve(load_scene("curved/penny"), 0, 1, tip="partial")
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_new_nodes_leave_other_cuts_as_they_were(seed):
+    """Two straight cracks anywhere: as many bodies as before, no mechanism, no hanging node."""
+    random = np.random.default_rng(seed)
+    mesh = shaken(rectangle_mesh((5, 5)), seed)
+    cuts = [Polyline(random.uniform(0.05, 0.95, (2, 2))) for _ in range(2)]
+    nodes = with_tip_nodes(mesh, cuts)
+    before, after = cut_mesh(mesh, cuts), cut_mesh(nodes.mesh, nodes.cuts)
+    assert zero_modes(after)[0] == zero_modes(before)[0]
+    divided = subdivide(after)
+    torn = facet_measures(divided.cut_facets).sum()
+    assert exterior(divided) == pytest.approx(4.0 + 2.0 * torn, abs=1e-9)
+    levels = [cut.level_set(nodes.mesh.points[: len(mesh.points)]) for cut in nodes.cuts]
+    asked = np.array([cut.level_set(mesh.points) for cut in cuts])
+    assert (np.array(levels) != asked).sum() <= len(nodes.moved)  # nodes that are ends, no others

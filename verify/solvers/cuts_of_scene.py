@@ -61,7 +61,7 @@ def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
     said = Regularisation(
         "end of a cut made a node", len(nodes.moved), float(nodes.moved.max(initial=0.0)), "m"
     )
-    return ToCut(nodes.mesh, nodes.cuts, "inside", [said] if len(nodes.moved) else [])
+    return ToCut(nodes.mesh, list(nodes.cuts), "inside", [said] if len(nodes.moved) else [])
 
 
 def _cut(cut: Any, size: float) -> Cut:

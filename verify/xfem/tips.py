@@ -33,36 +33,45 @@ _LEAST = 0.15  # share in an element or an edge that each part of it has at leas
 _BEHIND = 4.0
 _HALVINGS = 52
 _ROUND_OFF = 1e-9
+_NEAR = 0.05  # element sizes: an end farther from the cut than that is none
 
 
 @dataclass(frozen=True)
 class EndingCut:
-    """A cut that ends exactly at some nodes.
+    """A cut that ends exactly at some nodes, and is elsewhere as before they were there.
 
     Attributes
     ----------
     cut : Cut
         As asked for.
     ends : (k, space) float array
-        The nodes, in metres. Level set and depth are zero there.
+        The nodes at which it ends, in metres. Level set and depth are zero there.
+    others : (n, space) float array
+        Further new nodes, in metres.
+    levels : (n,) float array
+        Level set there: linear in the element that was divided, so that it is cut as it was.
     """
 
     cut: Cut
     ends: _Floats
+    others: _Floats
+    levels: _Floats
 
     def level_set(self, points: _Floats) -> _Floats:
-        """Level set of the cut, zero at the ends."""
-        return np.where(self._at_end(points), 0.0, self.cut.level_set(points))
+        """Level set of the cut, as stated at the new nodes."""
+        found = np.array(self.cut.level_set(points), dtype=float)
+        for place, level in zip(self.others, self.levels, strict=True):
+            found[(points == place).all(axis=1)] = level
+        return self._zero_at_ends(found, points)
 
     def depth(self, points: _Floats) -> _Floats:
-        """Depth of the cut, zero at the ends."""
-        return np.where(self._at_end(points), 0.0, self.cut.depth(points))
+        """Depth of the cut, zero at its ends."""
+        return self._zero_at_ends(np.array(self.cut.depth(points), dtype=float), points)
 
-    def _at_end(self, points: _Floats) -> _Bools:
-        found = np.zeros(len(points), dtype=bool)
+    def _zero_at_ends(self, values: _Floats, points: _Floats) -> _Floats:
         for end in self.ends:
-            found |= (points == end).all(axis=1)
-        return found
+            values[(points == end).all(axis=1)] = 0.0
+        return values
 
 
 class TipNodes(NamedTuple):
@@ -73,14 +82,14 @@ class TipNodes(NamedTuple):
     mesh : SimplexMesh
         Nodes keep their numbers, new ones follow. The first part of a divided cell keeps its
         number, the others follow.
-    cuts : list of Cut
+    cuts : list of EndingCut
         The cuts as they end at nodes of `mesh`, to be applied by the tip rule "inside".
     moved : (k,) float array
         Distance of each of these ends from where it was asked for, in metres.
     """
 
     mesh: SimplexMesh
-    cuts: list[Cut]
+    cuts: list[EndingCut]
     moved: _Floats
 
 
@@ -126,11 +135,18 @@ def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
     for cells, _ in met:
         times_met += cells
     division = _Division(mesh, times_met > 1)
-    ending: list[Cut] = []
-    for cut, (_, chords) in zip(cuts, met, strict=True):
-        places = [place for chord in chords if (place := division.end_at(chord)) is not None]
-        ending.append(EndingCut(cut, np.array(places)) if places else cut)
-    return TipNodes(division.mesh(), ending, np.array(division.moved))
+    ends = [
+        np.array([at for chord in chords if (at := division.end_at(chord)) is not None])
+        for _, chords in met
+    ]
+    divided = division.mesh()
+    nodes = divided.points[len(mesh.points) :]
+    levels = division.interpolated(values)
+    ending = [
+        EndingCut(cut, places, nodes, levels[:, k])
+        for k, (cut, places) in enumerate(zip(cuts, ends, strict=True))
+    ]
+    return TipNodes(divided, ending, np.array(division.moved))
 
 
 def _met(mesh: SimplexMesh, cut: Cut, values: _Floats) -> tuple[_Bools, list[_Chord]]:
@@ -140,30 +156,31 @@ def _met(mesh: SimplexMesh, cut: Cut, values: _Floats) -> tuple[_Bools, list[_Ch
     plus, rows = plus[cells], np.arange(len(cells))
     lone = (plus == (plus.sum(axis=1) == 1)[:, None]).argmax(axis=1)
     corners, size = mesh.points[mesh.cells[cells]], mesh.longest_edges(cells)
-    ways, inside = np.zeros((2, len(cells), 3)), np.zeros((2, len(cells)), dtype=bool)
+    ways, within = np.zeros((2, len(cells), 3)), np.zeros((2, len(cells)), dtype=bool)
+    near = np.zeros_like(within)
     for turn, at in enumerate(ways):
         other = (lone + turn + 1) % 3
         here, there = (values[mesh.cells[cells, k]] for k in (lone, other))
         at[rows, lone], at[rows, other] = there / (there - here), here / (here - there)
         level, depth = level_and_depth(cut, np.einsum("qi,qid->qd", at, corners))
-        inside[turn] = (depth >= -AT_END * size) & (np.abs(level) <= REACH * size)
+        near[turn], within[turn] = np.abs(level) <= REACH * size, depth >= -AT_END * size
     meets = np.zeros(len(mesh.cells), dtype=bool)
-    meets[cells] = inside.any(axis=0)
-    ending = inside[0] != inside[1]
-    first = np.where(inside[0, ending], 0, 1)
-    some = np.flatnonzero(ending)
+    meets[cells] = (near & within).any(axis=0)
+    some = np.flatnonzero(near.all(axis=0) & (within[0] != within[1]))
     if len(some) == 0:
         return meets, []
+    first = np.where(within[0, some], 0, 1)
     low, out = ways[first, some], ways[1 - first, some]
     entry, high = low, out
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        depth = level_and_depth(cut, np.einsum("qi,qid->qd", middle, corners[some]))[1]
-        within = (depth >= 0.0)[:, None]
-        low, high = np.where(within, middle, low), np.where(within, high, middle)
-    return meets, [
-        _Chord(*each) for each in zip(cells[some].tolist(), entry, low, out, strict=True)
-    ]
+        level, depth = level_and_depth(cut, np.einsum("qi,qid->qd", middle, corners[some]))
+        inner = (depth >= 0.0)[:, None]
+        low, high = np.where(inner, middle, low), np.where(inner, high, middle)
+    # beside a kink the depth may change its sign off the cut
+    ends = np.abs(level) <= _NEAR * size[some]
+    found = zip(cells[some].tolist(), entry, low, out, strict=True)
+    return meets, [_Chord(*each) for each, is_end in zip(found, ends, strict=True) if is_end]
 
 
 class _Division:
@@ -180,6 +197,7 @@ class _Division:
         self._mesh, self._taken = mesh, taken
         self._points, self._cells = list(mesh.points), mesh.cells.copy()
         self._more: list[_Ints] = []
+        self._from: list[tuple[int, _Floats]] = []
         self.moved: list[float] = []
         self._inner = np.ones(len(mesh.points), dtype=bool)
         for cell, opposite in mesh.boundary_facets:
@@ -188,6 +206,11 @@ class _Division:
     def mesh(self) -> SimplexMesh:
         """Return the mesh with the cells divided so far."""
         return SimplexMesh(self._points, np.concatenate([self._cells, *self._more]))
+
+    def interpolated(self, values: _Floats) -> _Floats:
+        """Values (n, c) at the nodes as (k, c) at the new ones, linear in the divided cells."""
+        found = [at @ values[self._mesh.cells[cell]] for cell, at in self._from]
+        return np.array(found).reshape(-1, values.shape[1])
 
     def end_at(self, chord: _Chord) -> _Floats | None:
         """Divide cells where a cut ends; the place of its end, if there is a good one."""
@@ -214,6 +237,7 @@ class _Division:
         nodes = self._mesh.cells[chord.cell]
         replaced, number = nodes[at > 0.0], len(self._points)
         self._points.append(at @ corners)
+        self._from.append((chord.cell, at))
         for cell in cells:
             parts = [
                 np.where(self._cells[cell] == node, number, self._cells[cell])
