@@ -210,7 +210,7 @@ class _Division:
     def interpolated(self, values: _Floats) -> _Floats:
         """Values (n, c) at the nodes as (k, c) at the new ones, linear in the divided cells."""
         found = [at @ values[self._mesh.cells[cell]] for cell, at in self._from]
-        return np.array(found).reshape(-1, values.shape[1])
+        return np.array(found).reshape(len(found), values.shape[1])
 
     def end_at(self, chord: _Chord) -> _Floats | None:
         """Divide cells where a cut ends; the place of its end, if there is a good one."""
