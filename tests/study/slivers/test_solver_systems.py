@@ -8,11 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from verify.assess.system_numbers import condition_numbers, critical_step
+from verify.assess.system_numbers import STEP, condition_numbers, critical_step
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers import find_solver
+from verify.study.slivers import study
 from verify.study.slivers.step_by_running import step_by_running
+from verify.study.variants import Variant
 from verify.system import checked_system
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
@@ -122,3 +124,16 @@ def test_a_solver_that_takes_its_own_step_has_none_by_running(scene):
     solver.own_step *= 8.0
     with pytest.raises(InputError, match="blows"):
         step_by_running(solver, scene, 0, 10.0, {})
+
+
+def test_no_critical_step_of_an_implicit_program_is_looked_for(scene):
+    class Implicit:
+        name, implicit = "implicit", True
+
+        def solve(self, *_, **__):
+            raise AssertionError("it was run")
+
+    ((quantity, _, value, reason),) = study._further(Implicit(), Variant("x", "x"), scene, 0)
+    assert quantity == STEP
+    assert value is None
+    assert "implicit" in reason
