@@ -18,6 +18,8 @@ class ForeignProgram(ProgramSolver):
     ----------
     files : list of path
         What its answers depend on, for the fingerprint of a solve.
+    implicit : bool
+        No step of any of these programs is critical: no study looks for one by running them.
 
     Raises
     ------
@@ -26,6 +28,7 @@ class ForeignProgram(ProgramSolver):
     """
 
     repeats = True
+    implicit = True
 
     def __init__(self, name: str) -> None:
         record = foreign_solver(name)

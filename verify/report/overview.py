@@ -81,6 +81,7 @@ def origin_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         said.append(("started", str(record.get("started") or "unknown")))
         said.append(("finished", str(record.get("finished") or "not finished")))
     said.append(("commit", f"{commit}{state}" if commit else "unknown"))
+    said += [("run again", str(rows)) for rows in record.get("run_again", [])]
     if isinstance(memory := origin.pop("memory", None), int | float):
         said.append(("memory", bytes_text(memory)))
     said += [(key, str(value)) for key, value in origin.items()]

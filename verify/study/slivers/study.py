@@ -114,6 +114,9 @@ def _further(solver: Solver, variant: Variant, scene: Scene, level: int) -> Iter
     if scene.analysis.kinematics != "linear" or scene.analysis.kind != "static":
         return
     system: Any = getattr(solver, "system", None)
+    if system is None and getattr(solver, "implicit", False):
+        yield STEP, "s", None, "its time integration is implicit: no step is critical"
+        return
     if system is None:
         yield _by_running(solver, variant, scene, level)
         return
