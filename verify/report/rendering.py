@@ -18,7 +18,8 @@ __all__ = ["render", "render_markdown", "render_pdf", "render_summary"]
 
 # of the provenance, what says something to a reader elsewhere
 _PUBLISHED = (
-    "command", "finished", "commit", "memory", "cpu", "cores", "load", "threads", "versions",
+    "command", "finished", "commit", "run again", "memory", "cpu", "cores", "load", "threads",
+    "versions",
 )  # fmt: skip
 _PAGE_BYTES = 14_500_000  # what a mail system or a code host still takes
 
