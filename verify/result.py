@@ -18,6 +18,7 @@ from verify.regularisation import Regularisation
 __all__ = [
     "COMPILING",
     "CRITICAL_STEP",
+    "LOG",
     "SCHEMA_VERSION",
     "CaseResult",
     "Metric",
@@ -38,6 +39,7 @@ __all__ = [
 ]
 
 SCHEMA_VERSION = 1
+LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
 CRITICAL_STEP = (
     "critical step"  #: of the notes of a solve in motion: of central differences, at rest

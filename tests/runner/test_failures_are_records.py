@@ -43,8 +43,12 @@ def test_a_solve_that_hangs_is_killed_with_its_children_after_the_timeout(verify
 
 
 def test_a_solve_that_eats_memory_is_killed_and_its_peak_recorded(verify):
-    verify("run", "square.toml", "--solver=fake_solvers:Hungry", "--memory", "0.4", "--out", "out")
+    done = verify(
+        "run", "square.toml", "--solver=fake_solvers:Hungry", "--memory", "0.4", "--out", "out"
+    )
     record = verify.records()["Hungry", 0]
+    assert (verify.folder / "out" / record["notes"]["log"]).is_file()
+    assert record["notes"]["log"] in done.stderr
     assert record["status"] == "memory"
     assert record["reason"] == "killed above 400 MB"
     # it touches 16 MB per 5 ms and is looked at every 20 ms (with the machine's own delays)
