@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from reference.exact import exact_solution
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Status
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
@@ -29,7 +30,7 @@ def solve(scenes, place, solvers, parameters=None, timed=False):
                 except ValueError as error:
                     record = SolveRecord(scene.name, name, level, Status.FAILED, str(error))
                 records.append(record)
-        result = CaseResult(scene.name, "", "", "", {}, {}, records, [], [])
+        result = CaseResult(scene.name, "", "", "", {}, ReferenceRecord(), records, [], [])
         found.append(Solved(scene, result, solutions))
     return found
 
