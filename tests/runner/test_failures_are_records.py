@@ -33,12 +33,12 @@ def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(ver
 def test_a_solve_that_hangs_is_killed_with_its_children_after_the_timeout(verify):
     mark = verify.folder / "mark"
     start = time.monotonic()
-    command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "1.5")
+    command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "6")
     verify(*command, "--out", "out", HANG_MARK=str(mark))
     assert time.monotonic() - start < 60
     record = verify.records()["Hanging", 0]
-    assert (record["status"], record["reason"]) == ("timeout", "killed after 1.5 s")
-    assert 1.5 <= record["wall"] < 10
+    assert (record["status"], record["reason"]) == ("timeout", "killed after 6 s")
+    assert 6.0 <= record["wall"] < 30
     assert not alive_in_group(int(mark.read_text()))
 
 

@@ -229,8 +229,11 @@ def test_a_static_answer_is_adequate_for_what_has_come_to_rest_and_not_on_the_wa
     assert ("not adequate" in said) != adequate
 
 
+BRIEF = {**SETTLING, "analysis": {**SETTLING["analysis"], "duration": 2.0}}
+
+
 def test_in_motion_mass_and_time_step_have_their_parts_and_all_add_up():
-    scene = Scene.model_validate(SETTLING)
+    scene = Scene.model_validate(BRIEF)
     study = budget_of(scene, metric="early")
     found = parts(study, "early")
     steps = ["consistent → lumped mass", "fine → own time step"]
@@ -238,7 +241,7 @@ def test_in_motion_mass_and_time_step_have_their_parts_and_all_add_up():
     total = found.pop("total")
     assert sum(found.values()) == pytest.approx(total, rel=1e-10)
     # the rule is of second order, but the kinks of the ramp are not smooth: faster than the step
-    halved = {**SETTLING, "analysis": {**SETTLING["analysis"], "time_step": 0.05}}
+    halved = {**BRIEF, "analysis": {**BRIEF["analysis"], "time_step": 0.05}}
     coarse, fine = (
         parts(one, "displacement_l2_mean")[steps[1]]
         for one in (study, budget_of(Scene.model_validate(halved)))
@@ -254,7 +257,7 @@ def test_a_link_that_cannot_be_made_is_named_and_the_rest_adds_up():
     cuts = [{**SETTLING["cuts"][0], "points": [[0.53, -0.1], [0.53, 0.13]]},
             {"kind": "polyline", "name": "later", "points": [[0.78, -0.1], [0.78, 0.13]],
              "opens_at": 1.0}]  # fmt: skip
-    study = budget_of(Scene.model_validate({**SETTLING, "cuts": cuts}))
+    study = budget_of(Scene.model_validate({**BRIEF, "cuts": cuts}))
     missing = {one.source: one for one in study.missing}
     assert "different times" in missing[CUT].reason
     found = parts(study, "end")
