@@ -43,7 +43,7 @@ demo: setup ## solve the demo cases and write build/demo/report.html
 
 # No claim about time: what passes here does so however busy the machine is.
 test: setup ## run the tests, without claims about time and heavy studies
-	@$(PYTEST) -n $(JOBS) --dist loadfile -m "not timing and not heavy"
+	@$(PYTEST) -n $(JOBS) --dist loadfile --no-loadscope-reorder -m "not timing and not heavy"
 
 heavy: setup ## run the heavy studies (minutes to hours)
 	@$(PYTEST) -m heavy --timeout 0

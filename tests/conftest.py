@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from _pytest.runner import runtestprotocol
 
+FOLDER = Path(__file__).resolve().parent
 _VARIABLE = "VERIFY_CACHE"
 
 ATTEMPTS = 3  # at a claim about time that fails while other programs run
@@ -65,6 +66,20 @@ def _said(failed):
 def _is_claim(failed):
     """Whether an assertion failed and not the program: an error is one on every machine."""
     return bool(failed) and _said(failed).startswith(("assert", "AssertionError"))
+
+
+@pytest.fixture(scope="session")
+def warm():
+    """A process that has imported what solving needs; solves of the own solvers are forked off."""
+    from verify.warm import warm_parent
+
+    folders = [*(str(FOLDER / name) for name in ("runner", "..")), os.environ.get("PYTHONPATH", "")]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PYTHONPATH", os.pathsep.join(folders))
+        opened = warm_parent()
+        opened.__enter__()
+    yield
+    opened.__exit__(None, None, None)
 
 
 def time_of_others():

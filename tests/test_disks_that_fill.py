@@ -13,6 +13,7 @@ from PIL import Image
 from small_disk import by_command, in_this_process, named_until_it_fits, small_disk
 
 from verify.compare.locate import SolutionField
+from verify.reference_record import ReferenceRecord
 from verify.report.blocks import Drawing
 from verify.report.template_sets import PICTURES, Beside
 from verify.result import CaseResult, write_result
@@ -62,7 +63,7 @@ WRITERS = {
     "a.gif": lambda path: animation.write_animation([], None, path, 10.0),
     "a.png": lambda path: animation.write_picture(None, None, path),
     "result.json": lambda path: write_result(
-        CaseResult("a", "b" * 9000, "", "", {}, {}, [], [], []), path
+        CaseResult("a", "b" * 9000, "", "", {}, ReferenceRecord(), [], [], []), path
     ),
 }
 

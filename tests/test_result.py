@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from verify.errors import InputError
+from verify.reference_record import ReferenceRecord
 from verify.result import (
     CaseResult,
     Metric,
@@ -31,7 +32,7 @@ def judged(*verdicts):
         requirement="It shall hold.",
         scene_hash="00",
         scene={"title": "A"},
-        reference={"kind": "exact"},
+        reference=ReferenceRecord("exact"),
         solves=[
             SolveRecord(
                 "statics/a", "xfem", 0, Status.SOLVED,

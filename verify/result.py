@@ -13,11 +13,13 @@ from typing import Any
 from verify.errors import InputError
 from verify.json_files import plain, read_json, write_json
 from verify.printable import one_line, words_of
+from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 
 __all__ = [
     "COMPILING",
     "CRITICAL_STEP",
+    "LOG",
     "SCHEMA_VERSION",
     "CaseResult",
     "Metric",
@@ -38,6 +40,7 @@ __all__ = [
 ]
 
 SCHEMA_VERSION = 1
+LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for
 CRITICAL_STEP = (
     "critical step"  #: of the notes of a solve in motion: of central differences, at rest
@@ -51,6 +54,7 @@ def _closed[Kind](kind: Kind) -> Kind:
 
 
 _closed(Regularisation)
+_closed(ReferenceRecord)
 
 
 class Status(StrEnum):
@@ -317,7 +321,7 @@ class CaseResult:
     requirement: str
     scene_hash: str
     scene: dict[str, Any]
-    reference: dict[str, Any]  # kind, source, levels, per metric: values, uncertainty, order
+    reference: ReferenceRecord
     solves: list[SolveRecord]
     rates: list[Rate]
     verdicts: list[VerdictRecord]
@@ -333,6 +337,10 @@ class CaseResult:
         """The worst verdict of the case (ERROR > FAIL > UNDECIDED > PASS)."""
         order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
         return max((v.verdict for v in self.verdicts), key=order.index, default=Verdict.UNDECIDED)
+
+    def content(self) -> dict[str, Any]:
+        """Return all of it as plain values; of the reference what its record says."""
+        return {**asdict(self), "reference": self.reference.said()}
 
     @property
     def warnings(self) -> list[Notice]:
@@ -358,7 +366,7 @@ def write_result(result: CaseResult, path: Path) -> None:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     lost: dict[str, str] = {}
-    content = plain(asdict(result), lost)
+    content = plain(result.content(), lost)
     write_json({**content, "not_finite": lost} if lost else content, path)
 
 

@@ -87,7 +87,7 @@ def judged_against_rows(
     judge_only : sequence of str
         As of `judge`.
     """
-    if not result.reference:  # its comparison failed, and its verdicts say so
+    if result.reference.kind is None:  # its comparison failed, and its verdicts say so
         return result
     applied = applied_checks(scene.acceptance, result.solves, judge_only)
     verdicts = []

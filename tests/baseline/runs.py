@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 from verify.calibration import KERNEL
+from verify.reference_record import ReferenceRecord
 from verify.result import (
     CaseResult,
     Metric,
@@ -69,7 +70,7 @@ def result(*solves, scene=None, verdicts=()):
         requirement="it shall hold",
         scene_hash="0123",
         scene=content,
-        reference={},
+        reference=ReferenceRecord(),
         solves=list(solves) or [solve(0), solve(1)],
         rates=[],
         verdicts=list(verdicts),

@@ -46,6 +46,7 @@ BROKEN_LINES = {
     ),
     "both weights": (["--quick", "--heavy"], "--heavy: not allowed with argument --quick"),
     "option": (["--fast"], "unrecognized arguments: --fast"),
+    "misspelt option": (["--repetition", "1", "--solvr=xfem"], "did you mean '--solver'?"),
 }
 
 

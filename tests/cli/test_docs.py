@@ -2,11 +2,11 @@
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
+from command_line import run_here
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = ["guide/write-a-case.md", "guide/cli.md"]
@@ -17,24 +17,18 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def run(line: str, folder: Path) -> CompletedProcess[str]:
     command, _, target = line.partition(" > ")
     words = shlex.split(command)
     assert words[0] == "verify", line
-    done = subprocess.run(
-        [sys.executable, "-m", "verify", *words[1:]],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = run_here(words[1:], folder)
     if target:
         (folder / target.strip()).write_text(done.stdout, encoding="utf-8")
     return done
 
 
 @pytest.mark.parametrize("page", PAGES)
+@pytest.mark.usefixtures("warm")
 def test_every_command_of_the_page_succeeds(page: str, tmp_path: Path) -> None:
     (tmp_path / "my_case.toml").write_text(
         blocks("guide/write-a-case.md", "toml")[0], encoding="utf-8"

@@ -27,6 +27,7 @@ def test_what_names_no_solver_or_no_value_is_bad_input(text):
         of_solvers([text])
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_run_solves_with_the_parameters_that_it_was_given(tmp_path, capsys):
     # one level and scheme: first order in time, which the case does not accept
     run = ["run", "dynamics/freed_half", "--solver", "xfem", "--repetitions", "1", "--no-report"]

@@ -2,9 +2,10 @@
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
+
+import pytest
+from command_line import run_here
 
 from verify.methods import METHODS
 from verify.solvers import find_solver
@@ -17,19 +18,12 @@ def blocks(language):
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def test_every_command_of_the_page_succeeds(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(PAGE.parents[1]))
+@pytest.mark.usefixtures("warm")
+def test_every_command_of_the_page_succeeds(tmp_path):
     lines = [line for block in blocks("sh") for line in block.splitlines() if line.strip()]
     assert len(lines) == 2
     for line in lines:
-        words = shlex.split(line)
-        done = subprocess.run(
-            [sys.executable, "-m", *words],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
+        done = run_here(shlex.split(line)[1:], tmp_path)
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 
 

@@ -62,9 +62,9 @@ def cruciform(a, intensity, energy, **more):
     return Known(scene, a, (intensity, 0.0), 2e-6, energy, **more)
 
 
-def moes(known, loads, supports=None):
+def moes(known, loads, supports=None, **more):
     scene = plate(7, 16, [polyline("a", (0, 8), (3.5, 8))], loads, supports)
-    return Known(scene, 1 / np.pi, known, 1e-5)
+    return Known(scene, 1 / np.pi, known, 1e-5, **more)
 
 
 def griffith(stress, energy, **more):
@@ -95,12 +95,12 @@ HEAVY = (pytest.mark.heavy,)
 CLAMPED = [{"where": "bottom", "displacement": [0, 0]}]
 VALUES = {
     "griffith, uniaxial": griffith([0.0, 1.0, 0.0], 8.07875793695, marks=HEAVY),
-    "griffith, 45 degrees": griffith([0.5, 0.5, 0.5], 7.508199303500),
+    "griffith, 45 degrees": griffith([0.5, 0.5, 0.5], 7.508199303500, marks=HEAVY),
     "single edge .3": edge(0.3, 1.661122, 1.1637318, 2.5641150, marks=HEAVY),
     "single edge .4": edge(0.4, 2.112763, 1.5195967, 4.7564718, marks=HEAVY),
     "single edge .5": edge(0.5, 2.825465, 2.2995892, 9.0036825),
     "single edge .6": edge(0.6, 4.033332, 4.1256056, 18.123400, marks=HEAVY),
-    "edge under tension": moes((9.366536, 0.0), TENSION),
+    "edge under tension": moes((9.366536, 0.0), TENSION, marks=HEAVY),
     "edge under shear": moes((34.0426, 4.5370), {"top": [1, 0]}, CLAMPED),
     "centre .3": centre(0.3, 1.123191),
     "centre .5": centre(0.5, 1.333712),

@@ -38,24 +38,6 @@ def patch() -> tuple[Scene, object]:
     return case, exact_solution(case.exact.solution, case.exact.parameters, case.material)
 
 
-@pytest.mark.parametrize("name", SOLVERS)
-def test_a_cut_through_two_materials_passes_the_patch_test(patch, name: str) -> None:
-    """Linear on each of the four parts: whatever carries the cut exactly has it to round-off.
-
-    That the law differs by place is tested with it: the energy is half the work on the outline,
-    which holds no modulus but those of the displacements there.
-    """
-    case, exact = patch
-    found = find_solver(name).solve(case, 0, 0)
-    near = found.points[found.cells[:, :3]].mean(axis=1)
-    for k in range(found.cells.shape[1]):
-        node = found.cells[:, k]
-        expected = exact.displacement(found.points[node], near)
-        assert np.abs(found.displacement[0][node] - expected).max() < 1e-12
-    energy = strain_energy(found, law_of(case))
-    assert energy == pytest.approx(exact.strain_energy(case), rel=1e-11)
-
-
 def test_the_layered_field_is_in_equilibrium_with_each_material(patch) -> None:
     """Stress by Hooke's law of each point's own material, against the tension that is stated."""
     case, exact = patch

@@ -9,7 +9,7 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "browser: opens the report in headless Chromium")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def plain_run(tmp_path_factory):
     """Return a rendered run of three cases without stored solutions."""
     root = make_run(tmp_path_factory.mktemp("plain") / "run", pictures=False)
@@ -17,7 +17,7 @@ def plain_run(tmp_path_factory):
     return root
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def pictured_run(tmp_path_factory):
     """Return a rendered run of three cases with pictures."""
     root = make_run(tmp_path_factory.mktemp("pictured") / "run")
@@ -25,7 +25,7 @@ def pictured_run(tmp_path_factory):
     return root
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def studies(tmp_path_factory):
     """Return a directory with the records of studies."""
     return make_studies(tmp_path_factory.mktemp("studies"))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 from verify.result import (
     CaseResult,
@@ -229,7 +230,7 @@ def _case(case, title, requirement, reference, solves, rates, verdicts, acceptan
         requirement=requirement,
         scene_hash="0" * 64,
         scene={"title": title, "acceptance": acceptance},
-        reference=reference,
+        reference=ReferenceRecord(**reference),
         solves=solves,
         rates=rates,
         verdicts=verdicts,

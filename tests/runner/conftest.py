@@ -1,4 +1,4 @@
-"""A case, and the command line in a process of its own with the fake solvers at hand."""
+"""A case, and the command line with the fake solvers at hand, in this process or one of its own."""
 
 import json
 import os
@@ -7,11 +7,17 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from case_texts import STRETCHED, body_text
+from command_line import run_here
+
+from verify.runner import asking, engine
+from verify.solvers.interface import is_built_in
 
 HERE = Path(__file__).parent
+HARMLESS = [f"fake_solvers:{name}" for name in ("Instant", "Other", "Wrong", "HangingOnLevelOne")]
 
 CASE = (
     'tags = ["stretched"]\n'
@@ -51,9 +57,15 @@ class CommandLine:
         )
 
     def __call__(self, *arguments, **environment):
-        process = self.start(*arguments, **environment)
-        out, err = process.communicate(timeout=120)
-        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+        """Run in this process, and fork the solvers that do no harm to theirs."""
+        if "--cluster" in arguments or "PYTHONPATH" in environment:  # of a fresh process
+            process = self.start(*arguments, **environment)
+            out, err = process.communicate(timeout=120)
+            return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+        if arguments[0] == "run":
+            arguments = (*arguments, "--no-report")
+        with patch.multiple(engine, is_built_in=forked), patch.multiple(asking, is_built_in=forked):
+            return run_here(arguments, self.folder, {**self.environment, **environment})
 
     def records(self, out="out"):
         """Records of all solves, by (solver, level)."""
@@ -62,8 +74,13 @@ class CommandLine:
         return {(r["solver"].removeprefix("fake_solvers:"), r["level"]): r for r in records}
 
 
+def forked(name):
+    """Whether the solver is run as the own ones are."""
+    return is_built_in(name) or name in HARMLESS
+
+
 @pytest.fixture
-def verify(tmp_path):
+def verify(tmp_path, warm):
     (tmp_path / "square.toml").write_text(CASE)
     paths = [str(HERE), str(HERE.parent.parent), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}

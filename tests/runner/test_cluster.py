@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from command_line import run_here
 
 pytest.importorskip("distributed")
 
@@ -109,8 +110,10 @@ def test_a_stopped_run_leaves_nothing_running_on_the_workers(verify, cluster):
     wait_for(lambda: not alive(int(mark.read_text())), "the solve outlived its run", 20)
 
 
-def test_no_scheduler_is_one_line_and_writes_nothing(verify):
-    done = verify("run", "square.toml", "--out", "out", "--cluster", "tcp://127.0.0.1:9")
+def test_no_scheduler_is_one_line_and_writes_nothing(verify, monkeypatch):
+    monkeypatch.setattr("verify.runner.cluster._CONNECT_SECONDS", 1.0)
+    words = ("run", "square.toml", "--out", "out", "--cluster", "tcp://127.0.0.1:9")
+    done = run_here(words, verify.folder)
     assert done.returncode == 2
     assert done.stderr.startswith("verify: error: --cluster: no scheduler answers at")
     assert len(done.stderr.splitlines()) == 1

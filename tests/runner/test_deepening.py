@@ -10,6 +10,7 @@ from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.assess.sufficiency import sufficiency
 from verify.errors import InputError
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.runner.deepening import further_level, levels_in_vain
 from verify.runner.job import Job
@@ -48,7 +49,7 @@ def scene(tmp_path) -> Scene:
 
 
 def judged(scene, *solves):
-    found = sufficiency(scene, solves, "reference", 3)
+    found = ReferenceRecord("conforming", **sufficiency(scene, solves, "reference", 3))
     return CaseResult("slit", "", "", "", {}, found, list(solves), [], [])
 
 
@@ -91,7 +92,7 @@ def test_no_level_follows_one_that_was_not_solved(scene):
     failed = solve("reference", 3, status=Status.TIMEOUT)
     poor = solve("xfem", 0, uncertainty=1)
     assert further_level(plan(scene), judged(scene, poor, failed)) is None
-    unjudged = replace(judged(scene), reference={"kind": "none", "reason": "too few levels"})
+    unjudged = replace(judged(scene), reference=ReferenceRecord("none", reason="too few levels"))
     assert further_level(plan(scene), unjudged) is None
 
 

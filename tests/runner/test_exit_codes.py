@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Status, Verdict, VerdictRecord
 from verify.runner import exit_code
 
@@ -12,7 +13,7 @@ from verify.runner import exit_code
 def result(verdicts=(), statuses=()):
     judged = [VerdictRecord("value", "xfem", "m", v, 1, 1, 1, "", "") for v in verdicts]
     solves = [SolveRecord("c", "xfem", i, status) for i, status in enumerate(statuses)]
-    return CaseResult("c", "", "", "", {}, {}, solves, [], judged)
+    return CaseResult("c", "", "", "", {}, ReferenceRecord(), solves, [], judged)
 
 
 PASS, FAIL, UNDECIDED, ERROR = Verdict.PASS, Verdict.FAIL, Verdict.UNDECIDED, Verdict.ERROR

@@ -33,18 +33,22 @@ def test_every_ending_is_a_record_with_its_reason_beside_a_solver_that_works(ver
 def test_a_solve_that_hangs_is_killed_with_its_children_after_the_timeout(verify):
     mark = verify.folder / "mark"
     start = time.monotonic()
-    command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "1.5")
+    command = ("run", "square.toml", "--solver=fake_solvers:Hanging", "--timeout", "6")
     verify(*command, "--out", "out", HANG_MARK=str(mark))
     assert time.monotonic() - start < 60
     record = verify.records()["Hanging", 0]
-    assert (record["status"], record["reason"]) == ("timeout", "killed after 1.5 s")
-    assert 1.5 <= record["wall"] < 10
+    assert (record["status"], record["reason"]) == ("timeout", "killed after 6 s")
+    assert 6.0 <= record["wall"] < 30
     assert not alive_in_group(int(mark.read_text()))
 
 
 def test_a_solve_that_eats_memory_is_killed_and_its_peak_recorded(verify):
-    verify("run", "square.toml", "--solver=fake_solvers:Hungry", "--memory", "0.4", "--out", "out")
+    done = verify(
+        "run", "square.toml", "--solver=fake_solvers:Hungry", "--memory", "0.4", "--out", "out"
+    )
     record = verify.records()["Hungry", 0]
+    assert (verify.folder / "out" / record["notes"]["log"]).is_file()
+    assert record["notes"]["log"] in done.stderr
     assert record["status"] == "memory"
     assert record["reason"] == "killed above 400 MB"
     # it touches 16 MB per 5 ms and is looked at every 20 ms (with the machine's own delays)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from verify.reference_record import ReferenceRecord
 from verify.report.family_view import family_views
 from verify.report.figures.style import Palette
 from verify.report.run_directory import load_run
@@ -59,8 +60,8 @@ def result(scene, error, verdicts=()):
         metrics=[Metric("displacement_l2", error, "1")],
     )  # fmt: skip
     row = vars(scene.row)
-    return CaseResult(scene.name, "", "", "", {}, {"kind": "exact"}, [solve], [], list(verdicts),
-                      row=row)  # fmt: skip
+    exact = ReferenceRecord("exact")
+    return CaseResult(scene.name, "", "", "", {}, exact, [solve], [], list(verdicts), row=row)
 
 
 @pytest.mark.parametrize(
@@ -83,5 +84,5 @@ def test_a_row_waits_for_the_one_that_it_is_compared_with(tmp_path, verify, erro
     alone = Families([near]).ready(result(near, error, [waits]))[0]
     assert alone.verdicts[0].verdict is Verdict.UNDECIDED
     assert "is not part of this run" in alone.verdicts[0].reason
-    failed = replace(result(near, error, [waits]), reference={})
+    failed = replace(result(near, error, [waits]), reference=ReferenceRecord())
     assert Families([near]).ready(failed)[0].verdicts == [waits]

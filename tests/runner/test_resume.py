@@ -122,7 +122,7 @@ def test_a_damaged_result_is_made_again_from_the_solutions(verify):
 
 def test_failures_are_tried_again(verify):
     command = ("run", "square.toml", "--out", "out", "--timeout")
-    verify(*command, "1.5", SLOW, HANG_MARK=str(verify.folder / "mark"))
+    verify(*command, "4", SLOW, HANG_MARK=str(verify.folder / "mark"))
     assert verify.records()["HangingOnLevelOne", 1]["status"] == "timeout"
     verify(*command, "60", SLOW)
     assert verify.records()["HangingOnLevelOne", 1]["status"] == "solved"

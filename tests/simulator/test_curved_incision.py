@@ -39,19 +39,6 @@ def beside(path, places):
     return distance[each, nearest], along
 
 
-def test_the_curved_incision_is_sound_at_every_step(curved) -> None:
-    session, qualities, _ = curved
-    assert len(qualities) > 40
-    assert session.records[-1].split > 25
-    for quality in qualities:
-        assert quality.volume_error < ROUND_OFF
-        assert quality.enclosed_error < ROUND_OFF
-        assert quality.loose_edges == 0
-        assert quality.inverted_elements == 0
-        assert quality.inverted_facets == 0
-        assert quality.stray_facets == 0
-
-
 def test_the_cut_lies_on_the_arc_and_never_ahead_of_the_blade(curved) -> None:
     """Element by element the cut is flat: it leaves the arc by at most h²/8R.
 

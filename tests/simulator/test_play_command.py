@@ -64,7 +64,7 @@ def test_a_scene_is_cut_alike_with_its_work_spread(tmp_path, monkeypatch, capsys
     [
         (["triangle"], "display"),
         (["triangle", "--window"], "display"),
-        (["triangle", "--out", "a.mp4"], ".gif or .png"),
+        (["triangle", "--out", "a.avi"], ".mp4 or .png"),
         (["triangle", "--out", "nowhere/a.gif"], "no directory"),
         (["triangle", "--out", "a.gif", "--frames", "1"], "at least 2"),
     ],

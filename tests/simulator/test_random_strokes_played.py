@@ -3,7 +3,7 @@
 import pytest
 from stroke_campaign import play_random_strokes
 
-QUICK, ALL, CHUNKS = 7, 334, 12
+QUICK, ALL, CHUNKS = 3, 334, 12
 
 
 @pytest.mark.parametrize("body", ["coarse_face", "hand", "block"])

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from verify.accelerated.resumable import finished
 from verify.simulator import Session, quality_of
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
 
 ROUND_OFF = 1e-12
@@ -122,46 +120,6 @@ def test_elements_beyond_the_most_of_a_cut_wait_and_are_split_like_the_others(
     unhurried, _ = played
     assert_cut_alike(session, unhurried)
     assert session.phantom.node_count == len(session.state.displacement)
-
-
-def test_a_spread_replay_is_the_same_to_the_last_bit(hand, played) -> None:
-    again = Session(incised(hand), account=False, spread=True)
-    again.run()
-    mine, other = again.state, played[0].state
-    assert len(mine.displacement) == len(other.displacement)
-    np.testing.assert_array_equal(mine.displacement, other.displacement)
-
-
-def test_a_path_led_elsewhere_after_a_look_does_not_change_what_was_found(hand) -> None:
-    """Between pieces of a look, and before the cut, a live blade may move on, and turn."""
-    begin, end = hand.strokes[0].blades[[0, -1]]
-    halfway = 0.5 * (begin + end)
-    live = ToolPath(np.stack([begin, halfway]), [0.0, 0.2])
-    straight = SemiProgressiveCutter(hand.mesh)
-    bent = SemiProgressiveCutter(hand.mesh)
-    for cutter in (straight, bent):
-        cutter.begin(live)
-    before = bent.body.node_count
-    looking = bent.looking(0.2)
-    next(looking)
-    turned = 0.5 * (halfway + end) + np.array([0.01, 0.0, 0.0])
-    bent.extend(turned[None], [0.3])
-    assert bent.strokes[0].path is live  # not while it is looked at
-    division = finished(looking)
-    assert bent.strokes[0].path.times[-1] == bent.strokes[0].led.times[-1] == 0.3
-    assert bent.body.node_count == before
-    assert not bent.body.split_cells.any()
-    bent.extend((end + np.array([0.02, 0.0, 0.0]))[None], [0.4])
-    bent.divide(division, 0.2)
-    straight.advance(0.2)
-    mine, other = bent.phantom_mesh(), straight.phantom_mesh()
-    np.testing.assert_array_equal(mine.cells, other.cells)
-    split = np.flatnonzero(bent.body.split_cells)
-    nodes = np.unique(hand.mesh.cells[split])
-    np.testing.assert_array_equal(bent.level_sets[nodes], straight.level_sets[nodes])
-    bent.advance(0.4)
-    assert bent.body.split_cells.sum() > len(split)
-    np.testing.assert_allclose(bent.phantom_mesh().volumes.sum(), hand.mesh.measures.sum())
 
 
 def test_what_is_new_moves_as_that_from_which_it_comes_until_mechanics_follow(hand) -> None:

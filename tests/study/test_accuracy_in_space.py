@@ -84,4 +84,4 @@ def test_near_and_far_make_up_the_whole():
         assert 0 < near < far
         assert near**2 + far**2 == pytest.approx(whole**2, rel=1e-12)
     # 0.6 of the cube's section is cut
-    assert result.reference["near"]["radius"] == pytest.approx(0.1 * np.sqrt(0.6), rel=1e-12)
+    assert result.reference.near["radius"] == pytest.approx(0.1 * np.sqrt(0.6), rel=1e-12)

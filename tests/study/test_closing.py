@@ -7,6 +7,7 @@ import pytest
 from pressed_halves import common, normal, pressed
 
 from verify.assess.closing import with_openings
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.scene import load_scene
 from verify.solvers import find_solver
@@ -60,7 +61,7 @@ def examined(asked, solutions, exact=None):
         for name, own in solutions.items()
         for level in own
     ]
-    blank = CaseResult(asked.name, "", "", "", {}, {}, solves, [], [])
+    blank = CaseResult(asked.name, "", "", "", {}, ReferenceRecord(), solves, [], [])
     return with_openings(blank, asked, solutions, exact)
 
 
@@ -164,7 +165,7 @@ def test_an_exact_solution_that_overlaps_is_warned_of_too(tmp_path):
     mesh = replace(mesh, cut_facets=np.zeros((1, 2, 2)))
     result = examined(asked, {"xfem": {0: mesh}}, Pressed())
     assert [warned.solver for warned in result.warnings] == ["reference"]
-    assert result.reference["overlap"]["depth"] == pytest.approx(0.02, rel=1e-6)
+    assert result.reference.overlap["depth"] == pytest.approx(0.02, rel=1e-6)
     curve = result.openings[0].curves[0]
     assert (curve.solver, curve.level) == ("reference", None)
     assert curve.normal == pytest.approx([-0.02] * len(curve.normal))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from verify.errors import InputError
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene
 from verify.study.cost import cost_study, growing_scenes
@@ -26,7 +27,7 @@ def solve(solver, level, error, seconds, spread=0.0, status=Status.SOLVED, meshi
 
 
 def result(*solves):
-    return CaseResult("case", "", "", "", {}, {}, list(solves), [], [])
+    return CaseResult("case", "", "", "", {}, ReferenceRecord(), list(solves), [], [])
 
 
 def ladder(solver, error, seconds, order=1.0, **others):

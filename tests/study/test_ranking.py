@@ -2,6 +2,7 @@
 
 import pytest
 
+from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
 from verify.study.ranking import rank_solvers
@@ -22,7 +23,7 @@ def solve(case, solver, level, error=None, width=0.0, seconds=None, status=Statu
 
 
 def case_of(name, solves, verdicts=()):
-    return CaseResult(name, name, "", "", {}, {}, solves, [], list(verdicts))
+    return CaseResult(name, name, "", "", {}, ReferenceRecord(), solves, [], list(verdicts))
 
 
 def compared(ranking, question="accuracy", metric="energy_norm", view="finest level"):

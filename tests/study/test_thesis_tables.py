@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene, load_scenes
 from verify.simulator.thesis.added_nodes import count_face, count_strips
@@ -187,7 +188,7 @@ def test_solved_cases_are_summed_up_with_their_critical_steps() -> None:
     mesh = scene.mesh.model_copy(update={"cells": scene.mesh.cells[:1]})
     failed = SolveRecord("f3", "removal", 0, Status.FAILED, "it broke")
     solves = [record("xfem", 0, 0.1), record("subdivision", 0, 0.1), failed]
-    result = CaseResult("f3", "", "", "", {}, {}, solves, [], [])
+    result = CaseResult("f3", "", "", "", {}, ReferenceRecord(), solves, [], [])
     rows = compare_methods([scene.model_copy(update={"mesh": mesh})], [result])
     xfem, subdivision, removal = rows
     assert xfem.displacement == pytest.approx((0.1, 0.099, 0.101))

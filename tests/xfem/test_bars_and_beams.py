@@ -16,18 +16,14 @@ from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences
-from verify.xfem.inherit import inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
 
 HALF, STRAIN = 0.5, 0.01
-SPEED = 3.668996928526  # √((λ + 2μ)/ρ)
-FACE_VELOCITY, PERIOD = -0.0366899693, 0.545108115
 
 
 def bar(dim, cells):
@@ -51,67 +47,11 @@ def dynamic(phantom, policy):
     return DynamicBody(treated.force, treated.mass, supports=Supports(fixed, supports.values))
 
 
-def freed_bar(dim, cells, offset, policy):
-    """Times after the cut, and the displacement of its left face (mean over the face)."""
-    mesh = bar(dim, cells)
-    whole = dynamic(cut_mesh(mesh, []), "keep")
-    state = whole.rest()
-    state.displacement[:, 0] = STRAIN * whole.force.phantom.node_points[:, 0]
-    h = 0.9 * RESONANCE_FREE * 2.0 * HALF / cells / SPEED
-    run(CentralDifferences(whole, h), whole, state, 10)
-    # equilibrium: nothing has moved
-    assert np.abs(state.velocity).max() < 1e-12
-    normal = np.eye(dim)[0]
-    phantom = cut_mesh(mesh, [Plane(offset * normal, normal)])
-    body = dynamic(phantom, policy)
-    treated = body.force.phantom
-    state = inherit_state(whole.force.phantom, treated, state, body)
-    parts = subdivide(treated)
-    # the cut as realised: a dropped sliver moves it to the nearest faces
-    left = parts.points[parts.cells].mean(axis=1)[:, 0] < parts.cut_facets[:, :, 0].mean()
-    face = np.unique(parts.cells[left])
-    face = face[parts.points[face, 0] > parts.cut_facets[:, :, 0].min() - 1e-9]
-    at = parts.interpolation[face]
-    scheme, faces = CentralDifferences(body, h), []
-    for _ in range(int(1.4 * PERIOD / h)):
-        faces.append((at @ state.displacement)[:, 0].mean())
-        scheme.step(state)
-    return h * np.arange(len(faces)), np.array(faces) - faces[0]
-
-
 def crossing(times, values, level, after):
     """First time after another at which linear interpolation reaches a level."""
     later = np.flatnonzero((values[:-1] - level) * (values[1:] - level) <= 0.0)
     k = later[times[later] >= after][0]
     return times[k] + (level - values[k]) / (values[k + 1] - values[k]) * (times[k + 1] - times[k])
-
-
-@pytest.mark.parametrize(
-    "dim,cells,offset,policy",
-    [
-        (2, 81, 0.0, "merge"),  # through the middle of cells
-        (2, 80, 0.0, "keep"),  # along their faces
-        (2, 80, 1e-12, "merge"),
-        (2, 80, 1e-5, "keep"),
-        (2, 81, 0.0, "penalise"),
-        (3, 41, 0.0, "merge"),
-        (3, 40, 1e-7, "merge"),
-    ],
-)
-def test_the_faces_of_a_cut_in_a_prestrained_bar_fly_apart_as_waves_say(dim, cells, offset, policy):
-    """Velocity −c_d ε0 until the wave is back from the end, then reversed; period 4L/c_d."""
-    times, face = freed_bar(dim, cells, offset, policy)
-    turn = 2.0 * HALF / SPEED
-    out = (times > 0.1 * turn) & (times < 0.9 * turn)
-    back = (times > 1.1 * turn) & (times < 1.9 * turn)
-    # the slope of a line through the wiggles that a front leaves on a grid
-    assert np.polyfit(times[out], face[out], 1)[0] == pytest.approx(FACE_VELOCITY, rel=0.01)
-    assert np.polyfit(times[back], face[back], 1)[0] == pytest.approx(-FACE_VELOCITY, rel=0.01)
-    half_way = FACE_VELOCITY * turn / 2.0
-    first = crossing(times, face, half_way, 0.0)
-    again = crossing(times, face, half_way, first + 0.75 * PERIOD)
-    assert first == pytest.approx(PERIOD / 4.0, rel=0.01)
-    assert again - first == pytest.approx(PERIOD, rel=0.01)
 
 
 WHOLE, SPLIT, HALF_SPLIT = 0.65408379, 0.33435932, 0.603212

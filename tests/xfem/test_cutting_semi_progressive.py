@@ -198,23 +198,3 @@ def test_a_degenerate_stroke_cuts_what_the_cut_at_once_does(tips, splits) -> Non
     assert_same_cut(phantom, cut_mesh(mesh, [path.sweep]))
     np.testing.assert_allclose(phantom.volumes.sum(), 1.0, rtol=1e-13)
     assert any(changed) is splits
-
-
-def test_cutting_again_in_the_same_place_changes_nothing_that_moves() -> None:
-    mesh = box_mesh((4, 4, 4))
-    cutter = SemiProgressiveCutter(mesh)
-    for _ in range(3):
-        cutter.begin(SPACE_STROKES[0])
-        cutter.advance(2.0)
-    assert cutter.body.node_count == cut_mesh(mesh, [SPACE_STROKES[0].sweep]).node_count
-    assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, cutter.cuts))
-
-
-def test_bad_input_is_refused_with_its_reason() -> None:
-    cutter = SemiProgressiveCutter(rectangle_mesh((3, 3)))
-    with pytest.raises(XfemError, match="tool path in 3D"):
-        cutter.begin(SPACE_STROKES[0])
-    cutter.begin(PLANE_STROKES[0])
-    increment = cutter.advance(2.0)
-    with pytest.raises(XfemError, match="3 nodal values; expected 16"):
-        increment.inherit(np.zeros((3, 2)))

@@ -165,10 +165,11 @@ def test_trapezoidal_with_converged_newton_keeps_small_strain_energy_over_ten_th
 def test_the_energy_momentum_scheme_conserves_at_large_amplitude_over_many_steps(share):
     body = _free(cut_square(2))
     state = _moving(body, 0.4, 3.0)
-    account = run(EnergyMomentum(body, share * _critical(body)), body, state, 2000)
-    assert account.drift <= 1e-8
+    account = run(EnergyMomentum(body, share * _critical(body)), body, state, 500)
+    # what a step leaves unsolved adds up: a quarter of what 2000 steps may drift
+    assert account.drift <= 2.5e-9
     turning = account.angular_momentum
-    assert np.abs(turning - turning[0]).max() <= 1e-8 * np.abs(turning).max()
+    assert np.abs(turning - turning[0]).max() <= 2.5e-9 * np.abs(turning).max()
     assert np.ptp(account.strain) > 0.1 * account.mechanical[0]
 
 

@@ -45,15 +45,6 @@ def test_a_turned_membrane_has_the_turned_stiffness_of_the_plate_and_none_across
     assert got == pytest.approx(space, abs=1e-11 * np.abs(plane).max())
 
 
-def test_the_force_of_a_membrane_is_its_stiffness_times_the_displacement():
-    membrane = plate(TURN)
-    displacement = np.random.default_rng(1).normal(size=(membrane.node_count, 3))
-    force, energy = InternalForce(membrane, MATERIAL, "linear").evaluate(displacement)
-    want = (dense(membrane) @ displacement.ravel()).reshape(force.shape)
-    assert force == pytest.approx(want, abs=1e-11 * np.abs(want).max())
-    assert energy == pytest.approx(0.5 * (want * displacement).sum(), rel=1e-12)
-
-
 def test_a_flat_membrane_held_across_itself_solves_the_plane_stress_plate():
     flat, membrane = plate(), plate(np.eye(3))
     ends = (flat.mesh.points[:, 1] < 1e-9) | (flat.mesh.points[:, 1] > 1.0 - 1e-9)

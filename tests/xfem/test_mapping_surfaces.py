@@ -9,7 +9,6 @@ from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
 from verify.simulator.mapping.pull_back import pull_back
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 PATHS = [
@@ -69,15 +68,6 @@ def test_an_affine_motion_moves_every_vertex_as_it_moves_the_material(refinement
     moved = embedded.surface.positions(nodes @ gradient + shift)
     expected = embedded.surface.material.rows @ (np.eye(3) + gradient) + shift
     np.testing.assert_allclose(moved, expected, atol=1e-13)
-
-
-def test_a_surface_outside_the_body_moves_with_the_nearest_element() -> None:
-    points, facets = _sphere(2, 0.5, 0.95)
-    cutter, _, embedded = _cut(box_mesh((3, 3, 3)), PATHS[:1], points, facets)
-    nodes = cutter.mesh.points[cutter.body.node_parent.rows]
-    rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    moved = embedded.surface.positions(nodes @ rotation.T - nodes)
-    np.testing.assert_allclose(moved, embedded.surface.material.rows @ rotation.T, atol=1e-12)
 
 
 def _upright(start, end):
@@ -250,25 +240,6 @@ def _neighbour(cutter, piece):
     shared = np.isin(body.piece_cells.rows, mine).sum(axis=1)
     others = np.flatnonzero(shared == 3)
     return int(others[0]) if len(others) else piece
-
-
-def test_bad_input_is_refused_with_its_reason() -> None:
-    cutter = SemiProgressiveCutter(box_mesh((1, 1, 1)))
-    points, facets = _sphere(0, 0.5, 0.4)
-    for wrong, message in (
-        ((points[:, :2], facets), "surface"),
-        ((points, facets[:, :2]), "surface"),
-        ((points, facets + 1), "outside 0..5"),
-        ((points, [[0, 1, 1]]), "a vertex twice"),
-    ):
-        with pytest.raises(XfemError, match=message):
-            EmbeddedSurface(cutter, *wrong)
-    surface = EmbeddedSurface(cutter, points, facets).surface
-    with pytest.raises(XfemError, match="2 nodal values; expected at least"):
-        surface.positions(np.zeros((2, 3)))
-    surface.retire(np.array([3]))
-    with pytest.raises(XfemError, match="facet 3 is no longer in use"):
-        surface.facet_force(3, np.ones(3) / 3, np.ones(3), np.zeros((8, 3)))
 
 
 def _facets_in_any_order(surface, displacement):

@@ -9,9 +9,8 @@ from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.pull_back import pull_back
 from verify.xfem.cuts import ToolPath
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.structured_meshes import rectangle_mesh
 
 BLADE = [0.0, 0.0, 3.0]
 INSIDE = ToolPath.of_tip([[0.15, 0.43, -1.0], [0.85, 0.55, -1.0]], [0.0, 1.0], BLADE)
@@ -56,15 +55,6 @@ def loops(edges):
                 break
         count += 1
     return count
-
-
-def test_a_membrane_is_its_own_surface() -> None:
-    cutter, skin = stroked(curved())
-    area, normals = area_and_normals(skin)
-    assert area == pytest.approx(cutter.mesh.measures.sum(), rel=1e-14)
-    assert (normals[:, 2] > 0.0).all()
-    assert len(skin.rims) == 0
-    assert len(BodySurface(SemiProgressiveCutter(box_mesh((1, 1, 1))).body).rims) == 0
 
 
 @pytest.mark.parametrize("diagonal", ["right", "alternating", "crossed"])
@@ -210,11 +200,3 @@ def test_beside_the_edge_and_in_an_open_cut_there_is_no_material() -> None:
     assert piece[1] == -1  # beside the membrane
     assert piece[2] == -1  # over the gap
     assert piece[3] >= 0  # exactly over the edge
-
-
-def test_shapes_that_do_not_match_a_membrane_are_refused() -> None:
-    cutter, _ = stroked(curved())
-    with pytest.raises(XfemError, match="expected"):
-        pull_back(cutter, np.zeros((3, 3)), [[0.0, 0.0, 0.0]], [0])
-    with pytest.raises(XfemError, match="starting piece"):
-        pull_back(cutter, np.zeros((cutter.body.node_count, 3)), [[0.0, 0.0, 0.0]], [10_000])

@@ -8,7 +8,7 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 # Of random sets of two to four strokes that are exactly degenerate or nearly, a third of which end
-# inside the body, with tip rule `inside`: shares that docs/guide/simulator.md states, rounded up.
+# inside the body, with tip rule `inside`: shares that docs/theory/xfem.md states, rounded up.
 ORDER, NUMBERING = {2: 0.004, 3: 0.015}, {2: 0.002, 3: 0.006}
 
 

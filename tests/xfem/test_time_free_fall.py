@@ -88,33 +88,6 @@ def test_with_the_thesis_lumping_a_freed_half_falls_too_slowly():
     assert found["thesis"] == pytest.approx(-8.757, abs=5e-4)
 
 
-def test_the_defect_of_the_thesis_lumping_shows_in_motion():
-    falls = {}
-    for name in ("exact", "thesis"):
-        v = cut_square(8, (0.5, 0.4375), (0.0, 1.0))
-        mass = (
-            side_wise_mass(v, DENSITY)
-            if name == "exact"
-            else shifted_mass(v, DENSITY, "enrichment")
-        )
-        held = Supports.none(v).prescribe(v, v.mesh.points[:, 1] == 1.0)
-        # stiff, so that what is left of elastic motion is small against the fall
-        body = DynamicBody(
-            InternalForce(v, material(2, 1e8)),
-            mass,
-            weight=mass.weight(_gravity(2)),
-            supports=held,
-        )
-        state, scheme = body.rest(), RealTimeEuler(body, 0.01)
-        for _ in range(50):
-            scheme.advance(state)
-        lower = v.bodies == v.bodies[np.argmin(v.node_points[:, 1])]
-        falls[name] = state.displacement[lower, 1].mean() / -1.2495 * -9.8
-    assert falls["exact"] == pytest.approx(-9.8, abs=1e-6)
-    # elastic strain g ρ L/E ≈ 1e-4
-    assert falls["thesis"] == pytest.approx(-8.757, abs=5e-3)
-
-
 def test_gravity_does_not_tear_a_sliver_from_its_neighbours():
     v = cut_cube(2, (0.5, 0.5 + 1e-9, 0.5), (0.3, 0.1, 1.0))
     mass = side_wise_mass(v, DENSITY)

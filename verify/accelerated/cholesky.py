@@ -157,7 +157,7 @@ class Cholesky(LinearSolver):
         if len(self._place) < most:
             self._place = np.empty(most, dtype=np.uint64)
         products = np.maximum(
-            (2 * width + below) * below, BAND * (width + height) + (width - BAND) * (height - BAND)
+            width * below, BAND * (width + height) + (width - BAND) * (height - BAND)
         )
         self._products = _room(self._products, int(products.max(initial=0)))
         self._permuted = np.empty((len(order), self._block))

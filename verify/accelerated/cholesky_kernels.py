@@ -31,25 +31,35 @@ def _write_entries(blocks, begin, end, entry_start, entry_block, entry_row, pane
 
 
 @njit(cache=True)
-def _extend_add(child, relative, size, place, panel, update):
-    """Add the update matrix of a child, whose nodes are at `relative` in this front."""
-    width, count = len(panel), len(child)
+def _places(relative, size, width, place):
+    """Write where the rows of a child are in this front; return how many are columns here."""
+    split = 0
     for k in range(len(relative)):
+        if relative[k] * size < width:
+            split += size
         for a in range(size):
             place[k * size + a] = relative[k] * size + a
-    split = 0  # rows of the child that are columns here
-    while split < count and place[split] < width:
-        split += 1
+    return split
+
+
+@njit(cache=True)
+def _take_columns(child, split, place, panel):
+    """Take what a child leaves of the columns of this front."""
     for j in range(split):
-        own, more = panel[place[j]], child[j]
-        for i in range(j, count):
-            own[place[i]] += more[i]
-    for j in range(split, count):
+        own, left = panel[place[j]], child[j]
+        for i in range(j, len(child)):
+            own[place[i]] -= left[i]
+
+
+@njit(cache=True)
+def _pass_on(child, split, place, width, update):
+    """Add what a child leaves of the rows of this front to what this front leaves of them."""
+    for j in range(split, len(child)):
         place[j] -= np.uint64(width)
-    for j in range(split, count):
-        own, more = update[place[j]], child[j]
-        for i in range(j, count):
-            own[place[i]] += more[i]
+    for j in range(split, len(child)):
+        own, left = update[place[j]], child[j]
+        for i in range(j, len(child)):
+            own[place[i]] += left[i]
 
 
 @njit(cache=True, fastmath=_FUSED)
@@ -78,27 +88,31 @@ def _eliminate_band(panel, begin, end, diagonal):
 
 
 @njit(cache=True)
-def _subtract_product(panel, begin, end, first, into, at, room):
-    """Take the product of columns `begin` to `end` of a panel, rows from `first` on.
-
-    It is taken from the rows and columns of `into` from `at` on.
-    """
-    depth, rows, columns = end - begin, panel.shape[1] - first, len(into) - at
+def _numbers(panel, begin, end, first, room):
+    """Columns `begin` to `end` of a panel, rows from `first` on, without gaps."""
+    depth, rows = end - begin, panel.shape[1] - first
     numbers = room[: depth * rows].reshape(depth, rows)
     for k in range(depth):
         for i in range(rows):
             numbers[k, i] = panel[begin + k, first + i]
-    left = numbers
-    if columns < rows:
-        left = room[depth * rows : depth * (rows + columns)].reshape(depth, columns)
-        for k in range(depth):
-            for i in range(columns):
-                left[k, i] = numbers[k, i]
-    used = depth * (rows + columns)
+    return numbers
+
+
+@njit(cache=True)
+def _subtract_product(panel, begin, end, room):
+    """Take the product of columns `begin` to `end` of a panel from those after them."""
+    numbers, columns = _numbers(panel, begin, end, end, room), len(panel) - end
+    depth, rows = numbers.shape
+    used = depth * rows
+    left = room[used : used + depth * columns].reshape(depth, columns)
+    for k in range(depth):
+        for i in range(columns):
+            left[k, i] = numbers[k, i]
+    used += depth * columns
     product = room[used : used + columns * rows].reshape(columns, rows)
     np.dot(left.T, numbers, product)
     for j in range(columns):
-        own, taken = into[at + j, at:], product[j]
+        own, taken = panel[end + j, end:], product[j]
         for i in range(j, rows):
             own[i] -= taken[i]
 
@@ -113,7 +127,7 @@ def _eliminate(panel, diagonal, room):
         if failed >= 0:
             return failed
         if end < width:
-            _subtract_product(panel, begin, end, end, panel, end, room)
+            _subtract_product(panel, begin, end, room)
     return -1
 
 
@@ -137,41 +151,54 @@ def factorise_fronts(
 ):
     """Factorise; return the scalar column (in the order) whose pivot failed, or -1.
 
-    The update matrices of fronts wait on one of two stacks, by the parity of their level: fronts
-    are in postorder, so those of the children are the last ones on the other.
+    What a front leaves of its rows, to be taken from its parent, is the product of its own columns
+    plus what its children leave of them. It waits on one of two stacks, by the parity of the level:
+    fronts are in postorder, so what the children leave is last on the other.
     """
     size = blocks.shape[1]
     waiting_front, waiting = np.empty(len(parent), dtype=np.int64), 0
-    none = np.int64(0)  # as a constant it would have the product compiled once more
+    none = np.int64(0)  # as a constant it would have a loop compiled once more
     tops = np.zeros(2, dtype=np.int64)
     for s in range(len(parent)):
         columns = bounds[s + 1] - bounds[s]
         width, below = columns * size, (row_start[s + 1] - row_start[s]) * size
         panel = factor[offset[s] : offset[s + 1]].reshape(width, width + below)
         mine = level[s] & 1
-        end = tops[mine] + below * below
-        update = stacks[mine][tops[mine] : end].reshape(below, below)
+        theirs = stacks[1 - mine]
         panel[:] = 0.0
-        update[:] = 0.0
         _write_entries(
             blocks, bounds[s], bounds[s + 1], entry_start, entry_block, entry_row, panel
         )  # fmt: skip
         for j in range(width):
             diagonal[j] = panel[j, j]
-        while waiting > 0 and parent[waiting_front[waiting - 1]] == s:
-            waiting -= 1
-            child = waiting_front[waiting]
+        first, top = waiting, tops[1 - mine]
+        while first > 0 and parent[waiting_front[first - 1]] == s:
+            first -= 1
+            child = waiting_front[first]
             places = relative[row_start[child] : row_start[child + 1]]
-            count, other = len(places) * size, 1 - mine
-            tops[other] -= count * count
-            its = stacks[other][tops[other] : tops[other] + count * count].reshape(count, count)
-            _extend_add(its, places, size, place, panel, update)
+            count = len(places) * size
+            top -= count * count
+            left = theirs[top : top + count * count].reshape(count, count)
+            _take_columns(left, _places(places, size, width, place), place, panel)
         failed = _eliminate(panel, diagonal, room)
         if failed >= 0:
             return bounds[s] * size + failed
         if below > 0:
-            _subtract_product(panel, none, width, width, update, none, room)
+            end = tops[mine] + below * below
+            update = stacks[mine][tops[mine] : end].reshape(below, below)
+            numbers = _numbers(panel, none, width, width, room)
+            np.dot(numbers.T, numbers, update)
+            top = tops[1 - mine]
+            for at in range(waiting - 1, first - 1, -1):
+                child = waiting_front[at]
+                places = relative[row_start[child] : row_start[child + 1]]
+                count = len(places) * size
+                top -= count * count
+                left = theirs[top : top + count * count].reshape(count, count)
+                _pass_on(left, _places(places, size, width, place), place, width, update)
             tops[mine] = end
+        tops[1 - mine], waiting = top, first
+        if below > 0:
             waiting_front[waiting] = s
             waiting += 1
     return -1

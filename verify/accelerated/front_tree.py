@@ -9,7 +9,7 @@ __all__ = ["levels", "merge_and_order"]
 _Ints = NDArray[np.int64]
 
 # Merge while the merged front has at most that many columns, or that share of added zeros:
-# dense loops are faster per entry than short ones (measured; docs/theory/linear-solvers.md).
+# dense loops are faster per entry than short ones (measured).
 _NARROW = 8
 _ZEROS = 0.1
 

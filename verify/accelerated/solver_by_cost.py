@@ -18,7 +18,7 @@ __all__ = ["SolverByCost"]
 
 _Floats = NDArray[np.float64]
 
-# measured, docs/theory/linear-solvers.md: in ns, per operation and entry of the factor of a
+# measured on one core (AVX-512): in ns, per operation and entry of the factor of a
 # factorisation with its solution, and per node and iteration of conjugate gradients
 _OPERATION, _ENTRY, _ITERATION = 0.035, 6.0, 50.0
 _SMALL = 500  # nodes, up to which a factorisation takes less than a millisecond

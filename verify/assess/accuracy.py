@@ -35,6 +35,7 @@ from verify.compare.integration import spread_of
 from verify.compare.locate import ROUND_OFF
 from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 from verify.scene import Scene, scene_hash
 from verify.solution import Solution
@@ -104,10 +105,10 @@ def assess_accuracy(
                 except Exception as problem:  # of this one: the others are measured all the same
                     measured[i] = _incomparable(records[i], problem)
     rates = _rates(scene, measured)
-    record = reference.record if reference else {"kind": "none", "reason": missing}
-    if record["kind"] == "conforming":
-        levels = len(record["levels"])
-        record = {**record, **sufficiency(scene, measured, REFERENCE, levels)}
+    record = reference.record if reference else ReferenceRecord("none", reason=missing)
+    if record.kind == "conforming":
+        levels = len(record.levels or ())
+        record = replace(record, **sufficiency(scene, measured, REFERENCE, levels))
     return CaseResult(
         case=scene.name,
         title=scene.title,

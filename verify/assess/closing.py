@@ -20,6 +20,7 @@ from verify.compare.body import AnyBody, body_of
 from verify.compare.motion import ExactMotion, Motion, SolutionMotion
 from verify.compare.overlap import Overlap, OverlapSearch
 from verify.errors import InputError, UnsupportedSceneError
+from verify.reference_record import ReferenceRecord
 from verify.result import (
     CaseResult,
     Metric,
@@ -143,13 +144,13 @@ def _recorded(record: SolveRecord, found: _Found, scene: Scene) -> SolveRecord:
     return replace(record, metrics=metrics, notes=notes)
 
 
-def _with_overlap(reference: dict[str, Any], found: _Found) -> dict[str, Any]:
+def _with_overlap(reference: ReferenceRecord, found: _Found) -> ReferenceRecord:
     """Add the overlap of an exact solution to what is recorded of it."""
     overlap = found.overlap
     entry: dict[str, Any] = {"depth": overlap.depth, "measure": overlap.measure}
     if overlap.depth > 0.0:
         entry["place"] = _place(found)
-    return {**reference, "overlap": entry}
+    return replace(reference, overlap=entry)
 
 
 def _contestants(

@@ -32,6 +32,7 @@ from verify.compare.simplices import simplices
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.strain_energy import field_strain_energy
 from verify.errors import InputError, UnsupportedSceneError
+from verify.reference_record import ReferenceRecord
 from verify.scene import Scene
 from verify.scene.acceptance import (
     DisplacementQuantity,
@@ -83,15 +84,15 @@ class Reference:
         Bound of the absolute norm of its error, per error metric.
     quantities : dict of str to (float, float)
         Value and half-width per quantity of interest that it has.
-    record : dict
-        What the result says about it (JSON).
+    record : ReferenceRecord
+        What the result says about it.
     """
 
     motion: Motion
     source: str
     norms: dict[str, float]
     quantities: dict[str, tuple[float, float]]
-    record: dict[str, Any]
+    record: ReferenceRecord
 
 
 def size_of(solution: Solution) -> float:
@@ -126,16 +127,16 @@ def exact_reference(scene: Scene, exact: ExactField, body: AnyBody, law: Law) ->
     found = {q.name: _exact_quantity(scene, q, exact, body, law) for q in scene.quantities}
     quantities = {name: pair for name, pair in found.items() if pair is not None}
     source = f"exact: {scene.exact.solution}"
-    record = {
-        "kind": "exact",
-        "source": source,
-        "levels": [],
-        "near": _near_text(body),
-        "metrics": {
+    record = ReferenceRecord(
+        kind="exact",
+        source=source,
+        near=_near_text(body),
+        levels=[],
+        metrics={
             name: {"values": [value], "uncertainty": width, "order": None, "reason": "exact"}
             for name, (value, width) in quantities.items()
         },
-    }
+    )
     return Reference(motion, source, dict.fromkeys(ERROR_NAMES, 0.0), quantities, record)
 
 
@@ -252,19 +253,18 @@ def conforming_reference(
         metrics[asked.name] = entry | _second_opinion(scene, asked, second, known)
     metrics |= entries
     source = f"conforming P{solutions[-1].order}, {len(solutions)} levels, GCI"
-    record = {
-        "kind": "conforming",
-        "source": source,
-        "near": _near_text(body),
-        "levels": [
+    record = ReferenceRecord(
+        kind="conforming",
+        source=source,
+        near=_near_text(body),
+        levels=[
             {"level": level, "size": h, "unknowns": int(levels[level].unknowns)}
             for level, h in zip(sorted(levels), sizes, strict=True)
         ],
-        "time_to_accuracy": time_to_accuracy(levels, metrics),
-        "metrics": metrics,
-    }
-    if missing:
-        record["missing"] = missing
+        time_to_accuracy=time_to_accuracy(levels, metrics),
+        metrics=metrics,
+        missing=missing or None,
+    )
     return Reference(measured[-1].motion, source, norms, quantities, record)
 
 

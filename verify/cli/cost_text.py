@@ -11,6 +11,8 @@ from verify.scene import Scene
 
 __all__ = ["case_lines", "costs_of", "duration_text", "run_line"]
 
+_START = 0.8  # s: half of what a run takes before and after its cases; comparing a small case
+
 
 def costs_of(scene: Scene, options: Options) -> list[LevelCost]:
     """Estimate the solves that a run of `scene` plans."""
@@ -38,10 +40,11 @@ def run_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> s
         return ""
     most, group = max(costs, key=lambda one: _seconds(one[1]))
     share = _seconds(group) / _seconds(rows)
+    spent = _seconds(rows) + _START * len(costs)
     at = f", {share:.0%} of it in {most.name}" if len(costs) > 1 else ""
     largest = max(rows, key=lambda row: row.unknowns)
     return (
-        f"expected (rough): {duration_text(_seconds(rows) / jobs)}{at}; at most about "
+        f"expected (rough): {duration_text(2 * _START + spent / jobs)}{at}; at most about "
         f"{largest.unknowns} unknowns and {memory_text(max(row.memory for row in rows))} a process"
     )
 

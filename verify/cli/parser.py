@@ -2,10 +2,11 @@
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from verify import __version__
 from verify.cli.argument_types import count, positive
@@ -62,11 +63,32 @@ own, on one thread. With -j above 1 the timings are marked as contended.
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Says what is wrong in one line, with the nearest word that is right."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; an option that is none of this command is told where the others are known."""
+        found, left = super().parse_known_args(args, namespace)
+        if unknown := next((word for word in left if word.startswith("-")), None):
+            options = [name for name in self._option_string_actions if name.startswith("--")]
+            near = _nearest(unknown.partition("=")[0], options)
+            self.error(f"unrecognized arguments: {' '.join(left)}{near}")
+        return found, left
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            said = _nearest(str(value), known) or f"; expected one of {', '.join(known)}"
+            raise argparse.ArgumentError(action, f"invalid choice: '{value}'{said}")
+        super()._check_value(action, value)
 
     def error(self, message: str) -> NoReturn:
         print(f"{self.prog}: error: {message} (see {self.prog} --help)", file=sys.stderr)
         sys.exit(2)
+
+
+def _nearest(word: str, known: Sequence[str]) -> str:
+    close = get_close_matches(word, known, n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -180,7 +202,7 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     weight.add_argument("--quick", action="store_true", help="only cases tagged quick")
     weight.add_argument("--heavy", action="store_true", help="also cases tagged heavy")
     command.add_argument(
-        "-j", metavar="N", dest="jobs", type=count, default=1,
+        "-j", "--jobs", metavar="N", dest="jobs", type=count, default=1,
         help="processes at the same time (default: 1)",
     )  # fmt: skip
     add_timeout(command, 600.0)

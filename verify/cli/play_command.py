@@ -5,11 +5,12 @@ import csv
 import io
 import json
 import os
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from verify.errors import InputError, UnsupportedSceneError
-from verify.scene import load_scene
+from verify.scene import Scene, load_scene
 from verify.whole_files import asked_place, write_whole
 
 if TYPE_CHECKING:
@@ -23,8 +24,10 @@ def execute(arguments: argparse.Namespace) -> int:
     out: Path | None = arguments.out
     if arguments.frames < 2:
         raise InputError(f"--frames {arguments.frames}: expected at least 2")
-    if out is not None and out.suffix not in (".gif", ".png"):
-        raise InputError(f"--out {out}: expected a name that ends in .gif or .png")
+    if out is not None and out.suffix not in (".gif", ".mp4", ".png"):
+        raise InputError(f"--out {out}: expected a name that ends in .gif, .mp4 or .png")
+    if out is not None and out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
+        raise InputError("--out: MP4 needs the program ffmpeg, which is not in the path")
     for path in (out, arguments.records):
         if path is not None and not path.resolve().parent.is_dir():
             raise InputError(f"no directory '{path.parent}' to write into")
@@ -45,12 +48,19 @@ def execute(arguments: argparse.Namespace) -> int:
 
         play_in_window(stage, scene.title, arguments.stroke, arguments.spread)
         return 0
-    return _play(stage, scene.name, arguments)
+    return _play(stage, scene, arguments)
 
 
-def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
+def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
     from verify.simulator import Session, quality_of
-    from verify.simulator.animation import Frame, view_of, write_animation, write_picture
+    from verify.simulator.animation import (
+        Frame,
+        Underlay,
+        view_of,
+        write_animation,
+        write_film,
+        write_picture,
+    )
     from verify.simulator.timings import timings_of
 
     session = Session(stage, spread=arguments.spread)
@@ -59,23 +69,26 @@ def _play(stage: "Stage", name: str, arguments: argparse.Namespace) -> int:
     while not session.finished:
         record = session.step()
         if arguments.out is not None and (record.step % every == 0 or session.finished):
-            frames.append(Frame(record.time, session.picture(), session.blades()))
+            frames.append(Frame(record.time, session.picture(), session.blades(), session.hooks()))
     session.settle()
     records, quality, timings = session.records, quality_of(session), timings_of(session.records)
     if arguments.out is not None:
-        view = view_of(frames)
+        skin = scene.geometry.kind == "skin"
+        under = Underlay(frames[0].picture, scene.material.thickness or 0.0) if skin else None
+        view = view_of(frames, underlay=under)
         with asked_place(arguments.out):
             if arguments.out.suffix == ".png":
                 write_picture(frames[-1], view, arguments.out)
             else:
                 # as fast as it happened, but no faster than a screen shows
                 rate = min(50.0, len(frames) / stage.duration)
-                write_animation(frames, view, arguments.out, rate)
+                write = write_film if arguments.out.suffix == ".mp4" else write_animation
+                write(frames, view, arguments.out, rate)
     if arguments.records is not None:
         with asked_place(arguments.records):
             write_whole(arguments.records, _table(records))
     summary = {
-        "case": name,
+        "case": scene.name,
         "steps": len(records),
         "elements": len(stage.mesh.cells),
         "spread": arguments.spread,

@@ -21,8 +21,8 @@ def add_play_commands(add: Add) -> None:
     )
     add_case(command)
     command.add_argument(
-        "--out", metavar="GIF", type=Path, help="draw off-screen into this file, .gif or .png "
-        "(the last frame)",
+        "--out", metavar="FILE", type=Path, help="draw off-screen into this file: .gif, .mp4 "
+        "(needs ffmpeg), or .png (the last frame)",
     )  # fmt: skip
     command.add_argument("--window", action="store_true", help="open a window")
     command.add_argument(

@@ -7,7 +7,7 @@ from typing import Any, Protocol, TextIO
 
 from verify.cli.streams import unfiltered
 from verify.printable import one_line
-from verify.result import COMPILING, CaseResult, SolveRecord, Status
+from verify.result import COMPILING, LOG, CaseResult, SolveRecord, Status
 from verify.runner import Progress
 
 __all__ = ["ClosableProgress", "progress_on"]
@@ -39,7 +39,8 @@ def _solve_text(label: str, record: SolveRecord, reused: bool) -> str:
         took += f", of them {record.notes[COMPILING]} compiling kernels (first use)"
     if record.status is Status.SOLVED:
         return f"{label}: solved, {record.unknowns} unknowns{took}"
-    return one_line(f"{label}: {record.status}{took}: {record.reason}")
+    where = f" (see {record.notes[LOG]})" if LOG in record.notes else ""
+    return one_line(f"{label}: {record.status}{took}: {record.reason}{where}")
 
 
 def _case_text(result: CaseResult) -> str:

@@ -14,6 +14,7 @@ from verify.cli.cost_text import costs_of, run_line
 from verify.cli.progress import progress_on
 from verify.cli.run_ranking import rank_run
 from verify.cli.solver_parameters import of_solvers
+from verify.cli.streams import print_line
 from verify.cli.verdict_text import verdict_lines
 from verify.runner import Options, RunStoppedError, exit_code, run_cases, select_cases
 from verify.runner.checking import check_solver_name
@@ -21,6 +22,8 @@ from verify.runner.ending import NOTHING_RAN
 from verify.runner.reference_cache import cache_folder
 
 __all__ = ["execute"]
+
+_SOON_DRAWN = 3  # cases whose report takes less than 2 s
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -69,6 +72,8 @@ def execute(arguments: argparse.Namespace) -> int:
     rank_run(
         arguments.out, summary.results, parameters, arguments.conform, arguments.timeout, _announce
     )
+    if not arguments.no_report and len(summary.results) > _SOON_DRAWN:
+        _announce(f"drawing the report of {len(summary.results)} cases")
     report = None if arguments.no_report else _rendered(arguments.out)
     code = exit_code(summary.results, arguments.strict)
     if arguments.json:
@@ -88,7 +93,7 @@ def execute(arguments: argparse.Namespace) -> int:
         print(json.dumps({"exit": code, "report": report, "cases": cases}, indent=2))
         return code
     for line in verdict_lines(summary.results):
-        print(line)
+        print_line(line)
     if summary.reused:
         print(f"{summary.reused} finished solves were taken over from before")
     if report:

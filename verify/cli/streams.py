@@ -1,5 +1,7 @@
 """Standard output and error that let no escape sequence of others through to the terminal."""
 
+import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,7 +9,10 @@ from typing import Any
 
 from verify.printable import visible
 
-__all__ = ["printable_streams", "unfiltered"]
+__all__ = ["in_colour", "print_line", "printable_streams", "unfiltered"]
+
+_COLOURS = {"PASS": 32, "FAIL": 31, "ERROR": 31, "WARNING": 33, "UNDECIDED": 33, "NOT JUDGED": 33}
+_VERDICT = re.compile(rf"\b({'|'.join(_COLOURS)})\b")
 
 
 class _Printable:
@@ -42,3 +47,21 @@ def printable_streams() -> Iterator[None]:
 def unfiltered(stream: Any) -> Any:
     """Return the stream below, for what draws with escapes of its own."""
     return stream.stream if isinstance(stream, _Printable) else stream
+
+
+def print_line(text: str) -> None:
+    """Print a line with its verdict in colour, on a terminal that shows colours.
+
+    Not where ``NO_COLOR`` is set, or the output goes elsewhere.
+    """
+    below = unfiltered(sys.stdout)
+    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    if plain or below is None or not below.isatty():
+        print(text)
+    else:
+        print(in_colour(visible(text)), file=below)
+
+
+def in_colour(line: str) -> str:
+    """Return a line with its first verdict in colour."""
+    return _VERDICT.sub(lambda m: f"\x1b[{_COLOURS[m[1]]}m{m[1]}\x1b[0m", line, count=1)

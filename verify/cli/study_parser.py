@@ -53,7 +53,7 @@ def add_study_command(add: Add) -> None:
             )  # fmt: skip
             cores = len(os.sched_getaffinity(0))
             kind.add_argument(
-                "-j", metavar="N", type=count, default=cores, dest="processes",
+                "-j", "--jobs", metavar="N", type=count, default=cores, dest="processes",
                 help="processes side by side (default: all cores; nothing measured is a time)",
             )  # fmt: skip
         kind.add_argument("--quick", action="store_true", help="less of it, in under a minute")

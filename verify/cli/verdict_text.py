@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from verify.printable import one_line
-from verify.result import CaseResult, Notice, Status, Verdict, VerdictRecord
+from verify.result import LOG, CaseResult, Notice, Status, Verdict, VerdictRecord
 
 __all__ = ["notice_text", "verdict_lines"]
 
@@ -26,7 +26,8 @@ def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
         for solve in result.solves:
             if solve.status is not Status.SOLVED:
                 said = f"{solve.solver}, level {solve.level}: {solve.status}: {solve.reason}"
-                yield f"    {one_line(said)}"
+                where = f" (see {solve.notes[LOG]})" if LOG in solve.notes else ""
+                yield f"    {one_line(said)}{one_line(where)}"
 
 
 def notice_text(notice: Notice) -> str:

@@ -158,8 +158,8 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     view.times, view.regularisations = times_table(result), regularisations_table(result)
     view.reference = reference_facts(result.reference)
     view.reference_tables = reference_tables(result.reference)
-    levels = result.reference.get("time_to_accuracy")
-    view.accuracy = accuracy_figure(levels) if isinstance(levels, dict) else None
+    levels = result.reference.time_to_accuracy
+    view.accuracy = None if levels is None else accuracy_figure(levels)
 
 
 def _show(view: CaseView, pictures: CasePictures) -> None:

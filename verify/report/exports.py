@@ -33,7 +33,7 @@ def json_document(run: Run) -> str:
         {
             "case": entry.name,
             "defect": entry.defect,
-            "result": asdict(entry.result) if entry.result else None,
+            "result": entry.result.content() if entry.result else None,
             "unjudged": [asdict(solve) for solve in entry.unjudged],
         }
         for entry in run.entries

@@ -80,7 +80,7 @@ def _name(curve: OpeningCurve) -> str:
 def _band_text(reference: OpeningCurve | None, result: CaseResult) -> str:
     if reference is None:
         return "There is no reference to draw."
-    source = result.reference.get("source") or "unnamed"
+    source = result.reference.source or "unnamed"
     if reference.level is None:
         return f"The reference ({source}) has no uncertainty."
     if not reference.normal_band:

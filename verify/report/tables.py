@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
+from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 from verify.report.blocks import Cell, Table, plain_table
 from verify.report.curves import duration, metric_names
@@ -206,12 +207,12 @@ def failures_table(solves: Sequence[SolveRecord]) -> Table | None:
     return plain_table("Solves that did not end well", head, rows, "prose") if rows else None
 
 
-def reference_facts(reference: dict[str, Any]) -> list[tuple[str, str]]:
+def reference_facts(reference: ReferenceRecord) -> list[tuple[str, str]]:
     """Return name and value of what the record of a reference says in single values."""
     return [(_words(k), _value(v)) for k, v in _said(reference).items() if not isinstance(v, dict)]
 
 
-def reference_tables(reference: dict[str, Any]) -> list[Table]:
+def reference_tables(reference: ReferenceRecord) -> list[Table]:
     """Return the nested parts of the record of a reference as tables."""
     return [
         _levels_table(record) if key == "time_to_accuracy" else _nested(key, record)
@@ -220,8 +221,8 @@ def reference_tables(reference: dict[str, Any]) -> list[Table]:
     ]
 
 
-def _said(reference: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in reference.items() if value not in ([], {}, None, "")}
+def _said(reference: ReferenceRecord) -> dict[str, Any]:
+    return {key: value for key, value in reference.said().items() if value not in ([], {}, "")}
 
 
 def _levels_table(levels: dict[str, dict[str, Any]]) -> Table:

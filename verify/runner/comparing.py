@@ -6,7 +6,6 @@ others are compared again: a solution that cannot be compared costs nobody else 
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +109,7 @@ class Comparison:
         reason, origin = f"comparison failed: {why}", self._question["provenance"]
         judged = self._question["judge_only"]
         result = unjudged_result(self.scene, self._folders, reason, origin, judged)
-        write_json(asdict(result), self._folder / "result.json")
+        write_json(result.content(), self._folder / "result.json")
         return result
 
 

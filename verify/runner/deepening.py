@@ -25,7 +25,7 @@ def further_level(plan: CasePlan, result: CaseResult) -> Job | None:
     result : CaseResult
         The judgement by the levels so far.
     """
-    if not plan.spare or result.reference.get("suffices", True):
+    if not plan.spare or result.reference.suffices is not False:
         return None
     own = [solve for solve in result.solves if solve.solver == REFERENCE]
     if any(solve.status is not Status.SOLVED for solve in own):

@@ -1,5 +1,6 @@
 """The run: solves in parallel processes, then the comparison of each finished case."""
 
+import os
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line
 from verify.provenance import provenance
-from verify.result import CaseResult, SolveRecord, Status, write_result
+from verify.result import LOG, CaseResult, SolveRecord, Status, write_result
 from verify.runner.checking import check_scene
 from verify.runner.child import POLL_SECONDS, Ending
 from verify.runner.cluster import ClusterEngine
@@ -284,6 +285,8 @@ class _Work:
                 record.notes["ended"] = f"had answered, and was killed for its {ending.killed_for}"
         if note := self._contention():
             record.notes["timing"] = note
+        if record.status in (Status.FAILED, Status.TIMEOUT, Status.MEMORY):
+            record.notes[LOG] = os.path.relpath(child.log, self.directory.root)
         return record
 
     def _contention(self) -> str:

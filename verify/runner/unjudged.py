@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from verify.applied_checks import applied_checks, unjudged
+from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Verdict
 from verify.runner.job import load_record
 from verify.scene import Scene, scene_hash
@@ -40,7 +41,7 @@ def unjudged_result(
         requirement=scene.requirement,
         scene_hash=scene_hash(scene),
         scene=scene.model_dump(mode="json", by_alias=True),
-        reference={},
+        reference=ReferenceRecord(),
         solves=solves,
         rates=[],
         verdicts=[

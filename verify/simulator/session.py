@@ -12,7 +12,7 @@ from verify.simulator.body_parts import BodyParts, held_nodes
 from verify.simulator.collision.surface_collider import Contacts, SurfaceCollider
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.grips import Grips, held_facets
+from verify.simulator.grips import Grips, gripped, held_facets
 from verify.simulator.stage import Stage
 from verify.simulator.staged_cut import MOST, Followed, Pieces, StagedCut
 from verify.simulator.step_record import PHASES, StepRecord
@@ -181,6 +181,16 @@ class Session:
         """Tip and other end of each blade under way, m."""
         now = self.state.time
         return [_blade_at(path, now) for path in self._under_way()]
+
+    def hooks(self) -> list[tuple[_Floats, _Floats]]:
+        """Place at the edge of the cut of each hook that has gripped, m, and its vector."""
+        found = []
+        for number in self._start:
+            hook = self.stage.hooks[number]
+            if len(nodes := gripped(self.phantom, hook)):
+                edge = hook.at_edge(self.stage.strokes[hook.stroke])
+                found.append((edge + self.displacement[nodes].mean(axis=0), hook.vector))
+        return found
 
     def _next_stroke(self, end: float) -> float:
         """How far to lead the blades: where work is spread, two strokes are not cut in one go."""

@@ -68,6 +68,16 @@ class Hook:
         s = min(max((time - self.begin) / self.duration, 0.0), 1.0)
         return s * s * (3.0 - 2.0 * s)
 
+    def at_edge(self, path: ToolPath) -> _Floats:
+        """Place (s,) of the edge of a cut that is nearest to where the hook grips, m."""
+        blade = (path.blades[:, -1] - path.blades[:, 0]).mean(axis=0)
+        along = blade / (np.linalg.norm(blade) or 1.0)
+        away = path.blades[:, 0] - self.at
+        away -= np.outer(away @ along, along)  # what lies along the blade is no distance
+        fine = np.linspace(0.0, len(away) - 1.0, 50 * len(away))
+        line = np.column_stack([np.interp(fine, np.arange(len(away)), x) for x in away.T])
+        return self.at + line[np.argmin(np.linalg.norm(line, axis=1))]
+
     def rate(self, time: float) -> float:
         """Time derivative of `share`, in 1/s."""
         s = min(max((time - self.begin) / self.duration, 0.0), 1.0)

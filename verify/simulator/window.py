@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.simulator.animation import Frame, meshes_of, view_of
+from verify.simulator.animation import Frame, beside, meshes_of, view_of
 from verify.simulator.live_scalpel import LiveScalpel
 from verify.simulator.session import Session
 from verify.simulator.sight import place_in_sight
@@ -61,7 +61,7 @@ class PlayWindow:
 
         self.session = Session(stage, account=False, spread=spread)
         frame = self._frame()
-        view = view_of([frame, frame])
+        self._view = view = view_of([frame, frame])
         self.scalpel = LiveScalpel(self.session, _DEPTH * view.width)
         self.plotter: Any = pyvista.Plotter(
             title=title, window_size=list(view.size), off_screen=off_screen
@@ -82,11 +82,12 @@ class PlayWindow:
         self.plotter.render()
 
     def _frame(self) -> Frame:
-        return Frame(self.session.time, self.session.picture(), self.session.blades())
+        session = self.session
+        return Frame(session.time, session.picture(), session.blades(), session.hooks())
 
     def _draw(self, frame: Frame) -> None:
         self.plotter.clear_actors()
-        for mesh, colour, smooth in meshes_of(frame):
+        for mesh, colour, smooth in [*meshes_of(frame), *beside(frame, self._view)]:
             self.plotter.add_mesh(
                 mesh, color=colour, smooth_shading=smooth, reset_camera=False, render=False
             )

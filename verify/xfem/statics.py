@@ -22,7 +22,7 @@ __all__ = ["StaticSolution", "StaticSolver", "is_large", "solve_static"]
 
 _Floats = NDArray[np.float64]
 
-ITERATE_FROM = 2000  # nodes in space: docs/theory/linear-solvers.md has the measurement
+ITERATE_FROM = 2000  # nodes in space, from which iterations are faster (measured)
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
 _PHASES = ("analysis", "assembly", "factorisation", "solve")
 _MOST = 2000  # iterations before a factorisation is the quicker way

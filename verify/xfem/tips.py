@@ -195,17 +195,19 @@ class _Division:
 
     def __init__(self, mesh: SimplexMesh, taken: _Bools) -> None:
         self._mesh, self._taken = mesh, taken
-        self._points, self._cells = list(mesh.points), mesh.cells.copy()
+        self._cells = mesh.cells.copy()
+        self._places: list[_Floats] = []
         self._more: list[_Ints] = []
         self._from: list[tuple[int, _Floats]] = []
         self.moved: list[float] = []
         self._inner = np.ones(len(mesh.points), dtype=bool)
-        for cell, opposite in mesh.boundary_facets:
-            self._inner[np.delete(mesh.cells[cell], opposite)] = False
+        cell, opposite = mesh.boundary_facets.T
+        self._inner[mesh.cells[cell][np.arange(3) != opposite[:, None]]] = False
 
     def mesh(self) -> SimplexMesh:
         """Return the mesh with the cells divided so far."""
-        return SimplexMesh(self._points, np.concatenate([self._cells, *self._more]))
+        points = np.concatenate([self._mesh.points, *(place[None] for place in self._places)])
+        return SimplexMesh(points, np.concatenate([self._cells, *self._more]))
 
     def interpolated(self, values: _Floats) -> _Floats:
         """Values (n, c) at the nodes as (k, c) at the new ones, linear in the divided cells."""
@@ -235,8 +237,8 @@ class _Division:
         if (at > 0.0).sum() == 1:
             return np.asarray(corners[at.argmax()])
         nodes = self._mesh.cells[chord.cell]
-        replaced, number = nodes[at > 0.0], len(self._points)
-        self._points.append(at @ corners)
+        replaced, number = nodes[at > 0.0], len(self._inner) + len(self._places)
+        self._places.append(at @ corners)
         self._from.append((chord.cell, at))
         for cell in cells:
             parts = [
@@ -245,7 +247,7 @@ class _Division:
             ]
             self._cells[cell] = parts[0]
             self._more.append(np.array(parts[1:]))
-        return np.asarray(self._points[number])
+        return self._places[-1]
 
     def _around(self, cell: int, at: _Floats) -> list[int] | None:
         """Cells around a place in a cell; None on the outline of the body."""

@@ -13,6 +13,7 @@ from verify.accelerated.resumable import Resumable, finished
 from verify.simulator.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.mapping.corner_kernels import place_corners
+from verify.simulator.mapping.cut_elements import cut_elements, sub_simplices
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.exposed_kernels import exposed_facets
 from verify.simulator.mapping.membrane_facets import membrane_facets, rim_edges
@@ -89,21 +90,9 @@ class BodySurface:
 
     def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:
         """Point numbers, barycentric corners, piece, cell, whether on a cut, of their facets."""
-        body, mesh = self._body, self._body.mesh
+        body = self._body
         if self._membrane:
             return membrane_facets(body, cells)
         return exposed_facets(
-            cells,
-            body.split_cells,
-            mesh.cells,
-            mesh.neighbours,
-            body.piece_cells.rows,
-            body.first_piece,
-            body.next_piece.rows,
-            body.sub_range,
-            body.sub_piece.rows,
-            body.sub_points.rows,
-            body.sub_barycentric.rows,
-            body.sub_sign.rows,
-            self._orientation,
+            cells, body.split_cells, cut_elements(body), sub_simplices(body), self._orientation
         )

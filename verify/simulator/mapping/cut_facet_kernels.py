@@ -104,10 +104,7 @@ def _take_corners(f, facets, of_facet, inside, corners, where):
 
 
 @njit(cache=True)
-def divide_facets(
-    facets, values, points, cut, reach, low, high, order, cells, nodes, gradients,
-    piece_label, first_piece, next_piece,
-):  # fmt: skip
+def divide_facets(facets, values, points, cut, tree, body):
     """Divide triangles by a cut where both places in which it crosses their edges are split.
 
     Parameters
@@ -118,10 +115,8 @@ def divide_facets(
         Level set at the points, exactly zero within round-off.
     points : (n, 3) float array
     cut : int
-    reach, low, high, order, cells, nodes, gradients
-        Elements of the body, as `cut_at` takes them.
-    piece_label, first_piece, next_piece
-        Pieces of the body, likewise.
+    tree : ElementTree
+    body : CutElements
 
     Returns
     -------
@@ -139,10 +134,7 @@ def divide_facets(
     """
     edges, of_facet = _crossed_edges(facets, values)
     place, share = _points_on_edges(edges, values, points)
-    inside = cut_at(
-        place, cut, reach, low, high, order, cells, nodes, gradients,
-        piece_label, first_piece, next_piece,
-    )  # fmt: skip
+    inside = cut_at(place, cut, tree, body)
     number, count = _number_points(edges, place, share, len(points))
     room = 3 * len(facets)
     ids, at = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, 3))

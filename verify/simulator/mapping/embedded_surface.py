@@ -22,6 +22,7 @@ from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.point_numbers import FoundPoints, PointNumbers
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.mapping.cut_elements import ElementTree, NearCells, cut_elements
 from verify.simulator.mapping.cut_facet_kernels import divide_facets
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.locate_kernels import (
@@ -40,18 +41,6 @@ __all__ = ["EmbeddedSurface"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
-
-
-class _Elements(NamedTuple):
-    """The elements of the body and the tree over them, as kernels take them."""
-
-    reach: float
-    low: _Floats
-    high: _Floats
-    order: _Ints
-    cells: _Ints
-    points: _Floats
-    gradients: _Floats
 
 
 class _Fragments(NamedTuple):
@@ -111,23 +100,23 @@ class EmbeddedSurface:
         self.surface = MovingSurface(mesh.dim + 1, mesh.space, self.facets.shape[1])
         self._cutter, self._snap = cutter, ROUND_OFF * mesh.extent
         tree = cutter.interior
-        self._elements = _Elements(
+        self._tree = ElementTree(
             1e-9 * mesh.extent, tree.low, tree.high, tree.order, mesh.cells, mesh.points,
             mesh.gradients,
         )  # fmt: skip
-        self._vertex_cell, self._vertex_at = locate_many(self.points, *self._elements)
+        self._vertex_cell, self._vertex_at = locate_many(self.points, self._tree)
         self._numbers = PointNumbers(len(self.points), mesh.space)
         self._edges = EdgePoints(self.points, self._numbers)
         leaf, count = np.argsort(tree.order), len(tree.order)
-        self._boxes = tree.low[count + leaf], tree.high[count + leaf]
-        self._near, self._around = self._facets_near_cells()
+        boxes = tree.low[count + leaf], tree.high[count + leaf]
+        self._near, around = self._facets_near_cells(boxes)
+        self._around = NearCells(*around, *boxes)
         every = np.arange(len(self.facets))
         own, corners = self._vertex_cell[self.facets], (*self.facets.shape, mesh.dim + 1)
         self._corners = np.empty_like(own), np.empty(corners), np.empty(corners)
         corner_cells(
-            every, self.points[self.facets], every, own, *self._around, *self._boxes,
-            *self._elements, *self._corners,
-        )  # fmt: skip
+            every, self.points[self.facets], every, own, self._around, self._tree, *self._corners
+        )
         self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
         most = max(len(self.points), len(self.facets), len(mesh.points))
         self._place, self._is_moved = np.full(most, -1), np.zeros(len(mesh.cells), dtype=bool)
@@ -161,13 +150,11 @@ class EmbeddedSurface:
 
     def is_cut(self, places: _Floats, cut: int) -> NDArray[np.bool_]:
         """Whether the element at each material place (q, s) is split by a cut."""
-        body = self._cutter.body
-        return cut_at(
-            places, cut, *self._elements, body.piece_label.rows, body.first_piece,
-            body.next_piece.rows,
-        )  # fmt: skip
+        return cut_at(places, cut, self._tree, cut_elements(self._cutter.body))
 
-    def _facets_near_cells(self) -> tuple[tuple[_Ints, _Ints], tuple[_Ints, _Ints]]:
+    def _facets_near_cells(
+        self, boxes: tuple[_Floats, _Floats]
+    ) -> tuple[tuple[_Ints, _Ints], tuple[_Ints, _Ints]]:
         """Facets near each cell, and cells near each facet, as (first of each, all).
 
         They are near if their boxes meet, or if a vertex of the facet belongs to the cell. Outside
@@ -176,9 +163,9 @@ class EmbeddedSurface:
         tree = self._cutter.interior
         cells, facets = [], []
         corners = self.points[self.facets]
-        floor, ceiling = (box[self._vertex_cell] for box in self._boxes)
+        floor, ceiling = (box[self._vertex_cell] for box in boxes)
         outside = np.maximum(floor - self.points, self.points - ceiling).max(axis=1, initial=0.0)
-        reach = self._elements.reach + 2.0 * outside[self.facets].max(axis=1)
+        reach = self._tree.reach + 2.0 * outside[self.facets].max(axis=1)
         for f, (low, high) in enumerate(zip(corners.min(axis=1), corners.max(axis=1), strict=True)):
             near = np.union1d(
                 tree.meeting_box(low - reach[f], high + reach[f]), self._vertex_cell[self.facets[f]]
@@ -209,14 +196,10 @@ class EmbeddedSurface:
             yield
         # where the corners of a whole facet are is known; only which piece that is may be new
         material, cell, weights, inside = place_parts(
-            self.points, self.facets, source, at, whole, *self._corners, *self._around,
-            *self._boxes, *self._elements,
-        )  # fmt: skip
+            self.points, self.facets, source, at, whole, self._corners, self._around, self._tree
+        )
         yield
-        piece = corner_pieces(
-            cell, inside, label, self._cutter.level_sets, body.mesh.cells, body.piece_label.rows,
-            body.first_piece, body.next_piece.rows,
-        )  # fmt: skip
+        piece = corner_pieces(cell, inside, label, self._cutter.level_sets, cut_elements(body))
         self.surface.retire(ranges(self._facet_range[facets]))
         self.surface.add(
             ids, material, weights, weights != 0.0, piece, np.zeros(len(ids), dtype=bool),
@@ -249,12 +232,10 @@ class EmbeddedSurface:
         if len(numbers) == 0:
             at = np.tile(np.eye(3), (len(facets), 1, 1))
             return self.facets[facets], np.arange(len(facets)), at, np.zeros((len(facets), 0), "i1")
-        body = self._cutter.body
         corners = self.points[nodes]
         ends, positions, ids, at, source, side = divide_facets(
-            np.searchsorted(nodes, self.facets[facets]), values[:, 0], corners,
-            numbers[0], *self._elements, body.piece_label.rows, body.first_piece,
-            body.next_piece.rows,
+            np.searchsorted(nodes, self.facets[facets]), values[:, 0], corners, numbers[0],
+            self._tree, cut_elements(self._cutter.body),
         )  # fmt: skip
         positions = np.concatenate([corners, positions])
         found = FoundPoints(positions, values, ends, np.zeros(len(ends), dtype=np.int64))

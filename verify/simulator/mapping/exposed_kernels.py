@@ -74,9 +74,9 @@ def _face_of(barycentric, skip):
 
 
 @njit(cache=True)
-def _meets(piece, other, cell, across, opposite, cells, piece_cells):
+def _meets(piece, other, cell, across, opposite, body):
     """Whether pieces of two cells move together at the nodes of the face between these."""
-    same = True
+    cells, piece_cells, same = body.cells, body.piece_cells, True
     for a in range(cells.shape[1]):
         for b in range(cells.shape[1]):
             if a != opposite and cells[across, b] == cells[cell, a]:
@@ -97,18 +97,17 @@ def _is_whole(points, skip, nodes):
 
 
 @njit(cache=True)
-def _beyond(
-    piece, cell, opposite, neighbours, cells, piece_cells, sub_range, sub_piece,
-    sub_points, sub_barycentric, sub_sign, orientation, out, count,
-):  # fmt: skip
+def _beyond(piece, cell, opposite, body, parts, orientation, out, count):
     """Expose parts of a whole face beyond which there is a piece that moves otherwise.
 
     They are the facets of the cell across, turned about. Gives the count of facets.
     """
     ids, at, piece_of, cell_of, inner = out
+    sub_range, sub_piece, sub_points, sub_barycentric, sub_sign = parts
+    cells, neighbours = body.cells, body.neighbours
     across, corners = neighbours[cell, opposite], cells.shape[1]
     for s in range(sub_range[across, 0], sub_range[across, 1]):
-        if _meets(piece, sub_piece[s], cell, across, opposite, cells, piece_cells):
+        if _meets(piece, sub_piece[s], cell, across, opposite, body):
             continue
         for skip in range(corners):
             face = _face_of(sub_barycentric[s], skip)
@@ -157,15 +156,15 @@ def _with_room(out, count, more):
 
 
 @njit(cache=True)
-def exposed_facets(
-    wanted, split, cells, neighbours, piece_cells, first_piece, next_piece,
-    sub_range, sub_piece, sub_points, sub_barycentric, sub_sign, orientation,
-):  # fmt: skip
+def exposed_facets(wanted, split, body, parts, orientation):
     """Facets of these cells on the surface of the material.
 
     Returns for each: point numbers (q, d), barycentric corners (q, d, d + 1), piece, cell,
-    and whether it lies on a cut. Facets are oriented outwards.
+    and whether it lies on a cut. Facets are oriented outwards. `body` is as `CutElements`, `parts`
+    as `SubSimplices`, `orientation` (m,) that of the elements.
     """
+    sub_range, sub_piece, sub_points, sub_barycentric, sub_sign = parts
+    cells, neighbours, first_piece = body.cells, body.neighbours, body.first_piece
     corners = cells.shape[1]
     room = 256
     for cell in wanted:
@@ -186,9 +185,7 @@ def exposed_facets(
             piece = first_piece[cell]
             for a in range(corners):
                 across = neighbours[cell, a]
-                other = partner(
-                    piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
-                )
+                other = partner(piece, cell, a, body)
                 if other < 0:
                     k = 0
                     for b in range(corners):
@@ -204,10 +201,7 @@ def exposed_facets(
                     continue
                 if not split[across]:
                     continue
-                count = _beyond(
-                    piece, cell, a, neighbours, cells, piece_cells, sub_range, sub_piece,
-                    sub_points, sub_barycentric, sub_sign, orientation, out, count,
-                )  # fmt: skip
+                count = _beyond(piece, cell, a, body, parts, orientation, out, count)
             continue
         if end - begin > len(sums):
             sums = np.empty(2 * (end - begin), dtype=np.int64)
@@ -219,10 +213,7 @@ def exposed_facets(
                     continue
                 face = _face_of(sub_barycentric[s], skip)
                 if face >= 0:
-                    other = partner(
-                        sub_piece[s], cell, face, cells, neighbours, piece_cells, first_piece,
-                        next_piece,
-                    )  # fmt: skip
+                    other = partner(sub_piece[s], cell, face, body)
                     across = neighbours[cell, face]
                     first, last = (np.int64(0), np.int64(0))
                     if across >= 0:
@@ -230,17 +221,12 @@ def exposed_facets(
                     # the same facet of the cell across may be that of a piece that moves otherwise
                     same = _find_facet(s, skip, first, last, sub_points)
                     if other >= 0 and (
-                        same < 0
-                        or _meets(
-                            sub_piece[s], sub_piece[same], cell, across, face, cells, piece_cells
-                        )
+                        same < 0 or _meets(sub_piece[s], sub_piece[same], cell, across, face, body)
                     ):
                         if _is_whole(sub_points[s], skip, cells[cell]):
                             count = _beyond(
-                                sub_piece[s], cell, face, neighbours, cells, piece_cells,
-                                sub_range, sub_piece, sub_points, sub_barycentric, sub_sign,
-                                orientation, out, count,
-                            )  # fmt: skip
+                                sub_piece[s], cell, face, body, parts, orientation, out, count
+                            )
                         continue
                 k = 0
                 for b in range(corners):

@@ -24,8 +24,9 @@ _SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on t
 
 
 @njit(cache=True)
-def barycentric(x, cell, cells, points, gradients, out):
+def barycentric(x, cell, tree, out):
     """Write the barycentric coordinates (d + 1,) of x; return the smallest."""
+    cells, points, gradients = tree.cells, tree.points, tree.gradients
     smallest, origin = np.inf, points[cells[cell, 0]]
     for a in range(cells.shape[1]):
         value = 1.0 if a == 0 else 0.0
@@ -37,8 +38,9 @@ def barycentric(x, cell, cells, points, gradients, out):
 
 
 @njit(cache=True)
-def _first_reach(x, reach, low, high, order, stack):
+def _first_reach(x, reach, tree, stack):
     """Give the reach, doubled until the box of a cell comes within it."""
+    low, high, order = tree.low, tree.high, tree.order
     least, top = np.inf, 1
     stack[0] = 1
     while top > 0:
@@ -59,8 +61,9 @@ def _first_reach(x, reach, low, high, order, stack):
 
 
 @njit(cache=True)
-def _cells_about(x, reach, low, high, order, stack, found):
+def _cells_about(x, reach, tree, stack, found):
     """Write the cells whose boxes come within reach of x; give their count."""
+    low, high, order = tree.low, tree.high, tree.order
     count, top = 0, 1
     stack[0] = 1
     while top > 0:
@@ -80,8 +83,9 @@ def _cells_about(x, reach, low, high, order, stack, found):
 
 
 @njit(cache=True)
-def locate(x, reach, low, high, order, cells, points, gradients):
+def locate(x, tree):
     """Give the cell of x."""
+    reach, low, high, order, cells = tree.reach, tree.low, tree.high, tree.order, tree.cells
     trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
     best, at = -np.inf, -1
     while at < 0:
@@ -99,42 +103,43 @@ def locate(x, reach, low, high, order, cells, points, gradients):
                 top += 2
                 continue
             cell = order[node - len(order)]
-            smallest = barycentric(x, cell, cells, points, gradients, trial)
+            smallest = barycentric(x, cell, tree, trial)
             if smallest > best:
                 best, at = smallest, cell
         if at < 0:
-            reach = _first_reach(x, 2.0 * reach, low, high, order, stack)
+            reach = _first_reach(x, 2.0 * reach, tree, stack)
     return at
 
 
 @njit(cache=True)
-def locate_many(places, reach, low, high, order, cells, points, gradients):
+def locate_many(places, tree):
     """Cells (q,), barycentric coordinates (q, d + 1)."""
     found = np.empty(len(places), dtype=np.int64)
-    at = np.empty((len(places), cells.shape[1]))
+    at = np.empty((len(places), tree.cells.shape[1]))
     for q in range(len(places)):
-        found[q] = locate(places[q], reach, low, high, order, cells, points, gradients)
-        barycentric(places[q], found[q], cells, points, gradients, at[q])
+        found[q] = locate(places[q], tree)
+        barycentric(places[q], found[q], tree, at[q])
     return found, at
 
 
 @njit(cache=True)
-def cut_at(
-    places, cut, reach, low, high, order, cells, points, gradients,
-    piece_label, first_piece, next_piece,
-):  # fmt: skip
-    """Whether a cell that holds each place (q, s) is split by a cut."""
-    found = np.zeros(len(places), dtype=np.bool_)
-    trial, stack = np.empty(cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
-    about, least = np.empty(len(order), dtype=np.int64), np.empty(len(order))
+def cut_at(places, cut, tree, body):
+    """Whether a cell that holds each place (q, s) is split by a cut.
+
+    `tree` is as `ElementTree`, `body` as `CutElements`.
+    """
+    piece_label, first_piece, next_piece = body.piece_label, body.first_piece, body.next_piece
+    found, count = np.zeros(len(places), dtype=np.bool_), len(tree.order)
+    trial, stack = np.empty(tree.cells.shape[1]), np.empty(_DEEP, dtype=np.int64)
+    about, least = np.empty(count, dtype=np.int64), np.empty(count)
     for q in range(len(places)):
-        count, wider, best = 0, reach, -np.inf
+        count, wider, best = 0, tree.reach, -np.inf
         while count == 0:
-            count = _cells_about(places[q], wider, low, high, order, stack, about)
+            count = _cells_about(places[q], wider, tree, stack, about)
             if count == 0:
-                wider = _first_reach(places[q], 2.0 * wider, low, high, order, stack)
+                wider = _first_reach(places[q], 2.0 * wider, tree, stack)
         for k in range(count):
-            least[k] = barycentric(places[q], about[k], cells, points, gradients, trial)
+            least[k] = barycentric(places[q], about[k], tree, trial)
             best = max(best, least[k])
         for k in range(count):
             if least[k] < min(best, 0.0) - _TIE:
@@ -147,8 +152,9 @@ def cut_at(
 
 
 @njit(cache=True)
-def _depth(x, cell, least, cells, points, gradients):
+def _depth(x, cell, least, tree):
     """Give the smallest barycentric coordinate of x, or one that is at most `least`."""
+    cells, points, gradients = tree.cells, tree.points, tree.gradients
     smallest, origin, a = np.inf, cells[cell, 0], 0
     while a < cells.shape[1] and smallest > least:
         value = 1.0 if a == 0 else 0.0
@@ -160,16 +166,17 @@ def _depth(x, cell, least, cells, points, gradients):
 
 
 @njit(cache=True)
-def _among(x, reach, some, floor, ceiling, cells, points, gradients):
+def _among(x, some, near, tree):
     """Give the cell of x of some cells, as `locate` does of all; -1 if x is in the box of none."""
     best, at = -np.inf, np.int64(-1)
+    floor, ceiling, reach = near.floor, near.ceiling, tree.reach
     for cell in some:
         i = 0
         while i < len(x) and floor[cell, i] - reach <= x[i] <= ceiling[cell, i] + reach:
             i += 1
         if i < len(x):
             continue
-        smallest = _depth(x, cell, best, cells, points, gradients)
+        smallest = _depth(x, cell, best, tree)
         if smallest > _TIE:  # inside of it, so in no other
             return cell
         if smallest > best:
@@ -178,23 +185,20 @@ def _among(x, reach, some, floor, ceiling, cells, points, gradients):
 
 
 @njit(cache=True)
-def corner_cells(
-    chosen, corners, facet, likely, near_start, near, floor, ceiling,
-    reach, low, high, order, cells, points, gradients, found, weights, at,
-):  # fmt: skip
+def corner_cells(chosen, corners, facet, likely, near, tree, found, weights, at):
     """Find the cell of each corner of chosen facets, looked up a little inside the facet.
 
     Of `corners` (q, k, s) those of the facets `chosen` are looked up. Each is a part of a given
     `facet` (q,). Cells that are `likely` (q, n) are tried first: where a place is inside of one,
-    it is in no other. Then those of `near` whose boxes, `floor` and `ceiling` (m, s), meet that of
-    the given facet, from `near_start` (f + 1,) on: no box of another cell holds the place. Writes
-    the cells `found` (q, k), and the coordinates (q, k, d + 1) of the corner, `weights`, and of
-    the place inside, `at`.
+    it is in no other. Then those `near` the given facet, as `NearCells`: no box of another cell
+    holds the place. Writes the cells `found` (q, k), and the coordinates (q, k, d + 1) of the
+    corner, `weights`, and of the place inside, `at`.
     """
+    cells = tree.cells
     _, size, space = corners.shape
     inside = np.empty(space)
     for q in chosen:
-        some = near[near_start[facet[q]] : near_start[facet[q] + 1]]
+        some = near.cells[near.starts[facet[q]] : near.starts[facet[q] + 1]]
         for k in range(size):
             for i in range(space):
                 inside[i] = (1.0 - _INWARDS) * corners[q, k, i]
@@ -206,16 +210,16 @@ def corner_cells(
                 if trial == tried:
                     continue
                 tried = trial
-                if _depth(inside, trial, _TIE, cells, points, gradients) > _TIE:
+                if _depth(inside, trial, _TIE, tree) > _TIE:
                     cell = trial
                     break
             if cell < 0:
-                cell = _among(inside, reach, some, floor, ceiling, cells, points, gradients)
+                cell = _among(inside, some, near, tree)
             if cell < 0:
-                cell = locate(inside, reach, low, high, order, cells, points, gradients)
-            barycentric(inside, cell, cells, points, gradients, at[q, k])
+                cell = locate(inside, tree)
+            barycentric(inside, cell, tree, at[q, k])
             found[q, k] = cell
-            barycentric(corners[q, k], cell, cells, points, gradients, weights[q, k])
+            barycentric(corners[q, k], cell, tree, weights[q, k])
             total = 0.0
             for a in range(cells.shape[1]):
                 if abs(weights[q, k, a]) <= _SNAP:
@@ -226,10 +230,7 @@ def corner_cells(
 
 
 @njit(cache=True)
-def place_parts(
-    vertices, facets, source, parts, whole, known_cell, known_weights, known_at,
-    near_start, near, floor, ceiling, reach, low, high, order, cells, points, gradients,
-):  # fmt: skip
+def place_parts(vertices, facets, source, parts, whole, known, near, tree):
     """Find where the corners of parts of facets are, and in which cell.
 
     Parameters
@@ -243,10 +244,10 @@ def place_parts(
         Barycentric coordinates of the corners in it.
     whole : (q,) bool array
         Whether a part is the facet itself, of which all is known.
-    known_cell, known_weights, known_at : (f, k), (f, k, d + 1), (f, k, d + 1) arrays
+    known : (f, k), (f, k, d + 1), (f, k, d + 1) arrays
         What `corner_cells` has found for the given facets.
-    near_start, near, floor, ceiling, reach, low, high, order, cells, points, gradients
-        As `corner_cells` takes them.
+    near : NearCells
+    tree : ElementTree
 
     Returns
     -------
@@ -255,6 +256,8 @@ def place_parts(
     cell, weights, at : (q, k), (q, k, d + 1), (q, k, d + 1) arrays
         As `corner_cells` gives them.
     """
+    known_cell, known_weights, known_at = known
+    cells = tree.cells
     count, size, space = len(source), facets.shape[1], vertices.shape[1]
     places = np.empty((count, size, space))
     cell = np.empty((count, size), dtype=np.int64)
@@ -280,20 +283,19 @@ def place_parts(
         if not whole[q]:
             chosen[more] = q
             more += 1
-    corner_cells(
-        chosen[:more], places, source, cell.copy(), near_start, near, floor, ceiling,
-        reach, low, high, order, cells, points, gradients, cell, weights, at,
-    )  # fmt: skip
+    corner_cells(chosen[:more], places, source, cell.copy(), near, tree, cell, weights, at)
     return places, cell, weights, at
 
 
 @njit(cache=True)
-def corner_pieces(cell, at, label, levels, cells, piece_label, first_piece, next_piece):
+def corner_pieces(cell, at, label, levels, body):
     """Piece (q, k) of each corner of facets, from its cell and the place `at` inside the facet.
 
     `label` (q, cuts) are the sides on which the cuts that split a facet have left it; on which
     side of the others a corner is, the level sets (n, cuts) tell.
     """
+    cells, piece_label = body.cells, body.piece_label
+    first_piece, next_piece = body.first_piece, body.next_piece
     count, size = cell.shape
     found = np.empty((count, size), dtype=np.int64)
     for q in range(count):

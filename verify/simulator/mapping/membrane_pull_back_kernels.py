@@ -14,11 +14,18 @@ _NEARER = 1.0 - 1e-12  # a neighbour is nearer if its squared distance is less t
 
 
 @njit(cache=True)
-def _distance(place, piece, cell, displacement, points, cells, piece_cells, simplex, at):
-    """Squared distance to the deformed virtual element; writes the weights of its nearest point."""
+def _deform(piece, cell, displacement, body, simplex):
+    """Write the corners of the deformed virtual element."""
     for a in range(3):
+        node, unknown = body.cells[cell, a], body.piece_cells[piece, a]
         for i in range(3):
-            simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
+            simplex[a, i] = body.points[node, i] + displacement[unknown, i]
+
+
+@njit(cache=True)
+def _distance(place, piece, cell, displacement, body, simplex, at):
+    """Squared distance to the deformed virtual element; writes the weights of its nearest point."""
+    _deform(piece, cell, displacement, body, simplex)
     nearest_on_facet(place, simplex, at)
     foot = np.empty(3)
     foot_on_facet(simplex, at, foot)
@@ -26,11 +33,9 @@ def _distance(place, piece, cell, displacement, points, cells, piece_cells, simp
 
 
 @njit(cache=True)
-def _beyond(place, piece, cell, displacement, points, cells, piece_cells, simplex):
+def _beyond(place, piece, cell, displacement, body, simplex):
     """Whether the foot of the perpendicular on the plane of an element lies outside of it."""
-    for a in range(3):
-        for i in range(3):
-            simplex[a, i] = points[cells[cell, a], i] + displacement[piece_cells[piece, a], i]
+    _deform(piece, cell, displacement, body, simplex)
     for a in range(3):
         # of the corner from its foot on the edge opposite to it, and of the place along that
         p, q = simplex[(a + 1) % 3], simplex[(a + 2) % 3]
@@ -49,14 +54,12 @@ def _beyond(place, piece, cell, displacement, points, cells, piece_cells, simple
 
 
 @njit(cache=True)
-def _step(
-    place, piece, least, at, trial, simplex, displacement, points, cells, neighbours,
-    piece_cells, piece_parent, first_piece, next_piece,
-):  # fmt: skip
+def _step(place, piece, least, at, trial, simplex, displacement, body):
     """Give a nearer piece; -1 if there is none around the nearest point, -2 if that is a free edge.
 
     Where the nearest point is a corner, all pieces around the corner are asked.
     """
+    cells, neighbours, piece_parent = body.cells, body.neighbours, body.piece_parent
     cell, free = piece_parent[piece], False
     for a in range(3):
         if at[a] != 0.0:
@@ -65,18 +68,14 @@ def _step(
         # round the corner that keeps its weight: through this edge, then the next one
         while turns < len(cells):
             current = piece_parent[coming]
-            other = partner(
-                coming, current, here, cells, neighbours, piece_cells, first_piece, next_piece
-            )
+            other = partner(coming, current, here, body)
             if other < 0:
                 free = True
                 break
             if other == piece:
                 break
             there = piece_parent[other]
-            distance = _distance(
-                place, other, there, displacement, points, cells, piece_cells, simplex, trial
-            )
+            distance = _distance(place, other, there, displacement, body, simplex, trial)
             if distance < _NEARER * least:
                 return other
             corner = -1
@@ -94,40 +93,32 @@ def _step(
 
 
 @njit(cache=True)
-def pull_back_to_membrane(
-    places, pieces, displacement, points, cells, neighbours,
-    piece_cells, piece_parent, piece_label, first_piece, next_piece, levels,
-):  # fmt: skip
-    """Material points nearest to places (q, 3), and their pieces; -1 beyond an edge or a rim."""
+def pull_back_to_membrane(places, pieces, displacement, body, levels):
+    """Material points nearest to places (q, 3), and their pieces; -1 beyond an edge or a rim.
+
+    `body` is as `CutElements`, `levels` are the level sets (n, cuts) at the nodes.
+    """
+    cells, points, _, _, piece_parent, piece_label, first_piece, next_piece = body
     count = len(places)
     material, found = np.zeros((count, 3)), np.full(count, -1)
     simplex, at, trial = np.empty((3, 3)), np.empty(3), np.empty(3)
     for q in range(count):
         piece = pieces[q]
         for _ in range(len(cells)):
-            least = _distance(
-                places[q], piece, piece_parent[piece], displacement, points, cells, piece_cells,
-                simplex, at,
-            )  # fmt: skip
-            nearer = _step(
-                places[q], piece, least, at, trial, simplex, displacement, points, cells,
-                neighbours, piece_cells, piece_parent, first_piece, next_piece,
-            )  # fmt: skip
+            cell = piece_parent[piece]
+            least = _distance(places[q], piece, cell, displacement, body, simplex, at)
+            nearer = _step(places[q], piece, least, at, trial, simplex, displacement, body)
             if nearer < 0:
                 break
             piece = nearer
         cell = piece_parent[piece]
         best, inside = np.inf, nearer == -1
         if nearer == -2:
-            inside = not _beyond(
-                places[q], piece, cell, displacement, points, cells, piece_cells, simplex
-            )
+            inside = not _beyond(places[q], piece, cell, displacement, body, simplex)
         # beside a tip the pieces of an element overlap: the nearest one with material counts
         other = first_piece[cell] if inside else -1
         while other >= 0:
-            least = _distance(
-                places[q], other, cell, displacement, points, cells, piece_cells, simplex, trial
-            )
+            least = _distance(places[q], other, cell, displacement, body, simplex, trial)
             if least < best and is_material(other, cell, trial, cells, piece_label, levels):
                 best, found[q] = least, other
                 for a in range(3):

@@ -6,8 +6,12 @@ __all__ = ["partner"]
 
 
 @njit(cache=True)
-def partner(piece, cell, opposite, cells, neighbours, piece_cells, first_piece, next_piece):
-    """Give the piece across the face of the cell opposite to a corner, -1 if there is none."""
+def partner(piece, cell, opposite, body):
+    """Give the piece across the face of the cell opposite to a corner, -1 if there is none.
+
+    `body` is as `CutElements`.
+    """
+    cells, _, neighbours, piece_cells, _, _, first_piece, next_piece = body
     other = neighbours[cell, opposite]
     found = first_piece[other] if other >= 0 else -1
     while found >= 0:

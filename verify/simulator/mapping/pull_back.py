@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.mapping.cut_elements import cut_elements
 from verify.simulator.mapping.material_share_kernels import is_material
 from verify.simulator.mapping.membrane_pull_back_kernels import pull_back_to_membrane
 from verify.simulator.mapping.partner_kernels import partner
@@ -71,25 +72,13 @@ def pull_back(
         if not np.isfinite(values).all():
             raise XfemError(f"{name}: a number is not finite")
     walk = _pull_back if body.mesh.dim == space else pull_back_to_membrane
-    return walk(
-        places,
-        pieces,
-        displacement,
-        body.mesh.points,
-        body.mesh.cells,
-        body.mesh.neighbours,
-        body.piece_cells.rows,
-        body.piece_parent.rows,
-        body.piece_label.rows,
-        body.first_piece,
-        body.next_piece.rows,
-        cutter.level_sets,
-    )
+    return walk(places, pieces, displacement, cut_elements(body), cutter.level_sets)
 
 
 @njit(cache=True)
-def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, simplex, at):
+def _coordinates(place, piece, cell, displacement, body, simplex, at):
     """Write the barycentric coordinates of a place in the deformed virtual element."""
+    cells, points, piece_cells = body.cells, body.points, body.piece_cells
     corners, space = simplex.shape
     for a in range(corners):
         for i in range(space):
@@ -107,10 +96,8 @@ def _coordinates(place, piece, cell, displacement, points, cells, piece_cells, s
 
 
 @njit(cache=True)
-def _pull_back(
-    places, pieces, displacement, points, cells, neighbours,
-    piece_cells, piece_parent, piece_label, first_piece, next_piece, levels,
-):  # fmt: skip
+def _pull_back(places, pieces, displacement, body, levels):
+    cells, points, _, _, piece_parent, piece_label, first_piece, next_piece = body
     count, space = places.shape
     corners = cells.shape[1]
     material, found = np.empty((count, space)), np.empty(count, dtype=np.int64)
@@ -119,22 +106,18 @@ def _pull_back(
         piece, found[q] = pieces[q], -1
         for _ in range(len(cells)):
             cell, place = piece_parent[piece], places[q]
-            least = _coordinates(
-                place, piece, cell, displacement, points, cells, piece_cells, simplex, at
-            )
+            least = _coordinates(place, piece, cell, displacement, body, simplex, at)
             if least >= _ON_FACE:
                 # beside a tip the pieces of an element overlap: the one with material here counts
                 other = first_piece[cell]
                 while other >= 0 and found[q] < 0:
-                    least = _coordinates(
-                        place, other, cell, displacement, points, cells, piece_cells, simplex, at
-                    )
+                    least = _coordinates(place, other, cell, displacement, body, simplex, at)
                     if least >= _ON_FACE and is_material(
                         other, cell, at, cells, piece_label, levels
                     ):
                         found[q] = piece = other
                     other = next_piece[other]
-            _coordinates(place, piece, cell, displacement, points, cells, piece_cells, simplex, at)
+            _coordinates(place, piece, cell, displacement, body, simplex, at)
             for i in range(space):
                 material[q, i] = 0.0
                 for a in range(corners):
@@ -145,9 +128,7 @@ def _pull_back(
             across, farthest = -1, _ON_FACE
             for a in range(corners):
                 if at[a] < farthest:
-                    beyond = partner(
-                        piece, cell, a, cells, neighbours, piece_cells, first_piece, next_piece
-                    )
+                    beyond = partner(piece, cell, a, body)
                     if beyond >= 0:
                         across, farthest = beyond, at[a]
             if across < 0:

@@ -1,0 +1,28 @@
+"""The command line in this process: most of what a new one takes is importing."""
+
+import os
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from io import StringIO
+from subprocess import CompletedProcess
+from unittest.mock import patch
+
+from verify.cli import main
+
+__all__ = ["run_here"]
+
+
+def run_here(arguments, folder, environment=None):
+    """Run ``verify ARGUMENTS`` in a folder; return its exit code and what it said."""
+    words, out, err = [str(word) for word in arguments], StringIO(), StringIO()
+    with (
+        chdir(folder),
+        patch.dict(os.environ, environment or {}),
+        patch("sys.argv", ["verify", *words]),
+        redirect_stdout(out),
+        redirect_stderr(err),
+    ):
+        try:
+            code = main(words)
+        except SystemExit as leaving:  # of argparse
+            code = leaving.code
+    return CompletedProcess(words, code, out.getvalue(), err.getvalue())
