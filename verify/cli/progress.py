@@ -22,9 +22,9 @@ class ClosableProgress(Progress, Protocol):
 
 
 @contextmanager
-def progress_on(stream: TextIO) -> Iterator[ClosableProgress]:
-    """Give bars if `stream` is a terminal, else lines."""
-    display: ClosableProgress = _Bars(stream) if stream.isatty() else _Lines(stream)
+def progress_on(stream: TextIO, expected: str = "") -> Iterator[ClosableProgress]:
+    """Give bars if `stream` is a terminal, else lines; say what is expected as the work begins."""
+    display: ClosableProgress = (_Bars if stream.isatty() else _Lines)(stream, expected)
     try:
         yield display
     finally:
@@ -52,11 +52,13 @@ def _case_text(result: CaseResult) -> str:
 class _Lines:
     """One line per finished solve and case."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self.stream, self.done, self.total = stream, 0, 0
+    def __init__(self, stream: TextIO, expected: str) -> None:
+        self.stream, self.expected, self.done, self.total = stream, expected, 0, 0
 
     def planned(self, solves: int, cases: int) -> None:
         self.total = solves
+        if self.expected:
+            self._say(self.expected)
         self._say(f"{solves} solves of {cases} case{'s' if cases != 1 else ''}")
 
     def started(self, label: str) -> None:
@@ -80,7 +82,7 @@ class _Lines:
 class _Bars:
     """A bar over the solves, with what runs now, above it what went wrong."""
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO, expected: str) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as RichProgress
@@ -93,9 +95,12 @@ class _Bars:
         )
         self.bars = RichProgress(*columns, console=Console(file=unfiltered(stream)), transient=True)
         self.task: Any = None
+        self.expected = expected
         self.running: dict[str, float] = {}
 
     def planned(self, solves: int, cases: int) -> None:
+        if self.expected:
+            self._say(self.expected)
         self.task = self.bars.add_task("", total=solves + cases)
         self.bars.start()
 

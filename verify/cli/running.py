@@ -54,9 +54,8 @@ def execute(arguments: argparse.Namespace) -> int:
     )
     if not arguments.no_report:
         threading.Thread(target=_load_report).start()  # while processes solve
-    if expected := run_line([(s, costs_of(s, options)) for s in scenes], options.jobs):
-        _announce(expected)
-    with progress_on(sys.stderr) as progress:
+    expected = run_line([(s, costs_of(s, options)) for s in scenes], options.jobs)
+    with progress_on(sys.stderr, expected) as progress:
         try:
             summary = run_cases(
                 scenes, arguments.out, options, progress, shlex.join(["verify", *sys.argv[1:]])
