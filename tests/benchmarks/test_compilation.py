@@ -63,7 +63,8 @@ def in_units(found):
     return whole / found["unit"]
 
 
-@pytest.mark.parametrize(("stage", "most"), [("plane: statics", 280.0), ("space: scalpel", 700.0)])
+# 8 s on a core that takes 0.1 s for the unit (measured: 24); the scalpel: all that it needs alone
+@pytest.mark.parametrize(("stage", "most"), [("plane: statics", 80.0), ("space: scalpel", 700.0)])
 def test_first_use_of_a_kind_of_scene_compiles_for_a_bounded_number_of_small_kernels(
     stage, most, tmp_path
 ):
