@@ -153,7 +153,8 @@ def test_nodes_at_the_ends_cost_no_more_than_those_of_the_conforming_elements(co
     for crack, answers in cracks(count):
         found, conforming = crack.solve("xfem", tip="partial"), answers["conforming"]
         assert found.error < 1.15 * conforming.error
-        assert found.released < 1.15**2 * conforming.released  # the square of the energy norm
+        # what was released too little is the square of the error in energy
+        assert found.released / conforming.released < 1.15**2
 
 
 @pytest.mark.parametrize("solver, elements", [("xfem", -0.45), ("conforming", -0.35)])
