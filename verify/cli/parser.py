@@ -120,7 +120,18 @@ def build_parser() -> argparse.ArgumentParser:
     add_play_commands(add)
     add_cache_command(add)
     _add_doctor(add)
+    _add_completion(add)
     return parser
+
+
+def _add_completion(add: Add) -> None:
+    command = add(
+        "completion",
+        "print a script that completes commands, options and cases in a shell",
+        "examples:\n  verify completion bash > ~/.local/share/bash-completion/completions/verify\n"
+        "  verify completion zsh > ~/.zfunc/_verify",
+    )
+    command.add_argument("shell", choices=("bash", "zsh"), help="the shell that shall read it")
 
 
 def _add_doctor(add: Add) -> None:
