@@ -17,7 +17,7 @@ LEFT = {"where": "x < 1e-6 and y > 0.999999", "displacement": [0], "components":
 @pytest.mark.parametrize(
     "supports, words",
     [
-        ([CLAMPED], "support"),
+        ([CLAMPED], "is held by no support"),
         ([CLAMPED, ROLLERS], "can still move in x"),
         ([CLAMPED, CORNER | {"where": "x < 1e-13 and y > 1 - 1e-13"}], "can still turn"),
     ],

@@ -21,7 +21,7 @@ def execute(arguments: argparse.Namespace) -> int:
             action.complete = {"bash": _CASES, "zsh": _CASES}  # type: ignore[attr-defined]
     names = " ".join(list_cases())
     functions = {
-        "bash": f"{_CASES}() {{ compgen -W '{names}' -- \"$1\"; compgen -f -- \"$1\"; }}",
+        "bash": f'{_CASES}() {{ compgen -W \'{names}\' -- "$1"; compgen -f -- "$1"; }}',
         "zsh": f"{_CASES}() {{ _alternative 'cases:case:({names})' 'files:file:_files' }}",
     }
     print(shtab.complete(parser, arguments.shell, preamble=functions))

@@ -8,6 +8,7 @@ import sys
 import threading
 from dataclasses import asdict
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 from verify.cli.cost_text import costs_of, run_line
@@ -28,6 +29,8 @@ _SOON_DRAWN = 3  # cases whose report takes less than 2 s
 
 def execute(arguments: argparse.Namespace) -> int:
     """Select, run, render, and say what came out."""
+    if find_spec("numba") is None:  # this process does without, those that it starts do not
+        raise ModuleNotFoundError("No module named 'numba'", name="numba")
     names = [name for entry in arguments.solvers for name in entry.split(",") if name]
     for name in names:
         check_solver_name(name, "--solver")

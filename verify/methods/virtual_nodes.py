@@ -97,7 +97,10 @@ def _body(
     weighed = phantom
     if weights == "raised":  # in all integrals: masses too
         raised = np.maximum(phantom.fraction, _LEAST_SHARE)
-        weighed = resisting = replace(phantom, fraction=raised)
+        sub, more = phantom.sub_cells, raised / phantom.fraction
+        # of its sub-cells likewise: a sliver's centroid stays where it is
+        sub = replace(sub, fraction=sub.fraction * more[sub.piece])
+        weighed = resisting = replace(phantom, fraction=raised, sub_cells=sub)
     extra = float(resisting.volumes.sum() / phantom.volumes.sum() - 1.0)
     copies = int((resisting.fraction > phantom.fraction).sum())
     changes.append(

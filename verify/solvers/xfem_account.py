@@ -62,7 +62,8 @@ class Account:
     ) -> None:
         """Enter the energy that is lost where a body that is cut further takes over a state.
 
-        Nothing without a sliver policy, whose loss is the scheme's, like what a step dissipates.
+        Nothing without a sliver policy and with masses of one part each; what EVS and GEVS gain or
+        lose is the scheme's, like what a step dissipates.
         What is removed takes its energy and its mass with it.
         """
         before, after = (

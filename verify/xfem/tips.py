@@ -136,8 +136,8 @@ def with_tip_nodes(mesh: SimplexMesh, cuts: Sequence[Cut]) -> TipNodes:
         times_met += cells
     division = _Division(mesh, times_met > 1)
     ends = [
-        np.array([at for chord in chords if (at := division.end_at(chord)) is not None])
-        for _, chords in met
+        np.array([at for chord in chords if (at := division.end_at(chord, cells)) is not None])
+        for cells, chords in met
     ]
     divided = division.mesh()
     nodes = divided.points[len(mesh.points) :]
@@ -214,8 +214,11 @@ class _Division:
         found = [at @ values[self._mesh.cells[cell]] for cell, at in self._from]
         return np.array(found).reshape(len(found), values.shape[1])
 
-    def end_at(self, chord: _Chord) -> _Floats | None:
-        """Divide cells where a cut ends; the place of its end, if there is a good one."""
+    def end_at(self, chord: _Chord, met: _Bools) -> _Floats | None:
+        """Divide cells where a cut ends; the place of its end, if there is a good one.
+
+        `met` (m,) are the cells that this cut meets: it must not end on another part of itself.
+        """
         corners = self._mesh.points[self._mesh.cells[chord.cell]]
         ahead = (chord.exit - chord.entry) @ corners
         best, least = None, np.inf
@@ -227,7 +230,9 @@ class _Division:
                 continue
             off = (at - chord.end) @ corners
             cost = np.linalg.norm(off) * (_BEHIND if off @ ahead < 0.0 else 1.0)
-            if cost < least:
+            # at the end itself the cells ahead are touched, and not met
+            exact = cost <= _ROUND_OFF * np.linalg.norm(ahead)
+            if cost < least and (exact or not self._joins(chord, cells, met)):
                 best, least = (at, cells), cost
         if best is None:
             return None
@@ -248,6 +253,16 @@ class _Division:
             self._cells[cell] = parts[0]
             self._more.append(np.array(parts[1:]))
         return self._places[-1]
+
+    def _joins(self, chord: _Chord, cells: list[int], met: _Bools) -> bool:
+        """Whether the cut is in some of the cells otherwise than on its way to its end."""
+        before = int(self._mesh.neighbours[chord.cell, chord.entry.argmin()])
+        others = {cell for cell in cells if met[cell]} - {chord.cell}
+        waiting = [before] if before in others else []
+        while waiting:
+            others.discard(here := waiting.pop())
+            waiting += [int(cell) for cell in self._mesh.neighbours[here] if cell in others]
+        return bool(others)
 
     def _around(self, cell: int, at: _Floats) -> list[int] | None:
         """Cells around a place in a cell; None on the outline of the body."""

@@ -14,7 +14,6 @@ from verify.study.ranking.standing import Item
 __all__ = ["strengths"]
 
 _SAME = 1e-6  # relative: two programs of one method differ by their linear solvers
-_CONTENDED = 2.0  # a time that others disturbed is less where it is half of the next one
 _NEAR = 1.05  # of the best
 _ACCURACY = ("displacement_l2", "energy_norm", "jump_l2")
 _TIME = "time at equal error"
@@ -37,13 +36,12 @@ def strengths(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Str
         (metric, lambda result, m=metric: item_at_equal_size(result, m, solvers))  # type: ignore[misc]
         for metric in _ACCURACY
     ]
-    questions.append((_TIME, lambda result: cost_item(result, "displacement_l2", solvers)))
-    disturbed = bool(why_times_are_no_sample(results, solvers))
+    if not why_times_are_no_sample(results, solvers):
+        questions.append((_TIME, lambda result: cost_item(result, "displacement_l2", solvers)))
     found = []
     for question, item_of in questions:
         items = [item for item in map(item_of, results) if isinstance(item, Item)]
-        margin = _CONTENDED if question == _TIME and disturbed else 1.0 + _SAME
-        compared = [_widened(item, margin) for item in items if len(item.found) > 1]
+        compared = [_widened(item) for item in items if len(item.found) > 1]
         for solver in solvers:
             own = [item for item in compared if solver in item.found]
             if own:
@@ -51,9 +49,9 @@ def strengths(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Str
     return found
 
 
-def _widened(item: Item, margin: float) -> Item:
-    """Let numbers be tied that are round-off, or nearer to each other than the margin."""
-    half, found = margin**0.5, {}
+def _widened(item: Item) -> Item:
+    """Let numbers be tied that are round-off, or equal but for the linear solvers."""
+    half, found = (1.0 + _SAME) ** 0.5, {}
     for name, own in item.found.items():
         least = max(own.value, ROUND_OFF)
         found[name] = Interval(least, min(own.low, least) / half, max(own.high, least) * half)

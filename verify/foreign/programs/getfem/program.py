@@ -134,7 +134,10 @@ def solve(case):
     values, middle = evaluation(answer, space.scalar, PULLED)
     unknown = unknown_of_groups(case, body, answer, space, middle)
     if not np.array_equal(np.sort(unknown[answer.used(body.count)]), np.arange(count)):
-        raise RefusedError("two level sets do not end this cut where it ends: it turns too far")
+        raise RefusedError(
+            "two level sets do not give this cut and its ends: it turns too far, or leaves slivers "
+            "whose unknowns are not told apart"
+        )
 
     lame, shear = float(case.constant("lame")[0]), float(case.constant("shear")[0])
     data = gf.MeshFem(space.mesh, 1)
