@@ -24,7 +24,8 @@ def execute(arguments: argparse.Namespace) -> int:
         "bash": f'{_CASES}() {{ compgen -W \'{names}\' -- "$1"; compgen -f -- "$1"; }}',
         "zsh": f"{_CASES}() {{ _alternative 'cases:case:({names})' 'files:file:_files' }}",
     }
-    print(shtab.complete(parser, arguments.shell, preamble=functions))
+    script = shtab.complete(parser, arguments.shell, preamble=functions)  # type: ignore[arg-type]
+    print(script)
     return 0
 
 
