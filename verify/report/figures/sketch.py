@@ -122,7 +122,8 @@ def _load(
     places = [side.mean(axis=0) for side in _where(load.get("where"), parts)]
     for at in places or ([corners.mean(axis=0)] if "where" not in load else []):
         arrow = {"arrowstyle": "-|>", "color": _LOAD, "lw": 1.6}
-        axes.annotate("", tuple(at + step), tuple(at), arrowprops=arrow)
+        axes.annotate("", tuple(at + step), tuple(at), arrowprops=arrow, annotation_clip=False)
+        axes.update_datalim([at + step])  # that a pull on the border lies inside
 
 
 def cut_lines(cut: Mapping[str, Any]) -> list[Points]:
