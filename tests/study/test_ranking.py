@@ -97,14 +97,17 @@ def test_solvers_at_round_off_tie_for_first_and_a_wrong_one_is_last(level):
     assert rank_solvers([case_of("a", solves)])["stability"][-1]["solver"] == "still"
 
 
-def test_an_error_below_the_reference_s_uncertainty_cannot_be_beaten():
-    solves = [solve("a", "x", 0, 0.010, 0.020), solve("a", "y", 0, 0.012, 0.001)]
-    found, by = compared(rank_solvers([case_of("a", solves)]))
-    assert by["x"]["rank"] == by["y"]["rank"] == 1
-    assert by["x"]["low"] == 0.0
+def test_a_case_whose_reference_cannot_tell_an_error_from_none_makes_no_ranks_ties():
+    told = [solve("b", "x", 0, 0.01, 0.001), solve("b", "y", 0, 0.5, 0.001)]
+    untold = [solve("a", "x", 0, 0.010, 0.020), solve("a", "y", 0, 0.012, 0.001)]
+    found, by = compared(rank_solvers([case_of("a", untold), case_of("b", told)]))
+    assert (by["x"]["rank"], by["y"]["rank"]) == (1, 2)
+    assert by["x"]["low"] > 0.0
     (entry,) = found["left_out"]
-    assert entry["solver"] == "x"
+    assert entry["case"] == "a"
     assert entry["reason"].startswith("undecided")
+    alone, _ = compared(rank_solvers([case_of("a", untold)]))
+    assert alone["standings"] == []
 
 
 def test_equal_size_takes_the_finest_common_level_and_refuses_unequal_meshes():

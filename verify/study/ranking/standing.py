@@ -46,7 +46,9 @@ def compared_by_mean(
     case well must not be the measure of all others there. The interval of a ratio is that of the
     solver's own number, since the least one only sets the scale, which is the same for all. An
     item whose least number is round-off has no ratios and is left out, with the numbers
-    (`compared_by_worst` is for those); what was left out `before` is listed with it.
+    (`compared_by_worst` is for those). So is one in which the reference cannot tell somebody's
+    error from none: a single lower bound of zero would make that of the mean zero, and all ranks
+    ties. What was left out `before` is listed with it.
     """
     counted, left_out = [], list(before)
     for item in items:
@@ -56,9 +58,10 @@ def compared_by_mean(
             left_out.append(LeftOut(item.case, "", f"nothing to compare: {alone}"))
         elif is_exact(item):
             left_out.append(LeftOut(item.case, "", _exact_text(item.found)))
+        elif why := _undecided(item):
+            left_out.append(LeftOut(item.case, "", why))
         else:
             counted.append(item)
-            left_out += _undecided(item)
     if not counted:
         return Comparison(metric, view, "mean", 0, [], left_out) if left_out else None
     everywhere = [name for name in solvers if all(name in item.found for item in counted)]
@@ -152,15 +155,11 @@ def _exact_text(found: Mapping[str, Interval]) -> str:
     return f"{text}; not: {', '.join(rest)}" if rest else text
 
 
-def _undecided(item: Item) -> list[LeftOut]:
-    """Say of which solvers the reference cannot tell the error from none; they stay in."""
-    return [
-        LeftOut(
-            item.case,
-            name,
-            f"undecided: the uncertainty {own.half_width:.1e} is not below the value "
-            f"{own.value:.1e}; it counts with a lower bound of 0",
-        )
+def _undecided(item: Item) -> str:
+    """Say of which solvers the reference cannot tell the error from none."""
+    said = [
+        f"{name} {own.value:.1e} ± {own.half_width:.1e}"
         for name, own in item.found.items()
         if own.low <= 0.0
     ]
+    return f"undecided, the uncertainty is not below the value: {', '.join(said)}" if said else ""
