@@ -133,7 +133,8 @@ class Beside:
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
             f'xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 {width:g} {height:g}">'
         )
-        return self._written("svg", f"{head}{_LOOK}{drawing.body}</svg>")
+        ground = '<rect width="100%" height="100%" fill="#fff"/>'  # black on dark pages else
+        return self._written("svg", f"{head}{_LOOK}{ground}{drawing.body}</svg>")
 
     def image(self, webp: bytes) -> Markup:
         """Write a PNG file; return its path from the Markdown."""

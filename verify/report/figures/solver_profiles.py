@@ -33,6 +33,7 @@ def profiles_figure(profiles: Sequence[Mapping[str, Any]]) -> Figure | None:
                 )  # fmt: skip
             log_axis(axes, "x", ends)
             axes.set_ylim(0.0, 1.03)
+            axes.set_xlabel(one["quantity"].partition(",")[0])
             axes.set_ylabel(f"share of {one['items']} cases")
             legend(axes)
             said = "; ".join(f"{name}: {len(own)}" for name, own in steps.items())

@@ -56,11 +56,13 @@ _OTHERS = (
     Style("#7a3b00", "h", False, (0, (8, 2, 2, 2))),
     Style("#d0378f", "d", True, (0, (3, 3))),
     Style("#1f2f6f", "*", False, (0, (5, 1, 1, 1))),
+    Style("#111111", "8", True, "-"),
+    Style("#00a0a0", "H", False, (0, (10, 1.5, 1, 1.5))),
 )
 
 
 class Palette(dict[str, Style]):
-    """Styles by label: the same in every figure of a page, distinct for the first ten others."""
+    """Styles by label: the same in every figure of a page, distinct for the first twelve others."""
 
     def __missing__(self, label: str) -> Style:
         known = _KNOWN.get(label)
@@ -124,7 +126,7 @@ def drawing(figure: Figure, alt: str, kind: str = "panel") -> Drawing:
 def legend(axes: Axes, title: str = "") -> None:
     """Name the curves right of the axes, long names in several lines; many make room for all."""
     handles, found = axes.get_legend_handles_labels()
-    labels = ["\n".join(s for line in printable(label).split("\n") for s in wrap(line, 19) or [""])
+    labels = ["\n".join(s for line in printable(label).split("\n") for s in wrap(line, 20) or [""])
               for label in found]  # fmt: skip
     if not handles:
         return
