@@ -7,6 +7,7 @@ scalpel and hooks.
 import io
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -161,8 +162,10 @@ def write_film(frames: Sequence[Frame], view: View, path: Path, per_second: floa
             "-s", f"{view.size[0]}x{view.size[1]}", "-r", f"{per_second:g}", "-i", "-",
             "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(partial),
         ]  # fmt: skip
-        images = b"".join(image.tobytes() for image in _draw(frames, view))
-        done = subprocess.run(command, input=images, capture_output=True)
+        with tempfile.TemporaryFile() as raw:  # a pipe that it closes kills a process with PETSc
+            raw.writelines(image.tobytes() for image in _draw(frames, view))
+            raw.seek(0)
+            done = subprocess.run(command, stdin=raw, capture_output=True)
         if done.returncode:
             said = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"]
             raise InputError(f"ffmpeg failed: {said[-1]}", str(path))
