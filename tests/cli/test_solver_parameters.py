@@ -37,3 +37,5 @@ def test_a_run_solves_with_the_parameters_that_it_was_given(tmp_path, capsys):
     assert case["verdict"] == "FAIL"
     assert main(["run", "dynamics/freed_half", "--set", "xfme.scheme=newmark"]) == 2
     assert "no solver 'xfme'" in capsys.readouterr().err
+    assert main(["run", "statics/f1_patch", "--set", "xfem.tip=middle", *out[:2]]) == 2
+    assert "xfem.tip" in capsys.readouterr().err

@@ -103,7 +103,7 @@ def solve_trials(
 
 def _start(solver: str, parameters: Mapping[str, Any], names: list[str], stem: Path) -> Child:
     batch, log = stem.with_suffix(".json"), stem.with_suffix(".txt")
-    write_json({"solver": solver, "parameters": list(parameters), "trials": names}, batch)
+    write_json({"solver": solver, "parameters": dict(parameters), "trials": names}, batch)
     own = is_built_in(solver)  # forked from a warm process, if the caller keeps one
     return Child("verify.conformance.worker", batch, log, _START_SECONDS, float("inf"), own=own)
 

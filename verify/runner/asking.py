@@ -6,7 +6,7 @@ fails on that case; about the others it is asked again.
 
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +31,8 @@ class Asking:
     ----------
     name : str
     scenes : sequence of Scene
-    parameters : iterable of str
-        Names of the parameters that it is to have.
+    parameters : mapping of str
+        Parameters that it is to have, with their values.
     folder : Path
         Where to work; made here.
     timeout : float
@@ -45,12 +45,12 @@ class Asking:
         self,
         name: str,
         scenes: Sequence[Scene],
-        parameters: Iterable[str],
+        parameters: Mapping[str, Any],
         folder: Path,
         timeout: float,
         memory: float | None,
     ) -> None:
-        self.name, self._left, self._parameters = name, list(scenes), list(parameters)
+        self.name, self._left, self._parameters = name, list(scenes), dict(parameters)
         self._folder, self._timeout = folder, timeout
         self._memory = memory or 0.8 * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
         self._failures: dict[str, dict[str, Any]] = {}

@@ -7,8 +7,9 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from verify.errors import InputError, UnsupportedSceneError
@@ -19,6 +20,8 @@ from verify.runner.fingerprint import digest_of, file_digest
 from verify.whole_files import write_whole
 
 __all__ = ["main", "survey"]
+
+_NONE: Mapping[str, Any] = MappingProxyType({})
 
 
 def main(question: Path) -> None:
@@ -42,17 +45,17 @@ def main(question: Path) -> None:
 def survey(
     name: str,
     scenes: list[dict[str, Any]],
-    parameters: Sequence[str] = (),
+    parameters: Mapping[str, Any] = _NONE,
     asking: Callable[[int], None] = lambda number: None,
 ) -> dict[str, Any]:
-    """Ask the solver `name` about `scenes` and the names of `parameters`.
+    """Ask the solver `name` about `scenes` and `parameters`.
 
     Parameters
     ----------
     name : str
     scenes : list of dict
         As `verify.scene.scene_content` gives them.
-    parameters : sequence of str
+    parameters : mapping of str
     asking : callable
         Is told the number of each scene before the solver is asked about it.
 

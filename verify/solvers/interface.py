@@ -1,6 +1,6 @@
 """The interface that every solver implements, and how a solver is found by its name."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import Parameter, signature
@@ -154,10 +154,11 @@ def find_solver(name: str) -> Solver:
     return solver
 
 
-def check_parameters(name: str, solver: Solver, given: Iterable[str]) -> None:
-    """Raise `InputError` if the solver called `name` has no parameter of a name that is `given`.
+def check_parameters(name: str, solver: Solver, given: Mapping[str, Any]) -> None:
+    """Raise `InputError` if the solver called `name` does not take the `given` parameters.
 
-    One that takes any name (``**parameters``) is asked only if it lists its ``parameters``.
+    One that takes any name (``**parameters``) is asked only if it lists its ``parameters``. Values
+    are checked of those that stand in its ``choices``, if it has such.
     """
     taken = signature(solver.solve).parameters
     known = set(taken) - {"scene", "level", "repetitions"}
@@ -169,3 +170,9 @@ def check_parameters(name: str, solver: Solver, given: Iterable[str]) -> None:
     for word in given:
         if word not in known:
             raise InputError(f"{name} has no parameter '{word}'{nearest(word, known)}")
+    choices: Mapping[str, Collection[str]] = getattr(solver, "choices", {})
+    for word in choices.keys() & given.keys():
+        if given[word] not in choices[word]:
+            raise InputError(
+                f"{name}.{word} = '{given[word]}'; expected one of {', '.join(choices[word])}"
+            )

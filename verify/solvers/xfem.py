@@ -1,5 +1,6 @@
 """Adapter of the compact XFEM solver: a scene in, a neutral solution out."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -92,6 +93,10 @@ class XfemSolver:
     """
 
     name = "xfem"
+    choices: Mapping[str, Collection[str]] = {
+        "basis": _BASES, "tip": _TIPS, "slivers": _POLICIES, "scheme": SCHEMES, "mass": MASSES,
+        "kernels": _KERNELS,
+    }  # fmt: skip
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `verify.xfem` does not do through this adapter."""
@@ -133,14 +138,9 @@ class XfemSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        check_choices(
-            ("basis", basis, _BASES),
-            ("tip", tip, _TIPS),
-            ("slivers", slivers, _POLICIES),
-            ("scheme", scheme, SCHEMES),
-            ("mass", mass, MASSES),
-            ("kernels", kernels, _KERNELS),
-        )
+        given = {"basis": basis, "tip": tip, "slivers": slivers, "scheme": scheme, "mass": mass,
+                 "kernels": kernels}  # fmt: skip
+        check_choices(*((name, one, self.choices[name]) for name, one in given.items()))
         if load_steps < 0 or not step_factor > 0.0:
             text = f"load_steps {load_steps}, step_factor {step_factor}"
             raise InputError(f"{text}; expected at least 0, and a positive number")
