@@ -105,3 +105,7 @@ def test_raised_copies_weigh_a_thousandth_of_their_cell_at_least_and_the_body_st
     corners = body.conforming.points[body.conforming.cells]
     areas = 0.5 * np.linalg.det(corners[:, 1:] - corners[:, :1])
     assert areas.sum() == pytest.approx(1.0, rel=1e-12)
+    # a sliver that weighs more lies where it lay
+    np.testing.assert_allclose(
+        body.phantom.piece_centroids, plain.phantom.piece_centroids, atol=1e-12
+    )

@@ -1,4 +1,4 @@
-"""What is drawn beside a simulated body: lips of a membrane, hooks, a true scale, and films."""
+"""Pictures of a simulated body: lips of a membrane, hooks, a true scale, and films."""
 
 import os
 import signal

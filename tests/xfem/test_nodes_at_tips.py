@@ -248,3 +248,21 @@ def test_new_nodes_leave_other_cuts_as_they_were(seed):
     levels = [cut.level_set(nodes.mesh.points[: len(mesh.points)]) for cut in nodes.cuts]
     asked = np.array([cut.level_set(mesh.points) for cut in cuts])
     assert (np.array(levels) != asked).sum() <= len(nodes.moved)  # nodes that are ends, no others
+
+
+@pytest.mark.parametrize("diagonal", ["right", "left"])
+@pytest.mark.parametrize(
+    "vertices",
+    [
+        [[0.23, 0.608], [0.26, 0.435], [0.698, 0.498], [0.389, 0.811]],
+        [[0.165, 0.233], [0.664, 0.119], [0.571, 0.379], [0.701, 0.741], [0.193, 0.42]],
+    ],
+)
+def test_an_end_beside_another_part_of_its_cut_does_not_close_it_to_a_loop(vertices, diagonal):
+    mesh, cut = rectangle_mesh((4, 4), diagonal=diagonal), Polyline(vertices)
+    nodes = with_tip_nodes(mesh, [cut])
+    phantom = cut_mesh(nodes.mesh, nodes.cuts)
+    assert phantom.bodies.max() == cut_mesh(mesh, [cut]).bodies.max() == 0
+    for end in nodes.cuts[0].ends:
+        (node,) = np.flatnonzero((nodes.mesh.points == end).all(axis=1))
+        assert np.count_nonzero(phantom.node_parent == node) == 1

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from verify.cli.cost_text import costs_of, run_line
 from verify.cli.progress import progress_on
@@ -42,19 +43,7 @@ def execute(arguments: argparse.Namespace) -> int:
     if not scenes:
         print("verify: no case matches; `verify list` shows them all", file=sys.stderr)
         return NOTHING_RAN
-    options = Options(
-        solvers=tuple(dict.fromkeys(names)),
-        repetitions=arguments.repetitions,
-        parameters=parameters,
-        jobs=arguments.jobs,
-        timeout=arguments.timeout,
-        memory=arguments.memory * 1e9 if arguments.memory else None,
-        cache=None if arguments.no_cache else cache_folder(),
-        references=arguments.references,
-        cluster=arguments.cluster,
-        ranks=arguments.ranks,
-        judge_only=tuple(dict.fromkeys(arguments.judge_only)),
-    )
+    options = _options(arguments, names, parameters)
     if not arguments.no_report:
         threading.Thread(target=_load_report).start()  # while processes solve
     expected = run_line([(s, costs_of(s, options)) for s in scenes], options.jobs)
@@ -101,6 +90,24 @@ def execute(arguments: argparse.Namespace) -> int:
     if report:
         print(f"report: {report}")
     return code
+
+
+def _options(
+    arguments: argparse.Namespace, names: list[str], parameters: dict[str, dict[str, Any]]
+) -> Options:
+    return Options(
+        solvers=tuple(dict.fromkeys(names)),
+        repetitions=arguments.repetitions,
+        parameters=parameters,
+        jobs=arguments.jobs,
+        timeout=arguments.timeout,
+        memory=arguments.memory * 1e9 if arguments.memory else None,
+        cache=None if arguments.no_cache else cache_folder(),
+        references=arguments.references,
+        cluster=arguments.cluster,
+        ranks=arguments.ranks,
+        judge_only=tuple(dict.fromkeys(arguments.judge_only)),
+    )
 
 
 def _announce(text: str) -> None:

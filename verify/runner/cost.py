@@ -25,7 +25,6 @@ _SECONDS = {True: 1.5e-5, False: 5e-6}  # per unknown of a static, linear solve 
 _BYTES = 2.5e3  # per unknown in the plane
 _IN_SPACE = 2.5  # times as much per unknown: fill-in of the factors
 _ITERATIONS = {"linear": 1.0, "corotational": 8.0}
-_LARGE_STRAIN = 15.0
 _STEP = 0.2  # of a static solve
 _LEAST = {True: 1e-3, False: 3e-4}  # s of a step, however few the unknowns
 _FINENESS = {2: 12, 3: 4}  # elements over a body's extent on the first level of its reference
@@ -76,7 +75,7 @@ def solver_costs(scene: Scene, solver: str, repetitions: int = 3) -> list[LevelC
         if scene.analysis.kind == "dynamic":
             work = max(_STEP * work, _LEAST[heavy]) * _steps(scene, size, level if reference else 0)
         else:
-            work *= _ITERATIONS.get(scene.analysis.kinematics, _LARGE_STRAIN)
+            work *= _ITERATIONS[scene.analysis.kinematics]
         times = 1 if reference else 1 + repetitions
         memory = _MEMORY[heavy] + unknowns * _BYTES * (_IN_SPACE if scene.dimension == 3 else 1.0)
         rows.append(LevelCost(solver, level, unknowns, _BESIDE[heavy] + times * work, memory))

@@ -1,4 +1,4 @@
-"""What each solver is best at: in how many cases nobody is better, and the clearest of them."""
+"""Strengths of solvers: in how many cases nobody is better, and the clearest of them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
