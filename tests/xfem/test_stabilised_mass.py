@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane
 from scipy.linalg import eigh
+from test_junctions import fork
 
 from verify.assess.system_numbers import critical_step, lowest_frequency
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.xfem.cuts import ImplicitCut, Polyline
 from verify.xfem.errors import XfemError
-from verify.xfem.mass import consistent_mass
+from verify.xfem.mass import consistent_mass, second_moments
 from verify.xfem.mass_stabilised import (
     eigenvalue_stabilised_mass,
     generalised_eigenvalue_stabilised_mass,
@@ -96,3 +97,64 @@ def test_a_strip_too_thin_for_a_generalised_stabilisation_is_named():
     v = cut_mesh(rectangle_mesh((4, 4)), lines)
     with pytest.raises(XfemError, match="too thin"):
         generalised_eigenvalue_stabilised_mass(v, DENSITY)
+
+
+def mass_by_parts(phantom, raised):
+    """Consistent mass in which `raised` acts on the moments of each part, one after the other."""
+    moments, found = second_moments(phantom), consistent_mass(phantom, 1.0).matrix.toarray()
+    for first in np.unique(phantom.part[phantom.split]):
+        own = moments[phantom.part == first].sum(axis=0)
+        corners = phantom.mesh.points[phantom.mesh.cells[phantom.parent[first]]]
+        nodes = phantom.cells[first]
+        found[np.ix_(nodes, nodes)] += raised(own, corners, phantom.part_fraction[first])
+    return found
+
+
+def raised_eigenvalues(own, _corners, _share):
+    values, modes = np.linalg.eigh(own)
+    weak = modes[:, values < 1e-3 * values[-1]]
+    return 1e-3 * values[-1] * weak @ weak.T
+
+
+def raised_generalised_eigenvalues(own, corners, share):
+    """Energy of the gradient of linear functions with the values of the identity at the corners."""
+    volume = 0.5 * abs(np.linalg.det(corners[1:] - corners[0]))
+    slopes = np.linalg.solve(np.column_stack([np.ones(3), corners]), np.eye(3))[1:]
+    energy, whole = volume * slopes.T @ slopes, volume * (np.ones((3, 3)) + np.eye(3)) / 12.0
+    limit = eigh(energy, whole, eigvals_only=True)[-1]
+    values, modes = eigh(share * energy, own)
+    fast = values > limit
+    moved = own @ modes[:, fast]
+    return moved @ np.diag(values[fast] / limit - 1.0) @ moved.T
+
+
+STABILISED = [
+    (eigenvalue_stabilised_mass, raised_eigenvalues),
+    (generalised_eigenvalue_stabilised_mass, raised_generalised_eigenvalues),
+]
+
+
+@pytest.mark.parametrize(("mass", "raised"), STABILISED)
+@pytest.mark.parametrize("off", [1e-3, 1e-2, 0.05])
+def test_pieces_that_no_cut_keeps_apart_are_one_cell_to_a_stabilised_mass(mass, raised, off):
+    """Planes past the point of a fork cut thin pieces off thick parts: no elements of their own."""
+    cuts = fork(np.array([0.375, 0.5 + off]), np.array([0.3, 2.2, 4.5]))
+    v = cut_mesh(rectangle_mesh((4, 4)), cuts)
+    assert (v.part != np.arange(len(v.part))).any()
+    expected = mass_by_parts(v, raised)
+    found = mass(v, 1.0).matrix.toarray()
+    np.testing.assert_allclose(found, expected, atol=1e-11 * expected.max())
+
+
+@pytest.mark.parametrize("mass", [mass for mass, _ in STABILISED])
+def test_a_cell_whose_pieces_are_all_joined_has_the_mass_of_an_uncut_one(mass):
+    """Of a fork only one ray leaves the element: it ends there, and divides nothing."""
+    point, angles = np.array([0.49849732, 0.47436723]), np.array([3.9912, 5.6559, 7.7417])
+    ends = point + 0.3 * np.stack([np.cos(angles), np.sin(angles)], axis=1) * [[1], [0.03], [0.03]]
+    v = cut_mesh(rectangle_mesh((4, 4)), [Polyline([point, end]) for end in ends])
+    whole = v.split & (v.part_fraction > 1.0 - 1e-12)
+    assert v.fraction[whole].min() < 1e-3
+    added = (mass(v, 1.0).matrix - consistent_mass(v, 1.0).matrix).toarray()
+    only = np.setdiff1d(v.cells[whole], v.cells[v.split & ~whole])
+    assert len(only)
+    assert abs(added[only]).max() < 1e-16

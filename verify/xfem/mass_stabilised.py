@@ -6,7 +6,8 @@ Radtke, Eisenträger, Düster, Rank, Kollmannsberger, Kopp 2025, arXiv 2509.0763
 the modes of stiffness against mass until none is faster than the uncut cell. Both were proposed
 for finite cells of high order; here they act on the parts of linear cells, one component at a
 time, the gradient's energy in the place of the stiffness. For an isotropic material that bounds
-the step as the stiffness does, up to the same constant as in the uncut body.
+the step as the stiffness does, up to the same constant as in the uncut body. Pieces that share all
+dof nodes (`PhantomMesh.part`) are one part: what both papers call the element is their sum.
 """
 
 import numpy as np
@@ -21,6 +22,7 @@ __all__ = ["eigenvalue_stabilised_mass", "generalised_eigenvalue_stabilised_mass
 _NEARLY_ZERO = 1e-3  # ε_λ: of the largest eigenvalue of the part's mass
 _ADDED = 1e-3  # ε_S: likewise
 _Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
 
 
 def eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
@@ -35,14 +37,11 @@ def eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass
     XfemError
         If cells are aggregated: there are no slivers left.
     """
-    moments = _moments(phantom)
+    first, moments = _split_parts(phantom)
     values, modes = np.linalg.eigh(moments)
     largest = values[:, -1:]
-    weak = (values < _NEARLY_ZERO * largest) & phantom.split[:, None]
-    added = np.where(weak, _ADDED * largest, 0.0)
-    return assembled_mass(
-        phantom, density, moments + np.einsum("pik,pk,pjk->pij", modes, added, modes)
-    )
+    added = np.where(values < _NEARLY_ZERO * largest, _ADDED * largest, 0.0)
+    return _raised(phantom, density, first, np.einsum("pik,pk,pjk->pij", modes, added, modes))
 
 
 def generalised_eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
@@ -57,28 +56,41 @@ def generalised_eigenvalue_stabilised_mass(phantom: PhantomMesh, density: ArrayL
         If cells are aggregated: there are no slivers left; or a part is so thin that its mass is
         singular in double precision.
     """
-    moments, count = _moments(phantom), phantom.cells.shape[1]
-    corners = phantom.mesh.points[phantom.mesh.cells[phantom.parent]]
+    first, moments = _split_parts(phantom)
+    parent, count = phantom.parent[first], phantom.cells.shape[1]
+    corners = phantom.mesh.points[phantom.mesh.cells[parent]]
     slopes = np.linalg.pinv(corners[:, 1:] - corners[:, :1])  # of N_1 …, by columns
     slopes = np.concatenate([-slopes.sum(axis=2, keepdims=True), slopes], axis=2)
     energy = np.einsum("pki,pkj->pij", slopes, slopes)
     whole = (np.ones((count, count)) + np.eye(count)) / (count * (count + 1))
     limit = _pencil(energy, np.broadcast_to(whole, energy.shape))[0][:, -1]
-    split = phantom.split
-    values, modes = _pencil(energy[split] * phantom.volumes[split, None, None], moments[split])
+    volumes = phantom.part_fraction[first] * phantom.mesh.measures[parent]
+    values, modes = _pencil(energy * volumes[:, None, None], moments)
     # the sum of Mφ is zero but for round-off, which λ of a sliver would make a mass of its own
-    rows, largest = np.arange(len(modes)), np.einsum("pii->pi", moments[split]).argmax(axis=1)
+    rows, largest = np.arange(len(modes)), np.einsum("pii->pi", moments).argmax(axis=1)
     modes[rows, largest, 1:] -= modes.sum(axis=1)[:, 1:]
     values[:, 0] = 0.0  # of the constant
-    added = np.maximum(values / limit[split, None] - 1.0, 0.0)
-    moments[split] += np.einsum("pik,pk,pjk->pij", modes, added, modes)
-    return assembled_mass(phantom, density, moments)
+    added = np.maximum(values / limit[:, None] - 1.0, 0.0)
+    return _raised(phantom, density, first, np.einsum("pik,pk,pjk->pij", modes, added, modes))
 
 
-def _moments(phantom: PhantomMesh) -> _Floats:
+def _split_parts(phantom: PhantomMesh) -> tuple[_Ints, _Floats]:
+    """First piece (q,) and moments (q, d + 1, d + 1) of each part of a split cell."""
     if phantom.aggregation is not None:
         raise XfemError("a stabilised mass of aggregated cells: they have no slivers left")
-    return second_moments(phantom)
+    split = np.flatnonzero(phantom.split)
+    first, number = np.unique(phantom.part[split], return_inverse=True)
+    moments = second_moments(phantom)[split]
+    found = np.zeros((len(first), *moments.shape[1:]))
+    np.add.at(found, number, moments)
+    return first, found
+
+
+def _raised(phantom: PhantomMesh, density: ArrayLike, first: _Ints, added: _Floats) -> Mass:
+    """Return the consistent mass plus density times `added` for the parts of pieces `first`."""
+    moments = second_moments(phantom)
+    moments[first] += added
+    return assembled_mass(phantom, density, moments)
 
 
 def _pencil(energy: _Floats, moments: _Floats) -> tuple[_Floats, _Floats]:
