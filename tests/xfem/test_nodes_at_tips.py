@@ -10,7 +10,8 @@ from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import boundary_nodes, scaled_dense_stiffness, sparse_stiffness, zero_modes
 
 from verify.errors import UnsupportedSceneError
-from verify.scene import load_scene
+from verify.scene import Scene, load_scene
+from verify.solution import Regularisation
 from verify.solvers import find_solver
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Polyline
@@ -224,6 +225,24 @@ def test_a_cut_that_opens_during_a_motion_keeps_the_energy(scheme):
     assert total == pytest.approx(np.full(len(total), total[0]), rel=1e-9)
     kinds = [one.kind for one in found.regularisations]
     assert "end of a cut made a node" in kinds
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_end_made_a_node_is_not_reported_as_moved_to_an_edge_too(seed):
+    """A crack anywhere in the body: what moves either end to its node is said once."""
+    content = load_scene("statics/griffith_inside").model_dump(mode="json", by_alias=True)
+    turn, half = np.random.default_rng(seed).uniform([0.0, 0.5], [np.pi, 0.9])
+    along = half * np.array([np.cos(turn), np.sin(turn)])
+    ends = np.random.default_rng(seed).uniform(-0.3, 0.3, 2) + np.stack([-along, along])
+    content["cuts"] = [{"kind": "polyline", "points": ends.tolist()}]
+    content["exact"]["parameters"] |= {
+        "centre": ends.mean(axis=0).tolist(), "a": half, "angle": np.rad2deg(turn)
+    }  # fmt: skip
+    solution = find_solver("xfem").solve(Scene.model_validate(content), 0, 0, tip="partial")
+    said = [one for one in solution.regularisations if one.kind.startswith("end of a cut")]
+    assert [(one.kind, one.count) for one in said] == [("end of a cut made a node", 2)]
+    assert type(said[0]) is Regularisation
+    assert said[0].size > 1e-3
 
 
 def test_solids_are_refused_by_library_and_solver():

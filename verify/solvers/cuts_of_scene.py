@@ -1,5 +1,6 @@
 """Cuts of a scene as the level sets of the compact XFEM solver."""
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath,
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tips import with_tip_nodes
 
-__all__ = ["ToCut", "cuts_of", "to_cut"]
+__all__ = ["EndNodes", "ToCut", "cuts_of", "to_cut"]
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,17 @@ _ARC_SEGMENTS_PER_CELL = 8
 def cuts_of(scene: Scene, size: float) -> list[Cut]:
     """Return the cuts as the solver's own; an arc that ends is sampled finely against `size`."""
     return [_cut(cut, size) for cut in scene.cuts]
+
+
+@dataclass(frozen=True)
+class EndNodes(Regularisation):
+    """Ends of cuts that were made nodes, with the places (k, 2) where they were asked for, m."""
+
+    asked: Array
+
+    def plain(self) -> Regularisation:
+        """Return the record without the places."""
+        return Regularisation(self.kind, self.count, self.size, self.unit)
 
 
 class ToCut(NamedTuple):
@@ -58,9 +70,8 @@ def to_cut(mesh: SimplexMesh, cuts: list[Cut], tip: Any) -> ToCut:
             "tip = 'partial' in a solid; it is offered for triangles, other tip rules are for both"
         )
     nodes = with_tip_nodes(mesh, cuts)
-    said = Regularisation(
-        "end of a cut made a node", len(nodes.moved), float(nodes.moved.max(initial=0.0)), "m"
-    )
+    kind, largest = "end of a cut made a node", float(nodes.moved.max(initial=0.0))
+    said = EndNodes(kind, len(nodes.moved), largest, "m", nodes.asked)
     return ToCut(nodes.mesh, list(nodes.cuts), "inside", [said] if len(nodes.moved) else [])
 
 
