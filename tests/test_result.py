@@ -101,12 +101,28 @@ def test_numpys_scalars_are_numbers_in_a_result(tmp_path):
         ([Verdict.PASS], Verdict.PASS),
         ([Verdict.PASS, Verdict.UNDECIDED], Verdict.UNDECIDED),
         ([Verdict.UNDECIDED, Verdict.FAIL, Verdict.PASS], Verdict.FAIL),
-        ([Verdict.ERROR, Verdict.FAIL], Verdict.ERROR),
+        ([Verdict.ERROR, Verdict.FAIL], Verdict.FAIL),
+        ([Verdict.ERROR, Verdict.PASS], Verdict.ERROR),
         ([], Verdict.UNDECIDED),
     ],
 )
 def test_a_case_is_as_good_as_its_worst_verdict(verdicts, worst):
     assert judged(*verdicts).verdict is worst
+
+
+@pytest.mark.parametrize(
+    "beside, whole",
+    [
+        (Verdict.PASS, Verdict.UNDECIDED),
+        (Verdict.UNDECIDED, Verdict.UNDECIDED),
+        (Verdict.FAIL, Verdict.FAIL),
+        (Verdict.ERROR, Verdict.ERROR),
+    ],
+)
+def test_a_solver_that_could_not_be_judged_does_not_hide_the_others(beside, whole):
+    lost = [replace(v, solver="removal") for v in judged(Verdict.ERROR, Verdict.ERROR).verdicts]
+    result = judged(Verdict.PASS, beside)
+    assert replace(result, verdicts=[*result.verdicts, *lost]).verdict is whole
 
 
 def test_a_metric_is_found_by_its_name():

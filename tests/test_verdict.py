@@ -170,6 +170,25 @@ def test_an_order_that_means_nothing_never_passes(reason, expected):
     assert reason in found.reason
 
 
+@pytest.mark.parametrize(
+    "limits, width, expected",
+    [
+        ({"at_least": 1.95}, 0.05, Verdict.FAIL),
+        ({"equals": 0.5, "within": 0.05}, 0.05, Verdict.FAIL),
+        ({"at_least": 1.95}, 2.0, Verdict.UNDECIDED),
+        ({"equals": 0.0, "within": 0.1}, 0.05, Verdict.UNDECIDED),
+    ],
+)
+def test_an_error_that_stops_falling_fails_if_the_order_is_below_the_limit_at_most(
+    limits, width, expected
+):
+    rate = Rate("uncut", "energy_norm", None, width, "slowing: slopes 0.08, 0.01", [0.08, 0.01])
+    records = [solve(0, 0.1, solver="uncut"), solve(1, 0.09, solver="uncut")]
+    found = verdict({"check": "rate", "solver": "uncut", **limits}, records, [rate])
+    assert found.verdict is expected
+    assert found.reason.startswith("slowing")
+
+
 @pytest.mark.parametrize("status", [Status.FAILED, Status.TIMEOUT, Status.REFUSED, Status.MEMORY])
 @pytest.mark.parametrize(
     "check",

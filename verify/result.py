@@ -4,6 +4,7 @@
 or timed-out solve is a record like any other, with its reason.
 """
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cache
@@ -36,6 +37,7 @@ __all__ = [
     "checked",
     "error_picture",
     "read_result",
+    "worst",
     "write_result",
 ]
 
@@ -191,8 +193,8 @@ class Rate:
         Half-width from the spread of the levels and the reference's uncertainty.
     reason : str
         Empty if the order means something; else ``"floor"`` (errors at round-off or at the
-        reference's uncertainty), ``"oscillating"``, ``"diverging"``, ``"too few levels"``,
-        followed by the numbers that say so.
+        reference's uncertainty), ``"oscillating"``, ``"rising"`` or ``"slowing"`` slopes,
+        ``"diverging"``, ``"too few levels"``, followed by the numbers that say so.
     pairwise : list of float
         Slope between each pair of successive levels.
     """
@@ -334,9 +336,12 @@ class CaseResult:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of the case (ERROR > FAIL > UNDECIDED > PASS)."""
-        order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
-        return max((v.verdict for v in self.verdicts), key=order.index, default=Verdict.UNDECIDED)
+        """The worst verdict of the case; UNDECIDED if some solvers alone could not be judged."""
+        lost = {v.solver for v in self.verdicts if v.verdict is Verdict.ERROR}
+        whole = worst(v.verdict for v in self.verdicts)
+        if whole is Verdict.ERROR and lost < {v.solver for v in self.verdicts}:
+            return Verdict.UNDECIDED
+        return whole
 
     def content(self) -> dict[str, Any]:
         """Return all of it as plain values; of the reference what its record says."""
@@ -351,6 +356,15 @@ class CaseResult:
     def failing(self) -> list[str]:
         """Solvers that fail a check, known findings included, in their order."""
         return list(dict.fromkeys(v.solver for v in self.verdicts if v.verdict is Verdict.FAIL))
+
+
+def worst(verdicts: Iterable[Verdict]) -> Verdict:
+    """Return the worst of verdicts: FAIL, ERROR, UNDECIDED, PASS; UNDECIDED if there are none.
+
+    A FAIL stands whatever the checks that could not be judged would have said.
+    """
+    order = (Verdict.PASS, Verdict.UNDECIDED, Verdict.ERROR, Verdict.FAIL)
+    return max(verdicts, key=order.index, default=Verdict.UNDECIDED)
 
 
 def error_picture(solver: str) -> str:

@@ -215,6 +215,10 @@ def _judge_rate(
     if rate.reason.startswith("diverging") and max(rate.pairwise) < low:
         worst = Interval(rate.pairwise[-1], min(rate.pairwise), max(rate.pairwise))
         return _record(check, Verdict.FAIL, worst, limit_text(check), rate.reason)
+    if rate.reason.startswith("slowing") and rate.pairwise[-1] + rate.uncertainty < low:
+        least = min(rate.pairwise[-1] - rate.uncertainty, *rate.pairwise)
+        at_most = Interval(rate.pairwise[-1], least, rate.pairwise[-1] + rate.uncertainty)
+        return _record(check, Verdict.FAIL, at_most, limit_text(check), rate.reason)
     return _record(check, Verdict.UNDECIDED, None, limit_text(check), rate.reason)
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from verify.report.notation import signed, with_interval
+from verify.report.notation import error_text, signed, with_interval
 from verify.report.sliver_view import graded
 from verify.report.tables import check_row, checks_table, reasons_table
 from verify.result import Verdict, VerdictRecord
@@ -22,6 +22,29 @@ from verify.result import Verdict, VerdictRecord
 )
 def test_an_interval_is_written_with_the_digits_that_tell_its_ends_apart(value, half, written):
     assert with_interval(value, value - half, value + half) == written
+
+
+def checked_error(value, half):
+    return VerdictRecord(
+        "error", "xfem", "energy_norm", Verdict.PASS, value, max(0.0, value - half), value + half,
+        "relative error ≤ 0.1", "",
+    )  # fmt: skip
+
+
+def test_an_error_that_is_not_above_its_uncertainty_is_no_number():
+    assert error_text(2e-3, 5e-3) == "not resolved (< 0.0070)"
+    assert check_row(checked_error(2e-3, 5e-3))[1].text == "not resolved (< 0.0070)"
+    assert error_text(6e-3, 5e-3) == "0.006000 ± 0.0050"
+    assert "[" in check_row(checked_error(6e-3, 5e-3))[1].text
+
+
+def test_the_bound_of_what_is_not_resolved_is_rounded_up():
+    assert error_text(0.0, 1.01e-3) == "not resolved (< 0.0011)"
+    assert error_text(0.0, 9.91e-2) == "not resolved (< 0.10)"
+
+
+def test_an_exact_zero_without_uncertainty_stays_a_number():
+    assert error_text(0.0, 0.0) == "0"
 
 
 def test_a_value_is_written_with_the_digits_of_the_one_it_shall_have():

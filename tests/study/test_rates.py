@@ -72,3 +72,29 @@ def test_steady_slopes_that_the_comparison_leaves_open_are_not_called_oscillatin
     assert rate.reason == (
         "floor: slopes 1.00, 1.00, which the uncertainty of the comparison leaves open by 0.58"
     )
+
+
+@pytest.mark.parametrize(
+    "slopes, reason",
+    [
+        ([0.29, 0.08, 0.01], "slowing"),
+        ([0.10, -0.02], "slowing"),
+        ([0.2, 0.9], "rising"),
+        ([-0.1, 0.5], "rising"),
+        ([0.5, -0.2, 0.4], "oscillating"),
+    ],
+)
+def test_slopes_that_only_fall_or_only_rise_are_not_called_oscillating(slopes, reason):
+    errors = [1.0]
+    for slope in slopes:
+        errors.append(errors[-1] * 2**-slope)
+    found = rate(errors, sizes=H[: len(errors)])
+    assert found.order is None
+    assert found.reason.startswith(reason)
+
+
+def test_slopes_that_fall_still_bound_the_order():
+    # 0.08 → 0.01: the next may differ from 0.01 by 1.25 × 0.07
+    errors = [1.0, 2**-0.29, 2**-0.37, 2**-0.38]
+    found = rate(errors)
+    assert found.pairwise[-1] + found.uncertainty == pytest.approx(0.01 + 1.25 * 0.07)

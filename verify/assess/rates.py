@@ -1,6 +1,7 @@
 """Observed orders of convergence, with reasons where an order means nothing."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import log
 
@@ -33,7 +34,8 @@ def observed_rate(
     -------
     Rate
         The slope between the two finest levels. Its uncertainty is 1.25 × the change from
-        the pair before, plus what the half-widths of the two errors allow.
+        the pair before, plus what the half-widths of the two errors allow. Slopes that fall from
+        level to level (``"slowing"``) have that uncertainty without an order.
     """
     levels = list(zip(sizes, errors, uncertainties, strict=True))
     if any(b >= a for a, b in pairwise(sizes)):
@@ -61,17 +63,19 @@ def observed_rate(
             )
     if all(slope <= 0 for slope in slopes):
         return without(f"diverging: slopes {shown}")
-    if min(slopes) < 0 < max(slopes):
-        return without(f"oscillating: slopes {shown}")
     span = log(sizes[-2] / sizes[-1])
     allowed = sum(w / e for e, w in zip(errors[-2:], uncertainties[-2:], strict=True)) / span
     change = SAFETY * abs(slopes[-1] - slopes[-2])
     spread = change + allowed
-    if spread >= 0.5 * slopes[-1] > change:
-        return without(
-            f"floor: slopes {shown}, which the uncertainty of the comparison leaves open by "
-            f"{allowed:.2f}"
-        )
-    if spread >= 0.5 * slopes[-1]:
-        return without(f"oscillating: slopes {shown}, so that the last says little about the next")
-    return Rate(solver, metric, slopes[-1], spread, "", slopes)
+    if min(slopes) >= 0:
+        if spread < 0.5 * slopes[-1]:
+            return Rate(solver, metric, slopes[-1], spread, "", slopes)
+        if 0.5 * slopes[-1] > change:
+            return without(
+                f"floor: slopes {shown}, which the uncertainty of the comparison leaves open by "
+                f"{allowed:.2f}"
+            )
+    if all(b < a for a, b in pairwise(slopes)):
+        return replace(without(f"slowing: slopes {shown}"), uncertainty=spread)
+    what = "rising" if all(b > a for a, b in pairwise(slopes)) else "oscillating"
+    return without(f"{what}: slopes {shown}, so that the last says little about the next")

@@ -28,7 +28,7 @@ from verify.report.tables import (
     regularisations_table,
     times_table,
 )
-from verify.result import CaseResult, NoticeKind, Verdict
+from verify.result import CaseResult, NoticeKind, Verdict, worst
 
 __all__ = ["CaseView", "PictureRow", "case_view", "floor_text", "required_slope", "verdict_of"]
 
@@ -131,11 +131,10 @@ def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Pal
 def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     view.title, view.requirement = result.title, result.requirement
     view.failing = [solver_title(name) for name in result.failing]
-    worst: dict[str, list[Verdict]] = {}
+    of_solver: dict[str, list[Verdict]] = {}
     for record in result.verdicts:
-        worst.setdefault(solver_title(record.solver or "nobody"), []).append(record.verdict)
-    order = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
-    view.by_solver = {name: str(max(own, key=order.index)) for name, own in worst.items()}
+        of_solver.setdefault(solver_title(record.solver or "nobody"), []).append(record.verdict)
+    view.by_solver = {name: str(worst(own)) for name, own in of_solver.items()}
     for notice in result.notices:
         whose = f"{solver_title(notice.solver)}, " if notice.solver else ""
         if notice.kind is NoticeKind.WARNING:

@@ -8,7 +8,7 @@ from typing import Any
 from verify.report.blocks import Cell, Drawing, Table, plain_table
 from verify.report.figures.profiles import profile_panel
 from verify.report.figures.style import Palette
-from verify.report.notation import metric_title, number, solver_title, with_interval
+from verify.report.notation import error_text, metric_title, number, solver_title
 from verify.report.released_table import released_table
 from verify.result import CaseResult, SolveRecord, Status
 
@@ -41,6 +41,7 @@ class MotionView:
 
     panels: list[Drawing]
     cuts: str
+    unresolved: str
     released: Table | None
     drifts: Table | None
     parts: Table | None
@@ -53,13 +54,16 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
         return None
     cuts = _cuts(result.scene)
     unit = "J/m" if any("linear_momentum_z" not in s.account for s in moving) else "J"
-    panels = [*_errors(moving, cuts, palette), *_energies(moving, cuts, unit, palette),
+    hidden = _hidden(moving)
+    panels = [*_errors(moving, hidden, cuts, palette), *_energies(moving, cuts, unit, palette),
               *_totals(moving, cuts, unit, palette), *_momenta(moving, cuts, palette)]  # fmt: skip
     if not panels:
         return None
     shown = ", ".join(f"{time:.4g} s" for time in cuts)
-    return MotionView(panels, shown, released_table(moving), _drifts_table(result, moving),
-                      _parts_table(moving))  # fmt: skip
+    unresolved = "; ".join(f"{metric_title(name)}: {', '.join(map(solver_title, whose))}"
+                           for name, whose in hidden.items() if whose)  # fmt: skip
+    return MotionView(panels, shown, unresolved, released_table(moving),
+                      _drifts_table(result, moving), _parts_table(moving))  # fmt: skip
 
 
 def _finest(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
@@ -80,12 +84,20 @@ def _cuts(scene: dict[str, Any]) -> list[float]:
     return sorted({float(t) for t in times if isinstance(t, int | float) and 0.0 < t < math.inf})
 
 
+def _hidden(solves: Sequence[SolveRecord]) -> dict[str, list[str]]:
+    """Return by error the solvers whose largest over time is not above its uncertainty."""
+    largest = {name: [(s.solver, s.metric(f"{name}_max")) for s in solves if name in s.series]
+               for name in ("displacement_l2", "energy_norm", "jump_l2")}  # fmt: skip
+    return {name: [solver for solver, m in of if m is not None and m.value <= m.uncertainty]
+            for name, of in largest.items()}  # fmt: skip
+
+
 def _errors(
-    solves: Sequence[SolveRecord], cuts: list[float], palette: Palette
+    solves: Sequence[SolveRecord], hidden: dict[str, list[str]], cuts: list[float], palette: Palette
 ) -> Iterator[Drawing]:
-    names = dict.fromkeys(n for s in solves for n in s.series if n != "time")
-    for name in [n for n in names if n in ("displacement_l2", "energy_norm", "jump_l2")]:
-        curves = [(s, s.series["time"], s.series[name]) for s in solves if name in s.series]
+    for name, below in hidden.items():
+        curves = [(s, s.series["time"], s.series[name]) for s in solves
+                  if name in s.series and s.solver not in below]  # fmt: skip
         yield from _several(metric_title(name), curves, cuts, palette)
 
 
@@ -155,10 +167,7 @@ def _drifts_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | 
         row: list[str | Cell] = [solver_title(solve.solver), str(solve.level)]
         for name in names:
             measured, verdict = solve.metric(name), judged.get((solve.solver, name))
-            value = number(measured.value) if measured else "–"
-            if measured and measured.uncertainty > 0:
-                low = max(0.0, measured.value - measured.uncertainty)
-                value = with_interval(measured.value, low, measured.value + measured.uncertainty)
+            value = error_text(measured.value, measured.uncertainty) if measured else "–"
             said, limit = (str(verdict.verdict), verdict.limit) if verdict else ("", "")
             row.append(Cell(value, limit, verdict=said))
         rows.append(row)

@@ -10,6 +10,7 @@ __all__ = [
     "ROUND_OFF",
     "SECONDARY",
     "bytes_text",
+    "error_text",
     "error_title",
     "is_error",
     "metric_title",
@@ -134,6 +135,17 @@ def with_interval(value: float | None, low: float | None, high: float | None) ->
     if digits == _MOST_DIGITS:  # nobody compares more: the width says it
         return f"{number(value)} ± {number((high - low) / 2.0, 1)}"
     return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
+
+
+def error_text(value: float, uncertainty: float, digits: int = 4) -> str:
+    """Return an error ± its uncertainty; one that is not above it, as what it is below."""
+    if uncertainty <= 0:
+        return number(value, digits)
+    if abs(value) > uncertainty or not math.isfinite(uncertainty):
+        return f"{number(value, digits)} ± {number(uncertainty, 2)}"
+    most = abs(value) + uncertainty
+    step = 10.0 ** (math.floor(math.log10(most)) - 1)
+    return f"not resolved (< {number(math.ceil(most / step * (1 - 1e-9)) * step, 2)})"
 
 
 def printable(text: Any) -> str:

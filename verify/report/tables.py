@@ -10,7 +10,9 @@ from verify.report.blocks import Cell, Table, plain_table
 from verify.report.curves import duration, metric_names
 from verify.report.notation import (
     bytes_text,
+    error_text,
     error_title,
+    is_error,
     metric_title,
     number,
     seconds_text,
@@ -59,7 +61,7 @@ def check_text(record: VerdictRecord, named: bool = True) -> str:
 
 def check_row(record: VerdictRecord) -> list[Cell]:
     """Return the row of one check."""
-    observed = with_interval(record.observed, record.low, record.high)
+    observed = _observed(record)
     if record.check == "value":  # as many digits as the limit has beside it
         observed = number(record.observed, 10)
     known = f"Known finding: {record.known} ({record.reason})" if record.known else record.reason
@@ -69,6 +71,14 @@ def check_row(record: VerdictRecord) -> list[Cell]:
         Cell(record.limit),
         Cell("", known, verdict=str(record.verdict)),
     ]
+
+
+def _observed(record: VerdictRecord) -> str:
+    """Return an observed value with its interval; an error that may be 0, as what it is below."""
+    value, low, high = record.observed, record.low, record.high
+    if record.check in ("error", "ratio") and low == 0.0 and value is not None and high is not None:
+        return error_text(value, high - value)
+    return with_interval(value, low, high)
 
 
 def checks_table(result: CaseResult) -> Table | None:
@@ -82,8 +92,9 @@ def checks_table(result: CaseResult) -> Table | None:
         return plain_table("Verdicts", head, rows, "verdicts")
     checks: dict[tuple[str, str], dict[str | None, Cell]] = {}
     for record in result.verdicts:
-        observed = with_interval(record.observed, record.low, record.high)
-        cell = Cell(note=number(record.observed, 2), tip=f"{observed}: {record.reason}",
+        observed = _observed(record)
+        shown = number(record.observed, 2) if "[" in observed else observed
+        cell = Cell(note=shown, tip=f"{observed}: {record.reason}",
                     verdict=str(record.verdict))  # fmt: skip
         checks.setdefault((check_text(record, named=False), record.limit), {})[record.solver] = cell
     across = [[Cell(what, limit), *(own.get(solver, "–") for solver in solvers)]
@@ -303,8 +314,10 @@ def _measured(solve: SolveRecord, name: str, result: CaseResult) -> Cell:
     metric: Metric | None = solve.metric(name)
     if metric is None:
         return Cell("–" if solve.status is Status.SOLVED else str(solve.status))
-    value = number(metric.value, 5 if metric.reference is None else 8)
     unit = "" if metric.unit == "1" else f" {metric.unit}"
+    if is_error(name):
+        return Cell(f"{error_text(metric.value, metric.uncertainty, 5)}{unit}")
+    value = number(metric.value, 5 if metric.reference is None else 8)
     plus = f" ± {number(metric.uncertainty, 2)}" if metric.uncertainty > 0 else ""
     own = ""
     if metric.reference is not None and len(_references(result, name)) > 1:
