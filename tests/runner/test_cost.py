@@ -53,6 +53,27 @@ def test_a_reference_level_has_the_unknowns_of_halved_elements():
     assert 3.5 < finest.unknowns / fine.unknowns < 4.0
 
 
+@pytest.mark.parametrize(
+    "name, found",  # unknowns of the references of published runs, coarse to fine
+    [
+        ("statics/tissue_strip", [8944, 34388, 133698]),
+        ("meeting/three_through_a_point", [4390, 15594, 56648]),
+        ("cutting/hanging_block_quick", [681, 2214, 8850]),
+        ("dynamics/plate_cut_vibrating", [252, 1822, 7184]),
+    ],
+)
+def test_unknowns_of_a_reference_lie_in_the_range_that_is_said(name, found):
+    for row, unknowns in zip(solver_costs(load_scenes(name)[0], "reference"), found, strict=True):
+        assert row.unknowns < unknowns < row.at_most
+
+
+def test_a_range_is_said_where_the_mesh_is_graded_and_one_number_where_it_is_known():
+    scene = load_scenes("statics/tissue_strip")[0]
+    own, reference = case_lines(case_cost(scene, ("xfem", "reference")))[:2]
+    assert " to " not in own
+    assert "3e3 to 2e4, " in reference
+
+
 def test_words_name_solvers_units_and_the_case_that_takes_most():
     both = [(s, case_cost(s, ("xfem", "reference"))) for s in SCENES.values()]
     said = run_line(both, jobs=2)

@@ -28,7 +28,7 @@ def case_lines(costs: Sequence[LevelCost]) -> list[str]:
     of_solver = sorted(costs, key=lambda row: order.index(row.solver))
     for solver, group in groupby(of_solver, key=lambda row: row.solver):
         rows = list(group)
-        unknowns = ", ".join(f"{row.unknowns}" for row in rows)
+        unknowns = ", ".join(_unknowns(row) for row in rows)
         lines.append(f"{solver}: about {unknowns} unknowns, {_spent(rows)}")
     return [*lines, f"in all {_spent(costs)}; rough, by mesh sizes"]
 
@@ -42,10 +42,11 @@ def run_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> s
     share = _seconds(group) / _seconds(rows)
     spent = _seconds(rows) + _START * len(costs)
     at = f", {share:.0%} of it in {most.name}" if len(costs) > 1 else ""
-    largest = max(rows, key=lambda row: row.unknowns)
+    largest = max(rows, key=lambda row: row.at_most)
+    memory = memory_text(max(row.memory for row in rows))
     return (
         f"expected (rough): {duration_text(2 * _START + spent / jobs)}{at}; at most about "
-        f"{largest.unknowns} unknowns and {memory_text(max(row.memory for row in rows))} a process"
+        f"{_unknowns(largest)} unknowns and {memory} a process"
     )
 
 
@@ -55,6 +56,13 @@ def duration_text(seconds: float) -> str:
         if seconds >= 1.5 * length:
             return f"{seconds / length:.2g} {unit}"
     return f"{max(seconds, 1.0):.2g} s" if seconds < 9.5 else f"{round(seconds, -1):.0f} s"
+
+
+def _unknowns(row: LevelCost) -> str:
+    """Return the number of unknowns, or its range with one digit each."""
+    if row.unknowns == row.at_most:
+        return f"{row.unknowns}"
+    return " to ".join(f"{n:.0e}".replace("e+0", "e") for n in (row.unknowns, row.at_most))
 
 
 def _spent(rows: Sequence[LevelCost]) -> str:
