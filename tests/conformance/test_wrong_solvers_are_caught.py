@@ -36,35 +36,35 @@ def state(solver, *names, **options):
 )
 def test_a_fault_breaks_the_check_that_is_there_for_it(solver, check, said):
     found = state(solver, check)[check]
-    assert found.state is State.BROKEN
+    assert found.state is State.FAIL
     assert said in found.reason
     assert exit_code_of([found]) == 1
 
 
 def test_a_solver_that_states_the_energy_of_its_field_keeps_its_account():
-    assert state("Stating", "energy-account")["energy-account"].state is State.KEPT
+    assert state("Stating", "energy-account")["energy-account"].state is State.PASS
 
 
 def test_noise_far_below_the_errors_breaks_repeatability_only():
     found = state("Noisy", "uncut-2d", "cut-patch", "repeatability")
-    assert found["uncut-2d"].state is found["cut-patch"].state is State.KEPT
-    assert found["repeatability"].state is State.BROKEN
+    assert found["uncut-2d"].state is found["cut-patch"].state is State.PASS
+    assert found["repeatability"].state is State.FAIL
 
 
 def test_a_crash_is_a_finding_and_the_checks_after_it_still_run():
     found = state("CrashesOnCuts", "cut-patch", "closed-cut", "uncut-2d", "uncut-3d")
     for name in ("cut-patch", "closed-cut"):
-        assert found[name].state is State.FAILED
+        assert found[name].state is State.ERROR
         assert "Segmentation fault (signal 11)" in found[name].reason
-    assert found["uncut-2d"].state is found["uncut-3d"].state is State.KEPT
+    assert found["uncut-2d"].state is found["uncut-3d"].state is State.PASS
     assert exit_code_of(list(found.values())) == 3
 
 
 def test_a_solver_that_hangs_is_stopped_and_the_checks_after_it_still_run():
     found = state("Hangs", "uncut-2d", "uncut-3d", timeout=4.0)
-    assert found["uncut-2d"].state is State.FAILED
+    assert found["uncut-2d"].state is State.ERROR
     assert found["uncut-2d"].reason.endswith("no answer after 4 s")
-    assert found["uncut-3d"].state is State.KEPT
+    assert found["uncut-3d"].state is State.PASS
 
 
 def test_a_solver_that_refuses_everything_has_shown_nothing():

@@ -134,6 +134,6 @@ def test_a_run_solves_levels_until_the_reference_suffices_and_says_so(verify):
     assert f"reached with {len(levels)} levels" in result["reference"]["suffices_reason"]
     # again: nothing is solved, and the same is said
     again = verify(*command)
-    assert f"{len(levels) + 1} finished solves were taken over" in again.stdout
+    assert f"{len(levels) + 1} finished solves of before were reused" in again.stdout
     said = json.loads((verify.folder / "out/cases/slit/result.json").read_text())["reference"]
     assert said["suffices_reason"] == result["reference"]["suffices_reason"]

@@ -55,7 +55,7 @@ def test_a_run_on_a_disk_that_fills_says_so_and_is_resumed_where_there_is_room(v
         disk.resize("4m")
         second = verify(*RUN, out)
         assert second.returncode == 0, second.stderr
-        assert second.stderr.count("taken over") == len(finished)
+        assert second.stderr.count("reused") == len(finished)
         assert numbers(out) == roomy["numbers"]
 
 

@@ -49,7 +49,7 @@ def test_a_check_without_a_solver_is_made_of_each_that_is_asked_and_does_not_ref
     again = verify(*BESIDE, "--judge", INSTANT)
     assert list(verdicts(again)) == [INSTANT]
     assert again.returncode == 0
-    assert again.stderr.count("taken over") == 4
+    assert again.stderr.count("reused") == 4
     none = verify(*BESIDE, "--judge", "fake_solvers:Wrnog")
     assert none.returncode == 2
     assert "--judge: solver 'fake_solvers:Wrnog' is not asked; did you mean" in none.stderr
@@ -112,4 +112,4 @@ def test_a_comparison_that_dies_is_an_error_of_its_checks_and_the_solves_stay(ve
     # the same command then only compares
     again = verify(*command)
     assert verdicts(again)[INSTANT][0] == "PASS"
-    assert again.stderr.count("taken over") == 2
+    assert again.stderr.count("reused") == 2

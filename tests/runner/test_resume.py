@@ -1,4 +1,4 @@
-"""A run that was stopped, however, is resumed: what is finished is taken over, nothing else."""
+"""A run that was stopped, however, is resumed: what is finished is reused, nothing else."""
 
 import json
 import os
@@ -56,7 +56,7 @@ def test_a_stopped_run_leaves_no_process_and_is_resumed(verify, how):
     assert count(solves) == 1
     done = verify(*command, COUNT_SOLVES=str(solves))
     assert count(solves) == 2  # level 1 only
-    assert "level 0: taken over" in done.stderr
+    assert "level 0: reused" in done.stderr
     assert {r["status"] for r in verify.records().values()} == {"solved"}
     assert json.loads((verify.folder / "out/run.json").read_text())["finished"]
 

@@ -1,4 +1,4 @@
-"""The table of ``verify conform``: what a solver keeps."""
+"""The table of ``verify conform``: which checks a solver passes."""
 
 import argparse
 import json
@@ -31,6 +31,6 @@ def execute(arguments: argparse.Namespace) -> int:
 def _number(result: CheckResult) -> str:
     if result.observed is None or result.limit is None:
         return ""
-    return f"{result.observed:.1e} ≤ {result.limit:.1e}" if result.state == "kept" else (
+    return f"{result.observed:.1e} ≤ {result.limit:.1e}" if result.state == "pass" else (
         f"{result.observed:.1e} > {result.limit:.1e}"
     )  # fmt: skip

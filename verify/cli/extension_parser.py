@@ -143,12 +143,12 @@ def _add_solvers(add: Add) -> None:
 def _add_conform(add: Add) -> None:
     command = add(
         "conform",
-        "check that a solver keeps what every right solver keeps, before it is ranked",
+        "check a solver on what holds for every right solver, before it is ranked",
         "examples:\n  verify conform xfem\n  verify conform xfem --set basis=shifted\n"
         "  verify conform my_module:MySolver --json\n\n"
         "exit codes:\n"
-        "  0  every check that the solver did not refuse is kept\n"
-        "  1  a check is broken\n"
+        "  0  every check that the solver did not refuse passes\n"
+        "  1  a check fails\n"
         "  2  no such solver, or it cannot be loaded\n"
         "  3  the solver crashed, hung or failed on a scene that it did not refuse\n"
         "  4  it refused everything",

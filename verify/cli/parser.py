@@ -55,7 +55,7 @@ examples:
   verify run -k "demo and not tissue" --out out -j 2
   verify run "statics/*" --quick --out out --strict --json > verdicts.json
 
-A run that was stopped is resumed by the same command: finished solves are taken over if their
+A run that was stopped is resumed by the same command: finished solves are reused if their
 scene, their solver's parameters and the code are the same. Each solve runs in a process of its
 own, on one thread. With -j above 1 the timings are marked as contended.
 

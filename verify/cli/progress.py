@@ -33,7 +33,7 @@ def progress_on(stream: TextIO, expected: str = "") -> Iterator[ClosableProgress
 
 def _solve_text(label: str, record: SolveRecord, reused: bool) -> str:
     if reused:
-        return f"{label}: taken over"
+        return f"{label}: reused"
     took = f" in {record.wall:.1f} s" if record.wall is not None else ""
     if took and COMPILING in record.notes:
         took += f", of them {record.notes[COMPILING]} compiling kernels (first use)"

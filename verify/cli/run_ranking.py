@@ -1,7 +1,7 @@
 """The ranking of a finished run, ``ranking.json``; before it, the conformance of the ranked.
 
 Conformance is a matter of a solver and its parameters, not of the cases: what was found stays in
-the run directory and is taken over as long as the code of the solver is the same.
+the run directory and is reused as long as the code of the solver is the same.
 """
 
 from collections.abc import Callable, Mapping, Sequence

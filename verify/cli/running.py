@@ -86,7 +86,7 @@ def execute(arguments: argparse.Namespace) -> int:
     for line in verdict_lines(summary.results):
         print_line(line)
     if summary.reused:
-        print(f"{summary.reused} finished solves were taken over from before")
+        print(f"{summary.reused} finished solves of before were reused")
     if report:
         print(f"report: {report}")
     return code

@@ -14,9 +14,9 @@ __all__ = ["Check", "CheckResult", "Finding", "State", "evaluate"]
 class State(StrEnum):
     """What became of a check."""
 
-    KEPT = "kept"
-    BROKEN = "broken"
-    FAILED = "failed"  # the solver crashed, hung or raised on a scene that it did not refuse
+    PASS = "pass"
+    FAIL = "fail"
+    ERROR = "error"  # the solver crashed, hung or raised on a scene that it did not refuse
     REFUSED = "refused"  # the solver does not do such scenes, or gives no such number
 
 
@@ -65,7 +65,7 @@ def evaluate(check: Check, outcomes: Mapping[str, Outcome]) -> CheckResult:
     """Decide `check` on the outcomes of its trials."""
     if check.judge_outcomes is not None:
         wrong = check.judge_outcomes(outcomes)
-        state = State.BROKEN if wrong else State.KEPT
+        state = State.FAIL if wrong else State.PASS
         return CheckResult(check.name, check.claim, state, reason=wrong)
     solutions = {}
     for name, outcome in outcomes.items():
@@ -73,12 +73,12 @@ def evaluate(check: Check, outcomes: Mapping[str, Outcome]) -> CheckResult:
             return CheckResult(check.name, check.claim, State.REFUSED, reason=outcome.reason)
         if outcome.solution is None:
             reason = f"{name}: {outcome.reason}"
-            return CheckResult(check.name, check.claim, State.FAILED, reason=reason)
+            return CheckResult(check.name, check.claim, State.ERROR, reason=reason)
         solutions[name] = outcome.solution
     assert check.judge is not None
     found = check.judge(solutions)
     if found.limit is None:
         return CheckResult(check.name, check.claim, State.REFUSED, reason=found.note)
     # `not <=`, so that a number that is not finite breaks the check
-    state = State.KEPT if found.observed <= found.limit else State.BROKEN
+    state = State.PASS if found.observed <= found.limit else State.FAIL
     return CheckResult(check.name, check.claim, state, found.observed, found.limit, found.note)

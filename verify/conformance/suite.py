@@ -66,11 +66,11 @@ def conform(
 
 
 def exit_code_of(results: Sequence[CheckResult]) -> int:
-    """Return 1 if a check is broken, else 3 if one failed, 4 if nothing was done, else 0."""
+    """Return 1 if a check fails, else 3 for an error, 4 if nothing was done, else 0."""
     states = [result.state for result in results]
-    if State.BROKEN in states:
+    if State.FAIL in states:
         return 1
-    if State.FAILED in states:
+    if State.ERROR in states:
         return 3
-    # a solver that refuses everything also keeps "refuses instead of crashing"
-    return 0 if any(r.state is State.KEPT and r.observed is not None for r in results) else 4
+    # a solver that refuses everything also passes "refuses instead of crashing"
+    return 0 if any(r.state is State.PASS and r.observed is not None for r in results) else 4

@@ -52,7 +52,7 @@ def compare_answers(
         What the program is called in the report.
     out : Path
         Run directory, new, or of an earlier import of the same case: then the reference is
-        taken over, and other programs stay beside this one.
+        reused, and other programs stay beside this one.
     options : Options
         Limits of the solves; its ``solvers`` run beside the answers, with those that the checks
         compare with and the reference.

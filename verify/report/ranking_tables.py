@@ -8,7 +8,7 @@ from verify.report.notation import metric_title, number, solver_title, with_inte
 
 __all__ = ["compared", "conformance_table", "left_out_table", "stability_table"]
 
-_STATES = ("kept", "broken", "failed", "refused")
+_STATES = ("pass", "fail", "error", "refused")
 _ENDS = (
     ("failed", "failed"),
     ("timeout", "out of time"),
@@ -33,7 +33,7 @@ def conformance_table(ranking: Mapping[str, Any]) -> Table | None:
         named = {state: [c for c in checks if c["state"] == state] for state in _STATES}
         bad = [
             f"{c['name']}: {c['claim']}" + (f" ({c['reason']})" if c["reason"] else "")
-            for c in (*named["broken"], *named["failed"])
+            for c in (*named["fail"], *named["error"])
         ]
         counts = [len(named[state]) for state in _STATES]
         rows.append([solver_title(solver), str(counts[0]), str(counts[1] + counts[2]),
@@ -89,8 +89,8 @@ def left_out_table(ranking: Mapping[str, Any]) -> Table | None:
 def _marked(solver: str, ranking: Mapping[str, Any]) -> Cell:
     """Return a solver's name, with a mark if it fails a conformance check."""
     checks = ranking["conformance"].get(solver, {}).get("checks") or []
-    broken = any(c["state"] in ("broken", "failed") for c in checks)
-    mark, tip = ("†", "does not conform") if broken else ("", "")
+    wrong = any(c["state"] in ("fail", "error") for c in checks)
+    mark, tip = ("†", "does not conform") if wrong else ("", "")
     return Cell(solver_title(solver), mark=mark, tip=tip)
 
 

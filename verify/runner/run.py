@@ -61,7 +61,7 @@ class Progress(Protocol):
 
 @dataclass(frozen=True)
 class RunSummary:
-    """What a finished run left: results by case, and how many solves were taken over."""
+    """What a finished run left: results by case, and how many solves were reused."""
 
     directory: Path
     results: list[CaseResult]
@@ -90,7 +90,7 @@ def run_cases(
         If a case or `out` is bad, or there is no mpiexec for several ranks; then nothing was
         written.
     RunStoppedError
-        If SIGINT, SIGTERM or SIGHUP came; what is finished stays and is taken over next time.
+        If SIGINT, SIGTERM or SIGHUP came; what is finished stays and is reused next time.
     OSError
         If the directory cannot be written (disk full).
     """
