@@ -9,6 +9,7 @@ import signal
 import sys
 import time
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -71,6 +72,16 @@ class Compiling(Instant):
 
 class Other(Instant):
     name = "other"
+
+
+class Straining(Instant):
+    """Stretches as far as it is told."""
+
+    choices = MappingProxyType({"way": ("along", "across")})
+
+    def solve(self, scene, level, repetitions=1, strain=0.1, way="along"):
+        self.strain = strain
+        return super().solve(scene, level, repetitions)
 
 
 class Wrong(Instant):

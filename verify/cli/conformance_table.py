@@ -6,18 +6,20 @@ from dataclasses import asdict
 
 from verify.cli.solver_parameters import of_one_solver
 from verify.conformance import CheckResult, conform, exit_code_of
+from verify.solvers.named import one_name, parameters_of, solver_in
 
 __all__ = ["execute"]
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the suite on one solver and print a line per check."""
-    parameters = of_one_solver(arguments.parameters)
-    results = conform(arguments.solver, parameters, arguments.timeout, arguments.checks)
+    name = one_name(arguments.solver)
+    parameters = parameters_of(name, {solver_in(name): of_one_solver(arguments.parameters)})
+    results = conform(name, parameters, arguments.timeout, arguments.checks)
     code = exit_code_of(results)
     if arguments.json:
         checks = [asdict(result) for result in results]
-        answer = {"solver": arguments.solver, "parameters": parameters, "exit": code}
+        answer = {"solver": name, "parameters": parameters, "exit": code}
         print(json.dumps({**answer, "checks": checks}, indent=2))
         return code
     width = max(len(result.name) for result in results)

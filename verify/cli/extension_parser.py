@@ -153,7 +153,9 @@ def _add_conform(add: Add) -> None:
         "  3  the solver crashed, hung or failed on a scene that it did not refuse\n"
         "  4  it refused everything",
     )
-    command.add_argument("solver", metavar="SOLVER", help="name of a solver, or module:Class")
+    command.add_argument(
+        "solver", metavar="'SOLVER [PARAMETER=VALUE …]'", help="name of a solver, or module:Class"
+    )
     command.add_argument(
         "--set", metavar="NAME=VALUE", dest="parameters", action="append", default=[],
         help="parameter of the solver; repeat for several",

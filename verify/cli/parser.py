@@ -223,9 +223,9 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "(default: 80 %% of the machine's, shared by the processes)",
     )  # fmt: skip
     command.add_argument(
-        "--solver", metavar="NAME", action="append", dest="solvers", default=[],
-        help="solver to compare, or module:Class; repeat for several "
-        "(default: those that the case names)",
+        "--solver", metavar="'NAME [PARAMETER=VALUE …]'", action="append", dest="solvers",
+        default=[], help="solver to compare, or module:Class; with parameters it is a row of its "
+        "own; repeat for several (default: those that the case names)",
     )  # fmt: skip
     command.add_argument(
         "--judge", metavar="NAME", action="append", dest="judge_only", default=[],

@@ -16,6 +16,7 @@ from verify.ranking import ranked_solvers
 from verify.result import CaseResult, Status
 from verify.runner.fingerprint import code_of_solver, digest_of
 from verify.solvers import solver_names
+from verify.solvers.named import solver_in
 
 __all__ = ["RANKING_FILE", "rank_run"]
 
@@ -65,7 +66,7 @@ def rank_run(
     found = {}
     for solver in solvers:
         own = dict(parameters.get(solver, {}))
-        if solver not in solver_names() and ":" not in solver:
+        if solver_in(solver) not in solver_names() and ":" not in solver:
             found[solver] = {"unchecked": "imported answers: there is no solver to be asked"}
             continue
         key = digest_of([solver, own, code_of_solver(solver), code_of_suite()])

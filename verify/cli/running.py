@@ -22,6 +22,7 @@ from verify.runner import Options, RunStoppedError, exit_code, run_cases, select
 from verify.runner.checking import check_solver_name
 from verify.runner.ending import NOTHING_RAN
 from verify.runner.reference_cache import cache_folder
+from verify.solvers.named import one_name, parameters_of
 
 __all__ = ["execute"]
 
@@ -32,12 +33,14 @@ def execute(arguments: argparse.Namespace) -> int:
     """Select, run, render, and say what came out."""
     if find_spec("numba") is None:  # this process does without, those that it starts do not
         raise ModuleNotFoundError("No module named 'numba'", name="numba")
-    names = [name for entry in arguments.solvers for name in entry.split(",") if name]
+    asked = (one_name(part) for entry in arguments.solvers for part in entry.split(","))
+    names = [name for name in asked if name]
     for name in names:
         check_solver_name(name, "--solver")
     parameters = of_solvers(arguments.parameters)
     for name in parameters:
         check_solver_name(name, "--set")
+    parameters |= {name: parameters_of(name, parameters) for name in names if " " in name}
     weight = "quick" if arguments.quick else "heavy" if arguments.heavy else "normal"
     scenes = select_cases(arguments.cases, arguments.expression, weight)
     if not scenes:
@@ -106,7 +109,7 @@ def _options(
         references=arguments.references,
         cluster=arguments.cluster,
         ranks=arguments.ranks,
-        judge_only=tuple(dict.fromkeys(arguments.judge_only)),
+        judge_only=tuple(dict.fromkeys(map(one_name, arguments.judge_only))),
     )
 
 

@@ -1,10 +1,10 @@
 """Parameters of solvers on the command line: ``--set NAME=VALUE``."""
 
-import json
 from collections.abc import Iterable
 from typing import Any
 
 from verify.errors import InputError
+from verify.solvers.named import plain_value
 
 __all__ = ["of_one_solver", "of_solvers"]
 
@@ -43,11 +43,7 @@ def of_solvers(given: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 
 def _split(text: str, given: str, example: str) -> tuple[str, Any]:
-    """Split ``name=value``; a value that is JSON (a number, true) is that, else it is text."""
     name, equals, value = text.partition("=")
     if not equals or not name.isidentifier():
         raise InputError(f"--set {given}: expected NAME=VALUE, e.g. {example}")
-    try:
-        return name, json.loads(value)
-    except json.JSONDecodeError:
-        return name, value
+    return name, plain_value(value)

@@ -15,8 +15,8 @@ from verify.exchange.export import export_case
 from verify.json_files import write_json
 from verify.result import Status
 from verify.scene import Scene
-from verify.scene.nearest import nearest
 from verify.solution import Solution
+from verify.solvers import check_parameters
 
 __all__ = ["ProgramSolver"]
 
@@ -74,10 +74,7 @@ class ProgramSolver:
         RuntimeError
             If the program fails; with the end of what it said.
         """
-        for word in parameters:
-            if word not in self.parameters:
-                near = nearest(word, self.parameters)
-                raise InputError(f"{self.name} has no parameter '{word}'{near}")
+        check_parameters(self.name, self, parameters)
         with tempfile.TemporaryDirectory(prefix="verify-") as place:
             folder = Path(place)
             export_case(scene, folder, [level], self.conforming)

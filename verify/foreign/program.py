@@ -37,7 +37,8 @@ class ForeignProgram(ProgramSolver):
             raise InputError(f"solver '{name}' is not installed: {state.missing}")
         program = record.folder / "program.py"
         self.name, self.conforming = name, record.conforming
-        self.parameters, self._takes = record.parameters, record.takes
+        self.parameters, self.choices = record.parameters, record.choices
+        self._takes = record.takes
         # without the user's packages and paths, which belong to another Python
         self.command = (state.python, "-s", str(program), "{folder}", "{level}")
         self.files = [*record.folder.glob("*.*"), *PROGRAMS.glob("*.py"), mark_of(name)]

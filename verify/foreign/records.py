@@ -120,6 +120,8 @@ class ForeignSolver:
     takes : Takes
     parameters : dict
         Those of ``--set NAME.…`` with their defaults.
+    choices : dict of str to list of str
+        What those of them may be that are words.
     conforming : bool
         Whether the program wants the conforming mesh.
     """
@@ -133,6 +135,7 @@ class ForeignSolver:
     takes: Takes
     source: str = ""
     parameters: dict[str, Any] = field(default_factory=dict)
+    choices: dict[str, list[str]] = field(default_factory=dict)
     conforming: bool = False
 
     @property

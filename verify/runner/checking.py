@@ -7,6 +7,7 @@ from verify.scene.empty_parts import check_parts_of_mesh
 from verify.scene.material_regions import check_regions_of_mesh
 from verify.scene.nearest import nearest
 from verify.solvers import solver_names
+from verify.solvers.named import parameters_in, solver_in
 
 __all__ = ["check_scene", "check_solver_name"]
 
@@ -47,7 +48,11 @@ def _missing(scene: Scene, asked: StressIntensityQuantity) -> str | None:
 
 
 def check_solver_name(name: str, where: str) -> None:
-    """Raise `InputError` if there is no solver of that name (``module:Class`` is not looked up)."""
-    known = solver_names()
-    if ":" not in name and name not in known:
-        raise InputError(f"no solver '{name}'{nearest(name, known)}", where)
+    """Raise `InputError` if there is no solver of that name (``module:Class`` is not looked up).
+
+    It may be followed by parameters; only their form is checked.
+    """
+    known, solver = solver_names(), solver_in(name)
+    if ":" not in solver and solver not in known:
+        raise InputError(f"no solver '{solver}'{nearest(solver, known)}", where)
+    parameters_in(name)

@@ -15,6 +15,7 @@ import numpy as np
 from reference.moduli import wave_speed
 from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.solvers.interface import is_built_in
+from verify.solvers.named import solver_in
 
 __all__ = ["LevelCost", "case_cost", "solver_costs"]
 
@@ -75,7 +76,7 @@ def solver_costs(scene: Scene, solver: str, repetitions: int = 3) -> list[LevelC
             return []
         nodes, size = found
         unknowns = round(nodes * scene.dimension)
-        heavy = solver in _FENICSX or not is_built_in(solver)
+        heavy = solver_in(solver) in _FENICSX or not is_built_in(solver)
         work = unknowns * _SECONDS[heavy] * (_IN_SPACE if scene.cell_dimension == 3 else 1.0)
         work *= scene.reference.degree if reference else 1  # more entries to a row
         if scene.analysis.kind == "dynamic":

@@ -13,6 +13,7 @@ import verify
 from verify.provenance import versions
 from verify.scene import MeshFile, Scene, mesh_path
 from verify.solvers.interface import is_built_in
+from verify.solvers.named import solver_in
 
 __all__ = [
     "bytes_digest",
@@ -92,7 +93,7 @@ def _registered_source(name: str) -> list[str]:
 @cache
 def code_of_solver(name: str) -> str:
     """Return the hash of the sources and of the versions that a solver's answers depend on."""
-    parts = _SOLVING if name in _INDEPENDENT else (*_SOLVING, *_METHODS)
+    parts = _SOLVING if solver_in(name) in _INDEPENDENT else (*_SOLVING, *_METHODS)
     if not is_built_in(name):
         parts = (*parts, *_PROGRAMS)
     return digest_of([versions(), _sources(parts, _PACKAGE.parent / "reference")])

@@ -19,7 +19,7 @@ from verify.runner.child import POLL_SECONDS, Ending
 from verify.runner.cluster import ClusterEngine
 from verify.runner.comparing import Comparison, stored_result
 from verify.runner.deepening import further_level, levels_in_vain, take_up_known_levels
-from verify.runner.directory import RunDirectory, claimed, emptied, write_run
+from verify.runner.directory import RunDirectory, claimed, emptied, folder_name, write_run
 from verify.runner.engine import Engine, LocalEngine, Running
 from verify.runner.families import Families
 from verify.runner.fingerprint import code_of_comparison, code_of_solver, digest_of
@@ -108,6 +108,9 @@ def run_cases(
         ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
     )
     names = {name for scene in scenes for name in solvers_of(scene, options)}
+    if len(set(map(folder_name, names))) < len(names):
+        said = f"{', '.join(sorted(names))}: two would have the same folder"
+        raise InputError(f"{said}; expected other parameters", "--solver")
     with listening() as stop, warm_parent() if any(map(is_built_in, names)) else nullcontext():
         origin = provenance()
         for name in names:  # asked below; the process to fork from is still loading

@@ -1,6 +1,7 @@
 """The interface that every solver implements, and how a solver is found by its name."""
 
 from collections.abc import Collection, Mapping
+from functools import partial
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import Parameter, signature
@@ -14,10 +15,11 @@ from verify.printable import shown
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Solution
+from verify.solvers.named import parameters_in, solver_in
 
 __all__ = [
-    "Solver", "check_parameters", "checked_levels", "checked_refusal", "find_solver",
-    "is_built_in", "solver_names",
+    "Solver", "check_choices", "check_parameters", "checked_levels", "checked_refusal",
+    "find_solver", "is_built_in", "solver_names",
 ]  # fmt: skip
 
 # module:class, imported only when asked for, so that one solver's missing dependency
@@ -104,8 +106,8 @@ def checked_levels(answer: Any) -> int:
 
 
 def is_built_in(name: str) -> bool:
-    """Whether the solver called `name` comes with the project."""
-    return name in _BUILT_IN
+    """Whether the solver called `name`, with parameters or without, comes with the project."""
+    return solver_in(name) in _BUILT_IN
 
 
 def _foreign_names() -> set[str]:
@@ -124,13 +126,16 @@ def find_solver(name: str) -> Solver:
     Parameters
     ----------
     name : str
-        One of `solver_names`, or ``module:Class`` for a class of the user's own.
+        One of `solver_names`, or ``module:Class`` for a class of the user's own. Parameters may
+        follow it (``xfem tip=partial``), which all that it solves then has.
 
     Raises
     ------
     InputError
-        If there is no such solver, or what it needs is not installed.
+        If there is no such solver, what it needs is not installed, or it does not take these
+        parameters.
     """
+    name, own = solver_in(name), parameters_in(name)
     told = name in _METHODS or name in _foreign_names()
     try:
         if name in _BUILT_IN or told:
@@ -151,28 +156,33 @@ def find_solver(name: str) -> Solver:
             raise  # our own mistake, not a missing dependency
         raise InputError(f"solver '{name}' needs '{error.name}', which is not installed") from None
     solver: Solver = found(name) if told else found()
+    check_parameters(name, solver, own)
+    for method in ("solve", "system") if own else ():
+        if hasattr(solver, method):
+            setattr(solver, method, partial(getattr(solver, method), **own))
     return solver
 
 
 def check_parameters(name: str, solver: Solver, given: Mapping[str, Any]) -> None:
     """Raise `InputError` if the solver called `name` does not take the `given` parameters.
 
-    One that takes any name (``**parameters``) is asked only if it lists its ``parameters``. Values
-    are checked of those that stand in its ``choices``, if it has such.
+    One that takes any name (``**parameters``) is asked only if it lists further ``parameters``.
+    Values are checked of those that stand in its ``choices``, if it has such.
     """
-    taken = signature(solver.solve).parameters
-    known = set(taken) - {"scene", "level", "repetitions"}
-    if any(one.kind is Parameter.VAR_KEYWORD for one in taken.values()):
-        listed = getattr(solver, "parameters", None)
-        if listed is None:
-            return
-        known = set(listed)
-    for word in given:
+    taken, listed = signature(solver.solve).parameters, getattr(solver, "parameters", None)
+    takes_any = any(one.kind is Parameter.VAR_KEYWORD for one in taken.values())
+    known = {*taken, *(listed or ())} - {"scene", "level", "repetitions"}
+    for word in given if listed is not None or not takes_any else ():
         if word not in known:
             raise InputError(f"{name} has no parameter '{word}'{nearest(word, known)}")
-    choices: Mapping[str, Collection[str]] = getattr(solver, "choices", {})
-    for word in choices.keys() & given.keys():
-        if given[word] not in choices[word]:
-            raise InputError(
-                f"{name}.{word} = '{given[word]}'; expected one of {', '.join(choices[word])}"
-            )
+    check_choices(name, getattr(solver, "choices", {}), given)
+
+
+def check_choices(
+    name: str, choices: Mapping[str, Collection[str]], given: Mapping[str, Any]
+) -> None:
+    """Raise `InputError` for the first `given` parameter that is none of its `choices`."""
+    for word, known in choices.items():
+        if word in given and given[word] not in tuple(known):
+            expected = f"expected one of {', '.join(known)}"
+            raise InputError(f"{name}.{word} = '{given[word]}'; {expected}")

@@ -1,5 +1,6 @@
 """Adapters of the other ways to cut (`verify.methods`): a scene in, a neutral solution out."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from inspect import signature
@@ -16,6 +17,7 @@ from verify.methods.catalogue import METHODS
 from verify.methods.cut_body import CutBody
 from verify.methods.spring_force import SpringForce
 from verify.scene import Scene
+from verify.scene.nearest import nearest
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import (
     across_interfaces,
@@ -24,6 +26,7 @@ from verify.solvers.body_of_scene import (
     material_of,
 )
 from verify.solvers.cuts_of_scene import cuts_of
+from verify.solvers.interface import check_choices
 from verify.solvers.loads_of_scene import loads_of
 from verify.solvers.methods_motion import MethodOpening
 from verify.solvers.motion_of_scene import Marching, Motion
@@ -31,7 +34,7 @@ from verify.solvers.openings_of_scene import openings_of
 from verify.solvers.runs import (
     Answer,
     Repeated,
-    check_choices,
+    check_steps,
     errors_of_scene,
     repeated,
     solution_on,
@@ -56,7 +59,6 @@ _Floats = NDArray[np.float64]
 _SHEETS = ("subdivision", "removal", "virtual_node", "virtual_node_arbitrary", "uncut")
 
 
-_SCHEMES = tuple(SCHEMES)
 _EXPLICIT = ("central_differences", "symplectic_euler", "forward_euler")
 
 
@@ -88,11 +90,17 @@ class MethodSolver:
         Those of the method, in `verify.methods`.
     """
 
+    choices: Mapping[str, Collection[str]] = {"scheme": SCHEMES}
     _force: Any = InternalForce
 
     def __init__(self, name: str) -> None:
         self.name = name
         self._method = name  # that cuts
+
+    @property
+    def parameters(self) -> Collection[str]:
+        """Names of those of the method, beside those that `solve` names."""
+        return _parameters_of(self._method)
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what ``xfem`` refuses, and what no changed mesh can do."""
@@ -131,11 +139,8 @@ class MethodSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        if load_steps < 0 or not step_factor > 0.0 or scheme not in _SCHEMES:
-            raise InputError(
-                f"load_steps {load_steps}, step_factor {step_factor}, scheme '{scheme}'; expected "
-                f"at least 0, a positive number, one of {', '.join(_SCHEMES)}"
-            )
+        check_choices(self.name, self.choices, {"scheme": scheme})
+        check_steps(load_steps, step_factor)
         self._check(scene, scheme, parameters)
         marching = Marching(scheme, step_factor, spectral_radius)
 
@@ -156,7 +161,7 @@ class MethodSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        taken = list(signature(METHODS[self._method]).parameters)[2:]
+        taken = _parameters_of(self._method)
         own = {name: value for name, value in parameters.items() if name in taken}
         with errors_of_scene(scene):
             mesh, size = background_mesh(scene, level)
@@ -165,13 +170,9 @@ class MethodSolver:
             return system_of(scene, body.phantom, body.resisting, material, exact_of(scene))
 
     def _check(self, scene: Scene, scheme: str, parameters: dict[str, Any]) -> None:
-        _, _, *offered = signature(METHODS[self._method]).parameters.values()
-        known = [one.name for one in offered if one.kind is not one.KEYWORD_ONLY]
         for name in parameters:
-            if name not in known:
-                common = ("load_steps", "scheme", "step_factor", "spectral_radius")
-                further = ", ".join([*known, *common])
-                raise InputError(f"parameter '{name}' of {self.name}; expected one of {further}")
+            if name not in (known := _parameters_of(self._method)):
+                raise InputError(f"{self._method} has no parameter '{name}'{nearest(name, known)}")
         if scene.analysis.kind == "dynamic" and parameters.get("weights") == "whole":
             raise UnsupportedSceneError(
                 "copies that resist as whole cells, with the mass of their share, have no "
@@ -261,8 +262,17 @@ class MassSpringSolver(MethodSolver):
         See `verify.methods.spring_fit`.
     """
 
+    choices: Mapping[str, Collection[str]] = {
+        "scheme": SCHEMES, "cut": METHODS, "fit": ("fitted", "van_gelder"),
+    }  # fmt: skip
+
     def __init__(self) -> None:
         super().__init__("mass_spring")
+
+    @property
+    def parameters(self) -> Collection[str]:
+        """Names of those of all methods, of which one cuts."""
+        return {name for method in METHODS for name in _parameters_of(method)}
 
     def solve(
         self,
@@ -278,7 +288,7 @@ class MassSpringSolver(MethodSolver):
         **parameters: Any,
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
-        check_choices(("cut", cut, METHODS), ("fit", fit, ("fitted", "van_gelder")))
+        check_choices(self.name, self.choices, {"cut": cut, "fit": fit})
         self._method = cut
         self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
         return super().solve(
@@ -303,6 +313,12 @@ class MassSpringSolver(MethodSolver):
                 f"{scheme} of springs: their critical step is not that of the elements, and they "
                 "have no stress; expected newmark, implicit_euler or generalised_alpha"
             )
+
+
+def _parameters_of(method: str) -> list[str]:
+    """Names of the parameters of a method after mesh and cuts."""
+    _, _, *offered = signature(METHODS[method]).parameters.values()
+    return [one.name for one in offered if one.kind is not one.KEYWORD_ONLY]
 
 
 def _left_out(force: InternalForce) -> int:

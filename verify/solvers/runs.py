@@ -1,6 +1,6 @@
 """Runs of our solvers on the mesh of a scene: repeated, timed, errors in the words of the scene."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
@@ -18,7 +18,7 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.subdivision import Subdivision
 
-__all__ = ["Answer", "Repeated", "check_choices", "errors_of_scene", "repeated", "solution_on"]
+__all__ = ["Answer", "Repeated", "check_steps", "errors_of_scene", "repeated", "solution_on"]
 
 _Floats = NDArray[np.float64]
 
@@ -49,17 +49,11 @@ class Repeated[A: Answer]:
     timings: dict[str, list[float]]
 
 
-def check_choices(*given: tuple[str, str, Collection[str]]) -> None:
-    """Check parameters, each with its name, its value and what it may be.
-
-    Raises
-    ------
-    InputError
-        For the first value that is none of those.
-    """
-    for name, value, known in given:
-        if value not in known:
-            raise InputError(f"{name} '{value}'; expected one of {', '.join(known)}")
+def check_steps(load_steps: int, step_factor: float) -> None:
+    """Raise `InputError` unless load steps are counted from 0 and a factor of steps is positive."""
+    if load_steps < 0 or not step_factor > 0.0:
+        text = f"load_steps {load_steps}, step_factor {step_factor}"
+        raise InputError(f"{text}; expected at least 0, and a positive number")
 
 
 @contextmanager

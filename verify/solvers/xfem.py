@@ -9,14 +9,15 @@ import numpy as np
 
 from reference.exact import exact_of
 from verify.accelerated import FAST
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import UnsupportedSceneError
 from verify.scene import Box, Scene, Skin
 from verify.solution import Regularisation, Solution
 from verify.solvers.body_of_scene import background_mesh, material_of
 from verify.solvers.cuts_of_scene import cuts_of, to_cut
+from verify.solvers.interface import check_choices
 from verify.solvers.motion_of_scene import Marching, Motion
 from verify.solvers.openings_of_scene import openings_of
-from verify.solvers.runs import Answer, check_choices, errors_of_scene, repeated
+from verify.solvers.runs import Answer, check_steps, errors_of_scene, repeated
 from verify.solvers.supports_of_scene import supports_of
 from verify.solvers.xfem_answer import joined, solution_of, treated
 from verify.solvers.xfem_motion import Cutting, XfemOpening
@@ -140,10 +141,8 @@ class XfemSolver:
             raise UnsupportedSceneError(reason)
         given = {"basis": basis, "tip": tip, "slivers": slivers, "scheme": scheme, "mass": mass,
                  "kernels": kernels}  # fmt: skip
-        check_choices(*((name, one, self.choices[name]) for name, one in given.items()))
-        if load_steps < 0 or not step_factor > 0.0:
-            text = f"load_steps {load_steps}, step_factor {step_factor}"
-            raise InputError(f"{text}; expected at least 0, and a positive number")
+        check_choices(self.name, self.choices, given)
+        check_steps(load_steps, step_factor)
         linear_static = scene.analysis.kind == "static" and scene.analysis.kinematics == "linear"
         if basis != "sidewise" and not linear_static:
             raise UnsupportedSceneError(f"the {basis} basis is offered for linear statics only")

@@ -5,8 +5,8 @@ import sys
 from dataclasses import dataclass, field
 from typing import Any
 
-from verify.errors import InputError
 from verify.solvers import Solver, check_parameters, find_solver
+from verify.solvers.named import one_name, parameters_in, solver_in
 
 __all__ = ["Variant", "variant_of"]
 
@@ -40,22 +40,7 @@ def variant_of(text: str) -> Variant:
     InputError
         If the solver, one of its parameters or the form is unknown.
     """
-    name, *words = text.split() or [""]
-    parameters: dict[str, Any] = {}
-    for word in words:
-        key, equals, value = word.partition("=")
-        if not key or not equals or not value:
-            raise InputError(f"'{word}' in '{text}'; expected NAME PARAMETER=VALUE …", "--solver")
-        parameters[key] = _plain(value)
-    variant = Variant(" ".join([name, *words]), name, parameters)
-    check_parameters(name, variant.found(), parameters)
+    label = one_name(text)
+    variant = Variant(label, solver_in(label), parameters_in(label))
+    check_parameters(variant.solver, variant.found(), variant.parameters)
     return variant
-
-
-def _plain(value: str) -> int | float | str:
-    for kind in (int, float):
-        try:
-            return kind(value)
-        except ValueError:
-            continue
-    return value
