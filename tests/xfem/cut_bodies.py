@@ -1,11 +1,18 @@
 """Bodies with a cut, as the tests of corotation and motion need them."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.internal_force import InternalForce
+from verify.xfem.kernels import PLAIN
+from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.phantom import cut_mesh
+from verify.xfem.phantom import PhantomMesh, cut_mesh
+from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 SOFT = 1e4  # Pa, the thesis' material
@@ -34,6 +41,28 @@ def cut_membrane():
     x, y = flat.points.T
     bent = SimplexMesh(np.stack([x, y, 0.3 * np.sin(3.0 * x)], axis=1), flat.cells)
     return cut_mesh(bent, [Plane((0.5, 0.53, 0.0), (0.3, 1.0, 0.0))])
+
+
+class TreatedBody(NamedTuple):
+    """A cut body whose slivers have been seen to."""
+
+    phantom: PhantomMesh
+    force: InternalForce
+    mass: Mass
+    slivers: Any
+
+
+def treated_body(phantom, policy="merge", held=None):
+    treated, report = treat_slivers(phantom, policy, held=held)
+    force = InternalForce(treated, material(phantom.mesh.dim))
+    return TreatedBody(treated, force, side_wise_mass(treated, DENSITY), report)
+
+
+def penalised(phantom, factor=0.01, kernels=PLAIN):
+    stuff = material(phantom.mesh.dim)
+    ghost = GhostPenalty(phantom, stuff, factor)
+    force = InternalForce(phantom, stuff, kernels=kernels, ghost=ghost)
+    return TreatedBody(phantom, force, ghost.mass(side_wise_mass(phantom, DENSITY), DENSITY), None)
 
 
 def rotation(dim, angle, axis=(1.0, 2.0, -0.5)):

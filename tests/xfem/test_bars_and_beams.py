@@ -5,7 +5,7 @@ The thesis' material (E = 1e4 Pa, ν = .3, ρ = 1000 kg/m³): c_d = 3.668997 m/s
 
 import numpy as np
 import pytest
-from cut_bodies import DENSITY, cut_body, material, rotation
+from cut_bodies import DENSITY, cut_body, material, rotation, treated_body
 from scipy.sparse import kron
 from scipy.sparse.linalg import eigsh
 
@@ -18,7 +18,6 @@ from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
@@ -37,7 +36,7 @@ def bar(dim, cells):
 
 def dynamic(phantom, policy):
     """The bar's body, and its supports' displacement."""
-    treated = treat_moving_body(phantom, material(phantom.mesh.dim), DENSITY, policy)
+    treated = treated_body(phantom, policy)
     ends = np.abs(np.abs(phantom.mesh.points[:, 0]) - HALF) < 1e-9
     supports = Supports.none(treated.phantom).prescribe(
         treated.phantom, ends, lambda at, _: STRAIN * at * np.eye(at.shape[1])[0]

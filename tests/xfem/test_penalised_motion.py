@@ -2,7 +2,16 @@
 
 import numpy as np
 import pytest
-from cut_bodies import DENSITY, GRAVITY, cut_body, cut_membrane, material, rotation
+from cut_bodies import (
+    DENSITY,
+    GRAVITY,
+    cut_body,
+    cut_membrane,
+    material,
+    penalised,
+    rotation,
+    treated_body,
+)
 from swings import let_go, rest_step, stretched
 
 from verify.xfem.block_pattern import block_pattern
@@ -15,10 +24,8 @@ from verify.xfem.errors import XfemError
 from verify.xfem.explicit import CentralDifferences, SymplecticEuler
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
-from verify.xfem.internal_force import inverted_cells
+from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.moving_body import treat_moving_body
-from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -34,11 +41,6 @@ SCHEMES = [
 ]
 
 
-def penalised(phantom, factor=0.01):
-    stuff = material(phantom.mesh.dim)
-    return treat_moving_body(phantom, stuff, DENSITY, "penalise", factor=factor)
-
-
 def sliver(dim, size):
     mesh = rectangle_mesh((8, 8)) if dim == 2 else box_mesh((3, 3, 4))
     up = np.eye(dim)[-1]
@@ -49,7 +51,7 @@ def sliver(dim, size):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_penalised_stiffness_is_the_derivative_of_force_and_energy(dim, kinematics):
     v, stuff = cut_body(dim), material(dim)
-    force = PenalisedForce(v, stuff, GhostPenalty(v, stuff, 0.1), kinematics)
+    force = InternalForce(v, stuff, kinematics, ghost=GhostPenalty(v, stuff, 0.1))
     random = np.random.default_rng(0)
     u, w = 0.03 * random.normal(size=(2, v.node_count, dim))
     pattern = side_wise_mass(v, 1.0).pattern(v, force.ghost.couplings)
@@ -137,20 +139,18 @@ def test_slivers_with_a_penalty_stay_upright_at_nine_tenths_of_the_resonance_fre
 def test_an_uncut_body_has_nothing_to_penalise():
     v = cut_mesh(rectangle_mesh((3, 3)), [])
     treated = penalised(v)
-    assert len(treated.ghost.weights) == 0
-    plain = treat_moving_body(v, material(2), DENSITY, "keep").force
+    assert len(treated.force.ghost.weights) == 0
+    plain = treated_body(v, "keep").force
     u = 0.01 * np.random.default_rng(1).normal(size=v.node_points.shape)
     assert np.array_equal(treated.force.evaluate(u)[0], plain.evaluate(u)[0])
 
 
-def test_wrong_policies_and_penalties_of_other_bodies_are_refused():
+def test_factors_that_are_none_and_penalties_of_other_bodies_are_refused():
     v = cut_body(2)
-    with pytest.raises(XfemError, match="penalise"):
-        treat_moving_body(v, material(2), DENSITY, "penalize")
     with pytest.raises(XfemError, match="positive"):
-        treat_moving_body(v, material(2), DENSITY, "penalise", factor=0.0)
+        GhostPenalty(v, material(2), 0.0)
     with pytest.raises(XfemError, match="another body"):
-        PenalisedForce(v, material(2), GhostPenalty(cut_body(2), material(2)))
+        InternalForce(v, material(2), ghost=GhostPenalty(cut_body(2), material(2)))
     with pytest.raises(XfemError, match="membrane"):
         GhostPenalty(cut_membrane(), material(2))
     ghost = GhostPenalty(v, material(2))

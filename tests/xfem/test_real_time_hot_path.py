@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from cut_bodies import DENSITY, cut_cube, material
+from cut_bodies import DENSITY, cut_cube, material, penalised
 
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
@@ -12,7 +12,6 @@ from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.xfem.body import DynamicBody, MovingSupports, StepFailedError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 
@@ -95,9 +94,7 @@ def test_a_step_that_fails_does_not_spoil_the_next():
 
 
 def test_a_penalised_solid_is_swept_to_the_force_and_stiffness_of_evaluation_and_assembly():
-    body = treat_moving_body(
-        cut_cube(3), material(3), DENSITY, "penalise", factor=0.01, kernels=FAST
-    )
+    body = penalised(cut_cube(3), kernels=FAST)
     force, phantom = body.force, body.force.phantom
     pattern = body.mass.pattern(phantom, force.ghost.couplings)
     rng = np.random.default_rng(2)

@@ -17,12 +17,12 @@ from verify.solvers.xfem_answer import penalised, treated
 from verify.solvers.xfem_steps import MASSES
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import Kernels
-from verify.xfem.mass import Mass
+from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.moving_body import treat_moving_body
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import treat_slivers
 
@@ -93,11 +93,10 @@ class XfemOpening:
         )
         kinematics, kernels = self.scene.analysis.kinematics, self.cutting.kernels
         if self.cutting.slivers == "penalise":
-            body = treat_moving_body(
-                phantom, material, density, "penalise", kinematics=kinematics, kernels=kernels
-            )
-            self._penalised = penalised(body.ghost)
-            return body.force, body.mass
+            ghost = GhostPenalty(phantom, material)
+            self._penalised = penalised(ghost)
+            force = InternalForce(phantom, material, kinematics, kernels, ghost)
+            return force, ghost.mass(side_wise_mass(phantom, density), density)
         try:
             mass = MASSES[self.mass](phantom, density)
         except XfemError as error:  # a lumping of the thesis, where cuts cross

@@ -20,15 +20,14 @@ reading:
 `polar`, `element`, `assembly`, `internal_force`
     nearest rotations; force and tangents of an element, linear elasticity being R = I; block
     pattern and supports; force, energy and stiffness of a body
-`contacts`, `absorption`, `aggregation`, `slivers`, `ghost_penalty`, `penalised_force`
+`contacts`, `absorption`, `aggregation`, `slivers`, `ghost_penalty`
     policies for parts with a small share of their element; ghost penalty
 `linear_solvers`, `kernels`
     SciPy behind one protocol; the operations that `verify.accelerated` replaces
 `statics`, `static_newton`, `rigid_motion`, `equilibrium`
     linear statics; Newton's method on the potential energy and load steps at finite rotation
 `body`, `energy_balance`, `explicit`, `implicit`, `generalised_alpha`, `real_time`, `inherit`
-    a body in motion and its schemes; `averaged_stress`, `energy_momentum`: the conserving one;
-    `moving_body`: slivers in motion
+    a body in motion and its schemes; `averaged_stress`, `energy_momentum`: the conserving one
 
 Example
 -------

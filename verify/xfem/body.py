@@ -20,7 +20,6 @@ from verify.xfem.given_arrays import check_floats
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
-from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.supports import Supports
 
 __all__ = [
@@ -127,7 +126,6 @@ class DynamicBody:
     Parameters
     ----------
     force : InternalForce
-        With a ghost penalty: `PenalisedForce`.
     mass : Mass
     weight : (N, d) float array, optional
         Dead load with the potential −weight·u, e.g. `Mass.weight(gravity)`, in newtons.
@@ -173,8 +171,7 @@ class DynamicBody:
             raise XfemError(f"damping {self.damping!r}; expected RayleighDamping")
         if self.supports is None:
             self.supports = Supports.none(phantom)
-        penalised = self.force if isinstance(self.force, PenalisedForce) else None
-        couplings = penalised.ghost.couplings if penalised else None
+        couplings = self.force.ghost.couplings if self.force.ghost else None
         self.pattern = self.mass.pattern(phantom, couplings)
         self._hold(self.supports)
 

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from verify.xfem.body import DynamicBody, Integrator, MotionState, StepForces
 from verify.xfem.errors import XfemError
-from verify.xfem.penalised_force import PenalisedForce
 
 __all__ = ["BalanceRecorder", "EnergyBalance", "run"]
 
@@ -133,7 +132,7 @@ class BalanceRecorder:
         """Strain energy, and the share of a ghost penalty in it."""
         force = self.body.force
         _, strain = force.evaluate(state.displacement)
-        return strain, force.penalty_energy if isinstance(force, PenalisedForce) else 0.0
+        return strain, force.penalty_energy
 
     def _row(self, state: MotionState) -> _Floats:
         body = self.body

@@ -12,7 +12,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
-from verify.xfem.penalised_force import PenalisedForce
 
 __all__ = ["EnergyMomentum"]
 
@@ -108,8 +107,7 @@ class EnergyMomentum(NewtonIntegrator):
         P *= force.elements.volumes[:, None, None]
         gradients = force.elements.gradients[force.elements.parent]
         internal[:] = force.nodal_force(gradients @ P.transpose(0, 2, 1))
-        if isinstance(force, PenalisedForce):
-            force.add_penalty(0.5 * (before + displacement), 1.0, internal)
+        force.add_penalty(0.5 * (before + displacement), 1.0, internal)
 
     def _solved(self, displacement: _Floats, residual: _Floats, kind: TangentKind) -> _Floats:
         self._takes_all |= self._is_slow and self.body.force.is_corotational
@@ -134,5 +132,5 @@ class EnergyMomentum(NewtonIntegrator):
         moduli = averaged_moduli(elements, self._ends(displacement), self.substituted)
         add_moduli(elements, moduli, 1.0, pattern.targets[: len(v.cells)], added)
         pattern.fold(added, self._blocks)
-        if isinstance(force, PenalisedForce):
+        if force.ghost is not None:
             force.ghost.add_stiffness(self.body.pattern, self._blocks, self.share)

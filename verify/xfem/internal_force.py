@@ -22,6 +22,7 @@ from verify.xfem.element import (
     geometric_stiffness,
 )
 from verify.xfem.errors import XfemError
+from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.given_arrays import check_floats
 from verify.xfem.kernels import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
@@ -49,10 +50,15 @@ class InternalForce:
         Linear keeps every rotation at the identity. A linear membrane resists in its plane alone.
     kernels : Kernels
         Of which `one_pass` serves tetrahedra here; the rest is for what solves with this force.
+    ghost : GhostPenalty, optional
+        Of the same body. A quadratic potential without rotations: it joins energy, force and every
+        tangent.
 
     Attributes
     ----------
     elements : Elements
+    penalty_energy : float
+        Share of the penalty in the energy that the last `evaluate` returned, in joules.
     left_out : int
         Cells whose rotation was not differentiable at the last consistent tangent, and which
         therefore entered with the rotation-fixed one.
@@ -60,7 +66,8 @@ class InternalForce:
     Raises
     ------
     XfemError
-        If the material fits neither () nor (m,), or the kinematics is unknown.
+        If the material fits neither () nor (m,), the kinematics is unknown, or the penalty is of
+        another body.
     """
 
     def __init__(
@@ -69,10 +76,14 @@ class InternalForce:
         material: Material,
         kinematics: Kinematics = "corotational",
         kernels: Kernels = PLAIN,
+        ghost: GhostPenalty | None = None,
     ) -> None:
+        if ghost is not None and ghost.phantom is not phantom:
+            raise XfemError("the ghost penalty belongs to another body; expected one of this one")
         if kinematics not in get_args(Kinematics):
             raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
         self.phantom, self.kinematics, self.kernels = phantom, kinematics, kernels
+        self.ghost, self.penalty_energy = ghost, 0.0
         self.elements = elements_of(phantom, material)
         self.left_out = 0
         cells, space = len(phantom.cells), phantom.mesh.space
@@ -142,7 +153,11 @@ class InternalForce:
             else:
                 rotations_in_space(F, self._quaternions, self._rotations)
             self._passed = False
-        return self._restrict_force(F, 1.0, 1.0, force, overwrite=True)
+        energy = self._restrict_force(F, 1.0, 1.0, force, overwrite=True)
+        if self.ghost is not None:
+            penalty, self.penalty_energy = self.ghost.force(displacement)
+            force += penalty
+        return force, energy + self.penalty_energy
 
     def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
         """Add `scale` K v (N, d), K the rotation-fixed tangent of the last evaluation, to `out`.
@@ -155,16 +170,22 @@ class InternalForce:
         self._check(vector=vector, force=out)
         deform(self.elements, self.phantom.extend(vector), 0.0, self._gradient)
         self._restrict_force(self._gradient, 0.0, scale, out)
+        self.add_penalty(vector, scale, out)
+
+    def add_penalty(self, vector: _Floats, scale: float, out: _Floats) -> None:
+        """Add `scale` times the stiffness of the penalty, if there is one, times a vector."""
+        if self.ghost is not None:
+            out += scale * (self.ghost.matrix @ vector)
 
     def _restrict_force(
         self, F: _Floats, share: float, scale: float, out: _Floats, overwrite: bool = False
-    ) -> tuple[_Floats, float]:
+    ) -> float:
         corner_force = np.zeros_like(self.phantom.corners.node_points)
         energy = add_force(self.elements, self.rotations, F, share, scale, corner_force)
         if overwrite:
             out[:] = 0.0
         out += self.phantom.restrict(corner_force)
-        return out, float(energy)
+        return float(energy)
 
     def _check(self, **arrays: _Floats) -> None:
         for name, values in arrays.items():
@@ -228,6 +249,8 @@ class InternalForce:
                 add_moduli(elements, moduli, scale, targets[some], added)
                 self.left_out += left_out
         pattern.fold(added, blocks)
+        if self.ghost is not None:
+            self.ghost.add_stiffness(pattern, blocks, scale)
 
     def add_geometric(
         self,
@@ -373,6 +396,9 @@ class InternalForce:
             one_pass = self._one_pass(pattern)
             self.left_out = one_pass(*moved, scale, force, blocks, whole, rotational)
             self._passed = self.is_corotational
+            if self.ghost is not None:
+                self.add_penalty(displacement + implicit * velocity, 1.0, force)
+                self.ghost.add_stiffness(pattern, blocks, scale)
             return
         self.evaluate(displacement, force)
         if implicit != 0.0:
@@ -417,6 +443,9 @@ class InternalForce:
         average = self._one_pass(pattern).average
         self.left_out = average(start, end, scale, rotational, substituted, force, blocks, whole)
         self._passed = True
+        if self.ghost is not None:
+            self.add_penalty(0.5 * (start + end), 1.0, force)
+            self.ghost.add_stiffness(pattern, blocks, scale)
 
 
 def inverted_cells(force: InternalForce, displacement: _Floats) -> NDArray[np.int64]:

@@ -14,7 +14,6 @@ from verify.xfem.errors import NotConvergedError, XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN, Kernels
-from verify.xfem.penalised_force import PenalisedForce
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
 
@@ -107,7 +106,7 @@ def solve_static(
     check_bodies(phantom, supports)
     if solver not in ("auto", "direct", "iterative"):
         raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
-    stiffness = _stiffness(phantom, material, ghost, kernels)
+    stiffness = InternalForce(phantom, material, "linear", kernels, ghost)
     clock = [perf_counter()]
     pattern = ghost.pattern() if ghost else body_pattern(phantom)
     iterates = solver == "iterative" or (solver == "auto" and not ghost and is_large(phantom))
@@ -123,26 +122,17 @@ def solve_static(
     displacement = inverse.solve(right, insists=solver == "iterative") + supports.values
     clock.append(perf_counter())
     internal, energy = stiffness.evaluate(displacement)
-    penalty = stiffness.penalty_energy if isinstance(stiffness, PenalisedForce) else 0.0
     unbalanced = internal - force
     scale = max(np.abs(internal).max(), np.abs(force).max(), np.finfo(float).tiny)
     return StaticSolution(
         displacement=displacement,
-        strain_energy=energy - penalty,
+        strain_energy=energy - stiffness.penalty_energy,
         reaction=np.where(supports.fixed, unbalanced, 0.0),
         residual=float(np.abs(unbalanced[~supports.fixed]).max(initial=0.0) / scale),
         timings=dict(zip(_PHASES, np.diff(clock).tolist(), strict=True)),
-        penalty_energy=penalty,
+        penalty_energy=stiffness.penalty_energy,
         solver="direct" if "direct" in inverse.used else "iterative",
     )
-
-
-def _stiffness(
-    phantom: PhantomMesh, material: Material, ghost: GhostPenalty | None, kernels: Kernels
-) -> InternalForce:
-    if ghost is None:
-        return InternalForce(phantom, material, "linear", kernels)
-    return PenalisedForce(phantom, material, ghost, "linear", kernels)
 
 
 def is_large(phantom: PhantomMesh) -> bool:
