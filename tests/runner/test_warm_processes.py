@@ -226,7 +226,7 @@ def test_the_parent_compiles_nothing_and_what_it_forks_does(prepared, tmp_path, 
     compiling = (
         "kept = Path(os.environ['NUMBA_CACHE_DIR']).rglob('*.nbi')\n"
         "            found = {file.stem.partition('-')[0] for file in kept}\n"
-        "            from verify.xfem.short_sort import sort_short\n"
+        "            from verify.accelerated.short_sort import sort_short\n"
         "            sort_short(np.array([2, 1], dtype=np.int32))\n"
     )
     with warm_parent():

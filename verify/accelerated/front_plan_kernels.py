@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from verify.xfem.short_sort import sort_short
+from verify.accelerated.short_sort import sort_short
 
 __all__ = ["assembly_lists", "front_rows"]
 

@@ -1,4 +1,4 @@
-"""The sparsity of nodal blocks, and where each element block goes: no triplets, no sorting."""
+"""The sparsity of nodal blocks, and where each element block goes."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from verify.xfem.errors import XfemError
-from verify.xfem.short_sort import sort_short
 
 __all__ = ["BlockPattern", "block_pattern", "symmetric_product"]
 
@@ -62,16 +61,13 @@ class BlockPattern:
     @cached_property
     def diagonal(self) -> _Ints:
         """(N,) the block on the diagonal of each row."""
-        return _diagonal(self.starts, self.columns)
+        rows = np.repeat(np.arange(self.node_count), np.diff(self.starts))
+        return np.flatnonzero(rows == self.columns).astype(np.int32)
 
     @cached_property
     def mirror(self) -> _Ints:
         """(B,) of each block (i, j), the place of (j, i)."""
-        return _mirror(self.starts, self.columns)
-
-    def symmetric_product(self, blocks: _Floats, vector: _Floats, out: _Floats) -> None:
-        """Write K v (N, d); blocks (B, d, d) below the diagonal are not read."""
-        symmetric_product(self.starts, self.columns, self.diagonal, blocks, vector, out)
+        return _order(self.columns, self.node_count)
 
     def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
         """Return the matrix of the given blocks (B, d, d), without a copy."""
@@ -99,75 +95,30 @@ def block_pattern(cells: NDArray[np.int64], node_count: int) -> BlockPattern:
         )
     if cells.size and not 0 <= cells.min() <= cells.max() < node_count:
         raise XfemError(f"a cell has a node outside 0..{node_count - 1}")
-    starts, columns, targets = _pattern(np.ascontiguousarray(cells), node_count)
+    corners = cells.shape[1]
+    rows, columns = np.repeat(cells, corners, axis=1).ravel(), np.tile(cells, corners).ravel()
+    order = _order(columns, node_count)
+    order = order[_order(rows[order], node_count)]
+    rows, columns = rows[order], columns[order]
+    is_first = (np.diff(rows, prepend=-1) != 0) | (np.diff(columns, prepend=-1) != 0)
+    starts = np.searchsorted(rows[is_first], np.arange(node_count + 1))
     empty = np.flatnonzero(starts[1:] == starts[:-1])
     if len(empty):
         raise XfemError(f"node {empty[0]} belongs to no cell")
-    return BlockPattern(starts, columns, targets)
+    targets = np.empty(len(order), dtype=np.int32)
+    targets[order] = np.cumsum(is_first) - 1
+    return BlockPattern(
+        starts.astype(np.int32), columns[is_first].astype(np.int32),
+        targets.reshape(len(cells), corners, corners),
+    )  # fmt: skip
 
 
-@njit(cache=True)
-def _pattern(cells, node_count):
-    count, corners = cells.shape
-    first = np.zeros(node_count + 1, dtype=np.int64)
-    for cell in range(count):
-        for a in range(corners):
-            first[cells[cell, a] + 1] += 1
-    for node in range(node_count):
-        first[node + 1] += first[node]
-    around = np.empty(first[node_count], dtype=np.int64)
-    fill = first[:-1].copy()
-    for cell in range(count):
-        for a in range(corners):
-            around[fill[cells[cell, a]]] = cell
-            fill[cells[cell, a]] += 1
-
-    starts = np.zeros(node_count + 1, dtype=np.int32)
-    mark = np.full(node_count, -1, dtype=np.int64)
-    columns = np.empty(corners * corners * count, dtype=np.int32)
-    place = np.empty(node_count, dtype=np.int32)
-    targets = np.empty((count, corners, corners), dtype=np.int32)
-    used = 0
-    for node in range(node_count):
-        begin = used
-        for k in range(first[node], first[node + 1]):
-            for b in range(corners):
-                other = cells[around[k], b]
-                if mark[other] != node:
-                    mark[other] = node
-                    columns[used] = other
-                    used += 1
-        sort_short(columns[begin:used])
-        starts[node + 1] = used
-        for k in range(begin, used):
-            place[columns[k]] = k
-        for k in range(first[node], first[node + 1]):
-            cell = around[k]
-            for a in range(corners):
-                if cells[cell, a] == node:
-                    for b in range(corners):
-                        targets[cell, a, b] = place[cells[cell, b]]
-    return starts, columns[:used].copy(), targets
-
-
-@njit(cache=True)
-def _diagonal(starts, columns):
-    place = np.empty(len(starts) - 1, dtype=np.int32)
-    for node in range(len(place)):
-        for k in range(starts[node], starts[node + 1]):
-            if columns[k] == node:
-                place[node] = k
-    return place
-
-
-@njit(cache=True)
-def _mirror(starts, columns):
-    # rows are met in ascending order, so each block is the next one in the row of its column
-    following, place = starts[:-1].copy(), np.empty(len(columns), dtype=np.int32)
-    for k in range(len(columns)):
-        place[k] = following[columns[k]]
-        following[columns[k]] += 1
-    return place
+def _order(keys: NDArray, count: int) -> _Ints:
+    """Stable order of keys in 0…count − 1: a transposition counts, and does not compare."""
+    rows = np.arange(len(keys) + 1)
+    matrix = csr_array((np.zeros(len(keys), np.int8), keys, rows), shape=(len(keys), count))
+    order: _Ints = matrix.tocsc().indices.astype(np.int32)
+    return order
 
 
 @njit(cache=True)

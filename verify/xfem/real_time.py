@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.assembly import add_mass, constrain, held_entries
+from verify.xfem.block_pattern import symmetric_product
 from verify.xfem.body import (
     DynamicBody,
     MotionState,
@@ -147,7 +148,8 @@ class RealTimeEuler:
         change = (where[nodes] - state.displacement[nodes]) / self.step_size - state.velocity[nodes]
         self._driven[nodes] = np.where(body.fixed[nodes], change, 0.0)
         if self._driven.any():
-            body.pattern.symmetric_product(self.blocks, self._driven, self._resisted)
+            lists = body.pattern.starts, body.pattern.columns, body.pattern.diagonal
+            symmetric_product(*lists, self.blocks, self._driven, self._resisted)
             self.load -= self._resisted
         held = self._held_above if self.solver.reads_half else self._held
         constrain(body.pattern, body.fixed, self.blocks, held)
