@@ -1,7 +1,5 @@
 """Claims about time: repeated beside other programs, then undecided; wrong on a quiet machine."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -75,20 +73,3 @@ def test_on_a_shared_machine_a_claim_is_undecided_and_an_error_is_one(
     assert count == calls
     if outcome == "skipped":
         found.stdout.fnmatch_lines(["*undecided: assert 3 == 9, 3 times on a shared machine*"])
-
-
-def test_a_program_sees_the_processor_time_of_another():
-    conftest = str(Path(__file__).parent / "conftest.py")
-    program = (
-        f"import runpy, time; own = runpy.run_path({conftest!r})\n"
-        "before, start = own['time_of_others'](), time.process_time()\n"
-        "while time.process_time() - start < 1.0: pass\n"
-        "print(own['time_of_others']() - before)\n"
-    )
-    both = [
-        subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
-        for _ in range(2)
-    ]
-    seen = [float(one.communicate(timeout=60)[0]) for one in both]
-    # whoever starts later sees less of the other's second; on a busy machine both see more
-    assert max(seen) > 0.3

@@ -1,6 +1,5 @@
 """Provenance of a number: true of this machine, and found without loading a solver."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -33,14 +32,6 @@ def test_a_repository_that_only_happens_to_be_around_us_is_not_ours(tmp_path, mo
     package = tmp_path / ".venv" / "lib" / "verify" / "__init__.py"
     monkeypatch.setattr(module.verify, "__file__", str(package))
     assert module._commit() in [(None, None)] or module._commit()[1] is False  # pip's own record
-
-
-def test_the_machine_is_described():
-    origin = provenance()
-    assert origin["cores"] == len(os.sched_getaffinity(0))
-    assert origin["memory"] > 1e8
-    assert origin["cpu"]
-    assert origin["threads"] == 1
 
 
 def test_versions_are_those_of_the_libraries_and_nothing_is_imported_for_them():

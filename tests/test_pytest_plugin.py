@@ -123,26 +123,6 @@ def test_a_marked_function_is_a_test_per_check_and_its_body_sees_the_result(pyte
     assert str(result.stdout).count("E       AssertionError: the body ran") == 1
 
 
-def test_a_solver_that_is_not_there_fails_its_checks_and_no_others(pytester, session):
-    checks = check(0.005, "xfem") + check(0.005, "no_such_module:Solver")
-    write(pytester, CASE + checks)
-    result = session()
-    result.assert_outcomes(passed=1, failed=1)
-    result.stdout.fnmatch_lines(["ERROR: strain_energy*needs 'no_such_module'*"])
-
-
-def test_the_ini_option_names_further_case_files_and_one_without_checks_is_skipped(
-    pytester, session
-):
-    pytester.mkdir("cases")
-    (pytester.path / "cases/empty.toml").write_text(CASE)
-    (pytester.path / "elsewhere.toml").write_text(CASE)
-    pytester.makeini("[pytest]\nverify_cases = cases/*.toml")
-    result = session()
-    result.assert_outcomes(skipped=1)
-    result.stdout.fnmatch_lines(["SKIPPED*makes no acceptance check*"])
-
-
 def test_a_bad_case_file_is_an_error_of_collection_in_one_line(pytester, session):
     write(pytester, CASE.replace("young", "yuong"))
     pytester.makepyfile("def test_plain(): pass")

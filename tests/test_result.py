@@ -4,7 +4,6 @@ import json
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from verify.errors import InputError
@@ -84,17 +83,6 @@ def test_numbers_that_are_not_finite_are_null_and_named_and_come_back(tmp_path):
     assert math.isnan(found.rates[0].pairwise[1])
 
 
-def test_numpys_scalars_are_numbers_in_a_result(tmp_path):
-    solve = replace(
-        judged().solves[0], level=np.int64(3), size=np.float32(0.5), notes={"a": np.bool_(True)}
-    )
-    path = tmp_path / "result.json"
-    write_result(replace(judged(), solves=[solve]), path)
-    written = strict(path)["solves"][0]
-    assert (written["level"], written["size"], written["notes"]) == (3, 0.5, {"a": True})
-    assert "not_finite" not in strict(path)
-
-
 @pytest.mark.parametrize(
     "verdicts, worst",
     [
@@ -123,12 +111,6 @@ def test_a_solver_that_could_not_be_judged_does_not_hide_the_others(beside, whol
     lost = [replace(v, solver="removal") for v in judged(Verdict.ERROR, Verdict.ERROR).verdicts]
     result = judged(Verdict.PASS, beside)
     assert replace(result, verdicts=[*result.verdicts, *lost]).verdict is whole
-
-
-def test_a_metric_is_found_by_its_name():
-    solve = judged().solves[0]
-    assert solve.metric("energy_norm").value == 0.25
-    assert solve.metric("jump_l2") is None
 
 
 def damaged(change):

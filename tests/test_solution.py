@@ -1,6 +1,5 @@
 """The neutral solution: what is written is read, a wrong shape fails where it arises."""
 
-import json
 from dataclasses import fields
 
 import numpy as np
@@ -69,27 +68,6 @@ def test_a_membrane_is_triangles_in_space_and_read_as_such(tmp_path, order):
     assert read.cell_type == flat.cell_type
     for name in ("points", "cells", "displacement", "cut_facets"):
         np.testing.assert_array_equal(getattr(read, name), getattr(written, name))
-
-
-def test_a_size_that_is_not_known_stays_so_and_the_file_stays_json(tmp_path):
-    plain = Solution(np.eye(3, 2), np.array([[0, 1, 2]]), np.zeros((1, 3, 2)))
-    write_solution(plain, tmp_path / "solution")
-    text = (tmp_path / "solution.json").read_text()
-    json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
-    assert np.isnan(read_solution(tmp_path / "solution").size)
-
-
-def test_the_json_half_comes_last(tmp_path, monkeypatch):
-    """Its presence says that the solution is whole."""
-    import meshio
-
-    def full_disk(*arguments, **options):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(meshio.Mesh, "write", full_disk)
-    with pytest.raises(OSError, match="No space left"):
-        write_solution(simplex(2, 1), tmp_path / "solution")
-    assert not (tmp_path / "solution.json").exists()
 
 
 PLAIN = {

@@ -1,8 +1,5 @@
 """A file is whole or not there, whatever ends its writing; what was there before stays."""
 
-import os
-from threading import Thread
-
 import pytest
 
 from verify.errors import InputError
@@ -21,26 +18,6 @@ def test_what_was_there_stays_if_writing_does_not_end(tmp_path, end):
     with pytest.raises(end):
         begin()
     assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
-
-
-def test_a_link_is_followed(tmp_path):
-    (tmp_path / "there").mkdir()
-    (tmp_path / "link").symlink_to("there/file")
-    for text in ("first", "second µ"):
-        write_whole(tmp_path / "link", text)
-        assert (tmp_path / "link").is_symlink()
-        assert (tmp_path / "there/file").read_text(encoding="utf-8") == text
-
-
-def test_a_pipe_is_written_and_stays_one(tmp_path):
-    pipe, read = tmp_path / "pipe", []
-    os.mkfifo(pipe)
-    reader = Thread(target=lambda: read.append(pipe.read_bytes()))
-    reader.start()
-    write_whole(pipe, b"through")
-    reader.join(timeout=10)
-    assert read == [b"through"]
-    assert pipe.is_fifo()
 
 
 def test_the_name_in_an_error_is_that_of_the_file_asked_for(tmp_path):

@@ -1,7 +1,5 @@
 """Slow-downs are ratios to a kernel timed beside the solve; what is noisy is undecided."""
 
-import re
-
 import pytest
 import runs
 
@@ -64,19 +62,6 @@ def test_contended_timings_and_another_cpu_decide_nothing(saved, tmp_path):
     verdict, reason = checked(saved, tmp_path / "two", slow, cpu="another CPU")
     assert verdict == "UNDECIDED"
     assert "on another CPU than 'a CPU'" in reason
-
-
-def test_a_ratio_to_another_kernel_decides_nothing_until_it_is_updated(saved, tmp_path):
-    """Also one of a file from before kernels had numbers there: that was the first."""
-    new = runs.run(tmp_path / "new", runs.result(runs.solve(seconds=(0.9, 0.9, 0.9))))
-    text = saved.file.read_text()
-    assert f'"kernel": {KERNEL}' in text
-    saved.file.write_text(re.sub(r'\s*"kernel": \d+,?', "", text))
-    row = speed(saved("check", new)[1])
-    assert row[0] == "UNDECIDED"
-    assert f"in units of kernel 1, now kernel {KERNEL}" in row[1]
-    assert saved("update", new, "--only", "a/case:speed")[1]["moved"] == 1
-    assert speed(saved("check", new)[1])[0] == "PASS"
 
 
 def test_speeds_move_only_by_name_and_keep_their_limit(saved, tmp_path):

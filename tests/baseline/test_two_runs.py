@@ -32,11 +32,3 @@ def test_changed_verdicts_are_listed_with_what_was_observed(baseline, tmp_path):
         ("rate of energy_norm (xfem)", "UNDECIDED", "PASS", "better"),
     ]
     assert [answer["changes"][0][k] for k in ("old_observed", "new_observed")] == [0.01, 0.09]
-
-
-def test_the_second_of_two_equal_checks_is_told_from_the_first(baseline, tmp_path):
-    new = [*OLD[:3], verdict("value", "strain_energy", "ERROR", None), OLD[4]]
-    old_run = runs.run(tmp_path / "old", runs.result(verdicts=OLD))
-    new_run = runs.run(tmp_path / "new", runs.result(verdicts=new))
-    (change,) = baseline("diff", old_run, new_run)[1]["changes"]
-    assert change["check"] == "value of strain_energy (xfem) #2"

@@ -87,15 +87,6 @@ def test_a_broken_command_line_is_refused(tmp_path, monkeypatch, capsys, fault):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_expression_that_matches_nothing_is_no_error_but_nothing_ran(
-    tmp_path, monkeypatch, capsys
-):
-    assert run_here(tmp_path, monkeypatch, "-k", "no_such_word") == 4
-    captured = capsys.readouterr()
-    assert captured.err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_check_says_a_line_for_every_file(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.toml").write_text(PATCH)
@@ -104,10 +95,3 @@ def test_check_says_a_line_for_every_file(tmp_path, monkeypatch, capsys):
     captured = capsys.readouterr()
     assert captured.out.startswith("good.toml: ok (F1 patch")
     assert captured.err.count("\n") == 2
-
-
-def test_no_command_is_a_usage_error(verify):
-    done = verify()
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "see verify --help" in done.stderr

@@ -26,10 +26,3 @@ def test_bash_completes(capsys, tmp_path, words, completed):
         ["bash", "-c", asked], cwd=tmp_path, capture_output=True, text=True, timeout=30, check=True
     )
     assert done.stdout.split() == [completed]
-
-
-def test_zsh_gets_a_script_with_the_cases(capsys):
-    assert main(["completion", "zsh"]) == 0
-    said = capsys.readouterr().out
-    assert said.startswith("#compdef verify")
-    assert "statics/f1_patch" in said

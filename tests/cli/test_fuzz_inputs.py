@@ -9,8 +9,6 @@ import signal
 import zipfile
 from contextlib import contextmanager
 
-import pytest
-
 from verify.cli import main
 from verify.scene import case_folder
 
@@ -175,15 +173,3 @@ def test_a_few_mutated_cases(tmp_path, capsys):
 
 def test_a_few_mutated_records(tmp_path, monkeypatch, capsys):
     check_records(tmp_path, monkeypatch, capsys, range(20))
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("hundred", range(20))
-def test_two_thousand_mutated_cases(tmp_path, capsys, hundred):
-    check_cases(tmp_path, capsys, range(100 * hundred, 100 * (hundred + 1)))
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("hundred", range(5))
-def test_five_hundred_mutated_records_bundles_and_entries(tmp_path, monkeypatch, capsys, hundred):
-    check_records(tmp_path, monkeypatch, capsys, range(100 * hundred, 100 * (hundred + 1)))

@@ -1,9 +1,6 @@
 """Files made to do harm: one clear line within seconds, exit code 2, nothing left behind."""
 
-import json
-import os
 import time
-import zipfile
 
 import pytest
 
@@ -65,31 +62,6 @@ def test_a_hostile_case_file_is_refused(tmp_path, monkeypatch, capsys, fault):
     assert [path.name for path in tmp_path.iterdir()] == ["own.toml"]
 
 
-def test_a_pipe_is_not_waited_for(tmp_path, capsys):
-    os.mkfifo(tmp_path / "own.toml")
-    refused(capsys, ["check", tmp_path / "own.toml"], "is a pipe or a device; expected a case file")
-
-
-@pytest.mark.parametrize(
-    "name, content, said",
-    [
-        ("body.ply", "ply", "that meshio can read"),
-        ("body.ply", "ply\n", "that meshio can read"),
-        ("body.bdf", "BEGIN BULK\n", "that meshio can read"),
-        ("body.nas", "$ cut\nBEGIN BULK", "that meshio can read"),
-        ("body.vtk", "# vtk DataFile Version 3.0\n", "that meshio can read"),
-    ],
-)
-def test_a_mesh_file_that_is_cut_off_is_not_read_for_ever(tmp_path, capsys, name, content, said):
-    rectangle = f'kind = "rectangle"\nlower = [0.0, 0.0]\n{UPPER}'
-    text = PATCH.replace(rectangle, f'kind = "file"\nfile = "{name}"')
-    text = text.replace("cells = [[8, 8], [16, 16]]", 'pattern = "given"')
-    assert text.count(name) == 1
-    (tmp_path / "own.toml").write_text(text)
-    (tmp_path / name).write_text(content)
-    refused(capsys, ["check", tmp_path / "own.toml"], said)
-
-
 @pytest.mark.parametrize("content", [NESTED, DEEP, '{"schema": 1, "n": ' + "9" * 5000 + "}"])
 def test_json_that_is_too_deep_or_too_long_is_one_line(tmp_path, capsys, content):
     run, answers = tmp_path / "run", tmp_path / "answers" / "level-0"
@@ -106,66 +78,6 @@ def test_json_that_is_too_deep_or_too_long_is_one_line(tmp_path, capsys, content
     (run / "run.json").write_text('{"schema": 1, "finished": "now", "cases": ["a"]}')
     (run / "cases" / "a" / "result.json").write_text(content)
     refused(capsys, ["baseline", "diff", run, run], "result.json: not a JSON file")
-
-
-# of a bundle: how its list of contents is changed
-SPOILT = {
-    "entries": lambda b: b.pop("entries"),
-    "entries of numbers": lambda b: b.update(entries=[1, None]),
-    "entries no list": lambda b: b.update(entries={"a": 1}),
-    "no files": lambda b: b["entries"][0].pop("files"),
-    "files a list": lambda b: b["entries"][0].update(files=["solution.json"]),
-    "level a text": lambda b: b["entries"][0].update(level="first"),
-    "level negative": lambda b: b["entries"][0].update(level=-1),
-    "origin null": lambda b: b["entries"][0].update(origin=None),
-    "notes a list": lambda b: b["entries"][0]["record"].update(notes=["a"]),
-    "record null": lambda b: b["entries"][0].update(record=None),
-    "member '.'": lambda b: b["entries"][0]["files"].update({".": "0"}),
-    "member '..'": lambda b: b["entries"][0]["files"].update({"..": "0"}),
-    "member ''": lambda b: b["entries"][0]["files"].update({"": "0"}),
-    "member elsewhere": lambda b: b["entries"][0]["files"].update({"../../x": "0"}),
-    "key elsewhere": lambda b: b["entries"][0].update(key="../../.."),
-}
-
-
-def entry():
-    record = {"case": "statics/f1_patch", "solver": "reference", "level": 0, "status": "solved"}
-    return {
-        "schema": 1, "key": "a" * 24, "physics": "b" * 24, "code": "c" * 24, "level": 0,
-        "case": "statics/f1_patch", "record": record, "files": {"solution.json": "d" * 24},
-        "origin": {"versions": {}}, "made": "2026-01-01",
-    }  # fmt: skip
-
-
-def bundle(path, content, *members):
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("bundle.json", content)
-        for name, data in members:
-            archive.writestr(name, data)
-
-
-@pytest.fixture
-def run_by(tmp_path, capsys):
-    def check(said):
-        command = ["run", "statics/griffith_inside", "--references", tmp_path / "b.zip"]
-        refused(capsys, [*command, "--out", tmp_path / "out"], said)
-        assert [path.name for path in tmp_path.iterdir()] == ["b.zip"]
-
-    return check
-
-
-@pytest.mark.parametrize("fault", SPOILT)
-def test_a_bundle_with_wrong_contents_is_refused(tmp_path, run_by, fault):
-    content = {"schema": 1, "entries": [entry()]}
-    SPOILT[fault](content)
-    bundle(tmp_path / "b.zip", json.dumps(content))
-    run_by("b.zip: not a")
-
-
-def test_a_bundle_that_unpacks_to_much_more_is_not_unpacked(tmp_path, run_by):
-    content = {"schema": 1, "entries": [entry()]}
-    bundle(tmp_path / "b.zip", json.dumps(content), ("a", bytes(2 * 10**8)))
-    run_by("unpacks to 200 MB")
 
 
 def test_no_escape_of_others_reaches_the_terminal(tmp_path, capsys):

@@ -41,8 +41,3 @@ def test_every_cell_of_the_notebook_runs_and_the_wrong_solver_alone_fails(tutori
         assert (tmp_path / f"build/tutorial/{name}/report.html").is_file()
     shown = next(text for text in said if "cut-patch" in text)
     assert re.search(r"^free-fall +refused", shown, re.MULTILINE)
-
-
-def test_a_command_of_the_tutorial_that_crashes_is_an_error(tutorial, tmp_path):
-    with pytest.raises(RuntimeError, match="exit code 2"):
-        tutorial.run("verify run no/such_case --solver xfem", tmp_path, ROOT)

@@ -6,7 +6,7 @@ from cut_meshes import grid, quadratic, solution
 from solid_meshes import cube_grid
 
 from verify.compare.energy_error import energy_error
-from verify.compare.hooke import corotated, hooke, law_of
+from verify.compare.hooke import corotated, hooke
 from verify.compare.locate import SolutionField
 from verify.compare.simplex_rule import points_in
 from verify.compare.slabs import Rule
@@ -54,19 +54,6 @@ def test_the_energy_of_a_uniaxial_stretch_is_the_catalogues():
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_both_energies_agree_for_small_strains_down_to_round_off(d):
-    random = np.random.default_rng(3)
-    material = PLANE if d == 2 else SPACE
-    for size in (1e-3, 1e-6, 1e-9):
-        gradient = size * random.normal(size=(50, d, d))
-        ratio = corotated(material).energy_density(gradient) / hooke(material).energy_density(
-            gradient
-        )
-        # they differ by the square of the rotation over the strain, of the order of `size`
-        assert np.abs(ratio - 1).max() < 100 * size + 1e-6
-
-
-@pytest.mark.parametrize("d", [2, 3])
 def test_an_inverted_cell_has_a_negative_stretch(d):
     flat = np.eye(d)
     flat[-1, -1] = -0.5
@@ -88,15 +75,6 @@ def test_the_norm_of_an_error_does_not_change_when_both_fields_are_turned(d):
     assert turned == pytest.approx(still, rel=1e-12)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_the_norm_of_a_small_error_is_what_the_energy_says(d):
-    """From rest, the energy of a small displacement is that of its difference from none."""
-    random = np.random.default_rng(6)
-    law = corotated(PLANE if d == 2 else SPACE)
-    small = 1e-5 * random.normal(size=(20, d, d))
-    assert law.error_density(small, 0 * small) == pytest.approx(law.energy_density(small), rel=1e-3)
-
-
 def test_the_corotated_energy_of_a_quadratic_field_is_integrated():
     points, cells = quadratic(*grid(3, 3))
     x, y = points.T
@@ -110,15 +88,6 @@ def test_the_corotated_energy_of_a_quadratic_field_is_integrated():
     assert found == pytest.approx(weights @ law.energy_density(gradient), rel=1e-8)
 
 
-def test_a_rigidly_turned_solution_in_space_has_no_energy():
-    points, cells = cube_grid(2, 2, 2)
-    u = points @ turn(3).T - points
-    one = solution(points, cells, u)
-    # round-off of unit displacements: (1e-16)² of the modulus
-    assert strain_energy(one, corotated(SPACE)) < 1e-27 * 1e4
-    assert strain_energy(one, hooke(SPACE)) > 1e3
-
-
 def test_a_reference_that_only_turns_has_no_energy_norm_to_be_relative_to():
     points, cells = cube_grid(2, 2, 2)
     turned = points @ turn(3).T - points
@@ -128,11 +97,3 @@ def test_a_reference_that_only_turns_has_no_energy_norm_to_be_relative_to():
     assert energy_error(field, reference, rule, corotated(SPACE)).scale == 0.0
     # linear kinematics see strains of order one there
     assert energy_error(field, reference, rule, hooke(SPACE)).scale > 1.0
-
-
-def test_the_scene_says_which_energy_is_meant():
-    from cut_meshes import scene
-
-    assert type(law_of(scene([]))).__name__ == "Hooke"
-    turned = scene([], analysis={"kinematics": "corotational"})
-    assert type(law_of(turned)).__name__ == "Corotated"

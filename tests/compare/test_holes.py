@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 import pytest
 
-from verify.compare.body import body_of, boundary_loops
+from verify.compare.body import body_of
 from verify.compare.opening import opening
 from verify.compare.realised import field_of
 from verify.compare.slabs import area_rule
@@ -68,14 +68,6 @@ def test_a_ring_is_bounded_by_two_loops_and_its_quadrature_leaves_out_the_hole(t
     # ∫ x² + y² is that of either polygon, by its moment of inertia
     inertia = polygon / 3 * (1 + 0.5 * np.cos(2 * np.pi / 24)) * (1 - HOLE**4)
     assert rule.weights @ np.sum(rule.points**2, axis=1) == pytest.approx(inertia, rel=1e-9)
-
-
-def test_loops_that_share_a_node_are_closed_curves():
-    # two squares that touch in node 2
-    cells = np.array([[0, 1, 2], [0, 2, 3], [2, 4, 5], [2, 5, 6]])
-    loops = boundary_loops(cells)
-    edges = {(a, b) for loop in loops for a, b in zip(loop, np.roll(loop, -1), strict=True)}
-    assert edges == {(0, 1), (1, 2), (2, 3), (3, 0), (2, 4), (4, 5), (5, 6), (6, 2)}
 
 
 def test_a_ring_held_at_its_hole_opens_by_lames_gap(tmp_path):

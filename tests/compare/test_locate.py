@@ -3,7 +3,6 @@ import pytest
 from cut_meshes import cube, grid, layered, quadratic, solution
 
 from verify.compare.locate import SolutionField
-from verify.errors import InputError
 
 RNG = np.random.default_rng(1)
 
@@ -82,29 +81,3 @@ def test_gradients_in_sliver_cells_lose_no_more_than_round_off_over_height(thin,
     u, gradient = field.evaluate(x)
     assert np.abs(gradient - slope).max() < 4 * np.finfo(float).eps / thin
     assert np.abs(u - x @ slope.T - 1).max() < 1e-15
-
-
-def test_cells_without_area_are_left_out_and_counted():
-    points, cells = grid(2, 2)
-    flat = np.array([[0, 4, 8]])
-    field = SolutionField(solution(points, np.vstack([flat, cells]), points))
-    assert field.degenerate_cells == 1
-    x = RNG.random((50, 2))
-    assert np.abs(field.displacement(x) - x).max() < 1e-15
-
-
-def test_a_curved_quadratic_edge_is_refused_by_name():
-    points, cells = quadratic(*grid(1, 1))
-    points[-1] += 1e-3
-    with pytest.raises(InputError, match="curved edge"):
-        SolutionField(solution(points, cells, np.zeros_like(points), order=2))
-
-
-def test_a_solution_without_volume_or_with_nodes_nowhere_is_refused():
-    points, cells = grid(1, 1)
-    with pytest.raises(InputError, match="volume"):
-        SolutionField(solution(0 * points, cells, points))
-    broken = points.copy()
-    broken[0, 0] = np.nan
-    with pytest.raises(InputError, match="not finite"):
-        SolutionField(solution(broken, cells, points))

@@ -2,23 +2,20 @@
 
 import numpy as np
 import pytest
-from cut_meshes import grid, quadratic
+from cut_meshes import grid
 from halves_in_space import Sheet
-from membrane_meshes import TILTED, bowl, flat, halved, layers, membrane, roof, upright
+from membrane_meshes import bowl, flat, halved, layers, membrane, roof, upright
 
 from verify.compare.body_rule import body_rule
 from verify.compare.displacement_error import displacement_error
 from verify.compare.energy_error import energy_error
 from verify.compare.jump_error import displacement_jump, jump_error
-from verify.compare.locate import SolutionField
 from verify.compare.membrane_body import cut_membrane
 from verify.compare.membrane_cut_rule import membrane_cut_rule
 from verify.compare.membrane_field import MembraneField
-from verify.compare.near_tip import near_radius
 from verify.compare.realised import field_of
 from verify.compare.strain_energy import field_strain_energy, strain_energy
-from verify.errors import UnsupportedSceneError
-from verify.scene.spatial_cuts import DiscCut, PolygonCut, SweptCut
+from verify.scene.spatial_cuts import SweptCut
 
 LAW = Sheet.law
 SLOPE = np.array([[0.1, 0.2, 0.05], [-0.3, 0.05, 0.1], [0.02, 0.15, -0.2]])
@@ -62,60 +59,6 @@ def test_turning_a_membrane_costs_no_energy_and_changes_no_error():
     assert other.scale == pytest.approx(one.scale, rel=1e-12)
 
 
-def test_sides_of_a_cut_along_edges_are_the_triangles_beside_it():
-    """A cut along edges of a bowl: the planes of the two sides are not one."""
-    points, cells = grid(6, 6)
-    body = cut_membrane(bowl(*points.T), cells, [upright(bowl, (-0.5, 0.5), (1.5, 0.5))])
-    (lines,) = body.lines.values()
-    assert len(lines.ends) == 6
-    assert not len(body.tips)
-    x, y = np.linspace(0, 1, 7), np.full(7, 0.5)
-    length = np.linalg.norm(np.diff(bowl(x, y), axis=0), axis=1).sum()
-    assert lines.lengths.sum() == pytest.approx(length, rel=1e-13)
-    for way, side in ((lines.positive, 1), (lines.negative, -1)):
-        assert (side * way[:, 1] > 0.9).all()
-    half = layers(bowl, 6, [lambda x: np.full_like(x, 0.5)])
-    u = np.where(half[2][:, None] > 0, SHIFT, 0.0)
-    field, still = (field_of(membrane(*half[:2], v), body) for v in (u, 0 * u))
-    found = jump_error(field, still, membrane_cut_rule(body, 0.1)).absolute
-    assert found == pytest.approx(np.linalg.norm(SHIFT) * length**0.5, rel=1e-10)
-
-
-def test_tips_of_a_membrane_are_the_ends_of_its_cuts_inside_it():
-    points, cells = grid(5, 5)
-    a, b, c = (0.23, 0.31), (0.71, 0.64), (0.47, 0.475)  # c is on ab
-    cuts = [upright(roof, a, b, "one"), upright(roof, c, (0.47, 1.3), "two")]
-    body = cut_membrane(roof(*grid(6, 6)[0].T), grid(6, 6)[1], cuts)
-    expected = roof(*np.array([a, b]).T)
-    off = np.linalg.norm(body.tips[:, None] - expected, axis=2)
-    assert body.tips.shape == (2, 3)
-    assert off.min(axis=0).max() < 1e-12
-    ridge = roof(np.array([a[0], 0.5, b[0]]), np.array([a[1], 0.495625, b[1]]))
-    length = np.linalg.norm(np.diff(ridge, axis=0), axis=1).sum()
-    assert near_radius(body) == pytest.approx(0.1 * length, rel=1e-9)
-    assert body.has_cuts
-    assert not cut_membrane(roof(*points.T), cells, []).has_cuts
-
-
-def test_a_quadratic_field_on_triangles_in_space_is_reproduced():
-    """Quadratic in the plan of a plane, with its tangential gradient, off the surface too."""
-    plan, cells = quadratic(*grid(5, 4))
-    points = flat(*plan.T)
-
-    def truth(x, y):
-        u = np.column_stack([x * y, x * x - y, 2 * y * y + x])
-        o = np.zeros_like(x)
-        slope = np.array([[y, x], [2 * x, o - 1], [o + 1, 4 * y]]).transpose(2, 0, 1)
-        return u, slope @ TILTED[:2]
-
-    field = SolutionField(membrane(points, cells.astype(np.int64), truth(*plan.T)[0], order=2))
-    at = np.random.default_rng(2).random((300, 2))
-    for lift in (0.0, 1e-3):
-        u, gradient = field.evaluate(flat(*at.T) + lift * TILTED[2])
-        assert np.abs(u - truth(*at.T)[0]).max() < 1e-13
-        assert np.abs(gradient - truth(*at.T)[1]).max() < 1e-12
-
-
 def test_two_triangulations_of_a_curved_surface_are_compared_by_nearest_points():
     """The error of the comparison falls like the sagitta, and the cut stays where it is."""
     found = []
@@ -144,22 +87,6 @@ def test_two_triangulations_of_a_curved_surface_are_compared_by_nearest_points()
         found.append(apart.relative)
     assert found[0] < 1e-2
     assert found[1] < 0.4 * found[0]
-
-
-def test_cuts_that_do_not_part_a_membrane_in_two_are_refused():
-    points, cells = grid(4, 4)
-    surface = roof(*points.T), cells
-    fold = [(0.5, -1, 0.4), (0.5, 2, 0.4), (-0.5, 2, 0.4), (-0.5, -1, 0.4)]  # touches the ridge
-    with pytest.raises(UnsupportedSceneError, match="'touch' lies along a fold"):
-        cut_membrane(*surface, [PolygonCut(kind="polygon", name="touch", points=fold)])
-    lies = [(0, 0, 0), (0.5, 0, 0.4), (0.5, 1, 0.4), (0, 1, 0)]
-    with pytest.raises(UnsupportedSceneError, match="triangles"):
-        cut_membrane(*surface, [PolygonCut(kind="polygon", name="lies", points=lies)])
-    with pytest.raises(UnsupportedSceneError, match="'beside' does not cross"):
-        cut_membrane(*surface, [upright(roof, (2, 0), (3, 0), "beside")])
-    disc = DiscCut(kind="disc", centre=(0.5, 0.5, 0.3), normal=(1, 0, 0), radius=0.2)
-    with pytest.raises(UnsupportedSceneError, match="'disc' through a membrane"):
-        cut_membrane(*surface, [disc])
 
 
 def test_each_sector_of_crossing_cuts_in_a_curved_membrane_keeps_its_own_values():

@@ -8,13 +8,12 @@ from membrane_meshes import flat, roof
 from verify.compare.body_rule import body_rule
 from verify.compare.displacement_error import displacement_error
 from verify.compare.energy_error import energy_error
-from verify.compare.integration import cut_rules, integrate_norm, rules
+from verify.compare.integration import integrate_norm, rules
 from verify.compare.jump_error import jump_error
 from verify.compare.maximum_error import maximum_error
 from verify.compare.opening import opening
 from verify.compare.opening_error import opening_error, opening_maximum_error
 from verify.compare.simplex_rule import points_in
-from verify.compare.strain_energy import strain_energy
 
 SLOPE = np.array([[0.1, 0.2, 0.05], [-0.3, 0.05, 0.1], [0.02, 0.15, -0.2]])
 SHIFT = np.array([0.01, 0.02, -0.03])
@@ -41,14 +40,6 @@ def test_fields_on_different_meshes_with_a_known_difference_give_it(cut):
     assert found.absolute == pytest.approx(np.sqrt(square), rel=1e-8)
     found = energy_error(field, reference, rule, cut.law)
     assert found.absolute == pytest.approx(np.sqrt(cut.energy(slope)), rel=1e-8)
-
-
-def test_the_energy_of_a_solid_is_half_the_square_of_its_energy_norm():
-    """Cell by cell or not."""
-    cut = Cube()
-    field, still = cut.halves(3, (SLOPE, SHIFT), REST), cut.halves(2, REST, REST)
-    norm = energy_error(still, field, body_rule(cut.body(), 0.2), cut.law).scale
-    assert strain_energy(field.solution, cut.law) == pytest.approx(0.5 * norm**2, 1e-12)
 
 
 @ALL
@@ -141,12 +132,3 @@ def test_the_estimated_integration_error_in_space_covers_the_true_one(cut, n):
         off = abs(found.norm.absolute - truth) / found.norm.scale
         assert off <= found.integration_error
         assert found.integration_error < 0.05 * found.norm.relative
-
-
-@ALL
-def test_rules_of_a_cut_have_the_estimate_of_their_error_too(cut):
-    n = cut.levels[0]
-    field, still = cut.halves(n, (SLOPE, SHIFT), REST), cut.halves(n, REST, (SLOPE, SHIFT))
-    found = integrate_norm(lambda r: jump_error(field, still, r), cut_rules(cut.body(), 0.3))
-    # linear on a plane: its square is integrated exactly by every rule
-    assert found.integration_error < 1e-12

@@ -7,7 +7,7 @@ from cut_meshes import STRAIGHT, scene
 from verify.compare.body import _inner_parts, body_of
 from verify.compare.curves import Segment
 from verify.compare.cut_line import cut_rule, place_on_cut
-from verify.compare.slabs import area_rule, graded_breaks, slab_angles
+from verify.compare.slabs import area_rule, slab_angles
 from verify.scene.planar import inside_polygon
 
 
@@ -55,12 +55,6 @@ def test_a_disc_has_its_area_because_arcs_are_not_cut_into_facets():
     assert rule.weights[inside].sum() == pytest.approx(np.pi * 0.09, rel=1e-10)
 
 
-def test_polynomials_of_the_order_are_integrated_exactly():
-    rule = area_rule(body_of(scene([STRAIGHT])), 0.2, order=4)
-    x, y = rule.points.T
-    assert rule.weights @ (x**3 * y**3) == pytest.approx(1 / 16, rel=1e-13)
-
-
 def test_a_square_root_singularity_at_a_tip_is_integrated():
     body = body_of(
         scene(
@@ -80,23 +74,6 @@ def test_a_square_root_singularity_at_a_tip_is_integrated():
     exact = sum(2 * (b * np.arcsinh(1 / b) + np.arcsinh(b)) for b in (0.9, 1.1)) * a[0]
     assert inverse_distance(1e-6) == pytest.approx(exact, rel=1e-6)
     assert inverse_distance(1e-3) == pytest.approx(exact, rel=1e-3)
-
-
-def test_gaps_never_exceed_their_distance_to_a_singular_point():
-    breaks = graded_breaks(np.array([0.0, 0.4, 1.0]), np.array([0.4]), 0.1, 1e-5)
-    gap = np.diff(breaks)
-    away = np.minimum(np.abs(breaks[1:] - 0.4), np.abs(breaks[:-1] - 0.4))
-    assert gap.max() <= 0.1 + 1e-15
-    assert (gap <= np.maximum(away, 1e-5) * (1 + 1e-6)).all()
-
-
-def test_a_singular_point_off_a_break_by_round_off_is_refined_on_both_sides():
-    for off in (-2e-16, 0.0, 2e-16):
-        breaks = graded_breaks(np.array([0.0, 0.7, 1.0]), np.array([0.7 + off]), 0.1, 1e-5)
-        gap = np.diff(breaks)
-        at = int(np.argmin(np.abs(breaks - 0.7)))
-        assert 1e-6 < gap[at - 1] <= 1e-5
-        assert 1e-6 < gap[at] <= 1e-5
 
 
 @pytest.mark.parametrize("turn", np.linspace(0, np.pi, 13))
@@ -132,17 +109,6 @@ def test_tips_kinks_and_junctions_are_known_and_smooth_points_are_not():
     assert not len(body_of(scene(CUTS["circle"])).tips)
 
 
-def test_a_curve_given_by_many_vertices_is_not_refined_at_each():
-    x = np.linspace(-0.1, 1.1, 200)
-    curve = np.column_stack([x, 0.5 + 0.1 * np.sin(6 * x)])
-    body = body_of(scene([{"kind": "polyline", "points": curve.tolist()}]))
-    assert len(body.parts) > 150
-    assert len(body.singular) == 4  # corners of the outline
-    rule = area_rule(body, 0.05)
-    assert abs(rule.weights.sum() - 1) < 1e-13
-    assert len(rule.weights) < 100_000
-
-
 L_SHAPE = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.4], [0.3, 0.4], [0.3, 1.0], [0.0, 1.0]]
 
 
@@ -170,11 +136,3 @@ def test_random_cuts_through_a_body_with_a_notch_lose_no_area(seed):
     for part in parts:
         foot = part.piece.point(part.piece.nearest(rule.points))
         assert np.linalg.norm(rule.points - foot, axis=1).min() > 0
-
-
-@pytest.mark.parametrize("ends", [[[0, 0], [1, 1]], [[0, 1], [0.5, 0.5]], [[0.2, 0], [0.2, 1]]])
-def test_a_cut_from_corner_or_along_a_mesh_line_keeps_its_length(ends):
-    points = np.array(ends, dtype=float)
-    body = body_of(scene([{"kind": "polyline", "points": points.tolist()}]))
-    length = np.linalg.norm(points[1] - points[0])
-    assert cut_rule(body, 0.03).weights.sum() == pytest.approx(length, rel=1e-13)

@@ -6,8 +6,6 @@ from pressed_halves import common, halves, normal, pressed
 from scipy.spatial.transform import Rotation
 
 from verify.compare.overlap import OverlapSearch
-from verify.errors import UnsupportedSceneError
-from verify.solution import Solution
 
 STILL = {d: (np.eye(d), np.zeros(d)) for d in (2, 3)}
 
@@ -98,10 +96,3 @@ def test_a_part_that_falls_onto_another_cut_face_is_found():
     assert measure > 0
     assert found.measure == pytest.approx(measure, rel=1e-4)
     assert found.depth > 0
-
-
-def test_edges_of_a_membrane_in_space_are_refused_with_the_reason():
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    sheet = Solution(points, np.array([[0, 1, 2]]), np.zeros((1, 3, 3)))
-    with pytest.raises(UnsupportedSceneError, match="pass each other"):
-        OverlapSearch(sheet)

@@ -8,7 +8,6 @@ from verify.assess.blade_intensity import blade_front, blade_intensity
 from verify.assess.stress_intensity import intensity_defect
 from verify.compare.body import body_of
 from verify.compare.motion import ExactMotion
-from verify.errors import UnsupportedSceneError
 from verify.scene import Scene
 from verify.scene.acceptance import StressIntensityQuantity
 
@@ -52,21 +51,6 @@ def test_the_exact_field_has_its_own_intensity(speed, angle, upwards):
     tip = [0.02 + 0.05 * speed * np.cos(np.deg2rad(angle)),
            0.01 + 0.05 * speed * np.sin(np.deg2rad(angle)), 0.01]  # fmt: skip
     np.testing.assert_allclose(front.point, tip, atol=1e-9)
-
-
-def test_where_the_blade_does_not_advance_there_is_no_intensity():
-    scene = _strip(0.3, 0.0)
-    body = body_of(scene)
-    with pytest.raises(UnsupportedSceneError, match="does not advance"):
-        blade_front(scene.cuts[0], body, 0.2)
-
-
-def test_mode_3_says_what_it_needs():
-    with pytest.raises(ValueError, match="radius"):
-        StressIntensityQuantity(kind="stress_intensity", name="K", end="end", mode="III")
-    with pytest.raises(ValueError, match="blade"):
-        StressIntensityQuantity(kind="stress_intensity", name="K", end="start", mode="III",
-                                radius=0.1)  # fmt: skip
 
 
 def test_modes_1_and_2_are_not_measured_at_a_tip_that_advances():

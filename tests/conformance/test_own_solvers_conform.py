@@ -7,7 +7,6 @@ import pytest
 
 from verify.cli import main
 from verify.conformance import State, conform, exit_code_of
-from verify.errors import InputError
 
 
 @pytest.mark.parametrize(
@@ -48,26 +47,3 @@ def test_the_command_prints_the_checks_as_a_table_and_as_json(capsys):
     said = json.loads(capsys.readouterr().out)
     assert said["parameters"] == {"basis": "shifted"}
     assert [check["state"] for check in said["checks"]] == ["pass"]
-
-
-@pytest.mark.parametrize(
-    "arguments, said",
-    [
-        (["no_such_module:Solver"], "needs 'no_such_module'"),
-        (["xfme"], "no solver 'xfme'; did you mean 'xfem'?"),
-        (["xfem", "--check", "uncut"], "no check 'uncut'; did you mean 'uncut-"),
-        (["xfem", "--set", "basis"], "expected NAME=VALUE"),
-    ],
-)
-def test_what_cannot_be_checked_is_bad_input_in_one_line(capsys, arguments, said):
-    assert main(["conform", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-
-
-def test_a_solver_that_cannot_be_loaded_is_bad_input_and_not_a_finding(tmp_path, monkeypatch):
-    (tmp_path / "brittle.py").write_text("raise RuntimeError('no licence')\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="RuntimeError"):
-        conform("brittle:Solver", only=["uncut-2d"])

@@ -12,7 +12,7 @@ import pytest
 from case_texts import body_text, support_text, weight_text
 
 from verify.cli import main
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import InputError
 from verify.exchange import ProgramSolver, export_case, problem_of, read_answers
 from verify.result import Status, Verdict, read_result
 from verify.scene import load_scene
@@ -57,17 +57,6 @@ def test_an_exported_case_holds_mesh_cuts_supports_and_material(tmp_path):
     np.testing.assert_array_equal(opened["held"][0]["values"], expected.held[0].values)
     cut = meshio.read(tmp_path / "f1/cuts.vtu")
     np.testing.assert_array_equal(cut.points[:, :2], [[-0.1, 0.3], [1.1, 0.7]])
-
-
-def test_an_export_goes_nowhere_where_something_else_is(tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(InputError, match="not an export"):
-        export_case(load_scene(CASE), tmp_path)
-    with pytest.raises(InputError, match="is a file"):
-        export_case(load_scene(CASE), tmp_path / "notes.txt")
-    with pytest.raises(InputError, match=r"mesh level 2; .* has 0\.\.1"):
-        export_case(load_scene(CASE), tmp_path / "new", [2])
-    assert not (tmp_path / "new").exists()
 
 
 SPACE = (
@@ -164,25 +153,6 @@ def test_an_answer_that_is_missing_refused_or_damaged_is_a_record_of_its_own(tmp
     assert not answers.solutions
 
 
-@pytest.mark.parametrize(
-    "arguments, said",
-    [
-        (["--solver", "xfem"], "program"),
-        (["--solver", "a b"], "program"),
-        (["--solver", "mine", "--judged-as", "xfme"], "xfme"),
-        (["--solver", "mine", "--beside", "xfme"], "did you mean 'xfem'?"),
-    ],
-)
-def test_a_bad_import_is_one_line_and_writes_nothing(tmp_path, capsys, arguments, said):
-    answer(tmp_path / "mine", 0)
-    run = tmp_path / "run"
-    assert main(["import", CASE, str(tmp_path / "mine"), "--out", str(run), *arguments]) == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-    assert not run.exists()
-
-
 def test_answers_to_another_case_are_refused(tmp_path):
     with pytest.raises(InputError, match="no such directory"):
         read_answers(load_scene(CASE), tmp_path / "nothing")
@@ -223,26 +193,6 @@ def test_a_program_is_a_solver_with_its_wall_time(tmp_path):
     assert len(solution.points) == 289
     assert len(solution.timings["program"]) == 2
     assert "start-up included" in solution.notes["timed"]
-
-
-def test_a_program_may_refuse_and_its_failure_says_what_it_said(tmp_path):
-    scene = load_scene(CASE)
-    refusing = (
-        "pathlib.Path(sys.argv[1], 'level-0/solution.json')"
-        '.write_text(\'{"schema": 1, "refused": "no cuts"}\')'
-    )
-    with pytest.raises(UnsupportedSceneError, match="no cuts"):
-        program(tmp_path, refusing).solve(scene, 0)
-    with pytest.raises(RuntimeError, match="ended with 3: the pivot is zero"):
-        program(tmp_path, "print('the pivot is zero', file=sys.stderr); sys.exit(3)").solve(
-            scene, 0
-        )
-    with pytest.raises(InputError, match="holds no answer"):
-        program(tmp_path, "pass").solve(scene, 0)
-    missing = program(tmp_path, "pass")
-    type(missing).command = ("no-such-program",)
-    with pytest.raises(InputError, match="no program 'no-such-program'"):
-        missing.solve(scene, 0)
 
 
 def test_several_materials_go_out_and_a_program_solves_their_patch_test(tmp_path):

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 import pyvista
 
-from verify.cli import main
 from verify.compare.hooke import law_of
 from verify.compare.locate import SolutionField
 from verify.compare.strain_energy import strain_energy
 from verify.compare.stress import strain_and_stress
-from verify.errors import InputError
 from verify.exchange import export_fields, problem_of
 from verify.json_files import write_json
 from verify.result import SolveRecord, Status
@@ -163,16 +161,3 @@ def test_the_error_of_a_motion_is_against_the_reference_at_the_same_time(tmp_pat
     for time, mesh in zip(*opened(files[0]), strict=True):
         expected = np.tile([0.0, -1e-3 * time, 0.0], (mesh.n_points, 1))
         np.testing.assert_allclose(mesh.point_data["error"], expected, atol=1e-15)
-
-
-def test_the_command_writes_into_the_run_and_names_what_is_missing(tmp_path, capsys):
-    scene, solution = moved("dynamics/freed_half", lambda x, _: 0 * x, (0.0, 0.1))
-    run = run_of(tmp_path / "run", scene, xfem=solution)
-    assert main(["paraview", str(run)]) == 0
-    assert (run / "paraview" / "dynamics__freed_half" / "xfem-0.pvd").is_file()
-    assert str(run / "paraview") in capsys.readouterr().out
-    with pytest.raises(InputError, match="reference"):
-        export_fields(run, tmp_path / "out", with_reference=True)
-    assert main(["paraview", str(run), "--solver", "nobody"]) == 2
-    assert "nobody" in capsys.readouterr().err
-    assert main(["paraview", str(tmp_path / "none")]) == 2

@@ -5,7 +5,6 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from verify.errors import UnsupportedSceneError
 from verify.exchange import problem_of
 from verify.scene import Scene, load_scene
 
@@ -45,15 +44,6 @@ def test_consistent_forces_sum_to_weight_and_traction(conforming):
     # area 2 times (density · g + f), and 2 m of upper side
     expected = 2 * (3 * np.array([0.5, -2.0]) + [0.1, 0.2]) + 2 * np.array([0.7, -0.3])
     np.testing.assert_allclose(forces.sum(axis=0), expected, rtol=1e-13)
-
-
-def test_consistent_forces_in_space_sum_to_weight_and_traction():
-    loads = [
-        {"kind": "gravity", "acceleration": [0.0, 0.0, -2.0]},
-        {"kind": "traction", "where": "right", "traction": [0.4, 0.0, 0.0]},
-    ]
-    forces = problem_of(scene(**BOX, loads=loads), 0).nodal_forces()
-    np.testing.assert_allclose(forces.sum(axis=0), [0.5 * 0.4, 0, -6.0], rtol=1e-13, atol=1e-14)
 
 
 def test_each_doubled_node_gets_the_value_of_its_own_side():
@@ -100,25 +90,6 @@ def test_the_later_of_two_supports_wins():
     left = problem.points[:, 0] == 0
     assert held[left].all()
     np.testing.assert_array_equal(value[left], np.tile([0.1, 0.5], (left.sum(), 1)))
-
-
-def test_a_given_mesh_in_space_conforms_without_a_cut_and_is_refused_with_one(tmp_path):
-    import meshio
-
-    from verify.xfem.structured_meshes import box_mesh
-
-    mesh = box_mesh([2, 2, 2])
-    meshio.Mesh(mesh.points, [("tetra", mesh.cells)]).write(tmp_path / "cube.vtu")
-    given = {"kind": "file", "file": str(tmp_path / "cube.vtu"), "dimension": 3}
-    held = [{"where": "x < 1e-9", "displacement": [0.0, 0.0, 0.0]}]
-    parts = {**BOX, "geometry": given, "mesh": {"pattern": "given"}, "supports": held}
-    assert len(problem_of(scene(**parts), 0).points) == 27
-    uncut = problem_of(scene(**parts), 0, conforming=True)
-    np.testing.assert_array_equal(uncut.points, problem_of(scene(**parts), 0).points)
-    plane = [[-1, -1, 0.45], [2, -1, 0.45], [2, 2, 0.55], [-1, 2, 0.55]]
-    parts["cuts"] = [{"kind": "polygon", "points": plane}]
-    with pytest.raises(UnsupportedSceneError, match="polyline"):
-        problem_of(scene(**parts), 0, conforming=True)
 
 
 @needs_gmsh

@@ -1,6 +1,5 @@
 """Motion on the exchange of files: stages of a body that is cut, and codes that march on them."""
 
-import json
 import sys
 
 import numpy as np
@@ -106,16 +105,6 @@ def test_stages_of_a_cut_body_move_as_the_conforming_solver_says(case, modules, 
     assert_same_motion(found, expected, 1e-9)
 
 
-def test_cells_of_an_uncut_body_are_read_with_positive_volumes(modules, tmp_path):
-    """Those of a structured block are of both orientations; Kratos and Akantu take one alone."""
-    export_case(load_scene("controls/hanging_bar"), tmp_path, [0], conforming=True)
-    case = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
-    edges = case.points[case.cells[:, 1:]] - case.points[case.cells[:, :1]]
-    volumes = np.linalg.det(edges) / 6.0
-    assert volumes.min() > 0.0
-    assert volumes.sum() == pytest.approx(np.ptp(case.points, axis=0).prod(), rel=1e-12)
-
-
 def test_cuts_that_open_in_turn_open_one_by_one(modules, tmp_path):
     scene = load_scene("dynamics/two_cuts_in_turn")
     export_case(scene, tmp_path, [0], conforming=True)
@@ -126,21 +115,6 @@ def test_cuts_that_open_in_turn_open_one_by_one(modules, tmp_path):
     np.testing.assert_array_equal(stages[2].points[stages[2].node], case.points)
     weights = [stage.force(0.0).sum(axis=0) for stage in stages]
     np.testing.assert_allclose(weights, 3 * [[0.0, -9.8 * 1000 * 0.03]], atol=1e-9)
-
-
-def test_an_initial_field_is_refused_and_a_loose_part_reported(modules, tmp_path):
-    scene = load_scene("dynamics/block_falls_apart")
-    export_case(scene, tmp_path, [0], conforming=True)
-    content = json.loads((tmp_path / "case.json").read_text())
-    for change, error in (
-        ({"initial": {"kind": "field"}}, modules["exchange_files"].RefusedError),
-        ({"initial": {"kind": "equilibrium", "cuts": "open"},
-          "cuts": [{**content["cuts"][0], "opens_at": 0.0}]}, RuntimeError),
-    ):  # fmt: skip
-        (tmp_path / "case.json").write_text(json.dumps({**content, **change}))
-        case = modules["exchange_files"].Case(tmp_path, 0, conforming=True)
-        with pytest.raises(error):
-            modules["motion"].run_engine(case, newmark(modules["example"]))
 
 
 def cube(modules, held=False):

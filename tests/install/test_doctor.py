@@ -6,8 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from verify import doctor
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,21 +21,6 @@ def test_all_that_a_full_run_needs_works_here():
     assert "mumps" in found["PETSc"]["found"]
     assert "gamg" in found["PETSc"]["found"]
     assert {"DOLFINx", "gmsh", "off-screen VTK", "DOLFINx forms", "numba"} <= set(found)
-
-
-@pytest.mark.parametrize(
-    ("code", "said"),
-    [
-        ("raise ModuleNotFoundError(\"No module named 'petsc4py'\")", "No module named 'petsc4py'"),
-        ("import os; os.kill(os.getpid(), 11)", "crashes (signal 11)"),
-        ("said = 1; raise SystemExit(3)", "exit code 3"),
-    ],
-)
-def test_what_fails_crashes_or_leaves_is_a_finding_with_its_cure(code, said):
-    finding = doctor._tried("it", doctor._script(code), "install it")
-    assert not finding.works
-    assert said in finding.found
-    assert finding.cure == "install it"
 
 
 def test_the_doctor_and_the_set_up_name_the_same_packages():

@@ -1,6 +1,5 @@
 """A Python that the locked wheels are made for is found, whatever `python3` is."""
 
-import os
 import subprocess
 import sys
 
@@ -65,25 +64,6 @@ def test_older_python3_and_refusing_shims_are_passed_over(root, tmp_path, progra
 
 
 @pytest.mark.parametrize(
-    "place",
-    [".pyenv/versions/3.12.9/bin/python3", ".local/share/uv/python/cpython-3.13.1-x/bin/python3"],
-)
-def test_python_of_a_version_manager_is_found_in_the_home(root, tmp_path, programs, place):
-    put, _ = programs
-    for name in ("python3", "python3.12", "python3.13", "python3.14", "python"):
-        put(name, REFUSING_SHIM)
-    # A PATH that holds the tools but no Python.
-    for tool in ("bash", "env", "timeout", "awk", "ls", "sed", "sh"):
-        (tmp_path / "bin" / tool).symlink_to(f"/usr/bin/{tool}")
-    (tmp_path / place).parent.mkdir(parents=True)
-    (tmp_path / place).write_text(passing_on_to_this_python())
-    (tmp_path / place).chmod(0o755)
-    found = find_python(root, str(tmp_path / "bin"), tmp_path)
-    assert found.returncode == 0, found.stderr
-    assert os.access(found.stdout.strip(), os.X_OK)
-
-
-@pytest.mark.parametrize(
     ("version", "reason"), [((3, 11, 7), "is Python 3.11"), ((3, 15, 0), "is Python 3.15")]
 )
 def test_named_python_that_does_not_fit_is_refused_with_its_version(
@@ -95,11 +75,3 @@ def test_named_python_that_does_not_fit_is_refused_with_its_version(
     assert refused.returncode == 2
     assert reason in refused.stderr
     assert "needed: CPython 3.12 to 3.14" in refused.stderr
-
-
-def test_system_dolfinx_asks_for_a_python_that_has_it(root, tmp_path, programs):
-    put, path = programs
-    without = put("bare", f'#!/bin/sh\nexec {sys._base_executable} -I -S "$@"\n')
-    refused = find_python(root, path, tmp_path, VERIFY_PYTHON=str(without), DOLFINX="system")
-    assert refused.returncode == 2
-    assert "has no dolfinx" in refused.stderr

@@ -4,11 +4,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
-from verify import first_use
-from verify.cli.main import main
-
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -26,11 +21,3 @@ def test_without_numba_a_run_ends_with_one_line_that_names_the_cure(tmp_path):
         "verify: error: this command needs numba, which is not installed: "
         "python -m pip install numba"
     ]
-
-
-def test_a_kernel_that_does_not_compile_is_an_error_of_one_line(monkeypatch, capsys):
-    monkeypatch.setattr(first_use, "_SHARES", (["no such stage"],))
-    with pytest.raises(first_use.FirstUseError, match="no such stage"):
-        first_use.compile_all()
-    assert main(["doctor", "--compile"]) == 3
-    assert "compile" in capsys.readouterr().err

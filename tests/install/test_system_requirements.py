@@ -37,13 +37,6 @@ def complete(headers):
             "has_module": lambda _: True}  # fmt: skip
 
 
-def test_every_library_is_asked_for_and_led_to_its_package(requirements, complete):
-    for library, (package, _) in requirements.LIBRARIES.items():
-        lacking = requirements.missing(**complete | {"load": loader_without(library)})
-        assert list(lacking) == [package]
-        assert library in lacking[package]
-
-
 def test_missing_libraries_lead_to_the_exact_apt_line(requirements, complete):
     lacking = requirements.missing(
         **complete | {"load": loader_without("libGLU.so.1", "libEGL.so.1")}
@@ -51,15 +44,6 @@ def test_missing_libraries_lead_to_the_exact_apt_line(requirements, complete):
     assert requirements.apt_line(lacking) == (
         "apt-get install -y --no-install-recommends libegl1 libglu1-mesa"
     )
-
-
-@pytest.mark.parametrize(
-    ("libc", "fits"),
-    [(("glibc", "2.34"), True), (("glibc", "2.41"), True), (("glibc", "2.31"), False),
-     (("", ""), False), (("glibc", "3.0"), True)],
-)  # fmt: skip
-def test_dolfinx_wheel_needs_glibc_2_34(requirements, libc, fits):
-    assert (requirements.missing_beyond_apt(libc, "/usr") == []) is fits
 
 
 def test_the_guide_gives_the_same_apt_line(requirements):

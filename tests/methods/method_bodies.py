@@ -8,7 +8,6 @@ from verify.xfem.loads import body_force
 from verify.xfem.statics import solve_static
 from verify.xfem.supports import Supports
 
-SPLITTING = [name for name in METHODS if name not in ("uncut", "removal", "removal_refined")]
 CUTTING = [name for name in METHODS if name != "uncut"]
 MATERIAL = {2: isotropic(1.0, 0.3, "plane strain"), 3: isotropic(1.0, 0.3, "solid")}
 

@@ -8,7 +8,6 @@ import pytest
 from command_line import run_here
 
 from verify.methods import METHODS
-from verify.solvers import find_solver
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "theory" / "methods.md"
 
@@ -32,12 +31,3 @@ def test_the_example_of_the_page_prints_a_line_for_every_method(capsys):
     exec(compile(example, str(PAGE), "exec"), {})
     printed = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in printed] == list(METHODS)
-
-
-def test_every_method_is_a_solver_of_its_name():
-    assert all(find_solver(name).name == name for name in METHODS)
-
-
-def test_the_page_names_every_method():
-    text = PAGE.read_text(encoding="utf-8")
-    assert all(f"| `{name}` |" in text for name in [*METHODS, "mass_spring"])

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from verify.methods.catalogue import cut_by
 from verify.methods.refinement import bisect_cells
-from verify.xfem.cuts import ImplicitCut, Plane, Polyline
-from verify.xfem.errors import XfemError
+from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 FEW = settings(max_examples=30, deadline=None, derandomize=True)
@@ -82,25 +81,3 @@ def test_bisection_leaves_no_hanging_node_and_no_gap(dim, seed, rounds):
     corners = mesh.points[mesh.cells[facets[:, 0]][local].reshape(-1, dim)]
     on_side = [(np.abs(corners - x) < 1e-12).all(axis=1).any(axis=1) for x in (0.0, 1.0)]
     assert (on_side[0] | on_side[1]).all()
-
-
-def test_bisection_keeps_the_shapes_of_triangles():
-    mesh = rectangle_mesh((3, 3))
-    for _ in range(8):
-        near = np.abs(mesh.points[mesh.cells].mean(axis=1) - 0.4).max(axis=1) < 0.1
-        mesh, _ = bisect_cells(mesh, near)
-    edges = np.linalg.norm(mesh.edge_vectors, axis=2).max(axis=1)
-    # right isosceles triangles stay right isosceles: area / longest edge² ≥ ¼ (legs as "longest
-    # of the first two" give ½)
-    assert (mesh.measures / edges**2).min() > 0.25 - 1e-12
-
-
-def test_removal_of_everything_is_an_error():
-    cut = ImplicitCut(lambda p: p[:, 1] - 0.5 - 1e-3 * p[:, 0])
-    with pytest.raises(XfemError, match="leaves nothing"):
-        cut_by("removal", rectangle_mesh((3, 1)), [cut])
-
-
-def test_a_negative_number_of_levels_is_an_error():
-    with pytest.raises(XfemError, match="-1 levels"):
-        cut_by("removal_refined", rectangle_mesh((3, 1)), [], levels=-1)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from verify.methods.catalogue import cut_by
 from verify.methods.snapped_mesh import snap_nodes, take_near_nodes
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
-from verify.xfem.errors import XfemError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 number = st.floats(-1.0, 1.0)
@@ -90,36 +89,3 @@ def test_a_node_that_is_reported_as_moved_lies_on_the_cut():
     assert (off > 1e-9).sum() == taken.count
     assert off.max() == pytest.approx(taken.size)
     assert taken.count < 0.2 * on.sum()
-
-
-def test_a_snapped_circle_has_its_radius_up_to_the_facets():
-    circle = ImplicitCut(lambda p: 0.31 - np.linalg.norm(p - 0.5, axis=1))
-    errors = []
-    for n in (10, 20, 40):
-        body = cut_by("snapping", rectangle_mesh((n, n)), [circle])
-        inside = np.bincount(
-            body.phantom.bodies[body.phantom.cells[:, 0]], body.phantom.volumes
-        ).min()
-        errors.append(abs(inside - np.pi * 0.31**2))
-    # chords of length h: an area of h²/12 per radius is missing at least; nodes that cannot
-    # move all the way add as much
-    assert errors[2] < errors[0] / 4
-    assert errors[2] < 2e-3
-
-
-@pytest.mark.parametrize(
-    "parameters, said",
-    [
-        ({"threshold": 0.6}, "threshold 0.6"),
-        ({"quality": 1.0}, "quality 1"),
-        ({"quality": 0.0}, "quality 0"),
-    ],
-)
-def test_wrong_parameters_are_named(parameters, said):
-    with pytest.raises(XfemError, match=said):
-        cut_by("snapping_subdivision", rectangle_mesh((3, 3)), [], **parameters)
-
-
-def test_an_unknown_method_is_named_with_those_that_there_are():
-    with pytest.raises(XfemError, match="sawing"):
-        cut_by("sawing", rectangle_mesh((3, 3)), [])

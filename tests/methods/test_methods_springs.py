@@ -1,7 +1,5 @@
 """Mass–spring: what springs can be fitted to, and what not."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 
@@ -9,15 +7,11 @@ from verify.methods.catalogue import cut_by
 from verify.methods.spring_fit import spring_stiffness
 from verify.methods.spring_force import SpringForce
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.body import DynamicBody
-from verify.xfem.cuts import Plane, Polyline
+from verify.xfem.cuts import Polyline
 from verify.xfem.elasticity import Material, isotropic
-from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.errors import XfemError
-from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.structured_meshes import rectangle_mesh
 
 
 def sheet_of_equilateral_triangles(rows=6, columns=6, edge=0.2):
@@ -30,22 +24,6 @@ def sheet_of_equilateral_triangles(rows=6, columns=6, edge=0.2):
         [np.column_stack([a, a + 1, a + up]), np.column_stack([a + 1, a + up + 1, a + up])]
     )
     return SimplexMesh(points, cells)
-
-
-def test_a_motion_in_space_is_pulled_by_springs_and_by_no_sweep_of_tetrahedra():
-    """What a scheme asks for, force and stiffness at once, is what the springs give one by one."""
-    cut = cut_mesh(box_mesh((2, 2, 2)), [Plane([0.5, 0.45, 0.4], [0.2, 0.3, 1.0])])
-    force = SpringForce(cut, isotropic(7.0, 0.25, "solid"))
-    u = 0.1 * np.random.default_rng(3).standard_normal((cut.node_count, 3))
-    alone, _ = force.evaluate(u)
-    pattern = block_pattern(cut.cells, cut.node_count)
-    swept, blocks = np.empty_like(u), np.empty((len(pattern.columns), 3, 3))
-    force.linearise(pattern, u, np.zeros_like(u), 0.0, 1.0, swept, blocks)
-    assert swept == pytest.approx(alone, rel=1e-14)
-    summed = np.zeros_like(blocks)
-    force.evaluate(u)
-    force.add_stiffness(pattern, summed)
-    assert blocks == pytest.approx(summed, rel=1e-14)
 
 
 @pytest.mark.parametrize("fit", ["fitted", "van_gelder"])
@@ -88,53 +66,6 @@ def test_a_sheet_of_equilateral_triangles_is_exact_at_the_one_ratio_that_springs
     assert np.abs(forces[top[1:-1], 1]).max() < 1e-12 * scale
 
 
-@pytest.mark.parametrize("poisson", [0.0, 1 / 3, 0.6])
-def test_whatever_ratio_is_asked_for_springs_of_equilateral_triangles_have_a_third(poisson):
-    mesh = sheet_of_equilateral_triangles()
-    force = SpringForce(cut_mesh(mesh, []), isotropic(1.0, poisson, "plane stress"), "linear")
-    stretched, sheared = (
-        force.evaluate(1e-3 * mesh.points * np.array(strain))[1]
-        for strain in ([1.0, 0.0], [1.0, -1.0])
-    )
-    # W = ½λ tr² ε + μ ε:ε with λ = μ, plane stress: 3/2 against 2, that is ν = 1/3
-    assert stretched / sheared == pytest.approx(0.75, rel=1e-12)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_the_fit_is_the_least_squares_solution_that_is_not_negative(dim):
-    rng = np.random.default_rng(dim)
-    for _ in range(20):
-        points = rng.normal(size=(dim + 1, dim))
-        material = Material(np.array(0.4), np.array(0.7))
-        mesh = SimplexMesh(points, [list(range(dim + 1))])
-        K = _element_stiffness(mesh, 0.4, 0.7)
-        columns = []
-        for i, j in combinations(range(dim + 1), 2):
-            v = np.zeros((dim + 1, dim))
-            t = points[j] - points[i]
-            v[i], v[j] = -t / np.linalg.norm(t), t / np.linalg.norm(t)
-            columns.append(np.outer(v.ravel(), v.ravel()).ravel())
-        A = np.array(columns).T
-        free = np.linalg.lstsq(A, K.ravel(), rcond=None)[0]
-        found, clamped = spring_stiffness(mesh, material)
-        assert (found >= 0.0).all()
-        if (free >= 0).all():
-            assert found[0] == pytest.approx(free, rel=1e-9)
-            assert not clamped.any()
-        else:
-            rest = ~clamped[0]
-            again = np.linalg.lstsq(A[:, rest], K.ravel(), rcond=None)[0]
-            assert found[0][rest] == pytest.approx(again, rel=1e-9)
-
-
-def _element_stiffness(mesh, lam, mu):
-    b, eye = mesh.gradients[0], np.eye(mesh.dim)
-    K = lam * np.einsum("ik,jl->ikjl", b, b) + mu * np.einsum("jk,il->ikjl", b, b)
-    K += mu * np.einsum("ij,kl->ikjl", b @ b.T, eye)
-    size = b.size
-    return mesh.measures[0] * K.reshape(size, size)
-
-
 @pytest.mark.parametrize("kinematics", ["linear", "corotational"])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_force_and_stiffness_are_derivatives_of_the_energy(dim, kinematics):
@@ -169,11 +100,3 @@ def test_springs_of_a_body_that_turns_and_opens_rigidly_bear_nothing():
     forces, energy = force.evaluate(u)
     assert energy < 1e-20 * 1e4
     assert np.abs(forces).max() < 1e-12 * 1e4
-
-
-def test_springs_have_no_stress_and_say_so():
-    force = SpringForce(cut_mesh(rectangle_mesh((2, 2)), []), isotropic(1.0, 0.3, "plane strain"))
-    with pytest.raises(XfemError, match="no stress field"):
-        EnergyMomentum(DynamicBody(force, side_wise_mass(force.phantom, 1.0)), 1e-3)
-    with pytest.raises(XfemError, match="van_gelder"):
-        SpringForce(force.phantom, isotropic(1.0, 0.3, "plane strain"), fit="best")

@@ -10,7 +10,6 @@ from verify.methods.catalogue import cut_by
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -101,18 +100,3 @@ def test_cuts_that_almost_pass_through_nodes_leave_valid_meshes(offset, dim):
         body = cut_by(method, mesh, [Plane(np.full(dim, 0.5) + offset * normal, normal)])
         assert body.phantom.mesh.measures.sum() == pytest.approx(1.0, rel=1e-12)
         assert body.phantom.bodies.max() == 1
-
-
-def test_diagonals_do_not_depend_on_the_numbers_of_the_nodes():
-    mesh = rectangle_mesh((5, 5))
-    order = np.random.default_rng(3).permutation(len(mesh.points))
-    other = type(mesh)(mesh.points[order], np.argsort(order)[mesh.cells])
-    energies = [hang("subdivision", one, LINES, ends(1))[1].strain_energy for one in (mesh, other)]
-    assert energies[0] == pytest.approx(energies[1], rel=1e-12)
-
-
-def test_what_no_mesh_can_show_is_said():
-    # two cuts nearer to each other than a triangle between them could be
-    cuts = [Plane([0.5, 0.47], [0.1, 1.0]), Plane([0.5, 0.47 + 3e-15], [0.1, 1.0])]
-    with pytest.raises(XfemError, match="leaves"):
-        cut_by("subdivision", rectangle_mesh((4, 4)), cuts)

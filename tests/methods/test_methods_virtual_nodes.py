@@ -6,7 +6,6 @@ from method_bodies import hang
 
 from verify.methods.catalogue import cut_by
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -35,23 +34,6 @@ def test_a_tetrahedron_in_eight_parts_has_at_most_four_copies():
     body = cut_by("virtual_node", TETRAHEDRON, cuts)
     assert body.counts.elements <= 4
     assert body.phantom.volumes.sum() == pytest.approx(1 / 6, rel=1e-13)
-
-
-def test_a_slab_between_two_cuts_without_a_node_is_no_copy_of_its_own():
-    cuts = [Plane([0.3, 0.0], [1.0, 0.0]), Plane([0.4, 0.0], [1.0, 0.0])]
-    assert cut_by("virtual_node_arbitrary", TRIANGLE, cuts).counts.elements == 3
-    body = cut_by("virtual_node", TRIANGLE, cuts)
-    assert body.counts.elements == 2
-    assert body.phantom.bodies.max() == 1
-
-
-@pytest.mark.parametrize("method", ["virtual_node", "virtual_node_arbitrary"])
-def test_every_copy_has_a_node_of_its_own_part_or_is_counted(method):
-    mesh = rectangle_mesh((6, 6))
-    body = cut_by(method, mesh, [Polyline([[-0.1, 0.31], [0.62, 0.55]])])
-    phantom = body.phantom
-    first = phantom.cells < len(mesh.points)
-    assert (first.sum(axis=1) >= 1).all()
 
 
 def test_one_cut_makes_both_algorithms_the_same_as_xfem():
@@ -86,11 +68,6 @@ def test_copies_that_resist_as_whole_cells_add_the_volume_of_the_cut_cells():
     # more material resists, the load is the same: less energy
     whole = hang("virtual_node", mesh, [cut], ends, weights="whole")[1].strain_energy
     assert whole < hang("virtual_node", mesh, [cut], ends)[1].strain_energy
-
-
-def test_unknown_weights_are_named():
-    with pytest.raises(XfemError, match="weights of copies 'half'"):
-        cut_by("virtual_node", TRIANGLE, [], weights="half")
 
 
 def test_raised_copies_weigh_a_thousandth_of_their_cell_at_least_and_the_body_stays():

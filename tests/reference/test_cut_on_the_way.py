@@ -152,54 +152,6 @@ def test_a_facet_opens_at_the_first_step_that_begins_after_the_blade_has_passed_
     assert apart < 1e-10 * np.abs(whole.displacement).max()
 
 
-def test_what_was_passed_before_the_start_is_open_and_what_comes_late_is_whole_until_then():
-    given = {**PULLED, "initial": {"kind": "equilibrium", "cuts": "open"}}
-    # at 0 the blade is in the middle of its way; at 0.1 s it goes on
-    ends = [[-0.1, 0.33], [0.5, 0.52], [0.5, 0.52], [1.1, 0.71]]
-    path = {**INCLINED, "points": ends, "times": [-1.0, -0.5, 0.11, 0.3]}
-    found = solved(plate([path], **given), degree=2)
-    still = np.abs(found.velocity).max(axis=(1, 2))
-    size = np.abs(found.displacement[0]).max()
-    # at rest with a slit, to 1e-11 of the forces, until it grows
-    assert still[1] < 1e-7 * size / 0.1
-    assert still[2] > 1e-2 * size / 0.1
-    half = {"kind": "polyline", "name": "half", "points": [[-0.1, 0.33], [0.5, 0.52]]}
-    rest = {"kind": "polyline", "name": "rest", "points": [[0.5, 0.52], [1.1, 0.71]]}
-    twin = solved(plate([half, {**rest, "opens_at": 0.3}], **given), degree=2)
-    assert twin.ledger["strain"][0] == pytest.approx(found.ledger["strain"][0], rel=0.02)
-
-
-def test_a_delay_is_a_blade_that_comes_later():
-    path = {**INCLINED, "times": [0.02, 0.2]}
-    late = solved(plate([path], **PULLED), delay=0.043)
-    later = solved(plate([{**path, "times": [0.063, 0.243]}], **PULLED))
-    assert np.array_equal(late.displacement, later.displacement)
-    assert np.abs(late.displacement - solved(plate([path], **PULLED)).displacement).max() > 1e-3
-
-
-@pytest.mark.parametrize("degree", [1, 2])
-def test_what_is_tied_is_the_mesh_on_which_only_the_open_facets_are_cut(degree):
-    """Nodes that cells share, as `open_cut` gives them for the first facets of two paths."""
-    from reference.dynamics_cuts import opening_times, partly_opened
-    from reference.dynamics_ties import TiedUnknowns, facing_nodes
-    from reference.space import conforming_space
-    from verify.solvers.conforming_meshes import peer_mesh
-
-    paths = [{**INCLINED, "times": [0.0, 0.2]}, {**ACROSS, "times": [0.05, 0.22]}]
-    scene = plate(paths)
-    mesh = peer_mesh(scene, 0, "imprinted")
-    whole, times = conforming_space(mesh, degree), opening_times(scene, mesh)
-    facing, ties = facing_nodes(whole), TiedUnknowns(whole, whole)
-    assert np.ptp(whole.node_points[facing], axis=2).max() == 0.0
-    for time in (0.06, 0.11, 0.15, 0.3):
-        ties.tie(facing[times > time].reshape(-1, 2))
-        part = conforming_space(partly_opened(mesh, times <= time), degree)
-        tied = ties.leader[whole.cell_nodes]
-        pairs = np.unique(np.stack([tied.ravel(), part.cell_nodes.ravel()]), axis=1)
-        # one to one: as many pairs as nodes of either
-        assert pairs.shape[1] == len(part.node_points) == len(np.unique(ties.leader))
-
-
 SLANTED = {
     "kind": "tool_path",
     "name": "stroke",
@@ -230,16 +182,6 @@ def test_a_block_keeps_its_energy_while_a_blade_goes_through_it(scheme, mesh):
     play = np.ptp(ledger["strain"])
     assert np.abs(ledger["algorithmic"]).max() < 1e-9 * play
     assert np.ptp(ledger["kinetic"]) > 0.05 * play
-
-
-def test_a_free_block_that_spins_keeps_energy_and_momenta_while_it_is_cut_through():
-    through = {**SLANTED, "points": [[0.31, -0.1, -0.1], [0.62, 1.1, -0.1]], "depth": 1.4}
-    start = {"kind": "moving", "spin": [1.0, 3.0, -2.0], "centre": [0.5, 0.5, 0.4]}
-    scene = solid([{**through, "times": [0.02, 0.15]}], 0.2, initial=start)
-    ledger = solved(scene, scheme="energy_momentum").ledger
-    assert spread(ledger["kinetic"] + ledger["strain"]) < 1e-10
-    for axis in "xyz":
-        assert np.ptp(ledger[f"angular_momentum_{axis}"]) < 1e-10 * 1000
 
 
 def test_a_membrane_is_cut_on_its_way_down(tmp_path):

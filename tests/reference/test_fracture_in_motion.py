@@ -10,7 +10,6 @@ from test_front_fracture import FRONT, prism
 
 from reference.exact.hooke import hooke
 from reference.fracture import front_intensity, stress_intensity, tips
-from verify.errors import InputError
 from verify.scene import Material, Scene
 from verify.solvers import find_solver
 
@@ -64,16 +63,6 @@ def test_a_body_in_free_fall_is_one_at_rest():
     dragged = pull + 0.3 * MOVING.density
     found = stress_intensity(falling, MOVING, ORIGIN, ALONG_X, RADII, dragged, drag=0.3)
     assert found.domains == pytest.approx(at_rest.domains, abs=1e-12)
-
-
-def test_a_motion_without_accelerations_is_refused():
-    field = interpolated_tip((1.0, 0.0))
-    moving = replace(field, velocity=np.zeros_like(field.displacement))
-    with pytest.raises(InputError, match="no accelerations"):
-        stress_intensity(moving, MOVING, ORIGIN, ALONG_X, [0.5])
-    still = replace(moving, acceleration=np.zeros_like(field.displacement))
-    with pytest.raises(InputError, match="without a density"):
-        stress_intensity(still, Material(young=1.0, poisson=0.3), ORIGIN, ALONG_X, [0.5])
 
 
 def test_a_front_in_antiplane_vibration_has_its_factor_in_every_tube():

@@ -9,7 +9,6 @@ from reference.exact import exact_solution
 from reference.fracture import CircularFront, StraightFront, front_intensity
 from reference.fracture.front_modes import mode_field
 from reference.meshing import imprint_polygons, open_cut, structured_tetrahedra
-from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution
 
@@ -121,25 +120,6 @@ def test_the_curved_fields_are_what_differences_in_space_say(mode):
 
     slope = np.einsum("nijk,nk->nij", difference(misfit, points), at.axes[:, 0])
     assert at.axes @ slope @ at.axes.swapaxes(1, 2) == pytest.approx(field.misfit, abs=1e-5)
-
-
-@pytest.mark.parametrize("radius, words", [(0.05, "too small"), (-1.0, "too small")])
-def test_a_tube_that_does_not_fit_is_refused(radius, words):
-    with pytest.raises(InputError, match=words):
-        front_intensity(prism((1, 0, 0), 8), SOLID, FRONT, [radius])
-
-
-def test_a_front_where_no_cell_is_or_of_a_plane_field_is_refused():
-    away = StraightFront([0.03, 0.03, 0], [0.03, 0.03, 1], [1, 0, 0])
-    with pytest.raises(InputError, match="touches"):
-        front_intensity(prism((1, 0, 0), 8), SOLID, away, [0.5])
-    with pytest.raises(InputError, match="not across"):
-        StraightFront([0, 0, 0], [0, 0, 1], [0, 0, 1])
-
-
-def test_more_stations_than_nodes_along_the_front_are_refused():
-    with pytest.raises(InputError, match="fewer, or refine"):
-        front_intensity(prism((1, 0, 0), 8), SOLID, FRONT, [0.5], stations=8)
 
 
 def test_each_station_sees_its_own_intensity_whichever_others_are_asked_for():

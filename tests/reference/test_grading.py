@@ -5,19 +5,8 @@ import pytest
 from reference_scenes import needs_fenicsx, polyline, square
 
 from reference.meshing.grading import Grading, clear_radii, singular_points
-from verify.scene import load_scene
 
 CLAMPED_TOP = {"supports": [{"where": "top", "displacement": [0, 0]}]}
-
-
-@pytest.mark.parametrize("case", ["statics/griffith_edges", "statics/tissue_strip"])
-def test_halving_keeps_the_law_of_the_grading_down_to_the_tip_on_every_default_level(case):
-    # h(r) = size (r/R)^0.8 meets h = r at R (size/R)^5: halving the size divides it by 32
-    outline = load_scene(case).geometry.outline()
-    extent = float(np.sqrt(np.prod(np.ptp(outline, axis=0))))
-    levels = [Grading(extent / 12, np.zeros((1, 2)), extent / 2).halved(k) for k in range(6)]
-    smallest = [level.smallest for level in levels]
-    assert np.divide(smallest[:-1], smallest[1:]) == pytest.approx([32.0] * 5, rel=1e-12)
 
 
 def rounded(points):
@@ -46,19 +35,9 @@ def test_crossings_and_branchings_are_singular():
     assert found == meetings | {(0.2, 0.5), (0.8, 0.5), (0.5, 0.2), (0.5, 0.8)}
 
 
-def test_corners_where_a_support_ends_are_singular_and_free_ones_are_not():
-    assert rounded(singular_points(square(**CLAMPED_TOP))) == {(0, 1), (1, 1)}
-    assert rounded(singular_points(square())) == set()
-
-
 def test_a_mouth_is_singular_where_the_boundary_is_held_and_not_where_it_is_free():
     cut = polyline("a", (0.4, -0.1), (0.4, 1.1))
     assert rounded(singular_points(square([cut], **CLAMPED_TOP))) == {(0, 1), (1, 1), (0.4, 1)}
-
-
-def test_the_end_of_an_inequality_inside_an_edge_is_singular():
-    supports = [{"where": "y > 0.9999999 and x < 0.37", "displacement": [0, 0]}]
-    assert rounded(singular_points(square(supports=supports))) == {(0, 1), (0.37, 1)}
 
 
 def test_a_traction_is_singular_where_no_bounded_stress_fits_it():
@@ -92,42 +71,6 @@ class TestNearerThanTheMeshGeneratorCanGo:
         assert area.sum() == pytest.approx(1.0, rel=1e-12)
         # and the tips stay closed: a cut of F facets between two tips doubles F − 1 nodes
         assert len(mesh.parent) - len(np.unique(mesh.parent)) == len(mesh.cut_facets) - 1
-
-
-class TestTheMeshEndsWhereAPartEnds:
-    pytestmark = needs_fenicsx
-    PART = "y > 0.9999999 and x < 0.37"
-
-    def test_the_end_is_a_node_and_the_smallest_cells_are_there(self):
-        from reference.meshing import conforming_mesh
-
-        scene = square(supports=[{"where": self.PART, "displacement": [0, 0]}])
-        grading = Grading(0.1, singular_points(scene), 0.5)
-        mesh = conforming_mesh(scene, grading)
-        away = np.linalg.norm(mesh.points - [0.37, 1.0], axis=1)
-        assert away.min() < 1e-12
-        assert np.sort(away)[1] < 3 * grading.smallest
-
-    def test_a_traction_acts_on_just_that_part(self):
-        from reference.meshing import conforming_mesh
-        from reference.space import conforming_space
-
-        load = {"kind": "traction", "where": self.PART, "traction": [0, 1.0]}
-        scene = square(supports=[{"where": "bottom", "displacement": [0, 0]}], loads=[load])
-        mesh = conforming_mesh(scene, Grading(0.1, singular_points(scene), 0.5))
-        assert resultant(scene, conforming_space(mesh, 2)) == pytest.approx([0.0, 0.37], abs=1e-12)
-
-
-def resultant(scene, space):
-    """Total force (2,) of the loads of a scene: the load vector summed over the nodes."""
-    import ufl
-    from dolfinx import fem
-
-    from reference.elasticity import load_form
-
-    v = ufl.TestFunction(space.function_space)
-    vector = fem.assemble_vector(fem.form(load_form(scene, space, v, None)))
-    return vector.array.reshape(-1, 2).sum(axis=0)
 
 
 WIDE = {"geometry": {"kind": "rectangle", "lower": [0, 0], "upper": [2000, 2000]}}

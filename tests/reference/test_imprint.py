@@ -10,7 +10,6 @@ from reference_scenes import areas, exterior_facets, needs_fenicsx
 
 from reference.meshing.imprint import imprint, structured_triangles
 from reference.meshing.opening import open_cut
-from verify.errors import InputError
 
 UNIT = ((0.0, 0.0), (1.0, 1.0), (8, 8))
 
@@ -90,11 +89,6 @@ def test_a_cut_a_sliver_away_from_edges_and_vertices_keeps_area_and_pieces(expon
     above = mesh.points[mesh.cells].mean(axis=1) @ [-slope, 1.0] > 0.5 + shift - 0.5 * slope
     sides = [set(mesh.pieces[above]), set(mesh.pieces[~above])]
     assert not sides[0] & sides[1]
-
-
-def test_a_cut_outside_the_mesh_is_an_error():
-    with pytest.raises(InputError, match="inside"):
-        cut_square([(2.0, 2.0), (3.0, 3.0)])
 
 
 class TestOnUnstructuredMeshes:

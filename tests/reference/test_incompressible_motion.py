@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from ranks_of_tests import on_ranks
 from reference_scenes import needs_fenicsx, polyline
 from test_motion import moving, spread
 
@@ -71,19 +70,3 @@ def test_a_pressure_halves_the_error_of_a_coarse_mesh_in_motion(monkeypatch):
     pure = energy(0)
     assert pure < mixed < fine
     assert fine - mixed < 0.5 * (fine - pure)
-
-
-_MOVING = """
-from test_incompressible_motion import SLIT, solved, swinging
-found = solved(swinging([SLIT | {"opens_at": 0.05}], duration=0.1))
-size = float(np.linalg.norm(found.displacement))
-answer = {**found.ledger, "size": size}
-"""
-
-
-def test_two_ranks_give_the_motion_of_one(tmp_path):
-    one, two = (on_ranks(count, _MOVING, tmp_path) for count in (1, 2))
-    energy = max(np.abs(one[name]).max() for name in ("kinetic", "strain", "gravity"))
-    for name, column in one.items():
-        size = np.abs(column).max() if "momentum" in name or name == "size" else energy
-        assert two[name] == pytest.approx(column, abs=1e-10 * size), name

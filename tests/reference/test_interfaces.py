@@ -48,14 +48,6 @@ def test_an_inclined_interface_crosses_no_cell_and_a_cut_through_it_opens_only_i
     assert length == pytest.approx(np.hypot(0.6, 0.6 * 0.08 / 0.7), rel=1e-9)
 
 
-def test_a_cut_along_an_interface_is_a_cut() -> None:
-    cut = {"kind": "polyline", "points": [[-0.1, 0.4], [0.5, 0.4]]}
-    one = scene([{"where": "y > 0.4", "young": 7.0}], cuts=[cut])
-    mesh = mesh_of(one)
-    assert not crossed_by_interfaces(one.material, mesh.points, mesh.cells).any()
-    assert len(mesh.realised_cut) > 0
-
-
 @pytest.mark.parametrize(
     "where", ["hypot(x - 0.47, y - 0.41) < 0.2", "(x - 0.47)**2 + (y - 0.41)**2 < 0.04"]
 )

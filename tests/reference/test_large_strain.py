@@ -75,15 +75,6 @@ def rolled(points, curvature, height):
     return np.column_stack([r * np.cos(curvature * Y) - middle - X, r * np.sin(curvature * Y) - Y])
 
 
-def test_a_strip_bends_to_a_half_circle():
-    space = body(2, (10, 100), (-0.05, 0.0), (0.05, 1.0))
-    nodes = ends(space)
-    found = solve(
-        space, nodes, lambda factor: rolled(space.node_points[nodes], factor * np.pi, 0.1)
-    )
-    assert found.strain_energy == pytest.approx(4.4748894293e-4, rel=1e-6)
-
-
 @pytest.mark.parametrize("degree, order", [(1, 2.0), (2, 4.0)])
 def test_bending_converges_with_twice_the_degree(degree, order):
     errors = []
@@ -132,23 +123,6 @@ def test_small_loads_give_the_linear_answer():
     assert two.iterations["newton"] >= 1
 
 
-def test_neo_hookean_and_corotated_agree_at_small_strain_and_part_at_large():
-    space = body(2, (4, 4))
-    nodes = ends(space)
-
-    def energies(stretch):
-        return [
-            solve(
-                space, nodes, lambda f: f * stretch * space.node_points[nodes] * [0, 1], energy=name
-            ).strain_energy
-            for name in ("corotated", "neo_hookean")
-        ]
-
-    small, large = energies(1e-4), energies(0.5)
-    assert small[1] == pytest.approx(small[0], rel=1e-3)
-    assert abs(large[1] / large[0] - 1) > 0.05
-
-
 def test_what_turns_inside_out_at_a_tip_is_measured_and_stays_a_point():
     from verify.solvers import find_solver
 
@@ -175,21 +149,3 @@ def test_a_load_beyond_any_equilibrium_says_how_far_it_came_and_why():
     with pytest.raises(RuntimeError, match=r"no equilibrium beyond load factor 0\.\d+: at 0\.\d+"):
         # pressed to nothing and through itself
         solve(space, nodes, lambda f: -1.5 * f * space.node_points[nodes] * [0, 1])
-
-
-def test_a_path_that_advances_by_tiny_steps_only_ends_in_a_bounded_number(monkeypatch):
-    from reference.strain_equations import StrainEquations
-
-    space, tried = body(1, (2, 2)), []
-    nodes = ends(space)
-    advance = StrainEquations.advance
-
-    def stumble(self, target, values, is_short=False):
-        tried.append(target)
-        done = max((t for t in tried[:-1] if t < target), default=0.0)
-        return "stumbled" if target - done > 5e-4 else advance(self, target, values, is_short)
-
-    monkeypatch.setattr(StrainEquations, "advance", stumble)
-    with pytest.raises(RuntimeError, match=r"beyond load factor 0\.0\d* in 100 steps"):
-        solve(space, nodes, lambda factor: 0.1 * factor * space.node_points[nodes])
-    assert len(tried) == 100

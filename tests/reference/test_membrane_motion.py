@@ -4,13 +4,10 @@ import meshio
 import numpy as np
 import pytest
 from case_texts import cut_text, sheet_text, support_text, weight_text
-from ranks_of_tests import on_ranks
 from reference_scenes import needs_fenicsx
 
 from reference.meshing import open_cut
-from verify.assess.accuracy import assess_accuracy
 from verify.compare.kinetic import kinetic
-from verify.result import SolveRecord, Status
 from verify.scene import Material, load_scene
 from verify.solvers import find_solver
 from verify.xfem.structured_meshes import rectangle_mesh
@@ -119,49 +116,3 @@ def test_the_lips_of_a_tear_fly_apart_with_the_elastic_wave(name, off):
     for asked in scene.quantities:
         wanted = 2 * np.sqrt(1e4 / 1000.0) * 0.1 * asked.time  # d'Alembert
         assert found.quantity(asked) == pytest.approx(wanted, rel=off)
-
-
-def test_two_ranks_move_a_membrane_as_one_does(tmp_path):
-    """A bowl that hangs and is torn on its way, in mean forces of each step."""
-    bowl_scene(tmp_path, 4, HANGING, duration=0.05, opens=0.02, outputs=2, at=0.25)
-    code = f"""
-from verify.compare.locate import SolutionField
-from verify.scene import load_scene
-from verify.solvers import find_solver
-scene = load_scene({str(tmp_path / "case.toml")!r})
-found = find_solver("conforming").solve(scene, 0, 0, scheme="energy_momentum")
-# nodes are numbered otherwise
-places = SolutionField(found).shape.corners.mean(axis=1)
-places = places[np.lexsort(np.round(places, 9).T)]
-answer = [SolutionField(found, k).displacement(places) for k in (0, 1)], found.ledger
-"""
-    one, two = (on_ranks(count, code, tmp_path) for count in (1, 2))
-    assert np.abs(one[0][1]).max() > 1e-3
-    for k in (0, 1):
-        assert two[0][k] == pytest.approx(one[0][k], abs=1e-10 * np.abs(one[0][1]).max())
-    for name in ("strain", "kinetic"):
-        assert two[1][name] == pytest.approx(one[1][name], abs=1e-10 * one[1]["kinetic"].max())
-
-
-def test_the_motion_of_a_membrane_is_compared_over_time(tmp_path):
-    """Two programs that find one motion have one error against the reference, at every time."""
-    scene = bowl_scene(tmp_path, 4, HANGING, duration=0.1, outputs=3, at=0.25)
-    solutions = {
-        "xfem": {0: moved(scene, "xfem", mass="consistent")},
-        "conforming": {0: moved(scene)},
-        "reference": {k: moved(scene, "reference", k) for k in range(3)},
-    }
-    rows = [
-        SolveRecord("case", name, level, Status.SOLVED, size=one.size)
-        for name, own in solutions.items()
-        for level, one in own.items()
-    ]
-    result = assess_accuracy(scene, rows, solutions)
-    one, other = result.solves[:2]
-    for name in ("displacement_l2_max", "displacement_l2_mean", "jump_l2_max"):
-        metric = one.metric(name)
-        assert metric.value == pytest.approx(other.metric(name).value, rel=1e-6)
-        assert 0 < metric.uncertainty < metric.value
-    assert len(one.series["displacement_l2"]) == 3
-    # of the energy that moves: the trapezoidal rule is off by the step's square
-    assert one.metric("energy_drift").value < 1e-3

@@ -8,7 +8,6 @@ from reference_scenes import needs_fenicsx
 from scipy.optimize import brentq
 
 from reference.meshing import imprint_surface, open_cut
-from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.xfem.structured_meshes import rectangle_mesh
@@ -120,27 +119,6 @@ def test_linear_elements_are_those_of_the_compact_solver_where_a_cut_runs_along_
     assert ours.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-8)
 
 
-def test_cuts_through_triangles_agree_with_the_compact_solver_up_to_the_cut_cells(tmp_path):
-    cut = cut_text((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
-    text = support_text("boundary") + weight_text(3) + cut
-    gaps = []
-    for n in (6, 12):
-        ours = solve(tmp_path, [n, n], bowl, text, poisson=0.3)
-        other = solve(tmp_path, [n, n], bowl, text, poisson=0.3, name="xfem")
-        gaps.append(abs(ours.ledger["strain"][0] / other.ledger["strain"][0] - 1))
-    assert gaps[1] < 0.6 * gaps[0] < 0.05
-
-
-def test_levels_of_the_reference_refine_the_surface_that_is_given(tmp_path):
-    text = support_text("boundary") + weight_text(3)
-    cut = cut_text((0.47, -1, -2), (0.56, 2, -2), (0.56, 2, 1), (0.47, -1, 1))
-    found = [solve(tmp_path, [3, 3], bowl, text + cut, 0.3, "reference", k) for k in (0, 1)]
-    assert len(found[1].cells) == 4 * len(found[0].cells)
-    assert found[1].size == 0.5 * found[0].size
-    falls = [f.displacement[0][:, 2].min() for f in found]
-    assert falls[1] == pytest.approx(falls[0], rel=0.05)
-
-
 def test_each_crossing_of_cuts_in_a_surface_opens_into_its_sectors():
     grid = rectangle_mesh([5, 5])
     points = np.column_stack([*grid.points.T, 0.2 * np.sin(3 * grid.points[:, 0])])
@@ -156,13 +134,3 @@ def test_each_crossing_of_cuts_in_a_surface_opens_into_its_sectors():
     x = mesh.points[mesh.cells]
     area = 0.5 * np.abs(np.linalg.det((x[:, 1:] - x[:, :1])[:, :, :2])).sum()
     assert area == pytest.approx(1.0, rel=1e-12)
-
-
-def test_what_is_not_offered_for_membranes_is_said(tmp_path):
-    text = support_text("boundary") + weight_text(3)
-    beside = cut_text((3, 0, -1), (4, 0, -1), (4, 0, 1), (3, 0, 1))
-    with pytest.raises(InputError, match="cut"):
-        solve(tmp_path, [2, 2], bowl, text + beside)
-    exact = "[exact]\nsolution = 'linear'\nparameters = {matrix = [[0, 0, 0]], shift = [0, 0, 0]}\n"
-    with pytest.raises(UnsupportedSceneError, match="membranes"):
-        solve(tmp_path, [2, 2], bowl, text + exact)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx, polyline
 
-from verify.errors import InputError
 from verify.scene import Scene, load_scene
 
 pytestmark = needs_fenicsx
@@ -114,12 +113,6 @@ def test_a_freed_half_falls_by_g_at_finite_rotation_with_every_level_of_the_refe
         assert spread(found.ledger["total"] + found.ledger["kinetic"].max()) < 1e-10
 
 
-def test_levels_halve_the_time_step_with_the_elements():
-    scene = moving(supports=[{"where": "top", "displacement": [0, 0]}], reference={"size": 0.5})
-    steps = [solved(scene, "reference", level).iterations["steps"] for level in (0, 1)]
-    assert steps == [50, 100]
-
-
 def test_supports_that_move_do_the_work_that_the_body_takes_up():
     """A slow ramp ends in the energy of the static stretch; what moves is that much or less."""
     walls = [
@@ -170,28 +163,3 @@ def test_small_elements_are_not_turned_inside_out_when_a_load_is_let_go_at_once(
     ledger = solved(Scene.model_validate(case), "reference", level).ledger
     total = ledger["kinetic"] + ledger["strain"]
     assert np.ptp(total) < 1e-9 * total[0]
-
-
-@pytest.mark.heavy
-def test_small_elements_that_ring_do_not_slow_newton_down(monkeypatch):
-    """From u + Δt v each of the last steps took fourteen iterations and seven factorisations."""
-    from reference.dynamics_step import Stepper
-
-    factorised, count = Stepper._factorise, [0]
-
-    def counted(*arguments):
-        count[0] += 1
-        factorised(*arguments)
-
-    monkeypatch.setattr(Stepper, "_factorise", counted)
-    case = load_scene("dynamics/cantilever_release").model_dump(mode="json", by_alias=True)
-    case["analysis"] |= {"kinematics": "corotational", "duration": 3.75}
-    case |= {"acceptance": [], "quantities": [{"kind": "strain_energy"}]}
-    iterations = solved(Scene.model_validate(case), "reference", 2).iterations
-    assert iterations["newton"] < 7 * iterations["steps"]  # 6.0, with three factorisations
-    assert count[0] < 20
-
-
-def test_an_unknown_scheme_is_named():
-    with pytest.raises(InputError, match="leapfrog"):
-        solved(moving(), scheme="leapfrog")

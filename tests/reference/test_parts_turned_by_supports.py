@@ -89,11 +89,6 @@ def test_a_part_that_is_turned_rigidly_stores_nothing_at_every_angle(solver, see
         assert energy(turned(seed, float(degrees), degree=1 + seed % 2), solver) < LEAST
 
 
-def test_a_box_without_a_structured_mesh_is_meshed_anew_and_turned_alike() -> None:
-    mesh = {"pattern": "unstructured", "sizes": [0.4]}
-    assert energy(turned_in_space(0, 105.0, mesh), "conforming") < LEAST
-
-
 @pytest.mark.heavy
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("solver", ["conforming", "reference"])
@@ -168,24 +163,6 @@ def test_an_unstable_column_is_refused_with_its_energy() -> None:
     cells[half:] = image[cells[half:]][:, [0, 2, 1]]
     with pytest.raises(RuntimeError, match=r"unstable equilibrium, of \S+ J and \S+ J"):
         solve(points, cells, lambda p: p[:, 0] == 0.0, lambda p, f: 0.0 * p, push)
-
-
-def test_modes_that_are_not_positive_are_counted_as_eigenvalues_are() -> None:
-    from petsc4py import PETSc
-
-    from reference.linear_solvers import modes_not_positive
-
-    random = np.random.default_rng(2)
-    for shift in (0.0, 1.5, 3.0):
-        dense = np.diag(np.full(60, 2.0 - shift))
-        for apart in (1, 7):
-            entries = -0.5 * random.uniform(size=60 - apart)
-            dense += np.diag(entries, apart) + np.diag(entries, -apart)
-        matrix = PETSc.Mat().createAIJ((60, 60), nnz=8)
-        for i, j in zip(*np.nonzero(dense), strict=True):
-            matrix.setValue(int(i), int(j), dense[i, j])
-        matrix.assemble()
-        assert modes_not_positive(matrix) == np.count_nonzero(np.linalg.eigvalsh(dense) <= 0.0)
 
 
 @pytest.mark.parametrize("degrees", [1e-6, 30.0, 179.999, 180.0, 300.0])

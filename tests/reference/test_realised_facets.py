@@ -6,7 +6,6 @@ from reference_scenes import needs_fenicsx
 from solid_scenes import cube, polygon, volumes
 
 from reference.meshing import imprint_facets, open_cut, structured_tetrahedra
-from verify.errors import InputError
 
 pytestmark = needs_fenicsx
 
@@ -101,16 +100,3 @@ def test_triangles_that_do_not_fit_the_mesh_are_imprinted_as_polygons():
     assert not found.fitted
     assert area(mesh.realised_cut) == pytest.approx(area(square[[[0, 1, 2], [0, 2, 3]]]), rel=1e-12)
     assert volumes(mesh).sum() == pytest.approx(1.0, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    "facets, words",
-    [
-        (np.zeros((0, 3, 3)), "nothing was cut"),
-        (np.eye(3)[None] * 3.0, "outside"),
-    ],
-)
-def test_what_cannot_be_imprinted_is_named(facets, words):
-    points, cells = structured_tetrahedra((0, 0, 0), (1, 1, 1), (2, 2, 2))
-    with pytest.raises(InputError, match=words):
-        imprint_facets(points, cells, facets)

@@ -5,7 +5,6 @@ import pytest
 from fourth_order import difference
 
 from reference.exact import exact_solution
-from verify.errors import InputError
 from verify.scene import Material, load_scene
 
 PLANE = Material(young=2.0, poisson=0.3, plane="strain")
@@ -68,11 +67,6 @@ def test_energies_are_those_of_the_catalogue():
         both = {"point": [0, 0], "angle": 90.0, "thickness": [h, h], "curvature": [np.pi] * 2}
         body = np.array([[-h, 0.0], [h, 0.0], [h, 1.0], [-h, 1.0]])
         assert made(both, unit).strain_energy(body) == pytest.approx(energy, rel=2e-9)
-
-
-def test_the_energy_of_another_body_is_not_stated():
-    with pytest.raises(InputError, match="thick"):
-        made().strain_energy(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]))
 
 
 def test_the_supports_of_the_case_are_the_ends_of_the_exact_field():

@@ -102,11 +102,6 @@ def test_cuts_that_almost_lie_on_each_other_are_not_taken_for_one(upper):
         graded(square([lower, polyline("b", *upper)]))
 
 
-def test_a_strip_that_would_take_millions_of_cells_is_refused_before_it_is_meshed():
-    with pytest.raises(InputError, match=r"take about \de\+06 cells"):
-        graded(two_cuts(1e-5), level=2)
-
-
 @pytest.mark.parametrize("apart", [1e-2, 1e-3])
 def test_a_strip_between_two_cuts_is_as_many_cells_wide_as_the_level_says(apart):
     for level, rows in ((0, 1), (1, 2)):
@@ -126,16 +121,6 @@ def test_the_reference_of_a_narrow_strip_knows_its_error():
     known = extrapolate(values[:3], [4.0, 2.0, 1.0], theoretical=2, best=4)
     assert abs(values[3] - values[2]) <= known.half_width
     assert known.half_width < 2e-4 * values[3]
-
-
-def test_a_curve_given_as_a_polyline_of_many_vertices_is_no_strip():
-    from reference.meshing.features import close_pairs, plane_features
-
-    angle = np.linspace(0.0, 5.0, 60)
-    ring = np.column_stack([0.5 + 0.2 * np.cos(angle), 0.5 + 0.2 * np.sin(angle)])
-    assert close_pairs(plane_features(square([polyline("a", *ring)])), 1e-7, 0.1) == []
-    hairpin = polyline("a", (0.2, 0.5), (0.8, 0.5), (0.8, 0.51), (0.2, 0.51))
-    assert close_pairs(plane_features(square([hairpin])), 1e-7, 0.1) == [(4, 6)]
 
 
 def circle(name, x, y, radius, start=0.0, sweep=360.0):
@@ -171,13 +156,6 @@ def test_an_arc_that_touches_tangentially_is_refused(what):
     cuts, names = TANGENT[what]
     with pytest.raises(InputError, match=f"{names} touch tangentially"):
         graded(square(cuts))
-
-
-def test_an_arc_that_goes_on_where_a_line_ends_is_no_contact():
-    cuts = [polyline("a", (0.2, 0.3), (0.5, 0.3)), circle("b", 0.5, 0.5, 0.2, 270.0, 90.0)]
-    mesh = graded(square(cuts))
-    length = np.linalg.norm(np.diff(mesh.realised_cut, axis=1), axis=2).sum()
-    assert length == pytest.approx(0.3 + 0.1 * np.pi, rel=1e-3)
 
 
 def test_a_cut_that_ends_in_a_support_opens_there_and_its_levels_approach_each_other():

@@ -73,22 +73,6 @@ def test_the_mean_force_of_a_step_is_a_discrete_gradient_and_turns_nothing(degre
         assert np.abs(force.sum(axis=0)).max() < 1e-12 * np.abs(force).sum()
 
 
-def test_the_mean_force_of_a_step_that_does_not_move_is_the_force_there():
-    mechanics, x = law(1)
-    u = 0.1 * np.random.default_rng(2).standard_normal(x.size)
-    force = mechanics.force(u)
-    assert mechanics.averaged(u, u) == pytest.approx(force, abs=1e-12 * np.abs(force).max())
-    # and its tangent is the slope of the mean force, half of that of the force
-    v = np.random.default_rng(3).standard_normal(u.size)
-    change = 1e-6 * v
-    slope = (mechanics.averaged(u, u + change) - mechanics.averaged(u, u - change)) / 2e-6
-    matrix = mechanics.averaged_tangent(u, u)
-    a, b = matrix.createVecs()
-    a.array[:] = v
-    matrix.mult(a, b)
-    assert b.array == pytest.approx(slope, abs=1e-7 * np.abs(slope).max())
-
-
 def test_a_cut_body_that_tumbles_keeps_energy_and_momenta():
     """Spun about no axis of symmetry, its halves stretched by centrifugal forces."""
     ledger = solved(moving([MIDDLE], initial=SPIN), scheme="energy_momentum").ledger
@@ -99,19 +83,6 @@ def test_a_cut_body_that_tumbles_keeps_energy_and_momenta():
     for axis in "xyz":
         assert np.ptp(ledger[f"angular_momentum_{axis}"]) < 1e-10 * total[0]
         assert np.ptp(ledger[f"linear_momentum_{axis}"]) < 1e-10 * 1000
-
-
-def test_a_freed_half_falls_by_g_while_the_other_sags():
-    scene = moving(
-        [MIDDLE],
-        supports=[{"where": "top", "displacement": [0, 0, 0]}],
-        loads=[{"kind": "gravity", "acceleration": [0, 0, -0.98]}],
-    )
-    found = solved(scene, scheme="energy_momentum")
-    lower = np.unique(found.cells[found.points[found.cells, 2].mean(axis=1) < 0.5])
-    fall = np.tile([0.0, 0.0, -0.1225], (len(lower), 1))
-    assert found.displacement[-1][lower] == pytest.approx(fall, abs=1e-9)
-    assert np.ptp(found.ledger["total"]) < 1e-10 * found.ledger["kinetic"].max()
 
 
 def test_cuts_that_open_one_after_the_other_set_one_piece_after_the_other_free():
@@ -144,66 +115,6 @@ def test_cuts_that_open_one_after_the_other_set_one_piece_after_the_other_free()
     assert np.diff(later, 2) == pytest.approx(np.full(2, -0.98 * 0.01), abs=1e-9)
     assert np.abs(np.diff(fallen["middle"][:3], 2) + 0.98 * 0.01).max() > 1e-4
     assert np.ptp(found.ledger["total"]) < 1e-10 * found.ledger["kinetic"].max()
-
-
-def test_every_facet_of_a_curved_cut_is_known_to_be_its_own():
-    """A tube crossed by a plane: each opens alone to the faces that it has."""
-    from reference.dynamics_cuts import opening_times, partly_opened
-    from reference.meshing import Grading, conforming_mesh
-
-    tube = {
-        "kind": "cylinder",
-        "name": "tube",
-        "base": [0.5, 0.5, -0.5],
-        "axis": [0.0, 0.0, 1.0],
-        "radius": 0.3,
-        "height": 2.0,
-    }
-    scene = moving([{**tube, "opens_at": 0.1}, {**MIDDLE, "opens_at": 0.2}])
-    mesh = conforming_mesh(scene, Grading(0.2, np.zeros((0, 3))))
-    areas, pieces = [], []
-    times = opening_times(scene, mesh)
-    for opened in [times == 0.1, times == 0.2, times < 0.1]:
-        part = partly_opened(mesh, opened)
-        a, b, c = part.realised_cut.swapaxes(0, 1)
-        areas.append(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-        pieces.append(part.pieces.max() + 1)
-    assert areas[0] == pytest.approx(2 * np.pi * 0.3, rel=0.02)  # facets: h²/24R²
-    assert areas[1] == pytest.approx(1.0, rel=1e-6)
-    assert pieces == [2, 2, 1]
-
-
-@pytest.mark.parametrize("kinematics", ["linear", "corotational"])
-def test_a_prestressed_body_stays_where_statics_finds_it_until_its_cut_opens(kinematics):
-    """Half cut from the start, cut through at 0.2 s: at rest before, its lower half falls after."""
-    half = polygon("half", (-1, -1, 0.5), (0.5, -1, 0.5), (0.5, 2, 0.5), (-1, 2, 0.5))
-    rest = polygon("rest", (0.5, -1, 0.5), (2, -1, 0.5), (2, 2, 0.5), (0.5, 2, 0.5))
-    given = {
-        "supports": [{"where": "top", "displacement": [0, 0, 0]}],
-        "loads": [{"kind": "gravity", "acceleration": [0, 0, -0.98]}],
-    }
-    motion = {
-        "kind": "dynamic",
-        "kinematics": kinematics,
-        "duration": 0.3,
-        "time_step": 0.02,
-        "outputs": 4,
-    }
-    start = {"kind": "equilibrium", "cuts": "open"}
-    late = [half, {**rest, "opens_at": 0.2}]
-    found = solved(moving(late, analysis=motion, initial=start, **given))
-    static = solved(moving([half], analysis={"kinematics": kinematics}, **given))
-    assert found.times == pytest.approx([0.0, 0.1, 0.2, 0.3])
-    sag = static.displacement[0][:, 2].min()
-    for at_rest in found.displacement[:3]:
-        assert at_rest[:, 2].min() == pytest.approx(sag, rel=1e-7)
-        assert at_rest == pytest.approx(found.displacement[0], abs=1e-7 * abs(sag))
-    assert found.ledger["strain"][:3] == pytest.approx(static.ledger["strain"][0], rel=1e-7)
-    cells = found.cells[found.points[found.cells, 2].mean(axis=1) < 0.5]
-    corners = found.points[cells]
-    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-    means = found.displacement[:, cells, 2].mean(axis=2) @ volume / volume.sum()
-    assert means[3] - means[2] == pytest.approx(-0.49 * 0.1**2, rel=1e-6)
 
 
 BLADE = {

@@ -7,8 +7,6 @@ from solid_scenes import EXACT, cube
 
 from reference.exact import exact_solution
 from verify.compare.patches import patches_of
-from verify.compare.solid import solid_of
-from verify.compare.surface_rule import surface_rule
 from verify.scene import SphereCut
 from verify.solvers import find_solver
 
@@ -55,13 +53,6 @@ def test_the_nearest_points_of_a_cap_are_those_of_its_fine_triangulation():
     assert (vertices >= low - 1e-12).all()
     assert (vertices <= high + 1e-12).all()
     np.testing.assert_allclose(np.ptp(vertices, axis=0), high - low, rtol=1e-3)
-
-
-def test_the_quadrature_on_the_cut_has_the_area_of_the_sphere_inside_the_body():
-    # a whole sphere inside the cube, of which nothing is trimmed
-    scene = cube([{"kind": "sphere", "centre": [0.45, 0.5, 0.55], "radius": 0.3}])
-    rule = surface_rule(solid_of(scene), 0.1)
-    assert rule.weights.sum() == pytest.approx(4 * np.pi * 0.3**2, rel=1e-3)
 
 
 def test_the_compact_solver_has_the_energy_of_the_shell_with_order_two():

@@ -7,10 +7,8 @@ import subprocess
 import zlib
 
 import pytest
-from synthetic_studies import STUDIES
 
 from verify.report.printing import BROWSERS, print_page
-from verify.report.study_page import render_study
 
 pytestmark = pytest.mark.browser
 
@@ -81,28 +79,6 @@ def test_the_page_opens_whole_without_errors_and_does_not_overflow(
     assert found["images"] == found["loaded"] == 13
     assert found["content"] <= width, found["left"]
     assert found["left"] == []
-
-
-@pytest.mark.parametrize("kind", STUDIES)
-def test_pages_of_studies_fit_a_phone(browser, studies, tmp_path, kind):
-    page = probed(render_study(studies, kind), tmp_path / "source")
-    found, console = opened(browser, page, 390, tmp_path)
-    assert console == []
-    assert found["content"] <= 390, found["left"]
-    assert found["left"] == []
-
-
-def test_the_browser_test_would_see_an_overflow_a_broken_image_and_an_error(browser, tmp_path):
-    page = tmp_path / "source" / "bad.html"
-    page.parent.mkdir()
-    page.write_text(
-        "<!DOCTYPE html><body><div style='width:900px'>x</div><img src='data:image/png;base64,AA'>"
-        f"<script>console.error('seen')</script>{PROBE}</body>"
-    )
-    found, console = opened(browser, page, 390, tmp_path)
-    assert found["content"] > 390
-    assert found["loaded"] < found["images"]
-    assert any("seen" in line for line in console)
 
 
 def test_the_print_has_no_empty_page_and_two_pages_a_case_at_most(browser, pictured_run, tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic_run import cut_square
 
-from verify.report.bodies import deformed_body, zoomed
+from verify.report.bodies import deformed_body
 from verify.report.error_maps import scale_top
 from verify.report.tips import plane_tips
 
@@ -22,28 +22,6 @@ def test_a_solver_that_errs_a_hundred_times_more_does_not_wash_the_others_out():
     others = [body_with(np.linspace(0.0, most, 50)) for most in (1.0, 1.2, 1.5)]
     assert scale_top(others) == 1.5
     assert scale_top([*others, body_with([100.0])]) == pytest.approx(2 * 1.2, rel=0.05)
-
-
-def test_a_single_node_does_not_set_the_scale_and_a_local_error_is_not_lost():
-    spike = body_with([1.0])
-    spike.values[3] = 1000.0
-    assert scale_top([spike]) == pytest.approx(2.0)
-    local = body_with([0.0])
-    local.values[3] = 5.0
-    assert scale_top([local]) == 5.0
-
-
-def test_a_window_keeps_the_triangles_that_reach_into_it_with_their_own_values():
-    body = deformed_body(cut_square(8), 0.0)
-    body = replace(body, values=body.points[:, 0] + 10 * body.points[:, 1])
-    part = zoomed(body, (0.3, 0.45, 0.1, 0.2))
-    assert 0 < len(part.triangles) < len(body.triangles)
-    np.testing.assert_array_equal(part.values, part.points[:, 0] + 10 * part.points[:, 1])
-    low, high = part.points[part.triangles].min(axis=1), part.points[part.triangles].max(axis=1)
-    assert (high[:, 0] > 0.3).all()
-    assert (low[:, 0] < 0.45).all()
-    assert part.element_edges.max() < len(part.points)
-    assert not len(zoomed(body, (3.0, 4.0, 3.0, 4.0)).triangles)
 
 
 @pytest.mark.parametrize(

@@ -1,24 +1,20 @@
 """Claims about the figures: what is drawn lies where its number says."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from synthetic_run import make_run
 
 from verify.report import load_run
-from verify.report.case_view import case_view, floor_text, required_slope
+from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
 from verify.report.figures import convergence
-from verify.report.figures.convergence import convergence_panel, error_range, slope_triangle
+from verify.report.figures.convergence import convergence_panel, error_range
 from verify.report.figures.style import (
     Palette,
     drawing,
 )
-from verify.report.pictures import CasePictures
-from verify.report.run_directory import CaseEntry
 from verify.result import Metric, SolveRecord, Status
 
 
@@ -45,15 +41,6 @@ def drawn(monkeypatch):
         return kept[0]
 
     return of
-
-
-@pytest.mark.parametrize("slope", [0.5, 0.98, 1.95, 2.0])
-def test_the_slope_triangle_has_its_slope(slope):
-    axes = Figure().add_subplot()
-    slope_triangle(axes, 1e-2, 1e-1, 1e-4, slope, "")
-    (x0, y0), (x1, _), (x2, y2), _ = axes.lines[0].get_xydata()
-    assert x1 == x2
-    assert math.log10(y2 / y0) / math.log10(x2 / x0) == pytest.approx(slope, rel=1e-12)
 
 
 def test_a_failed_level_ends_the_curve_and_is_marked(results, drawn):
@@ -129,30 +116,3 @@ def test_time_is_added_repetition_by_repetition():
     assert (time.low, time.median, time.high) == (3.0, 6.0, 10.0)
     assert time.meshing == 100.0
     assert time.phases == ("assembly", "solve")
-
-
-def shown(result):
-    return case_view(0, CaseEntry(result.case, None, result), CasePictures(), Palette())
-
-
-def with_errors(result, errors, uncertainty=0.0):
-    """Return the result with these errors of XFEM, level by level, and no other solver."""
-    solves = [
-        SolveRecord("c", "xfem", level, Status.SOLVED, size=0.1 / 2**level,
-                    metrics=[Metric("energy_norm", error, "1", None, uncertainty)])
-        for level, error in enumerate(errors)
-    ]  # fmt: skip
-    return replace(result, solves=solves, rates=[], verdicts=[])
-
-
-def test_what_is_exact_to_round_off_is_a_line_of_text_with_its_number(results):
-    view = shown(with_errors(results["statics/f3_inclined"], [3e-15, 2e-14]))
-    assert view.convergence == []
-    (said,) = view.convergence_notes
-    assert "exact to round-off (at most 2.0×10⁻¹⁴) on every level: XFEM" in said
-
-
-def test_points_below_the_uncertainty_are_named_and_not_drawn(results):
-    view = shown(with_errors(results["statics/f3_inclined"], [0.3, 0.1, 0.01], 0.02))
-    assert "not drawn: XFEM, level 2" in view.convergence_notes[0]
-    assert "0.1 at h = 0.05 m" in view.convergence[0].panels[0].alt

@@ -10,7 +10,6 @@ import pytest
 from page_parser import parsed
 from synthetic_run import make_run
 
-from verify.cli.verdict_text import verdict_lines
 from verify.report import render
 from verify.result import Notice, NoticeKind, read_result, write_result
 
@@ -31,13 +30,6 @@ def warned(tmp_path_factory):
     return root, read_result(file)
 
 
-def test_notices_are_read_as_they_were_written(warned):
-    _, result = warned
-    assert [notice.kind for notice in result.notices] == ["warning", "unavailable"]
-    assert result.warnings == result.notices[:1]
-    assert result.warnings[0].text == CLOSED
-
-
 def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge(warned):
     page = (warned[0] / "report.html").read_text()
     top, case = page.index("Warned of"), page.index('id="case-1"')
@@ -51,12 +43,6 @@ def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge
     assert CLOSED in inside[banner : banner + 400]
     assert inside.index("1 warning") < banner
     parsed(page)
-
-
-def test_notices_stand_on_the_terminal_below_the_verdict(warned):
-    lines = list(verdict_lines([warned[1]]))
-    assert lines[1].strip() == f"WARNING: cut 0 (xfem): {CLOSED}"
-    assert lines[2].strip() == f"UNAVAILABLE: K_I: {NO_TIP}"
 
 
 def test_notices_stand_in_every_export(warned):

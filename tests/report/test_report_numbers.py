@@ -1,12 +1,10 @@
 """A number and the interval that it lies in are written so that the width can be seen."""
 
-from types import SimpleNamespace
-
 import pytest
 
-from verify.report.notation import error_text, signed, with_interval
+from verify.report.notation import error_text, with_interval
 from verify.report.sliver_view import graded
-from verify.report.tables import check_row, checks_table, reasons_table
+from verify.report.tables import check_row
 from verify.result import Verdict, VerdictRecord
 
 
@@ -81,27 +79,3 @@ def test_a_graded_number_is_not_rounded_up_to_the_grade_that_it_misses(value, gr
 def test_a_graded_number_is_not_rounded_down_to_what_it_exceeds(value, grade, written):
     cell = graded(value, (1e3, 1e4, 1e6), most=True)
     assert (cell.grade, cell.text.split(" ")[1]) == (grade, written)
-
-
-def test_a_signed_number_that_is_written_as_zero_has_no_sign():
-    assert [signed(v) for v in (-1e-9, 1e-9, -0.356, 0.2)] == ["0.00", "0.00", "−0.36", "+0.20"]
-
-
-def test_verdicts_of_many_solvers_stand_side_by_side_and_what_did_not_pass_is_explained():
-    def record(solver, verdict):
-        return VerdictRecord("error", solver, "energy_norm", verdict, 0.0612, 0.06, 0.0624,
-                             "relative error ≤ 0.05", f"because of {solver}")  # fmt: skip
-
-    names = [f"solver{k}" for k in range(12)]
-    verdicts = [record(n, Verdict.FAIL if n == "solver7" else Verdict.PASS) for n in names]
-    result = SimpleNamespace(verdicts=verdicts)
-    table, reasons = checks_table(result), reasons_table(result)
-    assert [cell.text for cell in table.head] == ["check, limit", *names]
-    ((check, *cells),) = table.rows
-    assert (check.text, check.note) == ("relative energy-norm error", "relative error ≤ 0.05")
-    assert [n for n, c in zip(names, cells, strict=True) if c.verdict == "FAIL"] == ["solver7"]
-    assert {cell.note for cell in cells} == {"0.061"}
-    assert [row[3].note for row in reasons.rows] == ["because of solver7"]
-    few = SimpleNamespace(verdicts=verdicts[:4])
-    assert len(checks_table(few).rows) == 4
-    assert reasons_table(few) is None

@@ -10,7 +10,7 @@ from synthetic_run import make_run
 from verify.report.figures import profiles
 from verify.report.figures.style import Palette, drawing
 from verify.report.opening_view import opening_figures
-from verify.result import OpeningCurve, OpeningProfile, read_result, write_result
+from verify.result import OpeningCurve, OpeningProfile, read_result
 
 ARC = [0.0, 0.1, 0.2, 0.3]
 WIDTH = [0.0, 0.002, 0.002, 0.0]
@@ -70,9 +70,3 @@ def test_a_solver_that_blew_up_is_named_and_does_not_hide_the_others(drawn, valu
     (figure,), ((lines, _),) = drawn(profile(curve("reference", 2), curve("xfem"), odd))
     assert list(lines) == ["reference", "XFEM"]
     assert "left out: guest" in figure.caption
-
-
-def test_profiles_are_read_as_they_were_written(result, tmp_path):
-    whole = replace(result, openings=[profile(curve("reference", 2, band=WIDTH), time=0.5)])
-    write_result(whole, tmp_path / "result.json")
-    assert read_result(tmp_path / "result.json") == whole

@@ -51,15 +51,6 @@ def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(
     assert stored == json.loads((root / "ranking.json").read_text())
 
 
-def test_failed_and_refused_solves_and_undecided_checks_stand_in_the_section(tmp_path):
-    root = make_run(tmp_path / "run", pictures=False)
-    ranked(root)
-    said = text_of(root).partition("solvers on")[2].partition("How to read this")[0]
-    for words in ("killed after 60 s", "cannot do a tip inside an element", "level 3 timeout",
-                  "not clearly below the error 0.12"):  # fmt: skip
-        assert words in said
-
-
 def test_a_solver_that_does_not_conform_carries_a_mark_wherever_it_is_ranked(tmp_path, suite):
     root = make_run(tmp_path / "run", pictures=False)
     ranked(root, conformance=True)
@@ -83,25 +74,6 @@ def test_conformance_is_taken_over_until_the_solver_changes(tmp_path, suite, mon
     monkeypatch.setattr(runner_ranking, "code_of_solver", lambda name: "changed")
     ranked(root, conformance=True)
     assert len(suite) == 2 * len(first)
-
-
-def test_the_suite_runs_unasked_only_for_more_than_two_solvers(tmp_path, suite):
-    root = make_run(tmp_path / "run", pictures=False)
-    results = load_run(root).results
-    two = [r for r in results if not any(s.solver == "other" for s in r.solves)]
-    rank_run(root, two, {}, None, 10.0, lambda text: None)
-    assert suite == []
-    rank_run(root, results, {}, None, 10.0, lambda text: None)
-    assert len(suite) == 2
-
-
-@pytest.mark.parametrize("content", ["", "[]", '{"schema": 2}', '{"schema": 1, "cases": [1]}'])
-def test_a_damaged_ranking_is_a_note_and_no_crash(tmp_path, content):
-    root = make_run(tmp_path / "run", pictures=False)
-    (root / "ranking.json").write_text(content)
-    said = text_of(root)
-    assert "ranking.json" in said
-    assert "solvers on" not in said
 
 
 def test_a_solver_that_solved_nothing_is_not_asked_for_more(tmp_path, suite):

@@ -1,13 +1,8 @@
 """Claims about the plot of a reference's time to accuracy: what is drawn lies where it belongs."""
 
-import json
-
 import numpy as np
 import pytest
-from page_parser import parsed
-from synthetic_run import make_run
 
-from verify.report import render
 from verify.report.figures import studies
 from verify.report.figures.accuracy import accuracy_figure
 
@@ -61,18 +56,3 @@ def test_a_level_without_a_time_or_with_a_bound_of_zero_is_a_gap_and_not_bridged
     exact["level 2"]["strain_energy"] = 0.0
     _, (panel,) = drawn(exact)
     assert [np.isfinite(nodes).all(axis=1).tolist() for nodes in panel] == [[True, True, False]]
-
-
-def test_the_page_has_the_plot_above_the_table_of_the_same_numbers(tmp_path):
-    root = make_run(tmp_path / "run", pictures=False)
-    file = root / "cases" / "statics__tissue_strip" / "result.json"
-    result = json.loads(file.read_text())
-    result["reference"]["time_to_accuracy"] = levels_of((*QUANTITIES, *NORMS))
-    file.write_text(json.dumps(result))
-    text = render(root).read_text(encoding="utf-8")
-    said = [svg["aria-label"] for svg in parsed(text).all("svg")]
-    said = [label for label in said if label.startswith("relative error of") and "bound" in label]
-    assert len(said) == 2
-    assert "opening: 0.05 at 0.25, 0.00313 at 1, 0.000195 at 4." in said[0]
-    plot = text.index("bounds of its relative errors against the wall time")
-    assert plot < text.index("Reference: time to accuracy; of errors")

@@ -4,8 +4,6 @@ import pytest
 from page_parser import parsed
 from synthetic_studies import HOSTILE, STUDIES
 
-from verify.cli import main
-from verify.errors import InputError
 from verify.report.study_page import render_study
 
 
@@ -38,16 +36,3 @@ def test_numbers_of_studies_are_those_of_the_record(studies):
         ("calibration", "2.00"), ("calibration", "1 marks, 0 not covered"),
     ):  # fmt: skip
         assert said in texts[kind], (kind, said)
-
-
-def test_every_study_of_a_directory_is_rendered_again_in_the_form_that_is_asked_for(
-    studies, capsys
-):
-    assert main(["report", str(studies), "--format", "markdown"]) == 0
-    assert capsys.readouterr().out.count("report: ") == len(STUDIES)
-
-
-def test_a_record_of_another_kind_is_one_line(studies, tmp_path):
-    (tmp_path / "cost.json").write_text((studies / "budget.json").read_text())
-    with pytest.raises(InputError, match="kind is"):
-        render_study(tmp_path, "cost")

@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 
 import pytest
-from command_line import run_here
 
 pytest.importorskip("distributed")
 
@@ -84,37 +83,3 @@ def test_a_killed_worker_loses_nothing(verify, cluster):
     wait_for(lambda: not alive(solving), "the solve outlived its worker")
     solves = (verify.folder / "solves").read_text().splitlines()
     assert len(solves) == 2  # what the dead worker had finished was not solved again
-
-
-@pytest.mark.heavy
-def test_references_take_their_ranks_on_the_worker(verify, cluster):
-    pytest.importorskip("mpi4py")
-    case = (verify.folder / "square.toml").read_text() + "[reference]\nsize = 0.5\ndegree = 1\n"
-    cut = '[[cuts]]\nkind = "polyline"\npoints = [[-0.1, 0.53], [0.5, 0.53]]\n'
-    (verify.folder / "square.toml").write_text(case + cut)
-    done = verify("run", "square.toml", "--out", "out", "--solver", "reference", "--no-cache",
-                  "--cluster", cluster, "--ranks", "2")  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    notes = [record["notes"] for record in verify.records().values()]
-    assert [note["ranks"] for note in notes] == ["2"] * 3
-    assert all("worker" in note for note in notes)
-
-
-def test_a_stopped_run_leaves_nothing_running_on_the_workers(verify, cluster):
-    mark = verify.folder / "mark"
-    process = run(verify, cluster, "fake_solvers:HangingOnce")
-    wait_for(lambda: mark.exists() and mark.read_text(), "no worker took the solve")
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == 130, err
-    wait_for(lambda: not alive(int(mark.read_text())), "the solve outlived its run", 20)
-
-
-def test_no_scheduler_is_one_line_and_writes_nothing(verify, monkeypatch):
-    monkeypatch.setattr("verify.runner.cluster._CONNECT_SECONDS", 1.0)
-    words = ("run", "square.toml", "--out", "out", "--cluster", "tcp://127.0.0.1:9")
-    done = run_here(words, verify.folder)
-    assert done.returncode == 2
-    assert done.stderr.startswith("verify: error: --cluster: no scheduler answers at")
-    assert len(done.stderr.splitlines()) == 1
-    assert not (verify.folder / "out").exists()

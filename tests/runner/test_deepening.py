@@ -9,7 +9,6 @@ import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.assess.sufficiency import sufficiency
-from verify.errors import InputError
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.runner.deepening import further_level, levels_in_vain
@@ -110,13 +109,6 @@ def test_levels_wait_in_vain_when_fewer_than_three_can_have_an_answer(scene, sta
     assert not levels_in_vain(four, levels[0], levels[0].blank(status, "why"), levels[1:])
     assert not levels_in_vain(three, levels[0], levels[0].blank(Status.SOLVED, ""), waiting)
     assert not levels_in_vain(three, others[0], others[0].blank(status, "why"), waiting)
-
-
-def test_fewer_levels_at_most_than_at_least_are_refused(tmp_path):
-    file = tmp_path / "slit.toml"
-    file.write_text(CASE.format(most=3).replace("levels = 3\n", "levels = 4\n", 1))
-    with pytest.raises(InputError, match="max_levels 3 is below levels 4"):
-        load_scene(file)
 
 
 @pytest.mark.fenicsx

@@ -4,7 +4,7 @@ import pytest
 from test_resume import SLOW, wait_for
 
 from verify.errors import InputError
-from verify.runner.directory import RunDirectory, claimed
+from verify.runner.directory import claimed
 
 IDENTITY = {"cases": ["a"], "options_of_result": {"repetitions": 1}}
 
@@ -45,20 +45,6 @@ def test_a_run_with_other_cases_or_options_is_refused_with_the_command_that_resu
     assert contents(verify.folder / "out") == before
 
 
-def test_a_directory_that_is_not_a_run_is_refused(verify):
-    (verify.folder / "out").mkdir()
-    (verify.folder / "out/thesis.tex").write_text("precious")
-    said = refused(verify, "square.toml", "--solver=fake_solvers:Instant", "--out", "out")
-    assert "empty" in said
-    assert [p.name for p in (verify.folder / "out").iterdir()] == ["thesis.tex"]
-
-
-def test_a_run_that_died_before_its_first_word_is_started_afresh(tmp_path):
-    (tmp_path / ".lock").touch()
-    with claimed(tmp_path, IDENTITY) as directory:
-        assert directory.root == tmp_path
-
-
 def test_the_lock_goes_with_the_run(tmp_path):
     with (
         claimed(tmp_path, IDENTITY),
@@ -68,16 +54,3 @@ def test_the_lock_goes_with_the_run(tmp_path):
         pass
     with claimed(tmp_path, IDENTITY):
         pass
-
-
-def test_a_damaged_run_file_is_said(tmp_path):
-    (tmp_path / "run.json").write_text("{")
-    with pytest.raises(InputError, match="not a JSON file"), claimed(tmp_path, IDENTITY):
-        pass
-
-
-@pytest.mark.parametrize("name", ["statics/f1", "a b", "..", ".hidden", "ünï"])
-def test_every_case_has_a_folder_of_its_own_below_the_run(tmp_path, name):
-    folder = RunDirectory(tmp_path).solve_folder(name, "my.module:Solver", 3)
-    assert folder.resolve().parent.parent == tmp_path / "cases"
-    assert folder.name == "my.module_Solver-3"

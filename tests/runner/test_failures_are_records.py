@@ -55,18 +55,6 @@ def test_a_solve_that_eats_memory_is_killed_and_its_peak_recorded(verify):
     assert 0.4e9 < record["peak_memory"] < 1.5e9
 
 
-def test_what_kernels_took_to_compile_is_said_and_recorded(verify):
-    done = verify(
-        "run", "square.toml", "--solver=fake_solvers:Compiling", "--solver=fake_solvers:Instant",
-        "--out", "out",
-    )  # fmt: skip
-    compiling = verify.records()["Compiling", 0]
-    seconds = float(compiling["notes"]["compiling"].removesuffix(" s"))
-    assert 0.5 < seconds < compiling["wall"]
-    assert f"of them {seconds} s compiling kernels (first use)" in done.stderr
-    assert "compiling" not in verify.records()["Instant", 0]["notes"]
-
-
 def test_memory_time_threads_and_repetitions_are_recorded(verify):
     verify(
         "run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "4", "--out", "out"

@@ -6,11 +6,6 @@ import pytest
 from small_disk import small_disk
 
 from verify.json_files import read_json
-from verify.result import Status
-from verify.runner.job import Job
-from verify.runner.reference_cache import ReferenceCache
-from verify.scene import load_scene
-from verify.solution import write_solution
 
 RUN = ("run", "square.toml", "--solver=fake_solvers:Instant", "--repetitions", "1", "--out")
 
@@ -57,43 +52,3 @@ def test_a_run_on_a_disk_that_fills_says_so_and_is_resumed_where_there_is_room(v
         assert second.returncode == 0, second.stderr
         assert second.stderr.count("reused") == len(finished)
         assert numbers(out) == roomy["numbers"]
-
-
-def test_a_report_that_does_not_fit_leaves_the_one_before(verify):
-    with small_disk(verify.folder / "disk", "4m") as disk:
-        out = disk.root / "out"
-        assert verify(*RUN, out).returncode == 0
-        assert verify("report", out).returncode == 0
-        before = (out / "report.html").read_bytes()
-        disk.fill()
-        done = verify("report", out)
-        assert done.returncode == 3, done.stderr
-        assert done.stderr.count("\n") == 1
-        assert f"No space left on device ({out}" in done.stderr
-        assert (out / "report.html").read_bytes() == before
-        assert not list(out.rglob("*.partial"))
-
-
-def test_a_reference_that_does_not_fit_the_cache_is_not_kept_and_not_found(
-    tmp_path, case_text, monkeypatch
-):
-    from fake_solvers import Instant
-
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    (tmp_path / "square.toml").write_text(case_text + '[reference]\nkind = "conforming"\n')
-    scene = load_scene(tmp_path / "square.toml")
-    folder = tmp_path / "solve"
-    folder.mkdir()
-    job = Job("square", "reference", 0, 1, "any", folder)
-    write_solution(Instant().field(16, 1), folder / "solution")
-    record = job.blank(Status.SOLVED, "")
-    for size in ("4k", "12k"):
-        with small_disk(tmp_path / f"disk-{size}", size) as disk:
-            cache = ReferenceCache(disk.root / "cache")
-            said = cache.keep(scene, job, record)
-            assert said.startswith("not kept in the reference cache: No space left on device")
-            assert cache.take(scene, job) is None
-            assert not list((disk.root / "cache").glob("*"))
-            disk.resize("4m")
-            assert cache.keep(scene, job, record) == ""
-            assert cache.take(scene, job) is not None

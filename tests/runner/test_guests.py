@@ -1,10 +1,5 @@
 """Misbehaviour of a guest is a row with its reason: nobody else loses a verdict, the run ends."""
 
-import os
-import time
-from pathlib import Path
-
-import guests
 import pytest
 
 from verify.result import Status, read_result
@@ -53,13 +48,6 @@ PROCESSES = {
     "Killed": (Status.FAILED, "killed from outside (signal 9), not for memory"),
     "Removing": (Status.SOLVED, ""),
     "DyingRefusal": (Status.FAILED, "died when asked about the case: said nothing (exit code 0)"),
-}
-SLOW = {
-    "Talkative": (Status.SOLVED, ""),
-    "Staying": (Status.SOLVED, ""),
-    "Stopping": (Status.TIMEOUT, "killed after 20 s"),
-    "Leaving": (Status.TIMEOUT, "killed after 20 s"),
-    "Undecided": (Status.TIMEOUT, "killed after 20 s without saying whether it takes the case"),
 }
 
 
@@ -116,21 +104,6 @@ def test_whatever_it_does_to_its_process_it_is_a_row(verify):
     assert sorted(path.name for path in verify.folder.iterdir()) == ["out", "square.toml"]
 
 
-def test_what_it_removes_of_solves_that_are_finished_costs_nobody_a_verdict(verify):
-    # one at a time: a solve whose folder goes while it writes there is lost, and a row that says so
-    _, rows, done = run(verify, ["Removing"], "-j1")
-    assert_rows(rows, {"Removing": PROCESSES["Removing"]})
-    assert done.returncode == 0
-
-
-@pytest.mark.heavy
-def test_every_process_that_misbehaves_is_a_row(verify):
-    names = [name for name in PROCESSES if name != "Removing"]
-    _, rows, done = run(verify, names)
-    assert_rows(rows, {name: PROCESSES[name] for name in names})
-    assert done.returncode == 3
-
-
 @pytest.mark.heavy
 def test_numbers_that_are_absurd_are_compared_beside_the_others(verify):
     result, rows, _ = run(verify, COMPARED)
@@ -142,25 +115,3 @@ def test_numbers_that_are_absurd_are_compared_beside_the_others(verify):
     assert "cover 2 of the body" in rows["Twice"].notes["comparison"]
     assert "outside the body" in rows["FarAway"].notes["comparison"]
     assert result.verdicts == [] or all(v.solver for v in result.verdicts)
-
-
-@pytest.mark.heavy
-def test_who_hangs_is_stopped_with_all_that_it_started(verify):
-    start = time.monotonic()
-    _, rows, _ = run(verify, SLOW, "--timeout=20")
-    assert time.monotonic() - start < 400
-    assert_rows(rows, SLOW)
-    pids = (verify.folder / "pids").read_text().split()
-    assert len(pids) == 2
-    assert not [pid for pid in pids if Path("/proc", pid, "exe").exists()]
-    log = verify.folder / "out/cases/square/guests_Talkative-0/log.txt"
-    assert log.stat().st_size < 200 * 2**20
-    assert rows["Staying"].notes["ended"].startswith("had answered")
-    assert os.getcwd() != "/"
-
-
-def test_guests_are_all_listed():
-    own = {
-        n for n, c in vars(guests).items() if isinstance(c, type) and issubclass(c, guests.Guest)
-    }
-    assert own - {"Guest"} == {*ANSWERS, *ASKED, *COMPARED, *PROCESSES, *SLOW}

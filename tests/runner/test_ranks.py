@@ -1,11 +1,6 @@
 """References on several MPI ranks: the same answer, the same endings, nothing left running."""
 
-import os
-import signal
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,20 +26,6 @@ BOX = (
     + cut_text([-0.1, -0.1, 0.52], [0.5, -0.1, 0.52], [0.5, 1.1, 0.52], [-0.1, 1.1, 0.52])
     + "[reference]\nsize = 1.0\ndegree = 1\n"
 )
-
-
-def gone(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
-
-
-def wait_for(condition, what, seconds=60):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, what
-        time.sleep(0.05)
 
 
 @pytest.fixture
@@ -90,36 +71,6 @@ def test_two_ranks_give_the_answer_of_one_and_say_so(verify, job):
     assert np.abs(difference).max() <= 1e-10 * np.abs(one.displacement).max()
 
 
-def test_a_time_limit_ends_all_ranks(job):
-    child = job("fake_solvers:HangingRanks", timeout=5.0)
-    ending = ended(child)
-    assert ending.killed_for == "timeout"
-    started = [int(p.name) for p in Path(os.environ["HANG_MARK"]).iterdir()]
-    assert len(started) == 2
-    wait_for(lambda: all(map(gone, started)), "a rank outlived its solve", 20)
-
-
-def test_ranks_die_with_their_runner(job, verify):
-    """The runner is killed by SIGKILL, and cannot clean up."""
-    job("fake_solvers:HangingRanks").kill()  # writes job.json
-    for mark in Path(os.environ["HANG_MARK"]).iterdir():
-        mark.unlink()
-    code = """if True:
-        import time
-        from pathlib import Path
-        from verify.runner.child import Child
-        Child("verify.runner.solve", Path("job.json"), Path("log.txt"), 60.0, 4e9, ranks=2)
-        time.sleep(600)
-    """
-    runner = subprocess.Popen([sys.executable, "-c", code], cwd=verify.folder)
-    marks = Path(os.environ["HANG_MARK"])
-    wait_for(lambda: len(list(marks.iterdir())) == 2, "the ranks do not start")
-    started = [int(p.name) for p in marks.iterdir()]
-    os.kill(runner.pid, signal.SIGKILL)
-    runner.wait()
-    wait_for(lambda: all(map(gone, started)), "a rank outlived its runner", 20)
-
-
 def test_one_rank_that_fails_ends_the_others_and_is_told(job, verify):
     start = time.monotonic()
     ended(job("fake_solvers:FailingOnOneRank"))
@@ -133,25 +84,3 @@ def test_ranks_that_do_not_find_each_other_are_told(monkeypatch):
     monkeypatch.setenv(ranks.RANKS_VARIABLE, "3")
     with pytest.raises(InputError, match="started 3 processes of which each finds 1: it is of"):
         ranks.world()
-
-
-def test_no_mpiexec_is_one_line_and_writes_nothing(verify):
-    code = ("import sys; sys.executable = '/nowhere/python'; from verify.cli.main import main; "
-            "main(['run', 'square.toml', '--ranks', '2', '--out', 'out'])")  # fmt: skip
-    environment = {**verify.environment, "PATH": "/nowhere"}
-    done = subprocess.run(
-        [sys.executable, "-c", f"{code}"], cwd=verify.folder, env=environment, text=True,
-        capture_output=True, check=False,
-    )  # fmt: skip
-    assert "--ranks: needs mpiexec" in done.stderr
-    assert not (verify.folder / "out").exists()
-
-
-def test_what_all_ranks_refuse_is_told_once(verify, job):
-    """A through cut frees the upper half: the reason is the one of a single rank."""
-    text = BOX.replace("[0.5, -0.1, 0.52], [0.5, 1.1", "[1.1, -0.1, 0.52], [1.1, 1.1")
-    (verify.folder / "box.toml").write_text(text)
-    ended(job("reference", "box.toml"))
-    outcome = read_json(verify.folder / "outcome.json")
-    assert outcome["status"] == "failed"
-    assert "support" in outcome["reason"]

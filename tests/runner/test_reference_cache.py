@@ -95,15 +95,6 @@ def test_two_runs_that_keep_the_same_reference_leave_one_whole_entry(scene, kept
     assert not [path for path in kept.root.iterdir() if path.name.startswith(".")]
 
 
-def test_a_cache_that_cannot_be_written_does_not_stop_a_run(scene, kept, tmp_path):
-    (tmp_path / "file").write_text("")
-    job = job_of(tmp_path / "solve-1", 1)
-    said = ReferenceCache(tmp_path / "file" / "below").keep(
-        scene, job, job.blank(Status.SOLVED, "")
-    )
-    assert said.startswith("not kept in the reference cache")
-
-
 def test_a_bundle_gives_the_references_back_and_is_the_same_file_twice(scene, kept, tmp_path):
     one, two = tmp_path / "one.zip", tmp_path / "two.zip"
     assert len(write_bundle(one, [scene], kept)) == LEVELS
@@ -115,15 +106,6 @@ def test_a_bundle_gives_the_references_back_and_is_the_same_file_twice(scene, ke
     job = job_of(tmp_path / "again", 2)
     assert "one.zip" in bundle.take(scene, job).notes["cache"]
     assert len(read_solution(job.folder / "solution").points) == 81
-
-
-def test_a_bundle_needs_every_level(scene, kept, tmp_path):
-    kept.remove(kept.find(scene)[:1])
-    with pytest.raises(
-        InputError, match="level 0 of the reference of 'square' is not in the cache"
-    ):
-        write_bundle(tmp_path / "one.zip", [scene], kept)
-    assert not list(tmp_path.glob("one.zip*"))
 
 
 def test_a_damaged_bundle_is_found_before_anything_runs(scene, kept, tmp_path):

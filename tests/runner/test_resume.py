@@ -103,26 +103,3 @@ def test_a_damaged_solution_or_record_is_solved_again(verify):
     verify(*command, COUNT_SOLVES=str(solves))
     assert count(solves) == 5
     assert vtu.read_bytes() != bytes(changed)
-
-
-def test_a_damaged_result_is_made_again_from_the_solutions(verify):
-    solves = verify.folder / "solves"
-    command = solved_once(verify, solves)
-    result = verify.folder / "out/cases/square/result.json"
-    before = json.loads(result.read_text())
-    for content in (b"{", b"\xff\x00garbage"):
-        result.write_bytes(content)
-        verify(*command, COUNT_SOLVES=str(solves))
-        assert count(solves) == 2
-        after = json.loads(result.read_text())
-        assert [after[key] for key in ("solves", "rates", "verdicts")] == [
-            before[key] for key in ("solves", "rates", "verdicts")
-        ]
-
-
-def test_failures_are_tried_again(verify):
-    command = ("run", "square.toml", "--out", "out", "--timeout")
-    verify(*command, "4", SLOW, HANG_MARK=str(verify.folder / "mark"))
-    assert verify.records()["HangingOnLevelOne", 1]["status"] == "timeout"
-    verify(*command, "60", SLOW)
-    assert verify.records()["HangingOnLevelOne", 1]["status"] == "solved"

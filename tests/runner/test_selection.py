@@ -4,7 +4,7 @@ import pytest
 
 from verify.errors import InputError
 from verify.runner import selection
-from verify.runner.selection import parse_expression, select_cases
+from verify.runner.selection import select_cases
 from verify.scene import load_scene
 
 CASES = {
@@ -64,25 +64,6 @@ def test_an_expression_looks_into_name_title_and_tags(expression, expected):
     assert names([], expression) == expected
 
 
-@pytest.mark.parametrize(
-    "expression, fault",
-    [
-        ("", "a word is missing at its end"),
-        ("demo and", "a word is missing at its end"),
-        ("and demo", "a word is missing before 'and'"),
-        ("demo fall", "unexpected 'fall'"),
-        ("(demo", "a ')' is missing"),
-        ("demo)", "unexpected ')'"),
-        ("not", "a word is missing at its end"),
-        ("()", "a word is missing before ')'"),
-    ],
-)
-def test_a_wrong_expression_is_named(expression, fault):
-    with pytest.raises(InputError) as caught:
-        parse_expression(expression)
-    assert fault in str(caught.value)
-
-
 def test_two_cases_of_one_name_are_refused(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "yours").mkdir()
@@ -95,8 +76,3 @@ def test_two_cases_of_one_name_are_refused(tmp_path):
             select_cases([str(tmp_path / f / "own.toml") for f in ("mine", "yours")])
     else:
         assert loaded == {"mine/own", "yours/own"}  # below the case folder paths tell them apart
-
-
-def test_a_pattern_without_a_case_is_refused():
-    with pytest.raises(InputError, match="matches"):
-        select_cases(["fluids/*"])

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from verify import warm
 from verify.json_files import read_json, write_json
 from verify.runner.child import Child
 from verify.scene import load_scene, scene_content
@@ -154,35 +153,9 @@ def test_a_grandchild_in_a_session_of_its_own_that_nobody_waits_for_ends_too(sol
     assert not Path("/proc", pid, "exe").exists()
 
 
-def test_a_signal_that_kills_it_is_told_and_one_that_kills_its_keeper_too(solved):
-    body = "sys.modules['faulthandler'].disable(); os.kill({}, {}); time.sleep(60)"
-    for name, target, signum in (
-        ("crash", "os.getpid()", signal.SIGSEGV),
-        ("keeper", "os.getppid()", signal.SIGKILL),
-    ):
-        child, _ = solved(name, body=body.format(target, int(signum)))
-        assert ended(child).returncode == -signum
-
-
 def test_memory_is_that_of_the_process_without_its_keeper(solved):
     child, _ = solved("memory", body="x = np.ones(50_000_000); time.sleep(1)")
     assert 4e8 < ended(child).peak < 7e8  # 400 MB of it, and what is imported
-
-
-def test_without_a_parent_or_after_its_death_a_process_is_started_anew(prepared, monkeypatch):
-    folder = prepared("outside")
-    monkeypatch.setattr(warm._own, "parent", None, raising=False)
-    assert isinstance(_child(folder)._process, subprocess.Popen)
-    with warm_parent():
-        one = _child(prepared("before"))
-        assert isinstance(one._process, Forked)
-        ended(one)
-        warm._own.parent._process.kill()
-        folder = prepared("after", said="'two'")
-        two = _child(folder)
-        assert isinstance(two._process, subprocess.Popen)
-        ended(two)
-    assert reason(folder) == "ValueError: two"
 
 
 def test_all_of_them_die_with_the_runner(prepared):
@@ -217,23 +190,3 @@ def test_all_of_them_die_with_the_runner(prepared):
             return
         time.sleep(0.02)
     raise AssertionError(f"still running: {left}")
-
-
-def test_the_parent_compiles_nothing_and_what_it_forks_does(prepared, tmp_path, monkeypatch):
-    """A cache that is empty stays so until a process needs a kernel."""
-    monkeypatch.setattr(warm._own, "parent", None, raising=False)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    compiling = (
-        "kept = Path(os.environ['NUMBA_CACHE_DIR']).rglob('*.nbi')\n"
-        "            found = {file.stem.partition('-')[0] for file in kept}\n"
-        "            from verify.accelerated.short_sort import sort_short\n"
-        "            sort_short(np.array([2, 1], dtype=np.int32))\n"
-    )
-    with warm_parent():
-        for name in ("one", "two"):
-            folder = prepared(name, compiling, "str(found)")
-            child = _child(folder)
-            assert isinstance(child._process, Forked)
-            ended(child)
-            found = "set()" if name == "one" else "{'short_sort.sort_short'}"
-            assert reason(folder) == f"ValueError: {found}"

@@ -86,14 +86,6 @@ def load(folder: Path, text: str):
     return load_scene(path)
 
 
-def test_the_whole_case_is_read(tmp_path):
-    assert load(tmp_path, WHOLE).name == "strip"
-
-
-def test_a_byte_order_mark_is_no_fault(tmp_path):
-    assert load(tmp_path, "\ufeff" + WHOLE).title == "A strip"
-
-
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_named_with_file_and_key_in_one_line(tmp_path, fault):
     old, new, expected = FAULTS[fault]
@@ -106,28 +98,10 @@ def test_a_fault_is_named_with_file_and_key_in_one_line(tmp_path, fault):
     assert "\n" not in message
 
 
-def test_more_faults_are_counted(tmp_path):
-    text = WHOLE.replace("poisson = 0.3", "poisson = 3").replace("at = 0.2", "at = 2.0")
-    with pytest.raises(InputError, match=r"\(and 1 more\)"):
-        load(tmp_path, text)
-
-
 @pytest.mark.parametrize("name", ["nowhere.toml", "statics/f1_pach"])
 def test_a_case_that_is_not_there_is_named(name):
     with pytest.raises(InputError, match=r"no such file|did you mean 'statics/f1_patch'"):
         load_scene(name)
-
-
-def test_a_file_that_is_not_text_is_refused(tmp_path):
-    (tmp_path / "a.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="cannot be read"):
-        load_scene(tmp_path / "a.toml")
-
-
-def test_a_directory_is_refused(tmp_path):
-    (tmp_path / "a.toml").mkdir()
-    with pytest.raises(InputError, match="directory"):
-        load_scene(tmp_path / "a.toml")
 
 
 def test_links_in_a_circle_are_no_case(tmp_path):

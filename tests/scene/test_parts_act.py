@@ -29,7 +29,6 @@ traction = {force}
 """
 RECTANGLE = 'kind = "rectangle"\nlower = [0.0, 0.0]\nupper = [1.0, 1.0]'
 BOX = 'kind = "box"\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]'
-TRIANGLE = 'kind = "polygon"\ncorners = [[0.0, 0.0], [1.0, 0.0], [0.4, 0.9]]'
 
 
 def load(folder, geometry=RECTANGLE, mesh="cells = [[4, 4], [8, 8]]", held="left", loaded="right"):
@@ -79,13 +78,6 @@ def test_the_faces_of_a_box_are_held_against_the_inequality_too(tmp_path):
         load(tmp_path, BOX, mesh, "hypot(x - 0.5, y - 0.5) < 0.4 and abs(z - 0.5) < 0.4", "top")
 
 
-def test_corners_and_short_pieces_of_an_unstructured_boundary_are_not_missed(tmp_path):
-    mesh = 'pattern = "unstructured"\nsizes = [0.3]'
-    load(tmp_path, TRIANGLE, mesh, "x > 0.999999999", "y < 1e-9 and x > 0.3 and x < 0.31")
-    with pytest.raises(InputError, match=r"supports\[0\]\.where: no node"):
-        load(tmp_path, TRIANGLE, mesh, "y > 0.9 and x > 0.5", "y < 1e-9")
-
-
 def test_a_mesh_file_is_looked_at_by_verify_check(tmp_path, capsys):
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
     mesh = meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))])
@@ -96,16 +88,3 @@ def test_a_mesh_file_is_looked_at_by_verify_check(tmp_path, capsys):
     load(tmp_path, *given, "x > 0.2 and x < 0.8", "x > 0.5")
     assert main(["check", str(tmp_path / "case.toml")]) == 2
     assert "supports[0].where" in capsys.readouterr().err
-
-
-def test_a_region_of_a_material_that_holds_no_cell_of_a_mesh_file_is_named(tmp_path, capsys):
-    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
-    mesh = meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))])
-    mesh.write(tmp_path / "body.vtu")
-    load(tmp_path, 'kind = "file"\nfile = "body.vtu"', 'pattern = "given"', "x < 0.5", "x > 0.5")
-    case = tmp_path / "case.toml"
-    for where, code in (("x > y", 0), ("x > 0.9", 2)):
-        region = f'[[material.regions]]\nwhere = "{where}"\nyoung = 2.0\n'
-        (tmp_path / "layers.toml").write_text(case.read_text() + region)
-        assert main(["check", str(tmp_path / "layers.toml")]) == code
-    assert "material.regions[0].where" in capsys.readouterr().err

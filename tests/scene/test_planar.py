@@ -11,8 +11,6 @@ from verify.scene.planar import (
     inside_polygon,
     overlap_length,
     point_along,
-    polygon_defect,
-    polyline_defect,
 )
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -52,25 +50,6 @@ def test_winding_decides_inside_for_both_orientations():
     points = np.array([[0.5, 0.5], [1.5, 1.5], [2.5, 1.5], [-0.1, 0.5]])
     assert inside_polygon(points, NOTCHED).tolist() == [True, False, True, False]
     assert inside_polygon(points, NOTCHED[::-1]).tolist() == [True, False, True, False]
-
-
-def test_polygons_that_are_not_simple_are_named():
-    assert polygon_defect(NOTCHED) is None
-    assert "intersects itself" in polygon_defect(SQUARE[[0, 2, 1, 3]])
-    assert "repeats point" in polygon_defect(SQUARE[[0, 0, 1, 2]])
-    assert "folds back" in polygon_defect(
-        np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.0], [0.5, 1.0]])
-    )
-    # where it closes, a fold always touches a second segment
-    closing_fold = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 1.0], [3.0, 0.0]])
-    assert "intersects itself" in polygon_defect(closing_fold)
-
-
-def test_a_closed_polyline_is_simple_and_a_touching_one_is_not():
-    ring = np.vstack([SQUARE, SQUARE[:1]])
-    assert polyline_defect(ring) is None
-    lasso = np.vstack([ring[:-1], [[0.5, 0.0]]])  # its end touches its first segment
-    assert "intersects itself" in polyline_defect(lasso)
 
 
 def test_overlap_is_the_shared_length_and_a_crossing_has_none():

@@ -27,11 +27,6 @@ def test_output_times_are_evenly_spaced_and_eleven_unless_said_otherwise(tmp_pat
     assert load(tmp_path, STATIC + HELD).analysis.output_times == (0.0,)
 
 
-def test_finite_rotation_is_another_name_of_the_corotational_kinematics(tmp_path):
-    found = load(tmp_path, MOVING + 'kinematics = "finite_rotation"\n')
-    assert found.analysis.kinematics == "corotational"
-
-
 @pytest.mark.parametrize(
     "time, factor, slope",
     [(0.0, 0.0, 0.0), (1.0, 0.0, 2.0), (1.5, 1.0, 2.0), (2.0, -1.0, 0.0), (3.0, -1.0, 0.0)],
@@ -48,10 +43,6 @@ def test_a_load_that_jumps_at_the_beginning_was_there_before():
     assert (first_factor(history), factor_at(history, 0.0)) == (1.0, 0.0)
 
 
-def test_without_a_history_everything_is_there_always():
-    assert (factor_at(None, 3.0), slope_at(None, 3.0), first_factor(None)) == (1.0, 0.0, 1.0)
-
-
 @pytest.mark.parametrize("axis", [None, (1.0, 2.0, -2.0)])
 def test_a_support_turns_by_a_rotation_whose_rate_is_its_derivative(axis):
     dimension = 2 if axis is None else 3
@@ -64,57 +55,6 @@ def test_a_support_turns_by_a_rotation_whose_rate_is_its_derivative(axis):
     step = 1e-6
     slope = (support.values(points, 0.4 + step) - support.values(points, 0.4 - step)) / (2 * step)
     np.testing.assert_allclose(support.velocities(points, 0.4, 3.0, 0.0), 3 * slope, atol=3e-9)
-
-
-@pytest.mark.parametrize(
-    "text, said",
-    [
-        (STATIC, "supports"),
-        (STATIC + HELD + "history = [[0.0, 1.0]]", "supports[0].history"),
-        (STATIC + HELD + '[initial]\nkind = "equilibrium"', "initial"),
-        (STATIC + HELD + "[analysis]\noutputs = 3", "analysis"),
-        (STATIC + HELD + "[analysis]\ndamping = [1.0, 0.0]", "damping"),
-        (MOVING + "outputs = 1", "analysis.outputs"),
-        (MOVING + HELD + "history = [[1.0, 1.0], [0.5, 0.0]]", "times must ascend"),
-        (MOVING + HELD + "history = [[1.0, 1.0], [1.0, 2.0], [1.0, 0.0]]", "three are too many"),
-        (
-            MOVING
-            + '[[cuts]]\nkind = "polyline"\npoints = [[0.2, 0.5], [0.7, 0.5]]\nopens_at = 3.0',
-            "cuts[0].opens_at",
-        ),
-        (
-            MOVING + '[[quantities]]\nkind = "maximum_displacement"\ntime = 2.5',
-            "quantities[0].time",
-        ),
-        (
-            STATIC + HELD + '[[quantities]]\nkind = "maximum_displacement"\ntime = 0.5',
-            "quantities[0].time",
-        ),
-        (MOVING + '[initial]\nkind = "moving"', "velocity"),
-        (MOVING + '[initial]\nkind = "moving"\nvelocity = [1.0, 0.0, 0.0]', "initial.velocity: 3"),
-        (MOVING + '[initial]\nkind = "moving"\nspin = [1.0, 0.0, 0.0]', "initial.spin: expected a"),
-        (MOVING + '[initial]\nkind = "still"', "initial.kind: no 'still'"),
-        (MOVING + HELD + "rotation = { angle = 9.0, centre = [0.0] }", "expected at least 2"),
-        (
-            MOVING + HELD + "rotation = { angle = 9.0, centre = [0.0, 0.0], axis = [0, 0, 1] }",
-            "supports[0].rotation.axis",
-        ),
-        (
-            MOVING + '[[supports]]\nwhere = "left"\ndisplacement = [0.0]\ncomponents = ["x"]\n'
-            "rotation = { angle = 9.0, centre = [0.0, 0.0] }",
-            "displacement",
-        ),
-        (
-            STATIC.replace("density = 1.0", "thickness = 0.1") + HELD,
-            "material.thickness",
-        ),
-    ],
-)
-def test_what_does_not_fit_together_is_said_in_one_line(tmp_path, text, said):
-    with pytest.raises(InputError) as caught:
-        load(tmp_path, text)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 ARCS = """

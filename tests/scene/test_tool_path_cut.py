@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from verify.errors import InputError
-from verify.scene import Scene, ToolPathCut
+from verify.scene import ToolPathCut
 
 
 def _path(**given: object) -> ToolPathCut:
@@ -64,34 +63,3 @@ def test_blade_that_turns_in_its_plane_sweeps_a_polygon() -> None:
         tip = (1 - share) * np.array(path.points[0]) + share * np.array(path.points[1])
         place = tip + along * ((1 - share) * blade[0] + share * blade[1])
         assert path.passed_at(place[None])[0] == pytest.approx(2.0 * share, abs=1e-9)
-
-
-def test_blade_that_turns_out_of_a_plane_is_refused_with_its_reason() -> None:
-    path = _path(
-        points=[[0.3, 0.0, 1.0], [0.3, 1.0, 1.0]],
-        direction=[[0.5, 0, -1], [-0.5, 0, -1]], depth=0.5, speed=1.0,
-    )  # fmt: skip
-    with pytest.raises(InputError, match="direction"):
-        path.whole()
-
-
-def test_scene_gives_its_final_cuts_by_their_names() -> None:
-    scene = Scene.model_validate(
-        {
-            "title": "a blade",
-            "requirement": "It cuts.",
-            "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]},
-            "mesh": {"cells": [[4, 4]]},
-            "material": {"young": 1e4, "poisson": 0.3, "density": 1e3, "plane": "strain"},
-            "supports": [{"where": "bottom", "displacement": [0.0, 0.0]}],
-            "cuts": [
-                {
-                    "kind": "tool_path", "name": "blade", "points": [[-0.1, 0.3], [0.7, 0.6]],
-                    "times": [-1.0, 2.0],
-                }
-            ],
-            "analysis": {"kind": "dynamic", "duration": 2.0},
-        }
-    )  # fmt: skip
-    (cut,) = scene.final_cuts
-    assert (cut.kind, cut.name, cut.expected) == ("polyline", "blade", None)

@@ -26,13 +26,6 @@ def opened(hand):
     return session, found
 
 
-def test_the_hand_is_that_of_the_thesis(hand) -> None:
-    assert 0.97 * 1000 <= len(hand.mesh.cells) <= 1.03 * 1000
-    # "in all the analyzed meshes the number of cut elements does not exceed 50" for 6 cm
-    length = np.linalg.norm(np.diff(hand.strokes[0].blades[:, 0], axis=0), axis=1).sum()
-    assert 0.058 < length <= 0.06
-
-
 def test_volume_and_surfaces_are_sound_at_every_step(opened) -> None:
     _, found = opened
     assert len(found) > 40

@@ -9,7 +9,6 @@ from PIL import Image
 from thesis_stages import CASES
 
 from verify.cli import main
-from verify.runner.selection import select_cases
 from verify.scene import load_scene
 from verify.simulator import Session, stage_of
 from verify.simulator.live_scalpel import LiveScalpel
@@ -57,36 +56,6 @@ def test_a_scene_is_cut_alike_with_its_work_spread(tmp_path, monkeypatch, capsys
     for key in ("steps", "split", "unknowns", "loose_edges"):
         assert at_once[key] == spread_out[key]
     assert at_once["split"] > 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["triangle"], "display"),
-        (["triangle", "--window"], "display"),
-        (["triangle", "--out", "a.avi"], ".mp4 or .png"),
-        (["triangle", "--out", "nowhere/a.gif"], "no directory"),
-        (["triangle", "--out", "a.gif", "--frames", "1"], "at least 2"),
-    ],
-)
-def test_what_cannot_be_played_is_one_line(arguments, message, monkeypatch, capsys) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    name, *rest = arguments
-    assert main(["play", str(CASES / f"{name}.toml"), *rest]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
-
-
-def test_a_static_case_is_not_played(tmp_path, capsys) -> None:
-    assert main(["play", "statics/f1_patch", "--out", str(tmp_path / "a.gif")]) == 2
-    assert "in time" in capsys.readouterr().err
-
-
-def test_played_scenes_are_run_only_if_named() -> None:
-    assert not [scene for scene in select_cases(weight="heavy") if scene.played_only]
-    assert select_cases(["thesis/triangle"])
 
 
 def test_a_live_scalpel_cuts_what_it_is_led_through_and_its_stroke_can_be_played_again(

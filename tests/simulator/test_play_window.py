@@ -34,13 +34,6 @@ def test_sight_meets_the_nearest_skin_and_says_its_place_in_the_uncut_body(at) -
     np.testing.assert_allclose(from_below, [*at, 0.0], atol=1e-14)
 
 
-def test_sight_that_misses_or_meets_the_face_of_a_cut_finds_no_place() -> None:
-    down = np.array([0.0, 0.0, -1.0])
-    assert place_in_sight(_two_sheets(inner=False), np.array([2.9, 0.5, 5.0]), down) is None
-    assert place_in_sight(_two_sheets(inner=True), np.array([3.5, 0.4, 5.0]), down) is None
-    assert place_in_sight(_two_sheets(inner=False), np.array([3.5, 0.4, 5.0]), -down) is None
-
-
 @pytest.fixture
 def window(tmp_path):
     stage = stage_of(load_scene(CASES / "block_cut_once.toml"))
@@ -76,23 +69,3 @@ def test_the_left_button_cuts_and_writes_its_stroke_and_does_not_turn_the_body(
     box = window.session.stage.mesh.points
     outside = np.minimum(places - box.min(axis=0), box.max(axis=0) - places).min(axis=1)
     np.testing.assert_allclose(outside, 0.0, atol=1e-9)
-
-
-def test_the_right_button_turns_the_body_and_cuts_nothing(window, tmp_path) -> None:
-    eye = np.array(window.plotter.camera.position)
-    _send(window, "RightButtonPressEvent", 320, 400)
-    for x in (340, 380):
-        _send(window, "MouseMoveEvent", x, 380)
-    _send(window, "RightButtonReleaseEvent", 380, 380)
-    window.tick()
-    assert np.linalg.norm(np.array(window.plotter.camera.position) - eye) > 0.01
-    assert not window.session.cutter.body.split_cells.any()
-    assert not (tmp_path / "stroke.toml").exists()
-
-
-def test_a_click_beside_the_body_is_no_stroke(window, tmp_path) -> None:
-    for event in ("LeftButtonPressEvent", "MouseMoveEvent", "LeftButtonReleaseEvent"):
-        _send(window, event, 3, 3)
-    window.tick()
-    assert window.scalpel.finished == []
-    assert not (tmp_path / "stroke.toml").exists()

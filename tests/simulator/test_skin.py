@@ -4,13 +4,12 @@ import meshio
 import numpy as np
 import pytest
 
-from verify.errors import InputError
 from verify.scene import Skin
-from verify.simulator.anatomy.plane_mesh import mesh_of_about, plane_mesh
+from verify.simulator.anatomy.plane_mesh import plane_mesh
 from verify.simulator.anatomy.procedural import procedural_face
 from verify.simulator.anatomy.skin_mesh import skin_mesh, skin_surface
-from verify.simulator.anatomy.surface_file import border_loops, read_surface
-from verify.simulator.anatomy.thicken import closed_shell, thicken, vertex_normals
+from verify.simulator.anatomy.surface_file import border_loops
+from verify.simulator.anatomy.thicken import closed_shell, thicken
 from verify.xfem.mesh import SimplexMesh
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -26,14 +25,6 @@ def test_the_triangles_of_a_domain_cover_it_and_leave_its_holes() -> None:
     np.testing.assert_allclose(area.sum(), 1.0 - 0.04, rtol=1e-12)
     assert rim == 80
     assert len(border_loops(triangles)) == 2
-
-
-def test_triangles_are_nearly_equal_and_as_many_as_asked_for() -> None:
-    points, triangles, _ = mesh_of_about(SQUARE, [], 500)
-    assert abs(len(triangles) / 500 - 1.0) < 0.05
-    corners = points[triangles]
-    edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
-    assert (edges.max(axis=1) / edges.min(axis=1)).max() < 2.5
 
 
 def test_the_face_has_openings_for_eyes_and_mouth_and_the_nodes_of_the_thesis() -> None:
@@ -77,24 +68,6 @@ def test_a_plane_sheet_thickened_has_its_volume_and_a_closed_shell(layers) -> No
     assert len(border_loops(facets)) == 0
 
 
-def test_normals_of_a_sphere_point_outwards() -> None:
-    import pyvista
-
-    sphere = pyvista.Icosphere(radius=2.0, nsub=3)
-    points, triangles = np.asarray(sphere.points, float), sphere.regular_faces
-    # weights by area: off by the square of the angle of an element
-    np.testing.assert_allclose(vertex_normals(points, triangles), points / 2.0, atol=0.01)
-
-
-def test_a_surface_too_curved_for_its_thickness_is_refused() -> None:
-    import pyvista
-
-    sphere = pyvista.Icosphere(radius=1e-3, nsub=2)
-    points, triangles = np.asarray(sphere.points, float), sphere.regular_faces
-    with pytest.raises(InputError, match="too curved"):
-        thicken(points, triangles.astype(np.int64), 2e-3)
-
-
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "vtu"])
 def test_a_surface_of_ones_own_becomes_a_membrane_or_a_solid(suffix, tmp_path) -> None:
     plane, triangles, _ = plane_mesh(SQUARE, [HOLE], 0.2)
@@ -112,16 +85,3 @@ def test_a_surface_of_ones_own_becomes_a_membrane_or_a_solid(suffix, tmp_path) -
     np.testing.assert_allclose(volume, area * 0.05, rtol=1e-6)  # STL holds single precision
     _, facets = skin_surface(skin, tmp_path, 4 * len(triangles))
     assert len(facets) >= 4 * len(triangles)
-
-
-def test_a_bad_surface_file_is_one_clear_line(tmp_path) -> None:
-    with pytest.raises(InputError, match="surface"):
-        read_surface(tmp_path / "none.stl")
-    (tmp_path / "bad.obj").write_text("nonsense", encoding="utf-8")
-    with pytest.raises(InputError):
-        read_surface(tmp_path / "bad.obj")
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]])
-    fin = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
-    meshio.write(tmp_path / "fin.vtu", meshio.Mesh(points, [("triangle", fin)]))
-    with pytest.raises(InputError, match="triangles"):
-        read_surface(tmp_path / "fin.vtu")

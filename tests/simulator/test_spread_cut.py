@@ -80,67 +80,6 @@ def test_an_element_is_split_within_ten_steps_of_being_crossed(hand) -> None:
         assert all(record.busy for record in session.records[k - 1 : k + 7])
 
 
-def test_nothing_is_left_of_a_cut_when_a_hook_begins_so_its_step_is_no_long_one(hand) -> None:
-    """The stroke goes on: that step splits what was crossed in the three before, no more."""
-    scene = incised(hand)
-    session = Session(scene, account=False, spread=True)
-    begins = scene.hooks[0].begin
-    while session.time + scene.time_step <= begins:
-        session.step()
-    assert session._work is None
-    assert len(session.displacement) == len(session.state.displacement)
-    before = session.records[-1].split
-    session.step()
-    crossed = session.cutter.crossings
-    assert session.records[-1].split > before
-    late = (begins - crossed.leave[before:]) / scene.time_step
-    assert late.max() <= 4.0 * (
-        1.0 + 1e-9
-    )  # the step of the last look, and three in which none began
-
-
-def test_elements_beyond_the_most_of_a_cut_wait_and_are_split_like_the_others(
-    hand, played, monkeypatch
-) -> None:
-    monkeypatch.setattr("verify.simulator.session.MOST", 4)
-    # a hook would finish what waits as it begins
-    session = Session(incised(hand, hooks=[]), spread=True)
-    waited = 0
-    while not session.finished:
-        session.step()
-        waited += session.cutter.waits
-        quality = quality_of(session)
-        assert quality.volume_error < ROUND_OFF
-        assert quality.loose_edges == 0
-    session.settle()
-    assert waited > 10
-    assert not session.cutter.waits
-    # where a blade crosses two elements through at the same moment, one more
-    assert max(record.newly_split for record in session.records) <= 5
-    unhurried, _ = played
-    assert_cut_alike(session, unhurried)
-    assert session.phantom.node_count == len(session.state.displacement)
-
-
-def test_what_is_new_moves_as_that_from_which_it_comes_until_mechanics_follow(hand) -> None:
-    """Moving body: at the step at which the unknowns are known nothing jumps, nor is gained."""
-    wild = incised(hand, hooks=[])
-    session = Session(wild, spread=True)
-    rng = np.random.default_rng(3)
-    session.state.velocity[:] = 0.2 * rng.standard_normal(session.state.velocity.shape)
-    waited = 0
-    while not session.finished:
-        session.step()
-        ahead = session.displacement
-        known = len(session.state.displacement)
-        waited += len(ahead) > known
-        shown = session.surfaces.touchable_positions
-        assert np.isfinite(shown).all()
-        np.testing.assert_array_equal(ahead[:known], session.state.displacement)
-        assert len(ahead) == session.cutter.body.node_count
-    assert waited > 10
-
-
 def test_the_force_of_a_blade_on_what_is_new_pulls_at_what_it_moves_with(hand) -> None:
     """The force that a blade passes on is all there, whatever unknowns the mechanics know."""
     session = Session(incised(hand, hooks=[], tool_force=0.5, tool_radius=0.002), spread=True)

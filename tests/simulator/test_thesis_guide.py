@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from verify.cli import main
-from verify.scene import list_cases
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "simulator.md"
 
@@ -24,10 +23,3 @@ def test_every_command_of_the_guide_succeeds(tmp_path, monkeypatch) -> None:
     assert len(lines) == 3
     for line in lines:
         assert main(shlex.split(line)[1:]) == 0, line
-
-
-def test_the_guide_names_every_scene() -> None:
-    text = PAGE.read_text(encoding="utf-8").replace("`…_four_edges`", "`tetrahedron_four_edges`")
-    for name in list_cases():
-        if name.startswith("thesis/"):
-            assert f"`{name.removeprefix('thesis/')}`" in text

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from thesis_stages import CASES, stage
 
-from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import load_scene
 from verify.simulator import Session, quality_of, stage_of
 
@@ -119,37 +118,6 @@ def test_a_thousand_cuts_into_the_face_cost_about_a_node_each() -> None:
     assert split >= 1000
     assert 0.9 < added / split < 1.2  # 1100 for 1000 in the thesis
     assert abs(cutter.phantom_mesh().volumes.sum() / whole.mesh.measures.sum() - 1.0) < 1e-12
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('kind = "dynamic"', 'kind = "static"', "duration"),
-        ("time_step = 0.005\n", "", "time_step"),
-        ("speed = 1.0", "speed = 1.0\ntimes = [0.0, 1.0]", "either times or a speed"),
-        ("speed = 1.0", "speed = 0.01", "analysis"),
-        ("[[-0.02, 0.03], [0.12, 0.036]]", "[[0.1, 0.1], [0.1, 0.1]]", "does not move"),
-        ("[[-0.02, 0.03], [0.12, 0.036]]", "[[0.1, 0.1, 0.0], [0.2, 0.1, 0.0]]", "depth"),
-        ("[replay]\n", "[replay]\nvisual = 100\n", "its own surface"),
-        ("speed = 1.0", "speed = 1.0\ndepth = 0.1", "belongs to a path in space"),
-    ],
-)
-def test_a_bad_tool_path_is_one_clear_line(old, new, message, tmp_path) -> None:
-    text = (CASES / "triangle.toml").read_text(encoding="utf-8")
-    assert old in text
-    (tmp_path / "meshes").mkdir()
-    mesh = (CASES / "meshes" / "triangle.mesh").read_bytes()
-    (tmp_path / "meshes" / "triangle.mesh").write_bytes(mesh)
-    path = tmp_path / "bad.toml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(InputError, match=message) as error:
-        load_scene(path)
-    assert "\n" not in str(error.value)
-
-
-def test_a_scene_that_is_not_in_time_is_refused_with_a_reason() -> None:
-    with pytest.raises(UnsupportedSceneError, match="in time"):
-        stage_of(load_scene("statics/f1_patch"))
 
 
 def test_no_solver_takes_a_played_scene() -> None:

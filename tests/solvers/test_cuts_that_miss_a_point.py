@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from verify.errors import InputError
 from verify.scene import Scene
 from verify.solvers import find_solver
 
@@ -71,9 +70,3 @@ def test_conforming_meshes_join_and_count_it_too(solver, shares):
     # gmsh and the imprint take what is closer than 1e-9 of the body for one point
     assert joined >= 1
     assert _speck(missed)
-
-
-@pytest.mark.fenicsx
-def test_what_a_conforming_mesh_cannot_resolve_is_refused_with_its_distance():
-    with pytest.raises(InputError, match="within"):
-        find_solver("reference").solve(_three_cuts(0.2e-7), 0, repetitions=0)

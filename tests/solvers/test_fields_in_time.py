@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from verify.errors import InputError, UnsupportedSceneError
-from verify.exchange import problem_of
 from verify.scene import Scene
 from verify.solvers import find_solver
 
@@ -138,20 +136,3 @@ def test_two_halves_behind_the_blade_move_each_as_its_own_side(solver):
     errors = [_strip_error(_solved(scene, solver, level), scene) for level in (0, 1)]
     assert errors[1] < 1e-2
     assert errors[0] / errors[1] > 2.5
-
-
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_a_node_at_the_tip_where_the_velocity_is_infinite_is_refused(solver):
-    scene = _strip([])
-    scene["exact"]["parameters"] |= {"tip": [0.25, -0.4 + 0.8 / 3]}
-    with pytest.raises(
-        InputError, match=r"initial.velocity: .* unbounded at the node \(0.25, -0.13"
-    ):
-        _solved(scene, solver)
-
-
-def test_what_no_list_of_values_holds_is_not_exported():
-    moved = [{"where": "left", "displacement": ["0.01*t", 0.0]}]
-    for content, key in ((_wave(supports=moved), "supports"), (_strip([]), "supports")):
-        with pytest.raises(UnsupportedSceneError, match=rf"{key}\[\d\] is another field at every"):
-            problem_of(Scene.model_validate(content), 0)

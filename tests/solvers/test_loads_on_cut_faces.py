@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from reference.exact import exact_solution
-from verify.errors import UnsupportedSceneError
-from verify.exchange import problem_of
 from verify.scene import Scene
 from verify.solvers import find_solver
 
@@ -132,26 +129,3 @@ def test_a_pressure_drives_two_halves_apart_from_the_opening_of_the_cut_on(solve
     force = np.array([-1 / 3, 1.0]) * (0.5 + 0.5)
     assert (mass[above] @ speed[above]) == pytest.approx(0.2 * force, abs=1e-12)
     assert (mass[~above] @ speed[~above]) == pytest.approx(-0.2 * force, abs=1e-12)
-
-
-def test_what_has_no_faces_says_so():
-    with pytest.raises(UnsupportedSceneError, match="no faces"):
-        find_solver("removal").solve(pressed_arc(), 0, repetitions=0)
-    with pytest.raises(UnsupportedSceneError, match="not exported"):
-        problem_of(pressed_arc(), 0)
-
-
-@pytest.mark.parametrize(
-    "load, words",
-    [
-        ({"cut": "cat", "pressure": 1.0}, "no cut 'cat'; did you mean 'cut'"),
-        ({}, "pressure"),
-        ({"pressure": 1.0, "traction": [1.0, 0.0]}, "pressure"),
-        ({"traction": [1.0, 0.0, 0.0]}, "3 values; expected 2"),
-        ({"pressure": "1 + z"}, "'z' in '1 \\+ z' is not allowed"),
-    ],
-)
-def test_a_load_that_does_not_fit_is_refused_in_words(load, words):
-    cut = {"kind": "polyline", "points": [[-0.1, 0.33], [1.1, 0.73]]}
-    with pytest.raises(ValidationError, match=words):
-        body(2, [cut], [{"kind": "cut_faces", **load}], exact=uniform(2))

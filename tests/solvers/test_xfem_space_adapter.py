@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from case_texts import body_text, cut_text, sheet_text, support_text, weight_text
 
-from verify.errors import UnsupportedSceneError
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
 
@@ -54,19 +53,6 @@ def test_a_disc_is_cut_in_its_plane_and_ends_at_its_rim(tmp_path):
     assert volume(found) == pytest.approx(1.0, rel=1e-12)
 
 
-def test_an_ellipse_lies_along_its_axes(tmp_path):
-    cut = (
-        '[[cuts]]\nkind = "disc"\ncentre = [0.5, 0.5, 0.53]\nnormal = [0.0, 0.0, 1.0]\n'
-        "radii = [0.45, 0.2]\naxis = [0.0, 1.0, 0.0]\n"
-    )
-    found = XfemSolver().solve(scene(tmp_path, CUBE + PULLED + cut), 1, tip="through")
-    x, y, _ = (found.cut_facets.reshape(-1, 3) - [0.5, 0.5, 0.53]).T
-    assert np.ptp(y) > 1.5 * np.ptp(x)
-    # cut through, an element in which the rim ends is cut to its end
-    assert (np.abs(x) <= 0.2 + 0.125 * np.sqrt(2)).all()
-    assert (np.abs(y) <= 0.45 + 0.125 * np.sqrt(2)).all()
-
-
 @pytest.mark.parametrize("sweep, expected", [(360.0, 2 * np.pi * 0.3), (180.0, np.pi * 0.3)])
 def test_a_cylinder_cuts_its_mantle(tmp_path, sweep, expected):
     """Faceted in each element: area and distance differ by O(h²/R)."""
@@ -81,18 +67,6 @@ def test_a_cylinder_cuts_its_mantle(tmp_path, sweep, expected):
     assert areas(found.cut_facets).sum() == pytest.approx(expected, abs=0.02 + (sweep < 360) * 0.25)
     if sweep == 180.0:
         assert found.cut_facets[..., 1].min() >= 0.51 - 0.125 * np.sqrt(2)
-
-
-def test_a_swept_polyline_keeps_its_kink(tmp_path):
-    cut = (
-        '[[cuts]]\nkind = "swept"\n'
-        "points = [[-0.1, 0.45, -0.1], [0.5, 0.45, -0.1], [1.1, 0.75, -0.1]]\n"
-        'along = [0.0, 0.0, 1.2]\nexpected = "through"\n'
-    )
-    found = XfemSolver().solve(scene(tmp_path, CUBE + ENDS + cut), 1)
-    area = areas(found.cut_facets).sum()
-    assert area == pytest.approx(0.5 + np.hypot(0.5, 0.25), rel=0.02)  # the kink is rounded off
-    assert len(np.unique(found.cell_sides)) == 3  # either side, and away from the cut
 
 
 def test_a_cut_through_a_cube_frees_its_halves_of_each_other(tmp_path):
@@ -138,21 +112,6 @@ def test_a_cube_falls_apart_along_a_disc_that_is_larger_than_it(tmp_path):
     np.testing.assert_allclose(fallen, -1.225, rtol=1e-9)
 
 
-def test_tetrahedra_of_a_file_give_what_the_box_gives(tmp_path):
-    from verify.xfem.structured_meshes import box_mesh
-
-    mesh = box_mesh([4, 4, 4])
-    meshio.Mesh(mesh.points, [("tetra", mesh.cells)]).write(tmp_path / "cube.vtu")
-    cut = disc(0.4)
-    own = XfemSolver().solve(scene(tmp_path, CUBE + PULLED + cut), 0)
-    box = 'kind = "box"\nlower = [0.0, 0.0, 0.0]\nupper = [1.0, 1.0, 1.0]'
-    given = (CUBE + PULLED + cut).replace(box, 'kind = "file"\nfile = "cube.vtu"\ndimension = 3')
-    given = given.replace("cells = [[4, 4, 4], [8, 8, 8]]", 'pattern = "given"')
-    given = given.replace('"bottom"', '"z < 1e-6"').replace('"top"', '"z > 0.999999"')
-    other = XfemSolver().solve(scene(tmp_path, given), 0)
-    assert other.ledger["strain"][0] == pytest.approx(own.ledger["strain"][0], rel=1e-12)
-
-
 MEMBRANE = (
     sheet_text("A sheet in space", "It shall be cut.")
     + '[analysis]\nkind = "dynamic"\nkinematics = "corotational"\n'
@@ -193,11 +152,3 @@ def test_a_flat_membrane_without_tension_sags_as_one_that_is_hardly_curved(tmp_p
         assert -0.5 < found.displacement[-1][:, 2].min() < -0.05
         energies.append(found.ledger["strain"][-1])
     assert energies[1] == pytest.approx(energies[0], rel=1e-4)
-
-
-def test_a_box_without_structure_is_refused(tmp_path):
-    text = (CUBE + PULLED).replace(
-        "cells = [[4, 4, 4], [8, 8, 8]]", 'pattern = "unstructured"\nsizes = [0.2]'
-    )
-    with pytest.raises(UnsupportedSceneError, match="structured way only"):
-        XfemSolver().solve(scene(tmp_path, text), 0)

@@ -19,8 +19,6 @@ from verify.study.budget import CutEnd, cut_ends
 
 __all__ = ["Crack", "Off", "crack_scene"]
 
-_SIDE = 4.0
-
 
 def crack_scene(ends, angle, mesh):
     """`statics/griffith_inside` with a crack of `angle` degrees from ends[0] to ends[1], m."""

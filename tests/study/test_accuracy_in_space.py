@@ -62,14 +62,6 @@ def test_interpolants_in_space_converge_with_orders_two_and_one():
     assert finest.metric("displacement_l2_near") is None  # a cut through the body has no tip
 
 
-def test_a_solution_that_misses_a_layer_of_the_body_is_an_error():
-    whole = LEVELS[0]
-    part = Solution(whole.points, whole.cells[:-9], whole.displacement, size=whole.size)
-    result = assess(CHECKS[2:3], {"xfem": {0: part}}, EXACT)
-    assert result.verdicts[0].verdict is Verdict.ERROR
-    assert "of the body" in result.verdicts[0].reason
-
-
 def test_near_and_far_make_up_the_whole():
     half = {
         "kind": "polygon",

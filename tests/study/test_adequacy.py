@@ -60,15 +60,6 @@ def _record(solution):
     return SolveRecord("scene", "conforming", 0, Status.SOLVED, "", size=solution.size, unknowns=10)
 
 
-def test_what_cannot_be_measured_is_said() -> None:
-    one = scene(adequacy={"kinematics": True})
-    judged = find_solver("conforming").solve(one, 0, 0)
-    result = assess_accuracy(one, [_record(judged)], {"conforming": {0: judged}})
-    notice = adequacy_notice(one, "kinematics", {}, result)
-    assert "was not measured" in notice.text
-    assert "0 solved levels" in notice.text
-
-
 def test_the_question_does_not_change_the_scene_that_is_solved() -> None:
     """References stay in the cache; the other scene asks nothing further."""
     asked, plain = scene(adequacy={"kinematics": True}), scene()

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from verify.assess.realised_cut import polylines_of, triangles_of
+from verify.assess.realised_cut import polylines_of
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
 from verify.compare.motion import ExactMotion
 from verify.result import Verdict
 from verify.scene import load_scene
-from verify.study.budget import Candidate, cheapest_adequate, error_budget, on_realised_cut
+from verify.study.budget import Candidate, cheapest_adequate, error_budget
 from verify.study.budget.budget import Answer
 
 
@@ -79,23 +79,6 @@ def test_uncertain_links_make_both_of_their_parts_uncertain(scene):
     assert found.total.uncertainty == 0.0
 
 
-def test_parts_below_round_off_say_so_and_leave_nothing_undecided(scene):
-    from verify.study.budget.study import _finding
-
-    bare = budgets(scene, chain(1.0, 1.0 + 3e-15, 1.0 - 2e-14, width=1e-14))["length"]
-    assert bare.is_round_off
-    assert _finding(bare).verdict is Verdict.PASS
-    assert _finding(bare).sentence == "every part and the total are round-off."
-    mixed = _finding(budgets(scene, chain(1.0, 1.0 + 3e-15, 1.1))["length"])
-    assert mixed.verdict is Verdict.PASS
-    assert mixed.sentence.startswith("model round-off; mesh 10 % ± 0 %; total 10 %")
-    unknown = budgets(scene, chain(1.0, 1.0 + 3e-15, width=1e-3))["length"]
-    assert not unknown.is_round_off  # the references do not know it that well
-    assert _finding(unknown).verdict is Verdict.UNDECIDED
-    nothing = budgets(scene, chain(0.0, 1e-15, 1e-14))["length"]
-    assert not nothing.is_round_off  # of what, is not known
-
-
 def candidate(kinematics, error, seconds, width=0.0, spread=0.01, reason=""):
     low, high = error - width, error + width
     times = (seconds, seconds * (1 - spread), seconds * (1 + spread))
@@ -135,13 +118,6 @@ def test_what_cannot_be_told_is_undecided(rival, said):
     assert said in finding.sentence
 
 
-def test_nothing_adequate_is_said_with_the_best():
-    tried = [candidate("linear", 0.2, 0.01), candidate("corotational", 0.1, 0.01, reason="failed")]
-    found, finding = cheapest_adequate(tried, 0.05, "displacement_l2")
-    assert (found, finding.verdict) == (None, Verdict.FAIL)
-    assert "20 %" in finding.sentence
-
-
 def test_segments_in_any_order_and_direction_become_the_polylines_they_are():
     bent = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [3.0, 2.0]])
     branch = np.array([[2.0, 1.0], [2.0, 2.0]])
@@ -155,26 +131,3 @@ def test_segments_in_any_order_and_direction_become_the_polylines_they_are():
         assert sizes == [2, 2, 3]  # the middle of the straight part is no corner
         total = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines)
         assert total == pytest.approx(2 + 1 + np.sqrt(2) + 1)
-
-
-def test_the_scene_of_the_realised_cut_has_that_cut_and_one_level(scene):
-    facets = np.array([[[0.0, 0.4], [0.5, 0.5]], [[0.5, 0.5], [1.0, 0.6]]])
-    derived = on_realised_cut(scene, facets, 1, "linear")
-    assert derived.mesh.count == 1
-    (cut,) = derived.cuts
-    np.testing.assert_allclose(cut.points, [[0.0, 0.4], [1.0, 0.6]])
-    assert derived.supports == scene.supports
-
-
-def test_triangles_of_a_cut_close_to_nodes_are_those_with_an_area():
-    """A square of two triangles, beside which a cut that misses a node by 1e-9 has a sliver."""
-    a, b, c, d = np.array([[0.0, 0, 0], [1, 0, 0.3], [1, 1, 0.3], [0, 1, 0]])
-    near = b + np.array([0.0, 0.0, 1e-9])
-    needle = np.array([a, d, a + 0.5 * (d - a) + np.array([1e-9, 0.0, 0.0])])
-    found = triangles_of(np.array([[a, near, c], [c, d, a], [b, near, c], needle]))
-    assert found.shape == (2, 3, 3)
-    areas = np.linalg.norm(np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]), axis=1)
-    np.testing.assert_allclose(areas, np.linalg.norm([-0.3, 0.0, 1.0]), rtol=1e-8)
-    corners = {tuple(corner) for corner in found.reshape(-1, 3)}
-    assert len(corners) == 4  # they still meet along a whole edge
-    assert triangles_of(np.zeros((0, 3, 3))).shape == (0, 3, 3)

@@ -69,42 +69,6 @@ def test_what_both_methods_reproduce_has_no_part_at_all(name):
         assert max(map(abs, parts(study, metric).values())) < 1e-11
 
 
-@pytest.mark.heavy
-def test_tips_inside_elements_make_the_cut_the_largest_part():
-    """With the tip's element uncut the error is 2.1 to 2.5 times that of conforming elements at
-    this place of the ends; the method's own part is what is left once the crack is as short."""
-    found = parts(budget_of(load_scene("statics/griffith_inside")), "displacement_l2")
-    assert 2.1 <= found["total"] / found[MESH] <= 2.5
-    assert found[CUT] > found[MESH] > 4 * found[METHOD]
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("tip", ["through", "nearest"])
-def test_on_the_coarsest_mesh_a_tip_cut_through_is_nearer_than_one_left_uncut(tip):
-    """0.6 to 1.1 times the error of conforming elements at this place of the ends. On level 1 the
-    part of the method is twice that of the mesh: `test_ends_of_cuts.py` says why."""
-
-    def cut_so(scenes, place, solvers, parameters=None, timed=False):
-        given = {**(parameters or {}), "xfem": {"tip": tip}}
-        return solve(scenes, place, solvers, given, timed)
-
-    scene = load_scene("statics/griffith_inside")
-    exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
-    study = budget_study(scene, 0, 0.05, None, exact, cut_so, quick=True)
-    found = parts(study, "displacement_l2")
-    assert 0.6 <= found["total"] / found[MESH] <= 1.1
-    assert found[METHOD] < 0.25 * found[MESH]
-
-
-@pytest.mark.heavy
-def test_tips_on_edges_are_realised_and_the_method_differs_less_than_the_mesh():
-    """No geometric error: far from the 2.1 to 2.5 times of tips inside elements."""
-    found = parts(budget_of(load_scene("statics/griffith_edges")), "displacement_l2")
-    assert CUT not in found
-    assert found[METHOD] < found[MESH]
-    assert 1.0 <= found["total"] / found[MESH] <= 1.5
-
-
 BURIED = {
     "title": "A tilted crack in a block whose surface moves as in infinite space",
     "requirement": "It shall open.",
@@ -134,32 +98,6 @@ def test_in_space_a_front_inside_elements_is_an_error_of_the_cut_and_not_of_the_
     total = energy.pop("total")
     assert sum(energy.values()) == pytest.approx(total, rel=1e-10)
     assert energy[CUT] > 0.9 * total  # relative to what is released by the larger crack
-
-
-@pytest.mark.heavy
-def test_a_round_cut_in_space_is_taken_apart_and_nothing_is_left_out():
-    """A cylinder through a block, realised as 168 plane triangles that both methods share."""
-    block = {
-        **SETTLING,
-        "geometry": {"kind": "box", "lower": [0.0, 0.0, 0.0], "upper": [1.0, 1.0, 1.0]},
-        "mesh": {"cells": [[3, 3, 3]]},
-        "material": {"young": 1e4, "poisson": 0.3, "density": 1.0},
-        "analysis": {"kind": "static"},
-        "supports": [{"where": "bottom", "displacement": [0.0, 0.0, 0.0]}],
-        "loads": [{"kind": "gravity", "acceleration": [3.0, 2.0, -10.0]}],
-        "cuts": [{"kind": "cylinder", "base": [0.5, 0.48, -0.2], "axis": [0.0, 0.0, 1.0],
-                  "radius": 0.33, "height": 1.5}],
-        "reference": {"size": 0.5, "degree": 1},
-        "quantities": [{"kind": "strain_energy"}],
-    }  # fmt: skip
-    study = budget_of(Scene.model_validate(block))
-    assert study.missing == []
-    found = parts(study, "strain_energy")
-    total = found.pop("total")
-    assert list(found) == [CUT, "finite rotations → linear", MESH, METHOD]
-    assert sum(found.values()) == pytest.approx(total, rel=1e-10)
-    assert abs(found[METHOD]) < 0.5 * abs(found[MESH])
-    assert abs(found["finite rotations → linear"]) < 0.05 * abs(total)
 
 
 UNCUT = {
@@ -250,17 +188,3 @@ def test_in_motion_mass_and_time_step_have_their_parts_and_all_add_up():
     (left,) = study.missing
     assert (left.source, left.reason) == ("finite rotations → linear", "left out by --quick")
     assert np.isfinite([c.error for c in study.candidates]).all()
-
-
-def test_a_link_that_cannot_be_made_is_named_and_the_rest_adds_up():
-    """Cuts that open one after the other cannot be told apart once they are realised."""
-    cuts = [{**SETTLING["cuts"][0], "points": [[0.53, -0.1], [0.53, 0.13]]},
-            {"kind": "polyline", "name": "later", "points": [[0.78, -0.1], [0.78, 0.13]],
-             "opens_at": 1.0}]  # fmt: skip
-    study = budget_of(Scene.model_validate({**BRIEF, "cuts": cuts}))
-    missing = {one.source: one for one in study.missing}
-    assert "different times" in missing[CUT].reason
-    found = parts(study, "end")
-    assert f"{CUT}; {METHOD}" in found
-    total = found.pop("total")
-    assert sum(found.values()) == pytest.approx(total, rel=1e-10)

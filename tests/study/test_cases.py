@@ -63,25 +63,3 @@ def test_the_tips_of_the_cut_are_the_singular_points_of_the_exact_field(name):
     assert len(tips) == len(points)
     for tip in tips:
         assert np.linalg.norm(points - tip, axis=1).min() < 1e-14
-
-
-def places(name):
-    """Position of the tips inside their square of the background mesh, per level."""
-    case = load_scene(name)
-    lower, upper = (np.array(corner) for corner in (case.geometry.lower, case.geometry.upper))
-    for cells in case.mesh.cells:
-        where = (body_of(case).tips - lower) / (upper - lower) * cells
-        yield where - np.floor(where)
-
-
-@pytest.mark.parametrize("name", ["statics/griffith_edges", "statics/tissue_strip"])
-def test_tips_lie_in_the_middle_of_a_vertical_edge(name):
-    for place in places(name):
-        assert np.allclose(place, [0.0, 0.5], atol=1e-12)
-
-
-def test_tips_lie_inside_elements():
-    for place in places("statics/griffith_inside"):
-        x, y = place.T
-        # off the sides of the square, and off its rising diagonal
-        assert (np.minimum.reduce([x, 1 - x, y, 1 - y, np.abs(x - y)]) > 0.02).all()

@@ -97,13 +97,6 @@ def test_profiles_hold_both_parts_of_the_jump_with_the_band_of_the_reference(tmp
     assert profile.curves[1].normal_band == []
 
 
-def test_a_case_may_mean_its_overlap(tmp_path):
-    asked = scene(tmp_path, '\n[contact]\nexpected = "overlap"\n')
-    result = examined(asked, {"reference": levels(-0.0185 * normal(2))})
-    assert not result.warnings
-    assert result.solves[0].metric("overlap_depth").value > 0.018
-
-
 @pytest.mark.parametrize("shift", [0.02 * normal(2), 0.1 * ALONG, 0.0 * ALONG])
 def test_what_opens_slides_or_stays_does_not_warn(tmp_path, shift):
     result = examined(scene(tmp_path), {"xfem": {0: moved(shift)}, "reference": levels(shift)})
@@ -139,38 +132,6 @@ def test_the_deepest_overlap_of_a_motion_is_found_at_its_time(tmp_path):
     )
 
 
-class Pressed:
-    """An exact field: the upper half goes down."""
-
-    singular_points = np.zeros((0, 2))
-
-    def displacement(self, points, near=None):
-        above = ((points if near is None else near) - 0.5) @ normal(2) > 0.0
-        return -0.02 * above[:, None] * normal(2)
-
-    def gradient(self, points, near=None):
-        return np.zeros((len(points), 2, 2))
-
-
-def test_an_exact_solution_that_overlaps_is_warned_of_too(tmp_path):
-    more = '\n[exact]\nsolution = "patch"\nparameters = { point = [0.5, 0.5], slope = 0.3 }\n'
-    text = (
-        scene(tmp_path)
-        .file.read_text()
-        .replace("displacement = [0.0, 0.0]", 'displacement = "exact"')
-    )
-    (tmp_path / "exact.toml").write_text(text + more)
-    asked = load_scene(tmp_path / "exact.toml")
-    mesh = moved(0.0 * ALONG)
-    mesh = replace(mesh, cut_facets=np.zeros((1, 2, 2)))
-    result = examined(asked, {"xfem": {0: mesh}}, Pressed())
-    assert [warned.solver for warned in result.warnings] == ["reference"]
-    assert result.reference.overlap["depth"] == pytest.approx(0.02, rel=1e-6)
-    curve = result.openings[0].curves[0]
-    assert (curve.solver, curve.level) == ("reference", None)
-    assert curve.normal == pytest.approx([-0.02] * len(curve.normal))
-
-
 PLATE = """
 title = "A plate pressed across its slit"
 requirement = "It shall be warned of."
@@ -200,25 +161,6 @@ displacement = [0.0, {}]
 kind = "polyline"
 points = [[0.021, 0.0437], [0.0763, 0.0569]]
 """
-
-
-def test_a_plate_pressed_across_its_slit_warns_and_one_pulled_as_far_does_not(tmp_path):
-    """A linear answer closes by what it opens by: the profile of one is minus that of the other."""
-    results = []
-    for pull in (-0.02, 0.02):
-        file = tmp_path / "plate.toml"
-        file.write_text(PLATE.format(pull))
-        asked = load_scene(file)
-        results.append(examined(asked, {"xfem": {0: find_solver("xfem").solve(asked, 0)}}))
-    pressed_, pulled = results
-    assert len(pressed_.warnings) == 1
-    assert not pulled.warnings
-    closing, opening = (np.array(r.openings[0].curves[0].normal) for r in results)
-    assert closing == pytest.approx(-opening, abs=1e-12)
-    # the faces turn little: what is pressed in is what the other is opened by, less than a tenth
-    depth = pressed_.solves[0].metric("overlap_depth").value
-    assert depth == pytest.approx(opening.max(), rel=0.1)
-    assert pulled.solves[0].metric("overlap_depth").value == 0.0
 
 
 # both supports turn as one, so that the answer is the same one, turned; equilibrium is found to

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from verify.errors import InputError
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
 from verify.scene import load_scene
@@ -81,16 +80,6 @@ def test_a_background_mesh_is_paid_once_and_a_conforming_one_at_every_step():
     assert study.running["conforming"][-1][0] == pytest.approx(4 * 1.16)
 
 
-def test_a_solver_that_failed_is_left_out_with_its_reason_and_not_averaged():
-    broken = solve("other", 2, 0.0, 0.0, status=Status.FAILED)
-    steps = [result(*ladder("xfem", 0.4, 0.01), *ladder("other", 0.4, 0.01)[:2], broken)] * 2
-    steps[1] = result(*ladder("xfem", 0.4, 0.01), broken)
-    study = cost_study("case", steps, "energy_norm")
-    assert study.running["other"] == [pytest.approx((0.04, 0.04, 0.04)), None]
-    assert {one["reason"] for one in study.left_out} == {"it broke"}
-    assert any("no time at step 2" in finding.sentence for finding in study.findings)
-
-
 def test_the_pareto_front_has_only_what_nothing_beats():
     points = work_points(
         [*ladder("good", 0.4, 0.01), *ladder("bad", 0.8, 0.02), solve("best", 0, 0.01, 1.0)],
@@ -110,8 +99,3 @@ def test_the_cut_grows_by_equal_lengths_to_the_whole():
     np.testing.assert_allclose(lengths, whole * np.arange(1, 5) / 4, rtol=1e-14)
     assert scenes[-1].cuts == scene.cuts
     assert len({s.name for s in scenes}) == 4
-
-
-def test_a_scene_whose_cut_cannot_grow_is_refused():
-    with pytest.raises(InputError, match="no shorter cuts"):
-        growing_scenes(load_scene("statics/f3_inclined"), 2)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from test_budget_of_cases import budget_of, parts
 
 from verify.compare.body import body_of
 from verify.scene import load_scene
@@ -80,17 +79,3 @@ def test_opening_late_is_an_error_of_first_order_in_the_delay(tmp_path):
     orders = np.log2(np.array(changes[:-1]) / changes[1:])
     assert (orders > 0.7).all(), orders
     assert (orders < 1.3).all(), orders
-
-
-@pytest.mark.heavy
-@pytest.mark.fenicsx
-def test_the_budget_of_a_blade_has_a_bar_for_the_delay(tmp_path):
-    """The opening behind the blade is smaller if it comes later, by some of v τ ∂u/∂a."""
-    coarse = ("[[16, 8], [32, 16], [64, 32]]", "[[8, 4], [16, 8]]")
-    gap = '[[quantities]]\nkind = "opening"\nname = "gap"\nat = 0.25\ntime = 1.0\n'
-    judged = ("[[cuts]]", f"[reference]\nsize = 0.125\n{gap}[[cuts]]")
-    study = budget_of(scene_of(tmp_path, coarse, judged))
-    found = parts(study, "gap")  # asserts that they add up
-    assert next(iter(found)) == "crossing delay"
-    assert -0.2 < found["crossing delay"] < -0.01
-    assert any("waits 0.0294 s" in note for note in study.notes)

@@ -6,7 +6,6 @@ realised and from the nodes of the edge there. That is held here on cracks whose
 fractions of an element, in two directions, on two levels (the finer one: `make heavy`).
 """
 
-from dataclasses import asdict
 from functools import cache
 
 import numpy as np
@@ -16,17 +15,10 @@ from tip_advance import tip_advances
 
 from reference.exact import exact_solution
 from verify.compare.body import body_of
-from verify.report.study_page import render_study
-from verify.study.budget import cut_ends
-from verify.study.record import write_study
 
 ANGLES, PLACES = (20.0, -35.0), range(6)
 RULES = ("inside", "through")
 levels = pytest.mark.parametrize("count", [16, pytest.param(32, marks=pytest.mark.heavy)])
-
-
-PAGE = {"level": 0, "tolerance": 0.05, "metric": "displacement_l2", "chain": [], "notes": [],
-        "budgets": [], "candidates": [], "findings": [], "seconds": 1.0}  # fmt: skip
 
 
 def ends_at(place, angle, size):
@@ -134,20 +126,6 @@ def test_conforming_elements_with_a_node_at_the_end_shorten_it_by_a_third_of_an_
 
 
 @levels
-def test_what_a_rule_costs_against_conforming_elements_depends_on_where_the_ends_fall(count):
-    """No rule keeps to 2.1–2.5 (inside) or 0.6–1.1 (through); both keep to the guide's ranges."""
-    against = np.array([answers["conforming"].error for _, answers in cracks(count)])
-    inside, through = (
-        np.array([one.error for _, one in of(rule, count)]) / against for rule in RULES
-    )
-    assert 1.1 < inside.min() < 2.0
-    assert 2.6 < inside.max() < 3.5
-    assert 0.2 < through.min() < 0.6
-    assert 1.2 < through.max() < 2.5
-    assert np.median(inside) > 1.5 * np.median(through)
-
-
-@levels
 def test_nodes_at_the_ends_cost_no_more_than_those_of_the_conforming_elements(count):
     """The limit: both have a node at the end and elements about as large around it."""
     for crack, answers in cracks(count):
@@ -157,46 +135,9 @@ def test_nodes_at_the_ends_cost_no_more_than_those_of_the_conforming_elements(co
         assert found.released / conforming.released < 1.15**2
 
 
-@pytest.mark.parametrize("solver, elements", [("xfem", -0.45), ("conforming", -0.35)])
-def test_the_same_place_in_an_element_shifts_the_end_by_as_much_on_every_level(solver, elements):
-    """The ends of `statics/griffith_edges`: 1.24 = 0.44/0.35. The solver's last edge is whole, that
-    of the imprinted mesh half as long, because it has a node more there."""
-    found = []
-    for count in (16, 32):
-        scene = crack_scene([[-1.0, 0.0], [1.0, 0.0]], 0.0, {"cells": [[count, count + 1]]})
-        found.append(Crack(scene).solve(solver))
-    assert found[0].ends[:, 0] == pytest.approx([elements] * 2, abs=0.04)
-    assert found[1].ends[:, 0] == pytest.approx(found[0].ends[:, 0], abs=0.03)
-    shares = [one.rest / one.error for one in found]
-    assert shares[1] < 0.9 * shares[0]  # second order against first
-
-
 def test_ends_on_nodes_of_the_mesh_cost_xfem_what_they_cost_conforming_elements():
     scene = crack_scene([[-1.0, 0.0], [1.0, 0.0]], 0.0, {"cells": [[16, 16]]})
     crack = Crack(scene)
     one, other = crack.solve("xfem"), crack.solve("conforming")
     assert one.error == pytest.approx(other.error, rel=1e-9)
     assert [end.nodes for end in one.realised] == pytest.approx([0.0, 0.0], abs=1e-9)
-
-
-def budget_page(folder, ends):
-    write_study(folder, "budget", PAGE | {"ends": ends}, [], "by hand")
-    return render_study(folder, "budget").read_text(encoding="utf-8")
-
-
-def test_ends_are_found_by_their_edge_and_told_apart(tmp_path):
-    """A square of two triangles; the cut ends on the diagonal, a quarter from its middle."""
-    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
-    cells = np.array([[0, 1, 3], [0, 3, 2]])
-    scene = crack_scene([[-1.0, 0.25], [0.4, 0.25]], 0.0, {"cells": [[4, 4]]})
-    facets = np.array([[[-1.0, 0.25], [0.0, 0.25]], [[0.0, 0.25], [0.25, 0.25]]])
-    found = {end.place: end for end in cut_ends(body_of(scene), facets, points, cells, 1.0)}
-    assert found.keys() == {(-1.0, 0.25), (0.4, 0.25)}
-    end = found[0.4, 0.25]
-    assert (end.moved, end.nodes) == pytest.approx((-0.15, -0.4))
-    assert end.acts == pytest.approx(-0.15 - 2 / 3 * 0.25 - 0.355)
-    page = budget_page(tmp_path, [asdict(end)])
-    assert [f"{text} h" in page for text in ("−0.15", "−0.40", "−0.67 ± 0.22")] == [True] * 3
-    assert "acts as" not in budget_page(tmp_path, [])
-    # nothing is realised near an end: nothing is said of it
-    assert cut_ends(body_of(scene), facets[:0], points, cells, 1.0) == []

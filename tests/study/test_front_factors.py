@@ -4,12 +4,9 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from reference.exact import exact_solution
 from verify.assess.stress_intensity import exact_intensity, solution_intensity
-from verify.errors import InputError, UnsupportedSceneError
-from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
 from verify.solution import Solution
 from verify.solvers import find_solver
@@ -136,45 +133,3 @@ def test_the_three_modes_at_a_straight_front_are_those_of_its_field():
     assert values == pytest.approx([1.0, 0.6, -0.8], abs=0.04)
     exact = exact_of(scene)
     assert [exact_intensity(scene, exact, q) for q in scene.quantities] == [1.0, 0.6, -0.8]
-
-
-def test_a_straight_front_that_has_no_room_for_a_domain_is_refused():
-    beside = {"kind": "polygon", "name": "beside",
-              "points": [[0.1, -2, -2], [0.1, 2, -2], [0.1, 2, 2], [0.1, -2, 2]]}  # fmt: skip
-    cuts = [*straight(16, {"mode": "I"}).model_dump(mode="json")["cuts"], beside]
-    with pytest.raises(InputError, match="meets another cut"):
-        check_scene(straight(16, {"mode": "I"}, cuts=cuts))
-    scene = straight(4, {"mode": "I"})
-    with pytest.raises(UnsupportedSceneError, match="too small"):
-        solution_intensity(scene, sampled(scene, 4), scene.quantities[0])
-
-
-@pytest.mark.parametrize(
-    "asked, words",
-    [
-        ({"point": [0.07, -0.04, 0.03]}, "1 m away from the front of 'crack'"),
-        ({"end": "start"}, "a factor in 3D is at 'point = …'"),
-    ],
-)
-def test_what_is_no_point_of_a_front_is_refused(asked, words):
-    with pytest.raises(ValidationError, match=words):
-        penny(asked)
-
-
-def test_mode_three_belongs_to_space():
-    content = load_scene("statics/griffith_inside").model_dump(mode="json", by_alias=True)
-    asked = {"kind": "stress_intensity", "name": "K", "end": "end", "mode": "III", "radius": 0.1}
-    with pytest.raises(ValidationError, match="III belongs to 3D"):
-        Scene.model_validate(content | {"quantities": [asked]})
-
-
-def test_a_front_that_meets_another_cut_or_a_load_that_varies_is_refused():
-    asked = {"point": front_point(60.0)}
-    across = {"kind": "polygon", "name": "across",
-              "points": [[0.5, -2, -2], [0.5, 2, -2], [0.5, 2, 2], [0.5, -2, 2]]}  # fmt: skip
-    cuts = [*load_scene("curved/penny").model_dump(mode="json")["cuts"], across]
-    with pytest.raises(InputError, match="meets another cut"):
-        check_scene(penny(asked, cuts=cuts))
-    load = {"kind": "cut_faces", "cut": "crack", "pressure": "1 + x"}
-    with pytest.raises(InputError, match="is not uniform"):
-        check_scene(penny(asked, loads=[load]))

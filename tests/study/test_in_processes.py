@@ -5,7 +5,6 @@ import os
 
 import pytest
 
-from verify.cli import main
 from verify.study.in_processes import in_processes
 
 FACTORS = [(2, 3), (5, 7), (11, 13)]
@@ -30,13 +29,3 @@ def test_what_a_call_raises_is_raised(processes):
 def test_a_killed_process_is_an_error_that_says_so():
     with pytest.raises(ChildProcessError, match="was killed"):
         list(in_processes(killed, [()], 2))
-
-
-def test_a_study_whose_process_is_killed_ends_with_one_line_and_exit_code_3(
-    tmp_path, monkeypatch, capsys
-):
-    monkeypatch.setattr("verify.study.slivers.study._measured", killed)
-    command = ["study", "slivers", "slivers/plane_edges", "--solver", "xfem", "-j", "2"]
-    assert main([*command, "--out", str(tmp_path)]) == 3
-    assert "was killed" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())

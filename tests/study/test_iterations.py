@@ -65,9 +65,3 @@ def test_the_findings_say_from_which_setting_on(found):
     assert "No number of iterations up to 4" in out
     assert out.count("Without an answer: 7.") == 2
     assert "has 8 iterations and substeps 1: 8 s" in out
-
-
-def test_what_does_not_move_is_bad_input(tmp_path, capsys):
-    words = ["study", "iterations", "statics/f1_patch", "--solver", "xfem", "--truth", "xfem"]
-    assert main([*words, "--out", str(tmp_path / "studies")]) == 2
-    assert "does not move" in capsys.readouterr().err

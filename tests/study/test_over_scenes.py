@@ -9,13 +9,9 @@ from pathlib import Path
 import pytest
 
 from verify.cli import main
-from verify.errors import InputError
-from verify.report.study_page import render_study
 from verify.result import Verdict
-from verify.scene import load_scenes
-from verify.study.measured_scenes import Measurement, measured_scenes
+from verify.study.measured_scenes import Measurement
 from verify.study.slivers.findings import findings
-from verify.study.variants import variant_of
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guide" / "studies.md"
 COMMANDS = re.findall(r"^\$ verify (study (?:slivers|energy) .*)$", GUIDE.read_text(), re.MULTILINE)
@@ -32,10 +28,6 @@ def written(tmp_path_factory):
     return place / "studies"
 
 
-def test_the_guide_has_commands_for_both_studies():
-    assert [c.split()[1] for c in COMMANDS] == ["slivers", "energy"]
-
-
 @pytest.mark.parametrize("kind", ["slivers", "energy"])
 def test_record_table_and_page_are_written_and_agree(written, kind):
     record = json.loads((written / f"{kind}.json").read_text(encoding="utf-8"))
@@ -50,64 +42,6 @@ def test_record_table_and_page_are_written_and_agree(written, kind):
     assert ("<svg" in page) == (kind == "slivers")
     # nothing is fetched
     assert not re.search(r"""(?:src|href)=["'](?!#)|url\((?!#)|@import""", page)
-
-
-def test_a_damaged_record_is_one_line(written, tmp_path):
-    with pytest.raises(InputError, match="slivers"):
-        render_study(tmp_path, "slivers")
-
-
-@pytest.mark.parametrize(
-    ("solver", "message"),
-    [
-        ("xfm", "no solver 'xfm'"),
-        ("xfem slivers", "expected NAME PARAMETER=VALUE"),
-        ("xfem slivers=", "expected NAME PARAMETER=VALUE"),
-        ("xfem sliver=keep", "xfem has no parameter 'sliver'; did you mean 'slivers'"),
-        ("", "no solver ''"),
-    ],
-)
-def test_a_bad_solver_is_one_line(solver, message):
-    with pytest.raises(InputError, match=message):
-        variant_of(solver)
-
-
-@pytest.mark.parametrize("study", ["slivers", "energy"])
-def test_cases_that_do_not_suit_a_study_are_one_line(study, tmp_path, capsys):
-    case = "statics/f1_patch"
-    assert main(["study", study, case, "--solver", "xfem", "--out", str(tmp_path / "s")]) == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
-    assert not (tmp_path / "s").exists()
-
-
-class Broken:
-    """Raises, which is a row with its reason."""
-
-    name = "broken"
-
-    def refuses(self, scene):
-        return None
-
-    def levels(self, scene):
-        return 1
-
-    def solve(self, scene, level, repetitions=1):
-        raise ZeroDivisionError("the pivot is zero")
-
-
-def test_a_solver_that_raises_is_a_row_and_a_failed_finding(monkeypatch):
-    from verify.scene import scene_content
-    from verify.study import variants
-    from verify.study.variants import Variant
-
-    monkeypatch.setattr(variants, "find_solver", lambda name: Broken())
-    rows = [scene_content(scene) for scene in load_scenes("slivers/plane_edges_quick")]
-    measured = measured_scenes(Variant("broken", "broken"), rows)
-    assert [m.size for m in measured] == [0.5, 1e-12, 0.0]
-    assert all(m.value is None and "pivot" in m.reason for m in measured)
-    (finding,) = findings(measured, [])
-    assert finding.verdict is Verdict.FAIL
-    assert "No solution at 0.5, 1e-12, 0" in finding.sentence
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Energies without a ledger, and separated parts: mass, inertia, momenta, against exact motions."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from cut_meshes import layered, quadratic, scene
@@ -14,10 +12,9 @@ from verify.assess.part_account import part_metrics, part_records
 from verify.assess.quantities import Measured, unit_of
 from verify.compare.body import body_of
 from verify.compare.hooke import law_of
-from verify.compare.separated import boundary_nodes, separated_parts
-from verify.scene import PartQuantity, Scene, load_scene
+from verify.compare.separated import separated_parts
+from verify.scene import PartQuantity, Scene
 from verify.solution import Solution
-from verify.solvers import find_solver
 
 # what a blade releases is measured elsewhere
 ACCOUNT = [name for name in energy_account.ACCOUNT if not name.startswith("released")]
@@ -254,17 +251,6 @@ def test_energy_that_enters_unseen_is_not_guessed(change, said):
     assert said in notes["energy_drift"]
 
 
-def test_without_velocities_mass_and_inertia_stay_and_the_rest_says_why():
-    case, one = turning()
-    bare = Solution(one.points, one.cells, one.displacement, one.times)
-    _, parts, found, notes = accounted(case, bare)
-    assert [part.mass for part in parts] == pytest.approx([DENSITY / 2] * 2)
-    assert all(list(part.series) == ["strain"] and not part.drift for part in parts)
-    assert not found
-    assert set(notes) == set(ACCOUNT)
-    assert all("no velocities" in notes[name] for name in ACCOUNT if name != "ledger_mismatch")
-
-
 def test_a_part_that_a_support_holds_is_not_free():
     case, one = turning(loads=[])
     held = [{"where": "top", "displacement": [0.0, 0.0]}]
@@ -276,57 +262,9 @@ def test_a_part_that_a_support_holds_is_not_free():
     assert lower.drift
 
 
-def test_the_faces_of_a_cut_are_no_outer_boundary():
-    points, cells, _ = layered(4, [lambda x: 0.3 + 0.4 * x])
-    still = Solution(points, cells.astype(np.int64), np.zeros((1, *points.shape)))
-    outer = boundary_nodes(still)
-    x, y = points.T
-    on = (np.abs(x * (1 - x)) < 1e-12) | (np.abs(y * (1 - y)) < 1e-12)
-    assert (outer == on).all()
-
-
 def test_parts_that_touch_in_a_point_are_two():
     points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 2.0]])
     cells = np.array([[0, 1, 2], [2, 3, 4]])
     found = separated_parts(Solution(points, cells, np.zeros((1, 5, 2))), 2.0)
     assert [part.mass for part in found] == [1.0, 1.0]
     assert found[0].centre[1] > found[1].centre[1]
-
-
-@pytest.mark.parametrize(
-    ("entry", "said"),
-    [
-        ({"of": "mass", "component": "x"}, "has none"),
-        ({"of": "inertia"}, "needs one"),
-        ({"of": "inertia", "component": "x"}, "inertia in a 2D scene has z"),
-        ({"of": "linear_momentum", "component": "z"}, "has x or y"),
-        ({"of": "mass", "point": [0.1, 0.2, 0.3]}, "expected 2 coordinates"),
-        ({"of": "mass", "point": [3.0, 0.2]}, "not in the body"),
-        ({"of": "mass", "point": [0.5, 0.5]}, "between two parts"),
-        ({"of": "kinetic_energy", "time": 0.123}, "no output time"),
-        ({"of": "mass", "time": 0.1}, "undeformed"),
-    ],
-)
-def test_a_part_asked_for_in_a_wrong_way_is_one_clear_error(entry, said):
-    with pytest.raises(ValueError, match=said):
-        scene(
-            [LINE], material=PLANE, supports=[], analysis=DYNAMIC, initial=MOVING,
-            quantities=[{"kind": "part", "name": "p", **entry}],
-        )  # fmt: skip
-
-
-@pytest.mark.fenicsx
-def test_a_traction_that_is_let_go_at_the_start_does_no_work_and_one_that_stays_does():
-    """The trapezoidal rule keeps the energy of the cantilever, with its ledger and without one."""
-    case = load_scene("controls/cantilever")
-    solved = find_solver("conforming").solve(case, 0, 0)
-    assert np.ptp(solved.displacement[:, :, 1]) > 0.01  # it swings
-    bare = replace(solved, ledger={})
-    _, _, own, _ = accounted(case, solved)
-    _, _, metrics, _ = accounted(case, bare)
-    assert metrics["energy_drift"].value < 1e-8
-    assert metrics["energy_drift"].value == pytest.approx(own["energy_drift"].value, abs=1e-8)
-    stays = case.loads[0].model_copy(update={"history": None})
-    _, _, metrics, notes = accounted(case.model_copy(update={"loads": [stays]}), bare)
-    assert "energy_drift" not in metrics
-    assert "tractions" in notes["energy_drift"]

@@ -4,7 +4,7 @@ import pytest
 
 from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
-from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
+from verify.result import CaseResult, Metric, SolveRecord, Status
 from verify.study.ranking import rank_solvers
 
 
@@ -155,19 +155,6 @@ def test_times_that_are_no_sample_rank_nobody_before_another(repetitions, notes,
     assert by["x"]["tied"] == by["y"]["tied"] == bool(said)
 
 
-def test_a_solver_without_an_error_in_common_is_not_timed_against_the_others():
-    solves = [solve("a", n, level, 0.1 * 0.5**level, 0.0, 4.0**level)
-              for n in ("x", "y") for level in range(3)]  # fmt: skip
-    solves += [solve("a", "bad", level, 0.9, 0.0, 0.001) for level in range(3)]
-    solves += [solve("a", "good", level, 1e-4 * 0.5**level, 0.0, 9.0) for level in range(3)]
-    found, by = compared(rank_solvers([case_of("a", solves)]), "cost", view="time at equal error")
-    assert by["x"]["rank"] == by["y"]["rank"] == 1
-    assert by["bad"]["rank"] is by["good"]["rank"] is None
-    reasons = {e["solver"]: e["reason"] for e in found["left_out"]}
-    assert "does not reach" in reasons["bad"]
-    assert "already on level 0" in reasons["good"]
-
-
 def test_stability_counts_what_was_lost_and_forgives_refusals():
     worst = Metric("displacement_l2", 7.0, "1", None, 0.1, "exact")
     solves = [
@@ -198,14 +185,6 @@ def test_of_energy_the_worst_case_counts_and_round_off_is_as_good_as_zero():
     _, by = compared(rank_solvers(results), "energy", "energy_drift")
     assert by["x"]["rank"] == by["y"]["rank"] == 1
     assert (by["z"]["rank"], by["z"]["value"], by["z"]["where"]) == (3, 1e-3, "a")
-
-
-def test_undecided_checks_and_the_reference_are_never_ranked():
-    open_ = VerdictRecord("error", "x", "jump_l2", Verdict.UNDECIDED, 1, 0, 2, "at most 1", "why")
-    solves = [solve("a", n, 0, 0.1) for n in ("x", "y", "reference")]
-    ranking = rank_solvers([case_of("a", solves, [open_])])
-    assert ranking["solvers"] == ["x", "y"]
-    assert [e["reason"] for e in ranking["left_out"]] == ["error jump_l2 UNDECIDED: why"]
 
 
 def test_profiles_count_what_a_solver_has_not_done_as_never_done():
@@ -253,23 +232,3 @@ def test_a_solver_is_best_where_none_is_certainly_better_and_alone_where_all_are
     assert [y[k] for k in ("items", "best", "alone", "near")] == [4, 2, 0, 3]
     assert [x[k] for k in ("case", "value", "next_solver", "next_value")] == ["b", 0.1, "y", 0.3]
     assert y["case"] == ""
-
-
-@pytest.mark.parametrize("timing", ["", "contended: a load"])
-def test_nobody_is_best_in_time_where_times_are_contended(timing):
-    def run(name, fast, slow):
-        times = [
-            solve(name, solver, level, error, seconds=seconds * 4**level)
-            for solver, seconds in (("x", fast), ("y", slow))
-            for level, error in ((0, 0.2), (1, 0.1))
-        ]
-        for one in times:
-            one.metrics.append(
-                Metric("displacement_l2", one.metrics[0].value, "1", None, 0.0, "exact")
-            )
-            one.notes["timing"] = timing
-        return case_of(name, times)
-
-    found = rank_solvers([run("a", 1.0, 1.5), run("b", 1.0, 3.0)])["strengths"]
-    timed = [s for s in found if s["question"] == "time at equal error" and s["solver"] == "x"]
-    assert [(s["best"], s["case"][:1]) for s in timed] == ([] if timing else [(2, "b")])

@@ -143,17 +143,3 @@ def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most
     if scheme == "newmark":  # nothing takes it: all of it is in the mesh
         assert abs(values["released_to_scheme"]) < 1e-9
         assert values["released_to_kinetic"] > 0.3 * 0.36
-
-
-def test_a_solution_without_a_ledger_or_velocities_says_what_is_missing():
-    scene = strip()
-    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
-    still = Solution(points, np.array([[0, 1, 2, 3]]), np.zeros((2, 4, 3)),
-                     times=np.array([0.0, 0.15]))  # fmt: skip
-    law = law_of(scene)
-    metrics, notes = released_metrics(scene, still, 0.01, law, motion_account(scene, still, law),
-                                      None)  # fmt: skip
-    assert not metrics
-    assert "ledger" in notes["released_to_scheme"]
-    assert "no velocities" in notes["released_to_short_waves"]
-    assert released_metrics(strip(cuts=[]), still, 0.01, law, None, None) == ([], {})

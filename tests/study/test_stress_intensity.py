@@ -1,7 +1,5 @@
 """Stress-intensity factors as a quantity of interest: of any solver's solution, with reasons."""
 
-from dataclasses import replace
-
 import pytest
 
 from reference.exact import exact_solution
@@ -10,7 +8,7 @@ from verify.assess.reference import conforming_reference, exact_reference
 from verify.assess.unavailable import unavailable_quantities
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
-from verify.errors import InputError, UnsupportedSceneError
+from verify.errors import InputError
 from verify.result import Metric, SolveRecord, Status
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
@@ -56,27 +54,6 @@ def test_the_xfem_solution_has_factors_too_within_its_order():
     for asked in case.quantities:
         if asked.mode == "I":
             assert one.quantity(asked) == pytest.approx(expected, rel=0.1)
-
-
-def test_what_is_no_tip_or_not_linear_is_refused_with_the_reason():
-    strip = load_scene("statics/tissue_strip")
-    content = strip.model_dump(by_alias=True)
-    cut = strip.cuts[0].name
-    content |= {"acceptance": [], "quantities": [dict(q, cut=cut) for q in ASKED[::2]]}
-    case = Scene.model_validate(content)
-    solved = find_solver("xfem").solve(case, 0)
-    one = Measured(solved, body_of(case), hooke(case.material), case)
-    reasons = []
-    for asked in case.quantities:
-        try:
-            assert one.quantity(asked) > 0
-        except UnsupportedSceneError as problem:
-            reasons.append(str(problem))
-    assert len(reasons) == 1  # one end is the mouth
-    assert "no tip" in reasons[0]
-    turned = Scene.model_validate(content | {"analysis": {"kinematics": "corotational"}})
-    with pytest.raises(UnsupportedSceneError, match="linear kinematics"):
-        Measured(solved, body_of(case), hooke(case.material), turned).quantity(turned.quantities[0])
 
 
 OPENS_LATER = [{"kind": "polyline", "points": [[-1.0, 0.0], [1.0, 0.0]], "opens_at": 0.5}]
@@ -133,21 +110,6 @@ def test_a_factor_that_no_solution_can_have_is_refused_beforehand(changes, asked
         check_scene(scene)
     energy = [{"kind": "strain_energy"}]
     check_scene(Scene.model_validate(content | {"quantities": energy}))
-
-
-def test_a_solution_in_motion_without_accelerations_has_no_factor():
-    case = griffith(
-        material={"young": 1.0, "poisson": 0.3, "plane": "strain", "density": 1.0},
-        analysis=MOTION, exact=None, reference={}, loads=[],
-        supports=[{"where": "boundary", "displacement": [0, 0]}],
-    )  # fmt: skip
-    solved = find_solver("xfem").solve(case, 0, repetitions=0)
-    assert solved.acceleration is not None
-    found = Measured(solved, body_of(case), hooke(case.material), case).quantity(case.quantities[0])
-    assert found == pytest.approx(0.0, abs=1e-12)  # nothing moves
-    bare = replace(solved, acceleration=None)
-    with pytest.raises(UnsupportedSceneError, match="no accelerations"):
-        Measured(bare, body_of(case), hooke(case.material), case).quantity(case.quantities[0])
 
 
 def test_what_only_fine_levels_have_is_known_from_those():

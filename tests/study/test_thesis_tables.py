@@ -5,21 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from verify.reference_record import ReferenceRecord
-from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict
-from verify.scene import load_scene, load_scenes
+from verify.result import Verdict
+from verify.scene import load_scenes
 from verify.simulator.thesis.added_nodes import count_face, count_strips
 from verify.simulator.thesis.delays import delays, with_other_frames
-from verify.simulator.thesis.published import published_rows
 from verify.simulator.thesis.real_time import LIMITS, RealTime
 from verify.simulator.thesis.step_times import CUTS, TETRAHEDRA, StepTime, step_times
 from verify.study.thesis.measured import Measured
-from verify.study.thesis.methods_compared import MethodOnCase, compare_methods
+from verify.study.thesis.methods_compared import MethodOnCase
 from verify.study.thesis.sliver_systems import exponent, sliver_systems
 from verify.study.thesis.verdicts_on_cost import verdicts_on_cost
 from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
 
-ROUND_OFF = 1e-12
 _HOLD = (
     "Table 4.3, its law",
     "Table 4.3, XFEM",
@@ -65,19 +62,6 @@ def slivers():
     return sliver_systems([row for row in rows if row.row.value in (0.1, 1e-4, 1e-6)])
 
 
-def test_the_published_tables_are_those_of_the_thesis() -> None:
-    rows = published_rows("4.3")
-    assert [row[0] for row in rows] == [0, 10, 50, 100, 500, 1000]
-    for _, xfem, both, more, more_both, difference in rows:
-        # what is printed agrees with itself
-        assert (xfem - 3913, both - 3913, both - xfem) == (more, more_both, difference)
-    for row in published_rows("4.5"):
-        assert np.diff(row[1:]).tolist() == [50] * 4
-    for row in published_rows("4.6"):
-        assert np.mean(row[1:4]) == pytest.approx(row[4], abs=1e-8)
-    assert published_rows("4.4")[-1] == [1000, 1.0164, 2.2789, 2.31175, 2.6234, 2.78515]
-
-
 def test_a_strip_of_n_cut_triangles_enriches_n_plus_2_nodes(strips) -> None:
     assert {strip.pattern for strip in strips} == {"right", "left", "alternating", "crossed"}
     assert max(strip.triangles for strip in strips) == 21
@@ -103,16 +87,6 @@ def test_what_snaps_less_adds_more_and_subdivision_twice_as_much_as_xfem(face) -
     assert 2 * edges <= last["subdivision"] <= 2 * edges + 6 * face[-1].strokes
 
 
-def test_on_the_face_only_what_divides_elements_shortens_the_explicit_step(face) -> None:
-    last = face[-1]
-    assert last.step["xfem"] == pytest.approx(1.0, abs=1e-6)
-    assert last.smallest["xfem"] == pytest.approx(last.smallest["subdivision"], rel=1e-6)
-    # the same pieces, as elements of their own
-    assert last.step["subdivision"] < 0.02
-    assert last.step["subdivision"] <= last.step["snapping_subdivision 0.01"] < 0.1
-    assert last.step["snapping"] > 0.5
-
-
 def test_a_delay_is_a_length_over_the_speed_of_the_tool(crossed) -> None:
     for size in (200, 400):
         lengths = [row.delay * row.speed for row in crossed if row.tetrahedra == size]
@@ -123,14 +97,6 @@ def test_a_delay_is_a_length_over_the_speed_of_the_tool(crossed) -> None:
     for row in crossed:
         assert row.delay < row.seen < row.delay + 1.0 / 60.0
         assert 0.4 < row.delay * row.speed / row.edge < 0.6
-
-
-def test_a_slower_machine_has_the_same_delays(crossed) -> None:
-    speed = crossed[2].speed
-    for frames in with_other_frames(200, speed, (1 / 120, 1 / 10, 0.5)):
-        assert frames.difference < ROUND_OFF
-        assert 0.5 < frames.seen_difference <= 1.0 + ROUND_OFF
-        assert frames.elements == crossed[2].elements
 
 
 def test_the_hand_is_cut_as_often_as_the_table_asks() -> None:
@@ -171,31 +137,6 @@ def test_small_pieces_are_badly_scaled_and_nothing_worse(slivers) -> None:
     first, _, last = (row for row in slivers if row.method == "xfem")
     assert last.condition > 1e4 * first.condition
     assert last.scaled < 1.1 * first.scaled
-
-
-def record(solver, level, error, **more):
-    metrics = [
-        Metric("displacement_l2", error, "1", uncertainty=0.01 * error),
-        Metric("energy_norm", 10 * error, "1"),
-        Metric("strain_energy", 0.9, "J", reference=1.0),
-    ]
-    return SolveRecord("f3", solver, level, Status.SOLVED, metrics=metrics,
-                       timings={"solve": [1.0, 2.0, 3.0]}, **more)  # fmt: skip
-
-
-def test_solved_cases_are_summed_up_with_their_critical_steps() -> None:
-    scene = load_scene("statics/f3_inclined")
-    mesh = scene.mesh.model_copy(update={"cells": scene.mesh.cells[:1]})
-    failed = SolveRecord("f3", "removal", 0, Status.FAILED, "it broke")
-    solves = [record("xfem", 0, 0.1), record("subdivision", 0, 0.1), failed]
-    result = CaseResult("f3", "", "", "", {}, ReferenceRecord(), solves, [], [])
-    rows = compare_methods([scene.model_copy(update={"mesh": mesh})], [result])
-    xfem, subdivision, removal = rows
-    assert xfem.displacement == pytest.approx((0.1, 0.099, 0.101))
-    assert xfem.energy == pytest.approx(-0.1)
-    assert xfem.seconds == 2.0
-    assert xfem.critical_step > 0.9 > subdivision.critical_step
-    assert (removal.displacement, removal.reason) == (None, "it broke")
 
 
 def method(solver, level, error, step=1.0):

@@ -30,12 +30,6 @@ def test_bounds_hold_for_the_limit_of_a_sequence_and_fall_with_the_level():
         assert 0.16 / 4**k <= row["energy_norm"] <= 0.16 / 4**k + 0.0126
 
 
-def test_levels_that_were_not_timed_and_quantities_that_vanish_say_nothing():
-    levels = {level: replace(one, timings={}) for level, one in LEVELS.items()}
-    rows = time_to_accuracy(levels, {"u": {"values": [0.0] * 3, "uncertainty": 1e-9}})
-    assert [(row["seconds"], row["u"]) for row in rows.values()] == [(None, None)] * 3
-
-
 @pytest.mark.parametrize("finest", [1.0, -1.0])
 def test_the_bound_of_the_finest_level_is_its_own_half_width(finest):
     metrics = {"u": {"values": [1.3, 1.1, finest], "uncertainty": 0.02}}

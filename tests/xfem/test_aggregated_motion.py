@@ -8,12 +8,10 @@ from test_sliver_policies import degenerate_cuts
 from time_schemes import SCHEMES
 
 from verify.xfem.assembly import body_pattern
-from verify.xfem.body import DynamicBody, MotionState, MovingSupports
+from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.critical_step import critical_step, element_critical_steps
-from verify.xfem.cuts import Plane
 from verify.xfem.energy_balance import BalanceRecorder, run
 from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.errors import XfemError
 from verify.xfem.explicit import CentralDifferences, ForwardEuler
 from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
@@ -80,14 +78,6 @@ def test_the_critical_step_is_never_below_that_of_the_smallest_element(seed):
     assert mass.keeps_element_steps
     # eigenvalues of dense matrices to 1e-12
     assert critical_step(K, mass) >= (1.0 - 1e-9) * bound
-
-
-def test_a_mass_lumped_anew_would_not_keep_the_step():
-    """Why the mass is not diagonal: its row sums are no bound of it."""
-    treated, _ = treat_slivers(split(2))
-    mass = side_wise_mass(treated, DENSITY).matrix.toarray()
-    least = np.linalg.eigvalsh(np.diag(mass.sum(axis=1)) - mass)[0]
-    assert least < -1e-6 * mass.max()
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -179,60 +169,3 @@ def test_a_cut_midway_keeps_momenta_and_loses_what_slivers_moved_otherwise(dim, 
     assert rows.kinetic[0] <= kinetic * (1.0 + 1e-12) or held
     assert rows.kinetic[0] == pytest.approx(kinetic, rel=0.02)
     assert rows.strain[0] == pytest.approx(strain, rel=0.02)
-
-
-def test_a_linear_motion_is_inherited_as_it_is():
-    """What is linear on each side is in the space: nothing jumps."""
-    for dim in (2, 3):
-        new = split(dim)
-        old = cut_mesh(new.mesh, [])
-        state = MotionState(0.1 * old.node_points, 0.3 * old.node_points[:, ::-1].copy())
-        body = moving(new)
-        v = body.force.phantom
-        after = inherit_state(old, v, state, body)
-        source = ancestors(old, new)
-        for got, was in (
-            (after.displacement, state.displacement),
-            (after.velocity, state.velocity),
-        ):
-            assert v.extend(got) == pytest.approx(was[source], abs=1e-12)
-        with pytest.raises(XfemError, match="that body with its mass"):
-            inherit_state(old, v, state)
-
-
-def test_an_explicit_step_moves_supports_that_no_root_shares_and_refuses_others():
-    phantom = split(2)
-    treated = moving(phantom)
-    v = treated.force.phantom
-    coupled = np.unique(treated.mass.entries[0][treated.mass.entries[0] != treated.mass.entries[1]])
-
-    def driven(nodes):
-        fixed = np.zeros(v.node_points.shape, dtype=bool)
-        fixed[nodes] = True
-        rest = np.zeros(v.node_points.shape)
-        supports = MovingSupports(fixed, lambda t: (rest + 0.1 * t, rest + 0.1))
-        return DynamicBody(treated.force, treated.mass, supports=supports)
-
-    apart = np.setdiff1d(np.flatnonzero(v.node_points[:, -1] > 1.0 - 1e-9), coupled)
-    body = driven(apart)
-    state = body.rest()
-    account = run(CentralDifferences(body, 1e-3), body, state, 20)
-    assert state.displacement[apart] == pytest.approx(0.002, rel=1e-12)
-    assert np.ptp(account.balance) < 1e-10 * account.kinetic.max()
-    with pytest.raises(XfemError, match="couples"):
-        CentralDifferences(driven(coupled[:1]), 1e-3)
-
-
-def test_a_part_without_a_root_keeps_its_unknowns_and_falls_too():
-    """A strip a thousandth of an element thin, cut off along the whole body: counted."""
-    mesh = mesh_of(2, 6, 0)
-    cuts = [Plane([0.5, 0.55 + gap], [0.1, 1.0]) for gap in (0.0, 1e-3 / 6)]
-    phantom = cut_mesh(mesh, cuts)
-    treated = treated_body(phantom)
-    strip = phantom.bodies[phantom.cells[:, 0]]
-    thin = np.bincount(strip, phantom.volumes).argmin()
-    assert treated.slivers.rootless == (strip == thin).sum()
-    body = DynamicBody(treated.force, treated.mass, weight=treated.mass.weight([0.0, -GRAVITY]))
-    state = body.rest()
-    run(CentralDifferences(body, 1e-3), body, state, 10)
-    assert state.velocity[:, 1] == pytest.approx(-GRAVITY * 1e-2, rel=1e-9)

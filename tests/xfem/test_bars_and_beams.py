@@ -5,7 +5,7 @@ The thesis' material (E = 1e4 Pa, ν = .3, ρ = 1000 kg/m³): c_d = 3.668997 m/s
 
 import numpy as np
 import pytest
-from cut_bodies import DENSITY, cut_body, material, rotation, treated_body
+from cut_bodies import DENSITY, cut_body, material, rotation
 from scipy.sparse import kron
 from scipy.sparse.linalg import eigsh
 
@@ -20,7 +20,6 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.supports import Supports
 
 HALF, STRAIN = 0.5, 0.01
 
@@ -32,25 +31,6 @@ def bar(dim, cells):
     if dim == 2:
         return rectangle_mesh((cells, 1), lower, upper)
     return box_mesh((cells, 1, 1), lower, upper)
-
-
-def dynamic(phantom, policy):
-    """The bar's body, and its supports' displacement."""
-    treated = treated_body(phantom, policy)
-    ends = np.abs(np.abs(phantom.mesh.points[:, 0]) - HALF) < 1e-9
-    supports = Supports.none(treated.phantom).prescribe(
-        treated.phantom, ends, lambda at, _: STRAIN * at * np.eye(at.shape[1])[0]
-    )
-    fixed = supports.fixed.copy()
-    fixed[:, 1:] = True  # what follows a root cell does not move across either
-    return DynamicBody(treated.force, treated.mass, supports=Supports(fixed, supports.values))
-
-
-def crossing(times, values, level, after):
-    """First time after another at which linear interpolation reaches a level."""
-    later = np.flatnonzero((values[:-1] - level) * (values[1:] - level) <= 0.0)
-    k = later[times[later] >= after][0]
-    return times[k] + (level - values[k]) / (values[k + 1] - values[k]) * (times[k + 1] - times[k])
 
 
 WHOLE, SPLIT, HALF_SPLIT = 0.65408379, 0.33435932, 0.603212

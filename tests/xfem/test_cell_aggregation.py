@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import xfem_exact_fields as exact
 from cut_bodies import rotation
-from scipy.spatial import cKDTree
 from test_sliver_policies import degenerate_cuts, shaken
 from xfem_bodies import boundary_nodes, relative_l2_error
 
@@ -13,7 +12,6 @@ from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
-from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
@@ -210,19 +208,6 @@ def test_the_displacement_keeps_its_order_and_its_error(angle, seed):
     check_order((8, 16, 32), angle, seed)
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("angle", [0.2, 0.3, 0.5, 0.9, 1.3])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_the_displacement_keeps_its_order_and_its_error_up_to_128(angle, seed):
-    check_order((16, 32, 64, 128), angle, seed)
-
-
-def test_the_displacement_keeps_its_error_in_space():
-    for seed, angle in ((0, 1.3), (1, 0.7), (3, 0.2)):
-        kept, treated = errors_kept_and_aggregated(mesh_of(3, 6, seed), angle)
-        assert (treated < 1.02 * kept).all()
-
-
 def dense_stiffness(phantom):
     pattern = body_pattern(phantom)
     blocks = InternalForce(phantom, SOFT[phantom.mesh.dim], "linear").stiffness(pattern)
@@ -278,29 +263,6 @@ def test_the_condition_number_without_scaling_is_bounded(dim):
     assert condition(near_nodes(dim, 1e-4)) > 1e4 * uncut
 
 
-def test_the_root_does_not_depend_on_the_numbers_of_nodes_and_cells():
-    """Numbered anew, the same nodes of the same slivers follow the same values."""
-    for seed in range(6):
-        random = np.random.default_rng(seed)
-        mesh = mesh_of(2 + seed % 2, 5 - seed % 2, seed)
-        cut = random_cut(mesh, random)
-        order = random.permutation(len(mesh.points))
-        place = np.argsort(order)
-        cells = random.permutation(place[mesh.cells])
-        other = SimplexMesh(mesh.points[order], cells)
-        found = []
-        for one in (mesh, other):
-            treated, _ = treat_slivers(cut_mesh(one, [cut]))
-            extended = treated.extend(np.cos(3.0 * treated.node_points + treated.node_side))
-            corner = treated.corners.node_points[treated.cells].reshape(-1, mesh.dim)
-            piece = np.repeat(treated.piece_centroids, mesh.dim + 1, axis=0)
-            found.append((np.hstack([corner, piece]), extended[treated.cells.ravel()]))
-        (here, values), (there, others) = found
-        distance, match = cKDTree(there).query(here)
-        assert distance.max() < 1e-9
-        assert values == pytest.approx(others[match], abs=1e-9)
-
-
 @pytest.mark.parametrize("policy", ["keep", "merge"])
 def test_prescribed_values_on_slivers_are_what_they_are(policy):
     """A thin wedge between cut and boundary is pulled by its sharp end, where only slivers are."""
@@ -321,14 +283,6 @@ def test_prescribed_values_on_slivers_are_what_they_are(policy):
         plain, _ = treat_slivers(phantom, policy)
         with pytest.raises(XfemError, match="follow"):
             Supports.none(plain).prescribe(plain, tip)
-
-
-def test_supports_of_another_body_and_a_penalty_on_top_are_refused():
-    phantom = near_nodes(2, 1e-3)
-    with pytest.raises(XfemError, match="held nodes"):
-        treat_slivers(phantom, held=np.ones(3, dtype=bool))
-    with pytest.raises(XfemError, match="aggregated"):
-        GhostPenalty(treat_slivers(phantom)[0], SOFT[2])
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -79,22 +79,6 @@ def test_the_nearest_facet_is_that_of_all(dim) -> None:
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_each_part_of_a_cut_body_answers_for_itself(dim) -> None:
-    cutter, _, collider, _, _, rng = _model(dim, 2)
-    phantom = cutter.phantom_mesh()
-    order = np.argsort(cutter.body.piece_parent.rows, kind="stable")
-    piece_body = np.empty(len(order), dtype=np.int64)
-    piece_body[order] = phantom.bodies[phantom.cells[:, 0]]
-    points = rng.uniform(-0.3, 1.3, (40, dim))
-    every = collider.nearest(points)
-    one_by_one = [collider.nearest(points, piece_body=piece_body, body=b) for b in (0, 1)]
-    for b, contacts in enumerate(one_by_one):
-        assert (piece_body[contacts.piece] == b).all()
-    nearest = np.minimum(one_by_one[0].distance, one_by_one[1].distance)
-    np.testing.assert_array_equal(every.distance, nearest)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
 def test_a_segment_pierces_what_a_linear_solve_says(dim) -> None:
     _, _, collider, rows, corners, rng = _model(dim, 3)
     hits = 0
@@ -115,45 +99,3 @@ def test_a_segment_pierces_what_a_linear_solve_says(dim) -> None:
             np.testing.assert_allclose(foot, start + contacts.share[k] * (end - start), atol=1e-12)
         hits += len(expected)
     assert hits > 40
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_capsule_touches_what_is_within_its_radius(dim) -> None:
-    _, _, collider, rows, corners, rng = _model(dim, 4)
-    weights = np.empty(dim)
-    for _ in range(5):
-        start, end = rng.uniform(-0.3, 1.3, (2, dim))
-        radius = 0.08
-        contacts = collider.touched(start, end, radius)
-        axis = start + np.linspace(0, 1, 150)[:, None] * (end - start)
-        step = np.linalg.norm(end - start) / 149
-        for facet, corner in zip(rows, corners, strict=True):
-            gap = np.inf
-            for x in axis:
-                nearest_on_facet(x, corner, weights)
-                gap = min(gap, np.linalg.norm(weights @ corner - x))
-            found = np.flatnonzero(contacts.facet == facet)
-            # sampling the axis is an upper bound, good to half a step
-            if gap <= radius:
-                assert len(found) == 1
-            if gap > radius + step:
-                assert len(found) == 0
-            if len(found):
-                k = found[0]
-                assert gap - step <= contacts.distance[k] <= gap + 1e-12
-                on_axis = start + contacts.share[k] * (end - start)
-                assert np.linalg.norm(contacts.at[k] @ corner - on_axis) == pytest.approx(
-                    contacts.distance[k], abs=1e-12
-                )
-
-
-def test_a_penalty_on_a_contact_does_the_work_on_the_unknowns_that_it_does_on_the_tool() -> None:
-    cutter, body, collider, _, _, rng = _model(3, 5)
-    motion = rng.normal(size=(cutter.body.node_count, 3))
-    velocity = body.surface.positions(motion) - body.surface.material.rows
-    contacts = collider.nearest(rng.uniform(0.0, 1.0, (10, 3)))
-    for facet, at in zip(contacts.facet, contacts.at, strict=True):
-        push = rng.normal(size=3)
-        nodal = body.surface.facet_force(int(facet), at, push, np.zeros_like(motion))
-        on_surface = push @ (at @ velocity[body.surface.facets.rows[facet]])
-        assert (nodal * motion).sum() == pytest.approx(on_surface, rel=1e-12)

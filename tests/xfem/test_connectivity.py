@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from xfem_bodies import zero_modes
 
-from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch, Polyline
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.cuts import Plane, PolygonPatch, Polyline
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
@@ -92,15 +91,6 @@ def test_every_free_piece_of_a_block_has_exactly_six_zero_energy_modes(name):
     assert next_value > 1e-6
 
 
-def test_the_order_of_the_cuts_does_not_matter():
-    cuts = PLANAR["crossing, then a branch"][0]
-    counts = set()
-    for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0], [2, 0, 1]):
-        phantom = cut_mesh(SQUARE, [cuts[k] for k in order])
-        counts.add((phantom.node_count, len(phantom.cells), int(phantom.bodies.max())))
-    assert len(counts) == 1
-
-
 @given(st.floats(0.05, 0.95), st.floats(0.05, 0.95), st.floats(-2.0, 2.0))
 @settings(max_examples=60, deadline=None)
 def test_turning_a_cut_round_changes_nothing_but_the_name_of_its_sides(x, y, slope):
@@ -109,18 +99,6 @@ def test_turning_a_cut_round_changes_nothing_but_the_name_of_its_sides(x, y, slo
     assert one.bodies.max() == other.bodies.max()
     assert one.volumes.sum() == pytest.approx(other.volumes.sum(), rel=1e-14)
     assert np.allclose(np.sort(one.fraction), np.sort(other.fraction), atol=1e-14)
-
-
-@pytest.mark.parametrize("beside", [[], [Plane([9.0, 9.0], [1.0, 0.0])]], ids=["alone", "of two"])
-def test_whether_a_zero_point_is_near_enough_does_not_depend_on_the_order_of_corners(beside):
-    """The zero points are 0.35 off the cut, half the longest edge is 0.5, of the others 0.25."""
-    obtuse = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.05]])
-    far = ImplicitCut(
-        lambda x: np.where(x[:, 1] > 0.0, 0.5, -0.5) if len(x) == 3 else 0.35 + 0 * x[:, 0]
-    )
-    for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
-        phantom = cut_mesh(SimplexMesh(obtuse, [order]), [far, *beside])
-        assert len(phantom.cells) == 2
 
 
 @pytest.mark.parametrize(
@@ -136,29 +114,6 @@ def test_a_tip_inside_an_element_moves_to_an_edge_by_the_chosen_rule(tip, length
     want = {"inside": crossings[1], "through": crossings[2], "nearest": crossings[2]}[tip]
     assert realised == pytest.approx(want, abs=1e-12)
     assert phantom.bodies.max() == 0
-
-
-def test_nodes_of_the_edge_that_holds_the_tip_are_not_enriched():
-    phantom = cut_mesh(rectangle_mesh((4, 4)), [line(-1.0, 0.52, 0.5, 0.52)])
-    points = phantom.mesh.points[phantom.enriched_nodes]
-    assert (points[:, 0] < 0.5).all()
-    assert len(points) == 4  # two columns of nodes above and below: x = 0 and 0.25
-
-
-def test_the_turns_of_a_spiral_do_not_disturb_each_other():
-    """Between two turns the level set changes its sign without a cut: nothing may split there."""
-    angle = np.linspace(0.0, 5.0 * np.pi, 400)
-    radius = 0.05 + 0.38 * angle / angle[-1]
-    spiral = Polyline(0.5 + radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1))
-    length = np.linalg.norm(np.diff(spiral.vertices, axis=0), axis=1).sum()
-    for n, tolerance in ((24, 0.05), (60, 0.02)):  # an element at each end may stay whole
-        phantom = cut_mesh(rectangle_mesh((n, n)), [spiral])
-        facets = subdivide(phantom).cut_facets
-        realised = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum()
-        assert phantom.bodies.max() == 0
-        assert realised == pytest.approx(length, abs=tolerance)
-        # chords of elements of size h√2 under radii above 0.05
-        assert np.abs(spiral.level_set(facets.reshape(-1, 2))).max() < 2.0 / n**2 / (8 * 0.05)
 
 
 def test_the_area_inside_a_circular_cut_converges_at_second_order():

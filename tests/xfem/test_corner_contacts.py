@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from cut_comparison import assert_same_cut
 from scipy.spatial import Delaunay
 from xfem_bodies import zero_modes
 
@@ -39,22 +38,6 @@ def test_a_cut_through_a_re_entrant_corner_leaves_no_hinge(dim, slope, side):
     assert zero_modes(phantom)[0] == 3 * (3 if dim == 2 else 6)
     above = phantom.mesh.points[:, 1] - 0.5 - slope * (phantom.mesh.points[:, 0] - 0.5)
     assert len(np.unique(phantom.bodies[: len(mesh.points)][above > 1e-9])) == 2
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("back", [False, True])
-def test_a_tool_through_a_re_entrant_corner_leaves_no_hinge(dim, back):
-    mesh = angle_body(dim)
-    tips = np.array([[-0.5, -0.5, -0.5], [1.5, 1.5, -0.5]])[:, :dim]
-    depth = [0.0, 0.0, 2.0] if dim == 3 else None
-    path = ToolPath.of_tip(tips[::-1] if back else tips, [0.0, 1.0], depth)
-    cutter = SemiProgressiveCutter(mesh)
-    cutter.begin(path)
-    for time in np.linspace(0.1, 1.0, 4):
-        cutter.advance(time)
-    phantom = cutter.phantom_mesh()
-    assert phantom.bodies.max() + 1 == 3
-    assert_same_cut(phantom, cut_mesh(mesh, [path.sweep]))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -13,14 +13,8 @@ from cut_bodies import (
 )
 
 from verify.xfem.block_pattern import block_pattern
-from verify.xfem.body import DynamicBody
-from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, inverted_cells
-from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
-from verify.xfem.phantom import PhantomMesh, cut_mesh
 
 
 def _bodies():
@@ -162,50 +156,3 @@ def test_a_turned_body_has_the_turned_forces(force):
         turned, same = force.evaluate((X + u) @ Q.T - X)
         assert same == pytest.approx(energy, rel=1e-13)
         assert np.abs(turned - f @ Q.T).max() < 1e-12 * np.abs(f).max()
-
-
-def test_a_turned_membrane_resists_in_its_plane_only():
-    force = InternalForce(cut_membrane(), isotropic(1.0, 0.3, "plane stress"))
-    pattern = block_pattern(force.phantom.cells, force.phantom.node_count)
-    u = np.zeros_like(force.phantom.node_points)
-    values = np.linalg.eigvalsh(pattern.matrix(force.stiffness(pattern, u)).toarray())
-    # a triangle has 3 in-plane strains: no more stiff modes than 3 per piece
-    assert (values > 1e-10 * values[-1]).sum() <= 3 * len(force.phantom.cells)
-    assert values[0] > -1e-13 * values[-1]
-
-
-def test_energy_does_not_depend_on_the_numbering_of_nodes_and_cells():
-    rng = np.random.default_rng(5)
-    for v in (cut_body(2), cut_body(3)):
-        mesh, dim = v.mesh, v.mesh.dim
-        new = rng.permutation(len(mesh.points))
-        points = np.empty_like(mesh.points)
-        points[new] = mesh.points
-        cells = rng.permuted(new[mesh.cells][rng.permutation(len(mesh.cells))], axis=1)
-        cut = _plane_of(dim)
-        w = cut_mesh(SimplexMesh(points, cells), [cut])
-        energies = []
-        for body in (v, w):
-            X, side = body.node_points, body.node_side[:, :1]
-            u = 0.3 * np.sin(3.0 * X[:, ::-1] + side) + X @ rotation(dim, 1.0).T - X
-            energies.append(InternalForce(body, material(dim)).evaluate(u)[1])
-        assert energies[0] == pytest.approx(energies[1], rel=1e-13)
-
-
-def _plane_of(dim):
-    if dim == 2:
-        return Plane((0.5, 0.53), (-1.0 / 3.0, 1.0))
-    return Plane((0.5, 0.53, 0.47), (-1.0, -2.0, 3.0))
-
-
-def test_wrong_input_is_refused_in_one_sentence():
-    v: PhantomMesh = cut_body(2)
-    with pytest.raises(XfemError, match="kinematics 'quadratic'"):
-        InternalForce(v, material(2), "quadratic")  # type: ignore[arg-type]
-    sheet = cut_membrane()
-    with pytest.raises(XfemError, match="kinematics"):
-        DynamicBody(InternalForce(sheet, material(2), "linear"), side_wise_mass(sheet, 1.0))
-    with pytest.raises(XfemError, match="displacement of shape"):
-        InternalForce(v, material(2)).evaluate(np.zeros((3, 2)))
-    with pytest.raises(XfemError, match="λ of shape"):
-        InternalForce(v, isotropic([1.0, 2.0], 0.3, "plane strain"))

@@ -45,19 +45,6 @@ def test_at_every_moment_the_growing_cut_is_the_cut_made_at_once(mesh, paths) ->
     assert split > len(paths)
 
 
-def test_the_number_of_frames_does_not_matter() -> None:
-    mesh = box_mesh((4, 4, 4))
-    ends = []
-    for frames in (1, 2, 37):
-        cutter = SemiProgressiveCutter(mesh)
-        cutter.begin(SPACE_STROKES[0])
-        for time in np.linspace(0.0, 2.0, frames + 1)[1:]:
-            cutter.advance(time)
-        ends.append(cutter.phantom_mesh())
-    for end in ends[1:]:
-        assert_same_cut(ends[0], end)
-
-
 def test_energy_and_momentum_are_continuous_when_an_element_splits() -> None:
     mesh = box_mesh((4, 4, 4))
     cutter = SemiProgressiveCutter(mesh)
@@ -117,19 +104,6 @@ def test_delay_is_element_size_over_tool_speed() -> None:
             assert (crossings.seen == 1e3).all()
 
 
-def test_an_element_is_split_in_the_frame_in_which_the_tool_has_left_it() -> None:
-    mesh = box_mesh((4, 4, 4))
-    cutter = SemiProgressiveCutter(mesh)
-    cutter.begin(SPACE_STROKES[0])
-    frames = np.linspace(0.0, 2.0, 41)
-    for time in frames:
-        cutter.advance(time)
-    crossings = cutter.crossings
-    assert (crossings.entry <= crossings.leave).all()
-    frame = frames[np.searchsorted(frames, crossings.leave - 1e-9)]
-    np.testing.assert_allclose(crossings.seen, frame)
-
-
 def test_a_live_tool_whose_path_is_told_bit_by_bit_cuts_what_is_recorded_of_it() -> None:
     mesh = rectangle_mesh((15, 14))
     cutter = SemiProgressiveCutter(mesh)
@@ -163,16 +137,6 @@ def test_a_tool_that_leaves_and_comes_back_goes_on_cutting() -> None:
         cutter.advance(time)
     assert_same_cut(cutter.phantom_mesh(), cut_mesh(comb, [path.sweep]))
     assert len(np.unique(cutter.phantom_mesh().bodies)) == 3
-
-
-def test_a_stroke_that_begins_inside_is_found() -> None:
-    mesh = box_mesh((5, 5, 5))
-    path = ToolPath.of_tip([[0.23, 0.2, 0.35], [0.77, 0.25, 0.35]], [0.0, 1.0], [0.0, 0.62, 0.03])
-    cutter = SemiProgressiveCutter(mesh)
-    cutter.begin(path)
-    assert cutter.advance(0.7) is not None
-    cutter.advance(1.0)
-    assert_same_cut(cutter.phantom_mesh(), cut_mesh(mesh, [path.sweep]))
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,13 @@
 """A body cut further keeps its order of elimination; a cut alone is split as one among others."""
 
 import numpy as np
-import pytest
 from cut_bodies import material
 
 from verify.accelerated.cholesky import Cholesky
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.cuts import Plane, ToolPath
+from verify.xfem.cuts import ToolPath
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.pieces import split_cells
 from verify.xfem.structured_meshes import box_mesh
 
 ROUND_OFF = 1e-10  # relative residual: thousands of operations on numbers within 1e4 of each other
@@ -57,21 +55,3 @@ def test_a_solver_extended_at_every_cut_still_solves_its_system() -> None:
     anew = Cholesky(pattern, 3)
     assert not anew.is_worn
     assert anew.factor_entries < solver.factor_entries
-
-
-@pytest.mark.parametrize("tip", ["inside", "through"])
-def test_a_cut_splits_as_it_does_beside_one_that_meets_nothing(tip) -> None:
-    mesh = box_mesh((3, 3, 3))
-    beyond = Plane((9.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    rng = np.random.default_rng(11)
-    cuts = [Plane(rng.random(3), rng.standard_normal(3)) for _ in range(6)]
-    cuts.append(Plane((1 / 3, 0.0, 0.0), (1.0, 0.0, 0.0)))  # along faces
-    cuts.append(Plane((0.0, 0.0, 0.0), (1.0, -1.0, 0.0)))  # through nodes
-    for cut in cuts:
-        alone, among = split_cells(mesh, [cut], tip), split_cells(mesh, [cut, beyond], tip)
-        np.testing.assert_array_equal(alone.parent, among.parent)
-        np.testing.assert_array_equal(alone.label, among.label[:, :1])
-        for name, mine in vars(alone.simplices).items():
-            np.testing.assert_allclose(mine, getattr(among.simplices, name), rtol=1e-14, atol=1e-16)
-        np.testing.assert_allclose(alone.points.positions, among.points.positions, atol=1e-15)
-        np.testing.assert_array_equal(alone.points.ends, among.points.ends)

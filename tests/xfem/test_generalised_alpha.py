@@ -1,22 +1,16 @@
 """Generalised-α: its order, what it does to high frequencies, and where its energy goes."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, cut_square, material
-from time_schemes import SCHEMES
 
-from verify.xfem.body import DynamicBody, MovingSupports, RayleighDamping
+from verify.xfem.body import DynamicBody, RayleighDamping
 from verify.xfem.energy_balance import run
-from verify.xfem.errors import XfemError
 from verify.xfem.explicit import acceleration_of
 from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
 
 RADII = [0.0, 0.3, 0.8, 1.0]
@@ -133,21 +127,6 @@ def test_what_linear_motion_dissipates_is_the_formula_of_the_scheme(rho, dim):
         assert account.algorithmic[-1] > 1e-3 * size
 
 
-def test_momentum_is_later_than_impulses_by_a_share_of_a_step():
-    """M Δv − h M a_α = −h (½ − α_f) M Δa, of which the sum is that of the ends."""
-    v = cut_body(2)
-    body = _body(v, "corotational")
-    push = np.random.default_rng(3).normal(size=body.shape)
-    body.load = lambda t: np.sin(15.0 * t) * push
-    state = body.rest()
-    first = acceleration_of(body, state)
-    scheme = GeneralisedAlpha(body, 0.005, spectral_radius=0.4)
-    account = run(scheme, body, state, 50)
-    missing = account.momentum[-1] - account.momentum[0] - account.impulse[-1]
-    shift = -0.005 * (0.5 - scheme.alpha_f) * body.mass.apply(scheme.acceleration - first)
-    assert missing == pytest.approx(shift.sum(axis=0), rel=1e-6)
-
-
 @pytest.mark.parametrize("scheme", [Trapezoidal, GeneralisedAlpha])
 def test_a_load_that_jumps_between_two_steps_costs_no_order(scheme):
     """The step before took half of it already, and the acceleration of before was gone on with."""
@@ -163,33 +142,6 @@ def test_a_load_that_jumps_between_two_steps_costs_no_order(scheme):
         run(scheme(body, end / steps), body, state, steps)
         errors.append(abs(np.sum(body.mass.apply(shape) * state.displacement) - 1.0 + np.cos(3.0)))
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2.0, abs=0.15)
-
-
-@pytest.mark.parametrize("mass_of", [side_wise_mass, consistent_mass])
-def test_a_support_that_accelerates_from_the_start_costs_no_order(mass_of):
-    v = cut_mesh(rectangle_mesh((4, 4)), [])
-    fixed = np.repeat(v.node_points[:, -1:] == 0.0, 2, axis=1)
-    along = np.array([1.0, 0.0])
-
-    def motion(t):
-        return np.tile(0.5 * t**2 * along, (len(fixed), 1)), np.tile(t * along, (len(fixed), 1))
-
-    body = _body(v, mass_of=mass_of, supports=MovingSupports(fixed, motion))
-    ends = []
-    for steps in (20, 40, 80, 160):
-        state = body.rest()
-        run(GeneralisedAlpha(body, 0.2 / steps, spectral_radius=0.5), body, state, steps)
-        ends.append(state.displacement.copy())
-    changes = [np.linalg.norm(b - a) for a, b in pairwise(ends)]
-    assert np.log2(changes[1] / changes[2]) == pytest.approx(2.0, abs=0.2)
-
-
-def test_a_radius_outside_of_its_range_is_refused_and_the_others_have_none():
-    body = _body(cut_body(2))
-    for wrong in (-0.1, 1.1, np.nan):
-        with pytest.raises(XfemError, match="spectral radius"):
-            GeneralisedAlpha(body, 0.01, spectral_radius=wrong)
-    assert GeneralisedAlpha in SCHEMES
 
 
 def test_at_a_radius_of_one_it_goes_the_way_of_the_trapezoidal_rule():

@@ -9,7 +9,6 @@ from test_sliver_policies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
-from verify.methods.virtual_nodes import virtual_node
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
 from verify.xfem.phantom import cut_mesh
@@ -170,19 +169,6 @@ def test_strokes_that_end_in_one_point_part_the_body_as_the_cuts_at_once_do(seed
     assert phantom.bodies.max() + 1 == (3 if through else 1)
 
 
-def test_a_stroke_that_goes_on_past_a_junction_parts_what_was_one():
-    """Two strokes meet in an element; the second goes on through it when the first has been."""
-    mesh = shaken(rectangle_mesh((5, 5)), 1)
-    point = np.array([0.47, 0.52])
-    cutter = SemiProgressiveCutter(mesh)
-    cutter.begin(ToolPath.of_tip([[-1.0, 0.6], point], [0.0, 1.0]))
-    cutter.advance(1.0)
-    cutter.begin(ToolPath.of_tip([[0.6, -1.0], point, 2.0 * point - [0.6, -1.0]], [1.0, 2.0, 3.0]))
-    for time, parts in ((2.0, 2), (3.0, 3)):
-        cutter.advance(time)
-        assert cutter.phantom_mesh().bodies.max() + 1 == parts
-
-
 @pytest.mark.parametrize("policy", ["merge", "drop"])
 def test_pieces_that_no_cut_keeps_apart_are_slivers_together_or_not_at_all(policy):
     """A fork just inside an edge: planes past the point cut thin pieces off thick parts."""
@@ -198,11 +184,3 @@ def test_pieces_that_no_cut_keeps_apart_are_slivers_together_or_not_at_all(polic
     # only what is dropped goes to another part
     moved = report.volume_share if policy == "drop" else 0.0
     np.testing.assert_allclose(areas(treated.corners), areas(phantom), atol=moved + 1e-12)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_cells_copied_for_parts_with_a_node_keep_the_sectors_of_a_fork_apart(seed):
-    rng = np.random.default_rng([11, seed])
-    mesh = shaken(rectangle_mesh((5, 5)), seed)
-    body = virtual_node(mesh, fork(rng.uniform(0.35, 0.65, 2), sectors(rng, 3)))
-    assert body.phantom.bodies.max() + 1 == 3

@@ -7,7 +7,6 @@ import pytest
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
-from verify.accelerated import direct_by_size
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
 from verify.accelerated.direct_by_size import DirectBySize
@@ -35,11 +34,6 @@ def random_system(cells, nodes, block, seed=0):
     return pattern, blocks, rng.normal(size=(nodes, block))
 
 
-def random_cells(rng, nodes):
-    cells = np.array([rng.choice(nodes, 3, replace=False) for _ in range(2 * nodes)])
-    return np.concatenate([cells, np.stack([np.arange(nodes)] * 3, 1)])  # every node used
-
-
 MESHES = {
     "plate": rectangle_mesh((9, 7)),
     "long plate": rectangle_mesh((40, 2)),
@@ -58,44 +52,6 @@ def test_solutions_equal_those_of_superlu(method, name, block):
     want = spsolve(sparse.csc_matrix(pattern.matrix(blocks)), load.ravel()).reshape(load.shape)
     tolerance = 1e-11 if method in (Cholesky, LU) else 1e-7
     assert np.abs(solver.solve(load) - want).max() < tolerance * np.abs(want).max()
-
-
-@pytest.mark.parametrize(("cells", "ours"), [((9, 7), [8]), ((70, 70), [0])])
-def test_few_factorisations_of_a_small_matrix_wait_for_no_loops_of_ours(cells, ours, monkeypatch):
-    """A new `Cholesky` before the ninth one of a small matrix, and at once of a large one."""
-    made = []
-
-    def noted(*problem):
-        made.append(done)
-        return Cholesky(*problem)
-
-    monkeypatch.setattr(direct_by_size, "Cholesky", noted)
-    mesh, done = rectangle_mesh(cells), 0
-    pattern, blocks, load = random_system(mesh.cells, len(mesh.points), 2)
-    want = Cholesky(pattern, 2)
-    solver = DirectBySize(pattern, 2)
-    for done in range(10):
-        scaled = (1.0 + done) * blocks
-        want.factorize(scaled)
-        solver.factorize(scaled)
-        expected = want.solve(load)
-        assert np.abs(solver.solve(load) - expected).max() < 1e-11 * np.abs(expected).max()
-    assert made == ours
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_irregular_and_disconnected_graphs_are_factorised(seed):
-    rng = np.random.default_rng(seed)
-    nodes = int(rng.integers(1, 60))
-    cells = random_cells(rng, nodes) if nodes > 3 else np.zeros((1, 1), int) + np.arange(nodes)
-    if seed % 2 == 0:  # two parts that do not touch
-        cells = np.concatenate([cells, cells + nodes])
-        nodes *= 2
-    pattern, blocks, load = random_system(cells, nodes, 2, seed)
-    solver = Cholesky(pattern, 2)
-    solver.factorize(blocks)
-    residual = pattern.matrix(blocks) @ solver.solve(load).ravel() - load.ravel()
-    assert np.abs(residual).max() < 1e-10 * np.abs(blocks).max()
 
 
 def test_a_badly_scaled_matrix_loses_no_digits():
@@ -151,13 +107,3 @@ def test_a_matrix_with_a_null_space_or_a_negative_mode_is_refused(method, name):
         wanted = NotConvergedError if iterates and shift == 0.0 else SingularStiffnessError
         with pytest.raises((SingularStiffnessError, wanted)):
             _solve(solver, blocks, load)
-
-
-def test_conjugate_gradients_say_so_when_they_do_not_converge():
-    mesh = MESHES["plate"]
-    pattern, blocks, load = random_system(mesh.cells, len(mesh.points), 2)
-    for method in (ConjugateGradients, BlockJacobiCG):
-        solver = method(pattern, 2, limit=3)
-        solver.factorize(blocks)
-        with pytest.raises(NotConvergedError, match="after 3 iterations"):
-            solver.solve(load)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from surface_measures import loose_edges
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
@@ -138,28 +137,6 @@ def test_the_mesh_boundary_embedded_opens_exactly_as_the_material_does(mesh, pat
     np.testing.assert_allclose(vertices[0], vertices[1], atol=1e-9)
 
 
-def test_each_vertex_belongs_to_the_piece_that_contains_it() -> None:
-    points, facets = _sphere(3, 0.5, 0.45)
-    mesh = box_mesh((4, 4, 4))
-    cutter, _, embedded = _cut(mesh, PATHS[:1], points, facets)
-    surface = embedded.surface
-    rows = surface.used
-    # pull the two halves apart: everything above the cut by 1, everything below by -1
-    phantom = cutter.phantom_mesh()
-    side = phantom.node_side[:, 0].astype(float)
-    lift = surface.positions(np.stack([0 * side, 0 * side, side], axis=1))
-    lift = (lift - surface.material.rows)[:, 2]
-    facet_lift = lift[surface.facets.rows[rows]]
-    np.testing.assert_allclose(np.abs(facet_lift), 1.0, atol=1e-12)
-    assert (np.ptp(facet_lift, axis=1) < 1e-9).all()  # no facet spans the cut
-    height = PATHS[0].sweep.level_set(surface.material.rows[surface.facets.rows[rows]].mean(axis=1))
-    assert (np.sign(height) == np.sign(facet_lift[:, 0])).all()
-    # opened, it has two rims and no other hole: as many edges loose in one half as in the other
-    facets = surface.facets.rows[rows]
-    upper = loose_edges(facets[facet_lift[:, 0] > 0])
-    assert upper == loose_edges(facets[facet_lift[:, 0] < 0]) > 0
-
-
 def test_virtual_work_is_the_same_on_the_surface_and_on_the_unknowns() -> None:
     points, facets = _sphere(3, 0.5, 0.45)
     cutter, body, embedded = _cut(box_mesh((4, 4, 4)), PATHS, points, facets)
@@ -215,22 +192,6 @@ def test_a_tool_in_the_deformed_body_is_found_in_the_material() -> None:
     outside, found = pull_back(cutter, displacement, place + 10.0, order)
     assert (found == -1).all()
     assert np.isfinite(outside).all()
-
-
-def test_a_tool_in_an_open_cut_is_outside_the_material() -> None:
-    cutter, _, _ = _cut(box_mesh((3, 3, 3)), PATHS[:1])
-    body = cutter.body
-    phantom = cutter.phantom_mesh()
-    displacement = np.zeros((body.node_count, 3))
-    displacement[:, 2] = 0.1 * phantom.node_side[:, 0]
-    below = int(np.flatnonzero(body.piece_label.rows[:, 0] < 0)[0])
-    height = 0.48 + 0.07 / 1.2 * 0.6 + 0.05 / 1.4 * 0.7  # of the cut at (0.5, 0.5)
-    above_gap = [[0.5, 0.5, height + z] for z in (-0.12, 0.0, 0.12)]
-    _, piece = pull_back(cutter, displacement, above_gap, [below] * 3)
-    assert piece[0] >= 0
-    assert body.piece_label.rows[piece[0], 0] <= 0
-    assert piece[1] == -1
-    assert piece[2] == -1  # the other half cannot be reached through the cut
 
 
 def _neighbour(cutter, piece):

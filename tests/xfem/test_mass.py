@@ -5,11 +5,8 @@ import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane
 
 from verify.xfem.cuts import Plane
-from verify.xfem.errors import XfemError
 from verify.xfem.mass import consistent_mass, second_moments, side_wise_mass
 from verify.xfem.mass_shifted import shifted_mass
-from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import rectangle_mesh
 
 LUMPINGS = ("enrichment", "row sum", "weighted diagonal")
 
@@ -94,28 +91,3 @@ def test_enrichment_lumping_is_diagonal_in_the_shifted_unknowns():
                 square = above * psi[1] ** 2 + (1.0 - above) * psi[-1] ** 2
                 expected[position[node]] += share * square
     assert np.abs(M - np.diag(expected)).max() < 1e-12 * expected.max()
-
-
-def test_the_pattern_of_a_mass_holds_its_couplings():
-    v = cut_body(2)
-    for mass in _all_masses(v):
-        pattern = mass.pattern(v)
-        blocks = np.zeros((len(pattern.columns), 1, 1))
-        blocks[mass.places(pattern), 0, 0] = mass.entries[2]
-        assert abs(pattern.matrix(blocks) - mass.matrix).max() == 0.0
-    with pytest.raises(XfemError, match="lacks couplings"):
-        shifted_mass(v, 1.0, "enrichment").places(side_wise_mass(v, 1.0).pattern(v))
-
-
-def test_densities_and_lumpings_that_make_no_sense_are_refused():
-    v = cut_body(2)
-    for density in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(XfemError, match="density"):
-            side_wise_mass(v, density)
-    with pytest.raises(XfemError, match="density of shape"):
-        side_wise_mass(v, [1.0, 2.0])
-    with pytest.raises(XfemError, match="lumping 'HRZ'"):
-        shifted_mass(v, 1.0, "HRZ")  # type: ignore[arg-type]
-    crossing = [Plane((0.5, 0.53), (0.0, 1.0)), Plane((0.52, 0.5), (1.0, 0.1))]
-    with pytest.raises(XfemError, match="unknowns"):
-        shifted_mass(cut_mesh(rectangle_mesh((4, 4)), crossing), 1.0, "enrichment")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from cut_bodies import rotation
 
-from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.pull_back import pull_back
@@ -109,28 +108,6 @@ def test_the_rims_open_with_the_material_and_forces_on_them_do_the_same_work() -
     assert np.sum(nodal * u) == pytest.approx(work, rel=1e-12)
 
 
-def test_a_surface_begun_after_a_cut_is_that_which_has_followed_it() -> None:
-    cutter, followed = stroked(curved(), INSIDE, ACROSS)
-    fresh = BodySurface(cutter.body)
-    displacement = np.random.default_rng(5).normal(size=(cutter.body.node_count, 3))
-    shapes = []
-    for skin in (followed, fresh):
-        x = skin.surface.positions(displacement)
-        corners = x[skin.surface.facets.rows[skin.surface.used]].reshape(-1, 9)
-        corners = np.sort(corners, axis=1)
-        shapes.append(corners[np.lexsort(corners.T)])
-    np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-13)
-
-
-def nearest_by_force(cutter, displacement, places):
-    """Distance to the material, by brute force over many points of every sub-triangle."""
-    skin = BodySurface(cutter.body)
-    x = skin.surface.positions(displacement)[skin.surface.facets.rows[skin.surface.used]]
-    grid = np.array([[i, j, 60 - i - j] for i in range(61) for j in range(61 - i)]) / 60.0
-    points = np.einsum("ga,fas->fgs", grid, x).reshape(-1, 3)
-    return np.array([np.linalg.norm(points - place, axis=1).min() for place in places])
-
-
 def test_a_tool_on_a_deformed_membrane_is_found_in_its_material() -> None:
     """Turned, stretched, shaken by 1 %: centroids of all pieces, from a neighbour, off the skin."""
     cutter, _ = stroked(curved(), INSIDE)
@@ -157,46 +134,3 @@ def test_a_tool_on_a_deformed_membrane_is_found_in_its_material() -> None:
         reached = found == order
         assert reached.mean() > 0.6
         np.testing.assert_allclose(walked[reached], wanted[reached], atol=1e-12)
-
-
-def test_the_nearest_material_point_is_found_from_the_piece_in_contact() -> None:
-    """Above and below a skin folded like a roof, over ridges and corners too."""
-    cutter, skin = stroked(curved(), THROUGH)
-    nodes = cutter.mesh.points[cutter.body.node_parent.rows]
-    displacement = np.zeros_like(nodes)
-    displacement[:, 2] = 0.15 * np.sin(9.0 * nodes[:, 0])
-    random = np.random.default_rng(2)
-    places = random.uniform([0.1, 0.1, -0.3], [0.9, 0.9, 0.7], size=(200, 3))
-    collider = SurfaceCollider(skin.surface)
-    collider.refit(displacement)
-    contact = collider.nearest(places)
-    material, piece = pull_back(cutter, displacement, places, contact.piece)
-    brute = nearest_by_force(cutter, displacement, places)
-    # the grid of points is fine to 1/60 of an edge
-    assert np.abs(contact.distance - brute).max() < 2e-3
-    assert (piece >= 0).mean() > 0.9
-    for place, point, at, distance in zip(places, material, piece, contact.distance, strict=True):
-        if at < 0:
-            continue
-        cell = cutter.body.piece_parent.rows[at]
-        X = cutter.mesh.points[cutter.mesh.cells[cell]]
-        share = np.linalg.lstsq(np.vstack([X.T, np.ones(3)]), np.append(point, 1.0), rcond=None)[0]
-        moved = point + share @ displacement[cutter.body.piece_cells.rows[at]]
-        # the rim of a piece is nearer than what lies under its own virtual element: not asked for
-        assert np.linalg.norm(place - moved) <= distance + 1e-9
-
-
-def test_beside_the_edge_and_in_an_open_cut_there_is_no_material() -> None:
-    flat = rectangle_mesh((5, 5))
-    mesh = SimplexMesh(np.pad(flat.points, ((0, 0), (0, 1))), flat.cells)
-    cutter, _ = stroked(mesh, THROUGH)
-    side = cutter.phantom_mesh().node_side[:, :1]
-    apart = np.where(side == side[0], -0.1, 0.1) * [0.0, 1.0, 0.0]  # the part of node 0 goes down
-    places = [[0.31, 0.15, 0.2], [-0.01, 0.15, 0.0], [0.5, 0.49, 0.1], [0.0, 0.1, 0.3]]
-    start = [int(cutter.body.first_piece[0])] * 4
-    material, piece = pull_back(cutter, apart, places, start)
-    assert piece[0] >= 0
-    assert material[0] == pytest.approx([0.31, 0.25, 0.0], abs=1e-12)
-    assert piece[1] == -1  # beside the membrane
-    assert piece[2] == -1  # over the gap
-    assert piece[3] >= 0  # exactly over the edge

@@ -8,13 +8,12 @@ from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.supports import Supports
 
 MATERIAL = isotropic(1e3, 0.3, "plane stress")  # E times thickness, N/m
@@ -108,31 +107,3 @@ def test_a_stretched_membrane_that_is_plucked_comes_to_rest_in_steps_of_any_size
     # tension 183 N/m, density 1: the energy of the pluck, kept, lifts a wave by no more than this
     assert most < 10.0 * np.sqrt(before / 183.0)
     assert body.mass.diagonal @ state.velocity[:, 2] ** 2 < before
-
-
-def test_the_forces_of_a_step_of_a_membrane_balance_its_inertia():
-    v = _membrane(4)
-    held = Supports.none(v).prescribe(v, v.mesh.points[:, 0] == 0.0)
-    mass = side_wise_mass(v, 1.0)
-    body = DynamicBody(
-        InternalForce(v, MATERIAL), mass, weight=mass.weight([0.3, 0.0, -1.0]), supports=held
-    )
-    scheme, state = RealTimeEuler(body, 0.01), body.rest()
-    state.displacement[:] = 0.1 * v.node_points * [1.0, 0.0, 0.0]
-    for _ in range(5):
-        before = state.velocity.copy()
-        forces = scheme.step(state)
-        inertia = mass.apply(state.velocity - before) / 0.01
-        rest = forces.external - forces.internal - forces.viscous - inertia
-        assert np.abs(rest[~body.fixed]).max() < 1e-11 * np.abs(forces.internal).max()
-
-
-def test_a_solid_has_no_stiffness_from_tension_alone():
-    v = cut_mesh(box_mesh((1, 1, 1)), [])
-    force = InternalForce(v, isotropic(1.0, 0.3, "solid"))
-    pattern = block_pattern(v.cells, v.node_count)
-    u, blocks = np.zeros((v.node_count, 3)), np.zeros((len(pattern.columns), 3, 3))
-    with pytest.raises(XfemError, match="expected a membrane"):
-        force.add_geometric(pattern, u, blocks, 1.0)
-    with pytest.raises(XfemError, match="without the displacement"):
-        force.add_stiffness(pattern, blocks, 1.0, "geometric")

@@ -9,19 +9,16 @@ from test_sliver_policies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import boundary_nodes, scaled_dense_stiffness, sparse_stiffness, zero_modes
 
-from verify.errors import UnsupportedSceneError
 from verify.scene import Scene, load_scene
 from verify.solution import Regularisation
 from verify.solvers import find_solver
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Polyline
 from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import XfemError
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.statics import solve_static
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
 from verify.xfem.tips import with_tip_nodes
@@ -126,30 +123,6 @@ def test_what_opens_further_stores_less(seed):
         assert energy(phantom) < energy(cut_mesh(mesh, [Polyline(ends)]))
 
 
-def test_some_of_these_cracks_are_straight_and_some_are_not():
-    """About half of all ends are nearer to a place beside the line than to one on it."""
-    found = [straight(nodes, ends) for _, ends, nodes, _ in map(tipped, range(20))]
-    assert 3 < sum(found) < 17
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_turned_frame_changes_nothing(seed):
-    mesh, ends, _, phantom = tipped(seed)
-    turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
-    nodes = with_tip_nodes(SimplexMesh(mesh.points @ turn.T, mesh.cells), [Polyline(ends @ turn.T)])
-    turned = cut_mesh(nodes.mesh, nodes.cuts)
-    assert np.array_equal(turned.cells, phantom.cells)
-    field = np.random.default_rng(seed).normal(size=(2, 2))
-
-    def energy(body, back):
-        def pulled(points, _sides=None):
-            return points @ back @ field @ back.T
-
-        return solve_static(body, SOFT, held(body, pulled)).strain_energy
-
-    assert energy(turned, turn) == pytest.approx(energy(phantom, np.eye(2)), rel=1e-10)
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_scaled_conditioning_is_at_most_twice_that_without_the_nodes(seed):
     """Parts are at least 0.15 of an element, and the scaled matrix does not see their size."""
@@ -187,14 +160,6 @@ def test_ends_at_nodes_on_edges_and_outside_need_no_division_of_elements():
     assert len(with_tip_nodes(mesh, []).moved) == 0
 
 
-def test_an_end_on_an_edge_becomes_a_node_of_both_neighbours():
-    mesh = rectangle_mesh((4, 4))
-    nodes = with_tip_nodes(mesh, [Polyline([[-1.0, 0.35], [0.5, 0.35]])])
-    assert nodes.moved == pytest.approx([0.0], abs=1e-12)
-    assert len(nodes.mesh.cells) == len(mesh.cells) + 2
-    assert nodes.mesh.points[-1] == pytest.approx([0.5, 0.35])
-
-
 def test_a_branch_keeps_its_end_on_the_cut_from_which_it_leaves():
     mesh = rectangle_mesh((8, 8))
     stem, branch = Polyline([[0.2, 0.53], [0.83, 0.53]]), Polyline([[0.51, 0.53], [0.51, 0.83]])
@@ -204,14 +169,6 @@ def test_a_branch_keeps_its_end_on_the_cut_from_which_it_leaves():
     asked, given = cut_mesh(nodes.mesh, nodes.cuts), cut_mesh(mesh, [stem, branch])
     assert len(np.unique(asked.bodies)) == len(np.unique(given.bodies)) == 1
     assert zero_modes(asked)[0] == 3
-
-
-def test_an_arc_ends_at_nodes_too():
-    turn = np.linspace(0.3, 2.2, 60)
-    arc = Polyline(0.5 + 0.31 * np.stack([np.cos(turn), np.sin(turn)], axis=1))
-    nodes = with_tip_nodes(shaken(rectangle_mesh((10, 10)), 3), [arc])
-    assert len(nodes.moved) == 2
-    assert zero_modes(cut_mesh(nodes.mesh, nodes.cuts))[0] == 3
 
 
 @pytest.mark.parametrize(
@@ -243,13 +200,6 @@ def test_an_end_made_a_node_is_not_reported_as_moved_to_an_edge_too(seed):
     assert [(one.kind, one.count) for one in said] == [("end of a cut made a node", 2)]
     assert type(said[0]) is Regularisation
     assert said[0].size > 1e-3
-
-
-def test_solids_are_refused_by_library_and_solver():
-    with pytest.raises(XfemError, match="tetrahedra"):
-        with_tip_nodes(box_mesh((1, 1, 1)), [])
-    with pytest.raises(UnsupportedSceneError, match="partial"):
-        find_solver("xfem").solve(load_scene("curved/penny"), 0, 1, tip="partial")
 
 
 @pytest.mark.parametrize("seed", range(30))

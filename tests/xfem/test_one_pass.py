@@ -7,7 +7,6 @@ from cut_bodies import SOFT, cut_body, material
 from verify.accelerated import FAST
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.internal_force import InternalForce, inverted_cells
-from verify.xfem.mass import consistent_mass
 
 
 def _moving(phantom, size, seed=4):
@@ -77,19 +76,3 @@ def test_the_exact_stiffness_is_that_of_assembly(size):
             read = pattern.columns >= row
         assert np.abs(found - wanted)[read].max() < 1e-12 * np.abs(wanted).max()
         found[:] = np.nan
-
-
-def test_the_sweep_follows_a_change_of_sparsity_and_leaves_couplings_of_the_mass_zero():
-    phantom = cut_body(3)
-    force = InternalForce(phantom, material(3, 1.0), kernels=FAST)
-    u, v = _moving(phantom, 0.05)
-    plain = block_pattern(phantom.cells, phantom.node_count)
-    ends = np.full((1, 4), 0)
-    ends[0, 0] = phantom.node_count - 1  # a coupling that no cell has
-    wider = block_pattern(np.concatenate([phantom.cells, ends]), phantom.node_count)
-    assert len(wider.columns) > len(plain.columns)
-    for pattern in (plain, wider, consistent_mass(phantom, 1.0).pattern(phantom), plain):
-        one = _in_one(force, pattern, u, v, 0.0, 1.0)
-        _agree(one, _in_two(force, pattern, u, v, 0.0, 1.0))
-        dense = pattern.matrix(one[1]).toarray()
-        assert np.array_equal(dense, dense.T)

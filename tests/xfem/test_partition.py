@@ -6,7 +6,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
-from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.pieces import split_cells
@@ -107,22 +106,6 @@ def test_a_cut_off_corner_keeps_all_digits_of_its_volume(dim, size):
         assert phantom.fraction.min() == pytest.approx(size**dim, rel=1e-15 / size + 1e-14)
 
 
-def test_volume_shares_of_a_two_two_split_match_the_product_formula():
-    """r_bc r_bd + r_ac s_bc r_bd + r_ac r_ad s_bd for the plus side of corners a, b."""
-    a, b, c, d = 0.3, 0.8, -0.5, -0.1
-    partition = split_cells(TETRAHEDRON, [nodal_cut(TETRAHEDRON, [a, b, c, d])])
-
-    def r(p, q):
-        return p / (p - q)
-
-    def s(p, q):
-        return -q / (p - q)
-
-    want = r(b, c) * r(b, d) + r(a, c) * s(b, c) * r(b, d) + r(a, c) * r(a, d) * s(b, d)
-    plus = partition.fraction[partition.label[:, 0] > 0]
-    assert plus == pytest.approx([want], rel=1e-15)
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_subdivision_is_watertight_and_fills_the_body(dim, seed):
@@ -155,22 +138,6 @@ def _areas(facets):
     return np.linalg.norm(np.cross(*(facets[:, k] - facets[:, 0] for k in (1, 2))), axis=1) / 2
 
 
-def test_the_subdivision_beside_a_tip_has_no_hanging_node():
-    mesh = box_mesh((2, 2, 2))
-    half = Plane([0.5, 0.5, 0.52], [0.1, 0.0, 1.0])
-    cut = ImplicitCut(half.level_set, lambda x: 0.5 - x[:, 0])
-    body = subdivide(cut_mesh(mesh, [cut]))
-    keep = np.array([[j for j in range(4) if j != k] for k in range(4)])
-    facets, count = np.unique(
-        np.sort(body.cells[:, keep].reshape(-1, 3), axis=1), axis=0, return_counts=True
-    )
-    free = body.points[facets[count == 1]]
-    on_box = ((np.abs(free) < 1e-12).all(axis=1) | (np.abs(free - 1.0) < 1e-12).all(axis=1)).any(1)
-    assert (~on_box).sum() == 2 * len(body.cut_facets)
-    # the realised cut is the plane's part over x < 0.5
-    assert _areas(body.cut_facets).sum() == pytest.approx(0.5 * np.hypot(1.0, 0.1), rel=1e-12)
-
-
 def test_a_thin_layer_between_two_cuts_keeps_its_volume():
     gap = 1e-9
     cuts = [Plane([0.5, 0.52], [0.0, 1.0]), Plane([0.5, 0.52 + gap], [0.0, 1.0])]
@@ -180,24 +147,3 @@ def test_a_thin_layer_between_two_cuts_keeps_its_volume():
     assert len(volumes) == 3
     # positions carry round-off of 1e-16, the gap a relative 1e-7 of it
     assert volumes.min() == pytest.approx(gap, rel=1e-6)
-
-
-def test_a_cut_that_misses_the_body_changes_nothing():
-    mesh = rectangle_mesh((4, 4))
-    phantom = cut_mesh(mesh, [Plane([0.0, 2.0], [0.0, 1.0]), Polyline([[-2.0, 0.5], [-1.0, 0.5]])])
-    assert np.array_equal(phantom.cells, mesh.cells)
-    assert phantom.node_count == len(mesh.points)
-    assert len(subdivide(phantom).cut_facets) == 0
-
-
-def test_what_was_snapped_and_dropped_is_counted():
-    mesh = rectangle_mesh((4, 4))
-    phantom = cut_mesh(mesh, [Plane([0.0, 0.5 + 1e-17], [1e-17, 1.0])])
-    assert phantom.snapped + (phantom.level_sets == 0.0).sum() >= 5
-    # the plus side of every cell below the line has no volume: eight cells touch it from below
-    assert phantom.dropped == 8
-
-
-def test_an_unknown_tip_rule_is_refused():
-    with pytest.raises(XfemError, match="through"):
-        cut_mesh(MESHES[2], [], tip="midway")

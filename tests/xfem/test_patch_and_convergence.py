@@ -36,12 +36,6 @@ def test_a_cut_plate_passes_the_patch_test_to_round_off(n, diagonal):
     assert np.abs(solution.displacement - want).max() < 1e-14
 
 
-def test_the_side_of_an_unknown_is_that_of_its_material():
-    phantom = cut_mesh(rectangle_mesh((8, 8)), [LINE])
-    geometric = np.sign(LINE.level_set(phantom.node_piece_points))
-    assert np.array_equal(phantom.node_side[:, 0], geometric)
-
-
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 def test_a_cut_cube_passes_the_patch_test_to_round_off(solver):
     phantom, solution = solve(box_mesh((4, 4, 4)), PLANE, exact.f1_3d, solver)

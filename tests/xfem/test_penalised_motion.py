@@ -10,7 +10,6 @@ from cut_bodies import (
     material,
     penalised,
     rotation,
-    treated_body,
 )
 from swings import let_go, rest_step, stretched
 
@@ -134,15 +133,6 @@ def test_slivers_with_a_penalty_stay_upright_at_nine_tenths_of_the_resonance_fre
         if number % 10 == 0:
             inverted += len(inverted_cells(body.force, state.displacement)) > 0
     assert inverted == 0
-
-
-def test_an_uncut_body_has_nothing_to_penalise():
-    v = cut_mesh(rectangle_mesh((3, 3)), [])
-    treated = penalised(v)
-    assert len(treated.force.ghost.weights) == 0
-    plain = treated_body(v, "keep").force
-    u = 0.01 * np.random.default_rng(1).normal(size=v.node_points.shape)
-    assert np.array_equal(treated.force.evaluate(u)[0], plain.evaluate(u)[0])
 
 
 def test_factors_that_are_none_and_penalties_of_other_bodies_are_refused():

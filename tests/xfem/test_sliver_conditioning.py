@@ -63,24 +63,12 @@ def table(basis):
     return np.transpose([condition_numbers(cut_mesh(mesh, [cut]), basis) for cut in cuts])
 
 
-def test_the_uncut_condition_number_is_that_of_the_catalogue():
-    assert condition_numbers(cut_mesh(alternating(8), []), "sidewise")[0] == pytest.approx(
-        145, abs=0.5
-    )
-
-
 def test_shifted_unknowns_have_the_condition_numbers_of_the_catalogue():
     """Raw ∝ ε⁻²; with Jacobi scaling from 349 up to 468. As exact as the digits given."""
     raw, scaled = table("shifted")
     assert raw == pytest.approx(SHIFTED_RAW, rel=0.01)
     assert scaled[[0, -1]] == pytest.approx([349.0, 468.0], abs=0.5)
     assert (np.diff(scaled) > 0.0).all()
-
-
-def test_scaling_does_not_help_the_plain_heaviside_unknowns():
-    raw, scaled = table("heaviside")
-    assert scaled[-1] == pytest.approx(3.6e12, rel=0.01)
-    assert scaled[-1] == pytest.approx(raw[-1], rel=0.1)
 
 
 def test_side_wise_unknowns_have_the_smallest_scaled_condition_numbers_and_they_fall():

@@ -10,7 +10,6 @@ from xfem_bodies import boundary_nodes, relative_l2_error
 
 from verify.xfem.cuts import ImplicitCut, Plane
 from verify.xfem.elasticity import isotropic
-from verify.xfem.errors import XfemError
 from verify.xfem.loads import body_force, traction
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
@@ -131,11 +130,6 @@ def test_a_force_on_the_smallest_piece_does_not_see_how_small_it_is(dim):
     assert (np.abs(response / limit - 1.0) <= 6.0 * sizes + 1e-9).all()
 
 
-def test_without_a_policy_the_response_in_space_grows_like_the_inverse_of_the_size():
-    kept = [compliance(3, size, "keep") for size in (1e-3, 1e-4, 1e-6)]
-    assert np.array(kept[1:]) / kept[:-1] == pytest.approx([10.0, 100.0], rel=0.05)
-
-
 def solved_f3(mesh, policy):
     phantom = cut_mesh(mesh, [Plane([0.5] * mesh.dim, [-1.0, 3.0, 0.0][: mesh.dim])])
     ends = np.isin(np.arange(len(mesh.points)), boundary_nodes(mesh))
@@ -187,22 +181,6 @@ def test_a_corner_cut_off_by_a_sliver_is_given_back_or_counted(dim):
         assert (report.rootless, report.kept, report.aggregated) == (small, small, 0)
 
 
-def test_a_strip_between_two_cuts_a_sliver_apart_is_taken_out_or_counted():
-    cuts = [Plane([0.0, 0.53 + gap], [0.1, 1.0]) for gap in (0.0, 1e-6)]
-    phantom = cut_mesh(rectangle_mesh((8, 8)), cuts)
-    assert phantom.bodies.max() == 2
-    treated, report = treat_slivers(phantom, "drop")
-    assert treated.bodies.max() == 1
-    # the strip has sunk into its siblings: nothing moves but two halves
-    strip = phantom.bodies[phantom.cells[:, 0]]
-    volumes = np.bincount(strip, phantom.volumes)
-    assert report.volume_share >= volumes.min()
-    # it reaches no root: three parts stay three, and it is counted
-    treated, report = treat_slivers(phantom, "merge")
-    assert treated.bodies.max() == 2
-    assert report.rootless == (strip == volumes.argmin()).sum()
-
-
 @pytest.mark.parametrize("policy", ["drop", "merge"])
 def test_a_thin_neck_that_alone_holds_two_parts_together_is_kept(policy):
     """A strip between two cuts, 2 % of an element thick in its middle and thick at both ends."""
@@ -230,30 +208,6 @@ def test_pieces_in_a_chain_are_never_torn_apart():
                 nodes = np.flatnonzero((origin >= 0) & (treated.bodies[origin] == number))
                 assert len(np.unique(phantom.bodies[nodes])) == 1
             assert treated.bodies.max() <= phantom.bodies.max()
-
-
-def test_the_report_counts_everything():
-    phantom = body(2, 1e-3)
-    small = phantom.fraction < DEFAULT_THRESHOLD
-    treated, report = treat_slivers(phantom)
-    assert (report.policy, report.threshold) == (DEFAULT_POLICY, DEFAULT_THRESHOLD)
-    assert (report.dropped, report.aggregated, report.kept) == (0, small.sum(), 0)
-    assert report.largest == phantom.fraction[small].max()
-    assert report.volume_share == pytest.approx(phantom.volumes[small].sum(), rel=1e-12)
-    kept, report = treat_slivers(phantom, "keep")
-    assert (report.dropped, report.aggregated, report.kept) == (0, 0, small.sum())
-    assert np.array_equal(kept.cells, phantom.cells)
-    again, report = treat_slivers(treated)
-    assert report.aggregated == small.sum()
-    assert np.array_equal(again.node_parent, treated.node_parent)
-
-
-@pytest.mark.parametrize(
-    "policy,threshold", [("melt", 0.1), ("drop", 0.0), ("drop", 0.5), ("drop", np.nan)]
-)
-def test_unknown_policies_and_thresholds_are_refused(policy, threshold):
-    with pytest.raises(XfemError, match=r"expected"):
-        treat_slivers(body(2, 1e-3), policy, threshold)
 
 
 def degenerate_cuts(mesh, seed):

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, material
 
-from verify.accelerated import FAST, solver_by_cost
+from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
-from verify.accelerated.solver_by_cost import SolverByCost
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.errors import NotConvergedError
 from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
@@ -60,18 +57,6 @@ def test_a_motion_is_the_same_as_with_a_factorisation(kind, kinematics):
     assert found.displacement == pytest.approx(wanted.displacement, abs=1e-8 * size)
 
 
-def test_corrections_by_the_symmetric_stiffness_end_where_those_by_the_whole_one_do():
-    """The energy–momentum scheme; the solver that is given makes it take the whole one."""
-    from verify.accelerated.nearly_symmetric import NearlySymmetric
-
-    body = _body((3, 3, 3))
-    whole = NearlySymmetric(body.pattern, 3)
-    _, found = _moved(EnergyMomentum, body, 0.02, 10)
-    _, wanted = _moved(EnergyMomentum, body, 0.02, 10, solver=whole)
-    size = np.abs(wanted.displacement).max()
-    assert found.displacement == pytest.approx(wanted.displacement, abs=1e-9 * size)
-
-
 @pytest.mark.parametrize("fraction", [1e-4, 1e-9, 1e-13])
 def test_slivers_are_solved_for_as_well(fraction):
     """A plane that nearly touches nodes, at a fraction of an element from them."""
@@ -106,36 +91,3 @@ def test_what_it_takes_depends_on_the_size_the_shape_and_the_step(divisions, ste
         same.advance(other)
     size = np.abs(other.displacement).max()
     assert state.displacement == pytest.approx(other.displacement, abs=1e-7 * size)
-
-
-def test_supports_that_move_are_followed_on_both_sides_of_the_turn():
-    """What is below the diagonal is not there before."""
-    body = _body((26, 26, 1))
-    left = body.fixed
-    moved = body.held_by(Supports(left, np.where(left, 1e-3, 0.0)))
-    found, state = RealTimeEuler(moved, 4.0), body.rest()
-    wanted, other = RealTimeEuler(moved, 4.0, solver=_cholesky(body)), body.rest()
-    assert found.solver.is_iterative
-    for _ in range(3):
-        found.advance(state)
-        wanted.advance(other)
-    assert not found.solver.is_iterative
-    size = np.abs(other.displacement).max()
-    assert state.displacement == pytest.approx(other.displacement, abs=1e-7 * size)
-
-
-def test_without_memory_for_a_factor_it_goes_on_with_iterations(monkeypatch):
-    def refuse(*_):
-        raise MemoryError
-
-    monkeypatch.setattr(solver_by_cost, "Cholesky", refuse)
-    body = _body((26, 26, 1))
-    scheme, state = RealTimeEuler(body, 4.0), body.rest()
-    scheme.advance(state)
-    assert scheme.solver.is_iterative
-    assert np.isfinite(state.displacement).all()
-    monkeypatch.setattr(solver_by_cost, "_MOST", 20)
-    solver = SolverByCost(body.pattern, 3, body.fixed.all(axis=1), True, 1e-10)
-    solver.factorize(scheme.blocks)
-    with pytest.raises(NotConvergedError):
-        solver.solve(scheme.load)

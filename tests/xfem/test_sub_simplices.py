@@ -10,24 +10,6 @@ from verify.xfem.join import join_parts
 from verify.xfem.pieces import split_cells
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
-# products of the same factors, taken in another order: a few ulp
-ROUND_OFF = 4e-15
-
-
-def one_by_one(zero, order, points, fraction):
-    """Points and shares after bisection at one zero point after the other."""
-    for z in order:
-        plus, minus = zero.ends[z]
-        has = (points == plus).any(axis=1) & (points == minus).any(axis=1)
-        r, s = zero.shares(zero.cut[z], plus, minus)
-        parts = [(points[~has], fraction[~has])]
-        for end, share in ((plus, s), (minus, r)):
-            half = points[has].copy()
-            half[np.arange(len(half)), (half == end).argmax(axis=1)] = zero.nodes + z
-            parts.append((half, fraction[has] * share))
-        points, fraction = (np.concatenate(x) for x in zip(*parts, strict=True))
-    return points, fraction
-
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_parts_share_dof_nodes_where_points_of_a_common_face_lie_in_both(dim) -> None:

@@ -8,10 +8,9 @@ from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.cuts import Plane, PolygonPatch, Polyline
 from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.errors import XfemError
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.implicit import Trapezoidal
-from verify.xfem.inherit import ancestors, inherit_state
+from verify.xfem.inherit import inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
@@ -70,39 +69,6 @@ def test_energy_and_momenta_are_continuous_when_a_moving_body_is_cut(history, ma
         # then the two sides go their own ways, and the next cut inherits that
         after.displacement += rng.normal(scale=0.02, size=after.displacement.shape)
         old, state = new, after
-
-
-def test_the_field_itself_is_inherited():
-    mesh, stages = _histories()["a growing cut"]
-    old, new = cut_mesh(mesh, stages[1]), cut_mesh(mesh, stages[3])
-    source = ancestors(old, new)
-    assert (old.node_parent[source] == new.node_parent).all()
-    assert np.unique(source).size == old.node_count
-    jump = np.where(old.node_side[:, 0] > 0, 1.0, -1.0)[:, None] * np.ones((1, 2))
-    after = inherit_state(old, new, MotionState(jump, jump))
-    enriched = np.isin(old.node_parent, old.enriched_nodes)
-    kept = np.isin(new.node_parent, old.node_parent[enriched])
-    assert (after.displacement[kept, 0] == new.node_side[kept, 0]).all()
-
-
-def test_the_same_cut_inherits_itself():
-    mesh, stages = _histories()["a growing cut"]
-    v = cut_mesh(mesh, stages[2])
-    assert (ancestors(v, v) == np.arange(v.node_count)).all()
-
-
-def test_what_was_separated_cannot_be_joined_again():
-    mesh, stages = _histories()["a growing cut"]
-    longer, shorter = cut_mesh(mesh, stages[3]), cut_mesh(mesh, stages[1])
-    with pytest.raises(XfemError, match=r"join|part"):
-        ancestors(longer, shorter)
-    bent = cut_mesh(mesh, [Polyline([[-0.1, 0.45], [0.3, 0.7], [1.1, 0.6]])])
-    with pytest.raises(XfemError, match=r"join|part"):
-        ancestors(longer, bent)
-    with pytest.raises(XfemError, match="same mesh"):
-        ancestors(longer, cut_mesh(mesh, []))
-    with pytest.raises(XfemError, match="same mesh"):
-        ancestors(cut_mesh(rectangle_mesh((3, 3)), []), longer)
 
 
 def _hanging(angle, order=None):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from verify.xfem.cuts import Polyline, ToolPath, TriangulatedSurface
-from verify.xfem.errors import XfemError
 
 
 def test_a_sweep_in_the_plane_has_the_level_set_of_its_polyline() -> None:
@@ -86,22 +85,3 @@ def test_a_move_of_round_off_size_does_not_change_the_sweep(move, at) -> None:
     sweeps = ToolPath.of_tip(tips, range(3)).sweep, ToolPath.of_tip(jittered, range(4)).sweep
     for ask in ("level_set", "depth", "travel"):
         np.testing.assert_allclose(*(getattr(one, ask)(points) for one in sweeps), atol=4e-16)
-
-
-@pytest.mark.parametrize(
-    ("tips", "times", "depth", "message"),
-    [
-        ([[0, 0], [1, 0]], [1.0, 0.0], None, "time runs backwards"),
-        ([[0, 0], [1, 0]], [0.0], None, "times of shape"),
-        ([[0, 0], [1, 0], [0.5, 0]], [0, 1, 2], None, "turns back"),
-        ([[0, 0], [1, 0], [1, 1], [0.5, -1]], [0, 1, 2, 3], None, "intersect"),
-        ([[0, 0, 0], [1, 0, 0]], [0, 1], [0.0, 0.0, 0.0], "in one place"),
-        ([[0, 0, 0], [1, 0, 0]], [0, 1], None, "blade"),
-        ([[0, 0, 0], [1, 0, 0], [0.2, 0, 0]], [0, 1, 2], [0, 0, 1.0], "turns back"),
-        ([[0, np.nan], [1, 0]], [0, 1], None, "not finite"),
-        ([[0, 0, 0, 0]], [0], None, "blades of shape"),
-    ],
-)
-def test_a_wrong_path_is_refused_with_its_reason(tips, times, depth, message) -> None:
-    with pytest.raises(XfemError, match=message):
-        ToolPath.of_tip(tips, times, depth)

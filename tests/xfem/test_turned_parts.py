@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from cut_bodies import cut_cube, isotropic, rotation
-from turned_bodies import YOUNG, random_mesh, turn, turned_body, turned_sheet
+from cut_bodies import isotropic, rotation
+from turned_bodies import YOUNG, turn, turned_body, turned_sheet
 
 from verify.xfem import equilibrium
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.rigid_motion import RigidMotions, nearest_rotation, part_of_rotation
+from verify.xfem.rigid_motion import RigidMotions, nearest_rotation
 from verify.xfem.static_newton import NotInEquilibriumError
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
@@ -66,23 +65,6 @@ def test_a_false_equilibrium_is_left_for_the_right_one(monkeypatch, seed, degree
     assert min(found.check.dismissed) > 1.0
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("kind, count", [("plane", 10), ("space", 4)])
-def test_no_false_equilibrium_is_silent_without_rigid_motions_either(
-    monkeypatch, kind, count
-) -> None:
-    """The check alone: what the linear response leads to is right, or is refused."""
-    without_rigid_motions(monkeypatch)
-    for seed in range(count):
-        body = made(kind, seed)
-        for degrees in ANGLES:
-            try:
-                found = static_equilibrium(body.force, body.fixed, turn(body, degrees))
-            except NotInEquilibriumError:
-                continue
-            assert found.energy < LEAST
-
-
 def test_a_false_equilibrium_is_refused_with_both_energies_where_no_other_path_is_left(
     monkeypatch,
 ) -> None:
@@ -105,19 +87,6 @@ def test_a_part_that_is_turned_and_stretched_stores_what_stretching_it_stores(ki
         found = static_equilibrium(body.force, body.fixed, turn(body, degrees, stretch=0.3))
         # residuals of 1e-10 of the forces
         assert found.energy == pytest.approx(stretched.energy, rel=1e-8)
-
-
-@pytest.mark.heavy
-def test_turned_and_stretched_parts_of_ten_meshes_at_every_angle() -> None:
-    for kind in ("plane", "space"):
-        for seed in range(10):
-            body = turned_body(seed, 2 if kind == "plane" else 3, 7 if kind == "plane" else 4, True)
-            path = turn(body, 0.0, stretch=0.3)
-            energy = static_equilibrium(body.force, body.fixed, path, load_steps=16).energy
-            for degrees in ANGLES:
-                path = turn(body, degrees, stretch=0.3)
-                found = static_equilibrium(body.force, body.fixed, path)
-                assert found.energy == pytest.approx(energy, rel=1e-8)
 
 
 def test_halves_that_turn_by_their_own_angles_about_their_own_axes_store_nothing() -> None:
@@ -191,30 +160,6 @@ def test_the_nearest_rotation_is_the_one_made_and_the_smallest_where_points_leav
     assert nearest_rotation(line, line @ Q.T) == pytest.approx(Q, abs=1e-8)
     nothing = np.zeros((1, 3))
     np.testing.assert_array_equal(nearest_rotation(nothing, nothing), np.eye(3))
-
-
-def test_a_flat_sheet_and_a_body_without_whole_supports_stay_where_they_are() -> None:
-    flat = random_mesh(0, 2, 4)
-    sheet = cut_mesh(SimplexMesh(np.pad(flat.points, ((0, 0), (0, 1))), flat.cells), [])
-    for v in (sheet, cut_cube(2)):
-        rest = np.zeros(v.node_points.shape)
-        rollers = np.zeros(rest.shape, dtype=bool)
-        rollers[:, 0] = True
-        np.testing.assert_array_equal(RigidMotions(v, rollers).follow(rest, rest + 1.0), rest)
-        whole = np.ones(rest.shape, dtype=bool)
-        np.testing.assert_array_equal(RigidMotions(v, whole).follow(rest, rest), rest)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_share_of_a_rotation_is_the_rotation_by_that_share_of_its_angle(dim) -> None:
-    for angle in (1e-6, 1.0, 3.1, np.pi, -2.0):
-        whole = rotation(dim, angle)
-        for share in (0.0, 0.3, 1.0):
-            part = part_of_rotation(whole, share)
-            ways = [rotation(dim, share * angle)]
-            if angle == np.pi:  # either way round
-                ways.append(rotation(dim, -share * angle))
-            assert min(np.abs(part - way).max() for way in ways) < 1e-8
 
 
 def test_a_straight_path_of_supports_that_turn_is_followed_along_the_turn() -> None:

@@ -8,13 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from verify.assess.system_numbers import STEP, condition_numbers, critical_step
-from verify.errors import InputError
+from verify.assess.system_numbers import condition_numbers, critical_step
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.study.slivers import study
 from verify.study.slivers.step_by_running import step_by_running
-from verify.study.variants import Variant
 from verify.system import checked_system
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
@@ -114,26 +111,3 @@ def test_the_critical_step_is_found_by_running_where_there_is_no_system(scene):
     assert low == pytest.approx(exact, rel=0.02)
     from_above = step_by_running(Explicit(), scene, 0, 7.0 * exact, {})
     assert from_above[0] == pytest.approx(exact, rel=0.02)
-
-
-def test_a_solver_that_takes_its_own_step_has_none_by_running(scene):
-    solver = Explicit()
-    solver.own_step = 0.5 * critical_step(find_solver("xfem").system(scene, 0))
-    with pytest.raises(InputError, match="implicit"):
-        step_by_running(solver, scene, 0, 0.01, {})
-    solver.own_step *= 8.0
-    with pytest.raises(InputError, match="blows"):
-        step_by_running(solver, scene, 0, 10.0, {})
-
-
-def test_no_critical_step_of_an_implicit_program_is_looked_for(scene):
-    class Implicit:
-        name, implicit = "implicit", True
-
-        def solve(self, *_, **__):
-            raise AssertionError("it was run")
-
-    ((quantity, _, value, reason),) = study._further(Implicit(), Variant("x", "x"), scene, 0)
-    assert quantity == STEP
-    assert value is None
-    assert "implicit" in reason

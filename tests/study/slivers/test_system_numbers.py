@@ -9,7 +9,7 @@ from verify.assess.system_numbers import condition_numbers, critical_step, lowes
 from verify.errors import InputError
 from verify.scene import load_scene
 from verify.solvers.xfem import XfemSolver
-from verify.system import System, checked_system
+from verify.system import System
 
 
 def chain(n, masses=1.0, stiffness=1.0):
@@ -58,25 +58,6 @@ def test_what_cannot_be_known_is_said():
         critical_step(System(free.stiffness, None, free.fixed))
     with pytest.raises(InputError, match="held"):
         condition_numbers(System(free.stiffness, None, ~free.fixed))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"fixed": np.zeros(5, dtype=bool)}, "stiffness is no sparse array of 5 × 5"),
-        ({"fixed": np.zeros(6)}, "bool"),
-        ({"mass": np.eye(6)}, "sparse"),
-        ({"stiffness": csr_array(np.triu(np.ones((6, 6))))}, "stiffness"),
-        ({"mass": csr_array(np.full((6, 6), np.nan))}, "not finite"),
-    ],
-)
-def test_a_hook_that_hands_over_something_else_is_one_clear_error(change, message):
-    whole = chain(5)
-    with pytest.raises(InputError, match=message):
-        checked_system(System(**{**vars(whole), **change}))
-    with pytest.raises(InputError, match="expected a verify"):
-        checked_system((whole.stiffness, whole.mass))
-    assert checked_system(whole).fixed[0]
 
 
 @pytest.mark.parametrize("mass", ["sidewise", "consistent"])
