@@ -16,14 +16,10 @@ UPPER = "upper = [1.0, 1.0]"
 
 CASES = {
     "nested 900 deep": (UPPER, f"upper = {'[' * 900}{']' * 900}", "nested too deep; expected at"),
-    "nested 200 deep": (UPPER, f"upper = {'[' * 200}{']' * 200}", "nested too deep; expected at"),
     "5000 digits": ("poisson = 0.3", f"poisson = {'9' * 5000}", "not valid TOML: Exceeds"),
-    "300 digits": ("poisson = 0.3", f"poisson = {'9' * 300}", "material.poisson: expected a"),
     "1e308": (UPPER, "upper = [1.0, 1e308]", "geometry.upper[1]: expected a number ≤ 1e+60"),
     "dotted key": ("[material]", f"{'a.' * 20_000}a = 1\n[material]", "a key of more than"),
-    "quoted key": ("[material]", f"""{'"a b".' * 20_000}a = 1\n[material]""", "a key of more"),
     "key of 10 MB": ("[material]", f"{'a' * 10**7} = 1\n[material]", "has 10 MB; expected a case"),
-    "key of 1 MB": ("[material]", f"{'a' * 10**6} = 1\n[material]", "unknown key"),
     "long inequality": (
         'where = "boundary"',
         f'where = "{" or ".join(["x < 1"] * 100_000)}"',
@@ -31,7 +27,6 @@ CASES = {
     ),
     "escape in the title": ('title = "', 'title = "\\u001b[2J', "title: expected one line of text"),
     "mark of direction": ('title = "', 'title = "\\u202e', "title: expected one line of text"),
-    "title of 100 kB": ('title = "', f'title = "{"x" * 10**5}', "title: expected at most 2000"),
 }  # fmt: skip
 
 

@@ -39,13 +39,13 @@ def space():
 
 answer = {}
 for name, scene, schemes in [
-    ("linear", plane("linear"), ["newmark", "generalised_alpha"]),
-    ("turning", plane("corotational"), ["implicit_euler", "energy_momentum"]),
-    ("space", space(), ["generalised_alpha", "energy_momentum"]),
+    ("linear", plane("linear"), ["generalised_alpha"]),
+    ("turning", plane("corotational"), ["energy_momentum"]),
+    ("space", space(), ["energy_momentum"]),
 ]:
     points = np.random.default_rng(1).random((300, scene.dimension))
     for scheme in schemes:
-        degree = 2 if scheme == schemes[0] and scene.dimension == 2 else 1
+        degree = 2 if name == "linear" else 1
         found = find_solver("conforming").solve(scene, 0, 0, scheme=scheme, degree=degree)
         fields = [SolutionField(found, t).displacement(points) for t in range(len(found.times))]
         # on all ranks alike: they need no talk to take the same steps
@@ -63,7 +63,7 @@ def answers(tmp_path_factory):
 
 def test_two_ranks_move_every_point_as_one_does(answers):
     one, two = answers
-    assert len(one) == 6
+    assert len(one) == 3
     for motion, (_, fields, iterations) in one.items():
         assert np.abs(fields[-1] - fields[0]).max() > 1e-3, motion
         # Newton's residual is 1e-11 of the forces, and most steps end far below it

@@ -55,21 +55,6 @@ class Instant:
         )
 
 
-class Compiling(Instant):
-    """Has its kernels compiled, as the compact solver at its first use."""
-
-    def refuses(self, scene):
-        import numba
-
-        self.compiler = numba.njit
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        start = time.process_time()
-        while time.process_time() < start + 1.0:
-            self.compiler(lambda x: x + 1.0)(1.0)
-        return super().solve(scene, level, repetitions)
-
-
 class Other(Instant):
     name = "other"
 
@@ -164,14 +149,6 @@ class HangingOnce(Instant):
             mark.write_text(str(os.getpid()))
             time.sleep(600)
         return super().solve(scene, level, repetitions)
-
-
-class HangingRanks(Instant):
-    """Each MPI rank says so in a file of its own, and hangs."""
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        Path(os.environ["HANG_MARK"], str(os.getpid())).touch()
-        time.sleep(600)
 
 
 class FailingOnOneRank(Instant):

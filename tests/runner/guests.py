@@ -4,13 +4,9 @@ Each is asked, solves or answers in the way that its name says.
 """
 
 import os
-import shutil
 import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from fake_solvers import Instant
@@ -29,29 +25,12 @@ class Guest(Instant):
         return solution
 
 
-def left(name):
-    """Where a guest leaves a sign, for the test to see."""
-    return Path(os.environ["GUEST_SIGNS"], name)
-
-
 # what it answers
-
-
-class Nothing(Guest):
-    def spoilt(self, solution):
-        return None
 
 
 class Text(Guest):
     def spoilt(self, solution):
         return "solved"
-
-
-class Lying(Guest):
-    """An object with the attributes of a solution, which is none."""
-
-    def spoilt(self, solution):
-        return type("Solution", (), {**vars(solution), "__len__": lambda self: 1 / 0})()
 
 
 class Spoiling(Guest):
@@ -60,11 +39,6 @@ class Spoiling(Guest):
     def spoilt(self, solution):
         solution.displacement[0, 3] = np.nan
         return solution
-
-
-class Huge(Guest):
-    def spoilt(self, solution):
-        return replace(solution, displacement=np.full_like(solution.displacement, 1e300))
 
 
 class Large(Guest):
@@ -77,11 +51,6 @@ class Large(Guest):
 class Collapsed(Guest):
     def spoilt(self, solution):
         return replace(solution, cells=solution.cells * 0)
-
-
-class Negative(Guest):
-    def spoilt(self, solution):
-        return replace(solution, size=-1.0, unknowns=-5)
 
 
 class InSpace(Guest):
@@ -97,11 +66,6 @@ class TinySize(Guest):
 
     def spoilt(self, solution):
         return replace(solution, size=1e-12)
-
-
-class HugeSize(Guest):
-    def spoilt(self, solution):
-        return replace(solution, size=1e30)
 
 
 class Twice(Guest):
@@ -132,30 +96,9 @@ class Escaping(Guest):
         raise ValueError("\x1b[31mred\x1b]0;title\x07\nsecond line " + "x" * 10_000_000)
 
 
-class Unspeakable(Guest):
-    """An error that cannot be written."""
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        class Mute(BaseException):
-            def __str__(self):
-                raise RuntimeError("no")
-
-        raise Mute
-
-
 class Exiting(Guest):
     def solve(self, scene, level, repetitions=1, **parameters):
         sys.exit(0)
-
-
-class Interrupting(Guest):
-    def solve(self, scene, level, repetitions=1, **parameters):
-        raise KeyboardInterrupt
-
-
-class Recursive(Guest):
-    def solve(self, scene, level, repetitions=1, **parameters):
-        return self.solve(scene, level)
 
 
 # what it says when it is asked
@@ -164,26 +107,6 @@ class Recursive(Guest):
 class TextLevels(Guest):
     def levels(self, scene):
         return "3"
-
-
-class NoLevels(Guest):
-    def levels(self, scene):
-        return 0
-
-
-class NegativeLevels(Guest):
-    def levels(self, scene):
-        return -3
-
-
-class EndlessLevels(Guest):
-    def levels(self, scene):
-        return 10**9
-
-
-class TrueRefusal(Guest):
-    def refuses(self, scene):
-        return True
 
 
 class RaisingRefusal(Guest):
@@ -196,16 +119,6 @@ class Blaming(Guest):
 
     def refuses(self, scene):
         raise InputError("its mesh has a hole", "body.msh")
-
-
-class Undecided(Guest):
-    def refuses(self, scene):
-        time.sleep(1000)
-
-
-class DyingRefusal(Guest):
-    def refuses(self, scene):
-        os._exit(0)
 
 
 # what it does to its process and to others
@@ -225,67 +138,3 @@ class Elsewhere(Guest):
 class Quitting(Guest):
     def solve(self, scene, level, repetitions=1, **parameters):
         os._exit(0)
-
-
-class Silent(Guest):
-    """Closes what it was to speak through, then fails."""
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        sys.stdout.close()
-        sys.stderr.close()
-        os.close(1)
-        os.close(2)
-        raise ZeroDivisionError("the pivot is zero")
-
-
-class Talkative(Guest):
-    def solve(self, scene, level, repetitions=1, **parameters):
-        line = b"y" * 2**20 + b"\n"
-        for _ in range(300):
-            os.write(1, line)
-        return super().solve(scene, level, repetitions)
-
-
-class Stopping(Guest):
-    def solve(self, scene, level, repetitions=1, **parameters):
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
-class Killed(Guest):
-    """Killed as if from outside."""
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-class Leaving(Guest):
-    """Starts a process in a session of its own, and an orphan, and hangs."""
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        sleep = [sys.executable, "-c", "import time; time.sleep(600)"]
-        found = subprocess.Popen(sleep, start_new_session=True)
-        start = f"s.Popen({sleep!r}, start_new_session=True, stdout=-3)"
-        middle = f"import subprocess as s; print({start}.pid)"
-        orphan = subprocess.check_output([sys.executable, "-c", middle], text=True)
-        left("pids").write_text(f"{found.pid} {orphan}")
-        time.sleep(600)
-
-
-class Removing(Guest):
-    """Removes the records, the scene and its own folder from the run directory."""
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        for name in ("cases", "run.json"):
-            path = Path("out", name)
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-        return super().solve(scene, level, repetitions)
-
-
-class Staying(Guest):
-    """Answers, and leaves a thread that never ends."""
-
-    def solve(self, scene, level, repetitions=1, **parameters):
-        import threading
-
-        threading.Thread(target=time.sleep, args=(1000,)).start()
-        return super().solve(scene, level, repetitions)

@@ -73,8 +73,9 @@ def test_other_physics_or_other_code_finds_nothing(scene, kept, tmp_path, monkey
     assert len(kept.entries()) == LEVELS  # of the others nothing is lost
 
 
-@pytest.mark.parametrize("file", ["solution.vtu", "solution.json", "entry.json"])
-@pytest.mark.parametrize("damage", ["cut", "changed", "gone"])
+@pytest.mark.parametrize(
+    "file, damage", [("solution.vtu", "cut"), ("solution.json", "changed"), ("entry.json", "gone")]
+)
 def test_a_damaged_entry_is_not_used_and_makes_room(scene, kept, tmp_path, file, damage):
     key = kept.find(scene)[1].key
     place = kept.root / key / file

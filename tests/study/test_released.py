@@ -111,10 +111,8 @@ def test_the_advance_of_a_blade_is_what_it_sweeps_inside_the_body(angle):
 @pytest.mark.parametrize(
     "solver, scheme, least, angle, most",
     [
-        ("xfem", "newmark", 0.0, 0.0, 0.15),
         ("xfem", "implicit_euler", 0.5, 17.0, 0.25),
         ("conforming", "newmark", 0.0, 17.0, 0.25),
-        ("conforming", "implicit_euler", 0.5, 0.0, 0.15),
     ],
 )
 def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most):
