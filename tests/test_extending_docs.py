@@ -140,15 +140,3 @@ def test_every_command_on_regression_succeeds_in_order(tmp_path):
         assert not re.search("^FAIL +(own|independent|reference)", done.stdout, re.MULTILINE)
         if "--only" in line:
             assert "1 own values moved" in done.stdout
-
-
-def test_the_marked_test_of_the_page_passes(pytester):
-    from importlib.metadata import entry_points
-
-    installed = {point.value for point in entry_points(group="pytest11")}
-    plugin = [] if "verify.pytest_plugin" in installed else ["-p", "verify.pytest_plugin"]
-    pytester.makepyfile(blocks("guide/regression.md", "python")[0])
-    result = pytester.runpytest_inprocess(*plugin, "-p", "no:cacheprovider", "-p", "no:xdist")
-    checks = result.parseoutcomes()
-    assert set(checks) <= {"passed", "skipped", "warnings"}
-    assert checks["passed"] >= 2

@@ -170,15 +170,3 @@ def test_a_slip_of_the_hand_in_the_file_is_named(baseline, tmp_path, change, sai
     assert code == 2
     assert said in error
     assert error.count("\n") == 1
-
-
-def test_bad_input_is_one_line(baseline, tmp_path):
-    old = runs.run(tmp_path / "old")
-    assert "no such file" in baseline("check", old)[1]
-    baseline("save", old)
-    code, error = baseline("update", old, "--only", "a/case:strain_enrgy")
-    assert code == 2
-    assert "did you mean 'a/case:strain_energy'?" in error
-    assert "not a run" in baseline("check", tmp_path)[1]
-    going_on = runs.run(tmp_path / "going-on", finished=None)
-    assert "has not finished" in baseline("check", going_on)[1]

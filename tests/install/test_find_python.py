@@ -61,17 +61,3 @@ def test_older_python3_and_refusing_shims_are_passed_over(root, tmp_path, progra
         [found.stdout.strip(), "-c", "import sys; print(sys.version_info[:2] >= (3, 12))"]
     )
     assert version.strip() == b"True"
-
-
-@pytest.mark.parametrize(
-    ("version", "reason"), [((3, 11, 7), "is Python 3.11"), ((3, 15, 0), "is Python 3.15")]
-)
-def test_named_python_that_does_not_fit_is_refused_with_its_version(
-    root, tmp_path, programs, version, reason
-):
-    put, path = programs
-    python = put("mine", pretender(version))
-    refused = find_python(root, path, tmp_path, VERIFY_PYTHON=str(python))
-    assert refused.returncode == 2
-    assert reason in refused.stderr
-    assert "needed: CPython 3.12 to 3.14" in refused.stderr

@@ -61,31 +61,6 @@ def test_an_exact_body_force_is_applied_on_each_side_of_the_cut(plane):
     assert abs(energy_errors(with_exact("smooth", SMOOTH, plane), levels=1)[0]) > 0.05
 
 
-def test_an_exact_traction_does_the_work_of_an_exact_support():
-    # bending is quadratic on each side: P2 on a straight cut has no error at all
-    bending = {**INCLINED, "stress_gradient": [1.0, -0.5], "shift": [0.02, 0.0]}
-    supports = [{"where": where, "displacement": "exact"} for where in ("top", "bottom")]
-    loads = [{"kind": "traction", "where": w, "traction": "exact"} for w in ("left", "right")]
-    scene = with_exact("bending", bending, supports=supports, loads=loads)
-    # off by round-off, times the condition of the slender cells that an inclined cut leaves
-    assert energy_of(scene, "conforming", degree=2) == pytest.approx(exact_energy(scene), rel=1e-10)
-
-
-@pytest.mark.parametrize("plane, stiffness", [("strain", 1 / (1 - 0.3**2)), ("stress", 1.0)])
-@pytest.mark.parametrize("solver", ["conforming", "reference"])
-def test_a_uniform_traction_on_a_bar_gives_uniaxial_stress(plane, stiffness, solver):
-    # rollers below, one node held in x: σ_yy = 3 everywhere, energy ½ σ²/E' per area
-    scene = square(
-        material={"young": 1.0, "poisson": 0.3, "plane": plane},
-        supports=[
-            {"where": "bottom", "displacement": [0], "components": ["y"]},
-            {"where": "x < 1e-13 and y < 1e-13", "displacement": [0, 0]},
-        ],
-        loads=[{"kind": "traction", "where": "top", "traction": [0, 3.0]}],
-    )
-    assert energy_of(scene, solver) == pytest.approx(4.5 / stiffness, rel=1e-10)
-
-
 def test_a_bar_that_hangs_under_its_weight_stretches_like_a_parabola():
     from verify.solvers import find_solver
 

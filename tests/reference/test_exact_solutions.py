@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reference.exact import exact_solution, exact_solution_names
+from reference.exact.hooke import hooke
 from verify.scene import Material
 
 STRAIN = Material(young=1.0, poisson=0.3, plane="strain")
@@ -52,6 +53,18 @@ def test_every_named_solution_is_checked_here():
     others = ("3D", "finite rotation")  # test_exact_solutions_in_space, test_rolled_halves
     plane = {name for name, text in exact_solution_names().items() if not text.startswith(others)}
     assert set(SOLUTIONS) == plane - {"layers"}  # of two materials: test_layered_bodies
+
+
+@pytest.mark.parametrize(
+    "plane, strains",
+    [("strain", [1 - 0.3**2, -0.3 * 1.3]), ("stress", [1, -0.3]), (None, [1, -0.3, -0.3])],
+)
+def test_a_bar_that_is_pulled_in_any_direction_contracts_by_poissons_ratio(plane, strains):
+    """Unit tension along one axis: ε = 1/E and −ν/E, in plane strain (1−ν²)/E and −ν(1+ν)/E."""
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(len(strains),) * 2))[0]
+    law = hooke(Material(young=2.0, poisson=0.3, plane=plane))
+    gradient = turn @ np.diag(strains) @ turn.T / 2.0
+    assert law.stress(gradient) == pytest.approx(np.outer(turn[:, 0], turn[:, 0]), abs=1e-14)
 
 
 @pytest.mark.parametrize("material", [STRAIN, STRESS], ids=["strain", "stress"])

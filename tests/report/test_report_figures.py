@@ -66,32 +66,12 @@ def test_every_error_lies_where_its_number_says(results, drawn):
         assert np.ravel(found) == pytest.approx(np.ravel(expected), rel=1e-14)
 
 
-def test_a_gap_in_the_levels_is_not_bridged(results):
-    result = results["statics/f3_inclined"]
-    solves = [
-        SolveRecord(s.case, s.solver, s.level, Status.FAILED) if s.level == 1 else s
-        for s in result.solves
-    ]
-    curve = error_curves(replace(result, solves=solves), "energy_norm")[0]
-    assert [[p.level for p in stretch] for stretch in curve.stretches] == [[0], [2, 3]]
-
-
 def test_a_quantity_is_drawn_by_its_deviation_from_the_stored_reference(results):
     result = results["statics/griffith_inside"]
     curve = next(c for c in error_curves(result, "strain_energy") if c.solver == "conforming")
     stored = [s.metric("strain_energy") for s in result.solves if s.solver == "conforming"]
     expected = [abs(m.value - m.reference) / m.reference for m in stored]
     assert [p.value for p in curve.points] == pytest.approx(expected, rel=1e-14)
-
-
-def test_the_floor_of_the_reference_is_inside_the_figure_that_it_limits(results, drawn):
-    result = results["statics/tissue_strip"]
-    curves = error_curves(result, "energy_norm")
-    low, high = error_range(curves, sloped=False)
-    assert low < 0.03 / 2 < high
-    axes, _ = drawn(result, "energy_norm", curves, (low, high))
-    (band,) = [c for c in axes.collections if "uncertainty" in str(c.get_label())]
-    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(0.03)
 
 
 def test_the_band_and_its_caption_say_the_same_where_uncertainties_differ(results):

@@ -66,24 +66,6 @@ def test_a_damaged_result_is_a_row_with_its_reason(root, content, reason):
     assert reason in entry.defect
 
 
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda r: r.update(title=["a"]),
-        lambda r: r["verdicts"][0].update(observed="much"),
-        lambda r: r["solves"][0].update(level=None),
-        lambda r: r["solves"][0].update(timings={"solve": "fast"}),
-        lambda r: r["solves"][0]["metrics"][0].update(value=None),
-        lambda r: r["rates"][0].update(pairwise=7),
-    ],
-)
-def test_a_result_with_a_wrong_type_in_it_is_a_row_too(root, spoil):
-    result = json.loads(result_of(root).read_text())
-    spoil(result)
-    result_of(root).write_text(json.dumps(result))
-    assert "not a readable result" in said(root)
-
-
 def test_a_case_without_solves_checks_or_levels_renders(root):
     result = json.loads(result_of(root).read_text())
     result.update(solves=[], rates=[], verdicts=[], reference={}, scene={})

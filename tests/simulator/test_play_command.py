@@ -42,22 +42,6 @@ def test_an_animation_is_drawn_without_a_display(tmp_path, monkeypatch, capfd) -
     assert int(rows[-1]["split"]) == summary["split"] > 50
 
 
-def test_a_scene_is_cut_alike_with_its_work_spread(tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
-    found = []
-    for spread in ([], ["--spread"]):
-        command = ["play", str(CASES / "tetrahedron_four_edges.toml"), "--json",
-                   "--records", str(tmp_path / "steps.csv"), *spread]  # fmt: skip
-        assert main(command) == 0
-        found.append(json.loads(capsys.readouterr().out))
-    at_once, spread_out = found
-    assert not at_once["spread"]
-    assert spread_out["spread"]
-    for key in ("steps", "split", "unknowns", "loose_edges"):
-        assert at_once[key] == spread_out[key]
-    assert at_once["split"] > 0
-
-
 def test_a_live_scalpel_cuts_what_it_is_led_through_and_its_stroke_can_be_played_again(
     tmp_path,
 ) -> None:

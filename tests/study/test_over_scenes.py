@@ -1,47 +1,10 @@
 """Studies over families of scenes, by any solver: their commands, records, pages and faults."""
 
-import csv
-import json
-import re
-import shlex
-from pathlib import Path
-
 import pytest
 
-from verify.cli import main
 from verify.result import Verdict
 from verify.study.measured_scenes import Measurement
 from verify.study.slivers.findings import findings
-
-GUIDE = Path(__file__).parents[2] / "docs" / "guide" / "studies.md"
-COMMANDS = re.findall(r"^\$ verify (study (?:slivers|energy) .*)$", GUIDE.read_text(), re.MULTILINE)
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    """Directory in which the commands of the guide have run."""
-    place = tmp_path_factory.mktemp("guide")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(place)
-        for command in COMMANDS:
-            assert main([*shlex.split(command), "-j", "1"]) == 0
-    return place / "studies"
-
-
-@pytest.mark.parametrize("kind", ["slivers", "energy"])
-def test_record_table_and_page_are_written_and_agree(written, kind):
-    record = json.loads((written / f"{kind}.json").read_text(encoding="utf-8"))
-    assert (record["schema"], record["kind"]) == (1, f"{kind} study")
-    with (written / f"{kind}.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == len(record["measurements"]) > 20
-    assert record["findings"]
-    page = (written / f"{kind}.html").read_text(encoding="utf-8")
-    for finding in record["findings"]:
-        assert finding["topic"] in page
-    assert ("<svg" in page) == (kind == "slivers")
-    # nothing is fetched
-    assert not re.search(r"""(?:src|href)=["'](?!#)|url\((?!#)|@import""", page)
 
 
 @pytest.mark.parametrize(

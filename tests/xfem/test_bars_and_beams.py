@@ -11,11 +11,7 @@ from scipy.sparse.linalg import eigsh
 
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody
-from verify.xfem.critical_step import RESONANCE_FREE, critical_step
 from verify.xfem.cuts import Plane, Polyline
-from verify.xfem.energy_balance import run
-from verify.xfem.energy_momentum import EnergyMomentum
-from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
 from verify.xfem.phantom import cut_mesh
@@ -117,26 +113,3 @@ def test_a_rigid_turn_at_constant_rate_stores_nothing_and_keeps_every_momentum(d
         kept = np.concatenate([[np.sum(momenta * state.velocity)], np.atleast_1d(turning)])
         first = kept if first is None else first
         assert np.abs(kept - first).max() < 1e-12 * np.abs(first).max()
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("scheme", [CentralDifferences, EnergyMomentum])
-def test_the_halves_of_a_spinning_cut_body_each_keep_their_momentum(dim, scheme):
-    """One full turn: energy, both momenta, and the linear momentum of each half on its own."""
-    body, state = spinning(dim)
-    v = body.force.phantom
-    K = body.pattern.matrix(body.force.stiffness(body.pattern, np.zeros(body.shape)))
-    h = 0.9 * RESONANCE_FREE * critical_step(K, body.mass)
-    if scheme is EnergyMomentum:
-        h *= 4.0
-    upper = v.bodies == v.bodies[0]
-    halves = [body.mass.apply(state.velocity)[side].sum(axis=0) for side in (upper, ~upper)]
-    account = run(scheme(body, h), body, state, int(np.ceil(2.0 * np.pi / h)))
-    after = [body.mass.apply(state.velocity)[side].sum(axis=0) for side in (upper, ~upper)]
-    size = np.sqrt(2.0 * account.kinetic.max() * DENSITY)
-    assert np.abs(np.array(after) - halves).max() < 1e-11 * size
-    assert np.abs(account.momentum - account.momentum[0]).max() < 1e-11 * size
-    turning = account.angular_momentum
-    assert np.abs(turning - turning[0]).max() < 1e-9 * np.abs(turning).max()
-    # central differences: their own energy oscillates by (ωh)²/4 of what swings
-    assert account.drift < (1e-9 if scheme is EnergyMomentum else 2e-3)

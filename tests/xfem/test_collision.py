@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
@@ -11,30 +9,6 @@ from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.cuts import ToolPath
 from verify.xfem.nearest_points import nearest_on_facet
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-
-
-def _nearest_by_sampling(x, corners, n=60):
-    """Smallest distance to a fine grid of points of a facet: an upper bound, good to 1/n."""
-    grid = [np.array([1 - t, t]) for t in np.linspace(0, 1, n * n)]
-    if len(corners) == 3:
-        u = np.linspace(0, 1, n)
-        grid = [np.array([1 - a - b, a, b]) for a in u for b in u if a + b <= 1 + 1e-12]
-    return np.linalg.norm(np.array(grid) @ corners - x, axis=1).min()
-
-
-@pytest.mark.parametrize(("size", "space"), [(2, 2), (3, 3), (3, 2)])
-@given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=25, deadline=None, derandomize=True)
-def test_the_nearest_point_of_a_facet_is_the_nearest(size, space, seed) -> None:
-    rng = np.random.default_rng(seed)
-    x, corners, weights = rng.normal(size=space), rng.normal(size=(size, space)), np.empty(size)
-    nearest_on_facet(x, corners, weights)
-    assert weights.min() >= 0.0
-    assert weights.sum() == pytest.approx(1.0, abs=1e-14)
-    distance = np.linalg.norm(weights @ corners - x)
-    sampled = _nearest_by_sampling(x, corners)
-    spacing = np.ptp(corners, axis=0).max() / 59 * 2
-    assert sampled - spacing <= distance <= sampled + 1e-12
 
 
 def _model(dim, seed):

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
 from xfem_bodies import zero_modes
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.faceted_cuts import Polyline
-from verify.xfem.flat_cuts import Cut, Plane, PolygonPatch
+from verify.xfem.flat_cuts import Plane, PolygonPatch
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -65,51 +64,3 @@ def test_a_branch_from_a_stem_along_edges_or_faces_comes_off(side, way, tip):
         cuts = [Plane([0.5] * 3, [0.0, 0.0, side]), PolygonPatch(outline)]
         phantom = cut_mesh(block, cuts, tip)
         assert phantom.bodies.max() + 1 == 3
-
-
-def _scattered(rng, dim):
-    """Delaunay mesh of random points, without flat elements: nothing is structured or convex."""
-    points = rng.random((14, dim))
-    cells = Delaunay(points).simplices
-    edges = points[cells][:, 1:] - points[cells][:, :1]
-    cells = cells[np.abs(np.linalg.det(edges)) > 1e-3]
-    used, numbers = np.unique(cells, return_inverse=True)
-    return SimplexMesh(points[used], numbers.reshape(cells.shape))
-
-
-def _cuts(rng, mesh, turned):
-    """Three cuts along edges and faces of elements, some with an end in a node, or turned round."""
-    cuts: list[Cut] = []
-    for corners in mesh.points[mesh.cells[rng.integers(len(mesh.cells), size=3)]]:
-        a, b = corners[0], corners[1]
-        if mesh.dim == 2:
-            along = Polyline([a - rng.choice([0.0, 3.0]) * (b - a), b + 3.0 * (b - a)])
-            cuts.append(Polyline(along.vertices[::-1]) if turned else along)
-        else:
-            c = corners[2]
-            normal = np.cross(b - a, c - a)
-            if rng.random() < 0.5:
-                cuts.append(Plane(a, -normal if turned else normal))
-            else:  # its rim runs along two edges
-                rim = [a, b + 9.0 * (b - a), c + 9.0 * (c - a)]
-                cuts.append(PolygonPatch(rim[::-1] if turned else rim))
-    return cuts
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_exactly_degenerate_cuts_do_not_know_which_side_is_called_plus(dim):
-    """Nodes on a cut count as its plus side: nothing but the names of the sides may follow."""
-    for seed in range(60):
-        found = []
-        for turned in (False, True):
-            rng = np.random.default_rng([dim, seed])
-            mesh = _scattered(rng, dim)
-            phantom = cut_mesh(mesh, _cuts(rng, mesh, turned))
-            body = phantom.bodies[phantom.cells[:, 0]]
-            volumes = np.sort(np.bincount(body, phantom.volumes))
-            found.append((phantom.node_count, phantom.parent, volumes))
-        (nodes, parent, volumes), (turned_nodes, turned_parent, turned_volumes) = found
-        assert nodes == turned_nodes, seed
-        assert np.array_equal(parent, turned_parent), seed
-        # sums of some hundred pieces, each good to a few ulp
-        np.testing.assert_allclose(volumes, turned_volumes, rtol=1e-12, atol=1e-15)

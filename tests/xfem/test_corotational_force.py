@@ -145,14 +145,3 @@ def test_internal_forces_have_no_resultant_and_in_corotation_no_moment(force):
         x = force.phantom.node_points + u
         moment = np.einsum("ni,nj->ij", x, f)
         assert np.abs(moment - moment.T).max() < 1e-14 * size * np.abs(x).max()
-
-
-@pytest.mark.parametrize("force", [f for f in _bodies() if f.is_corotational])
-def test_a_turned_body_has_the_turned_forces(force):
-    u, X = _disturbed(force), force.phantom.node_points
-    f, energy = (force.evaluate(u)[0].copy(), force.evaluate(u)[1])
-    for angle in (0.7, 2.4, np.pi):
-        Q = rotation(X.shape[1], angle)
-        turned, same = force.evaluate((X + u) @ Q.T - X)
-        assert same == pytest.approx(energy, rel=1e-13)
-        assert np.abs(turned - f @ Q.T).max() < 1e-12 * np.abs(f).max()

@@ -4,13 +4,11 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from cut_comparison import assert_same_cut
 from test_sliver_policies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
-from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath
+from verify.xfem.cuts import PolygonPatch, Polyline
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
@@ -145,28 +143,6 @@ def test_a_branch_from_the_kink_of_a_polyline_comes_off(bend, seed):
         phantom = cut_mesh(mesh, cuts)
         assert phantom.bodies.max() + 1 == 3
         assert zero_modes(phantom)[0] == 9
-
-
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("through", [True, False])
-def test_strokes_that_end_in_one_point_part_the_body_as_the_cuts_at_once_do(seed, through):
-    """Two come to the point, a third leaves it; at each frame pieces and joins are the same."""
-    rng = np.random.default_rng([9, seed])
-    mesh = shaken(rectangle_mesh((5, 5)), seed)
-    point, angles = rng.uniform(0.4, 0.6, 2), sectors(rng, 3)
-    ends = point + (2.0 if through else 0.3) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    cutter = SemiProgressiveCutter(mesh)
-    nodes = 0
-    for k, end in enumerate(ends):
-        tips = [point, end] if k == 2 else [end, point]
-        cutter.begin(ToolPath.of_tip(tips, [k, k + 1.0]))
-        for time in np.linspace(k, k + 1.0, 6)[1:]:
-            cutter.advance(time)
-            phantom = cutter.phantom_mesh()
-            assert_same_cut(phantom, cut_mesh(mesh, cutter.cuts))
-            assert phantom.node_count >= nodes
-            nodes = phantom.node_count
-    assert phantom.bodies.max() + 1 == (3 if through else 1)
 
 
 @pytest.mark.parametrize("policy", ["merge", "drop"])

@@ -69,43 +69,6 @@ def test_an_affine_motion_moves_every_vertex_as_it_moves_the_material(refinement
     np.testing.assert_allclose(moved, expected, atol=1e-13)
 
 
-def _upright(start, end):
-    """The path of a blade that reaches through a unit cube, from above."""
-    return ToolPath.of_tip([[*start, -0.2], [*end, -0.2]], [0.0, 1.0], [0.0, 0.0, 1.4])
-
-
-@pytest.mark.parametrize("outside", [0.06, 0.9])
-@pytest.mark.parametrize(
-    "paths",
-    [
-        [_upright([-0.1, 0.5], [1.1, 0.5]), _upright([0.5, -0.1], [0.5, 1.1])],
-        [
-            _upright([-0.1, 0.5], [0.5, 0.5]),
-            _upright([0.5, 0.5], [1.1, 0.9]),
-            _upright([0.5, 0.5], [1.1, 0.1]),
-        ],
-        [_upright([-0.1, 0.47], [0.6, 0.47]), _upright([0.3, -0.1], [0.3, 0.8])],
-    ],
-    ids=["crossing along faces", "branching", "partial"],
-)
-def test_a_surface_outside_the_body_that_has_followed_cuts_is_the_one_begun_after_them(
-    paths, outside
-) -> None:
-    """Vertices there went on with nodes of elements that a later cut had divided."""
-    mesh = box_mesh((4, 4, 4))
-    if outside < 0.5:  # like a smooth skin over a coarse mesh
-        facets = _own_boundary(mesh)
-        points = 0.5 + (1.0 + outside) * (mesh.points - 0.5)
-    else:
-        points, facets = _sphere(2, 0.5, outside)
-    cutter, _, followed = _cut(mesh, paths, points, facets)
-    begun = EmbeddedSurface(cutter, points, facets)
-    displacement = np.random.default_rng(3).normal(size=(cutter.body.node_count, 3))
-    there, here = (_facets_in_any_order(s.surface, displacement) for s in (begun, followed))
-    assert there.shape == here.shape
-    np.testing.assert_allclose(here, there, atol=1e-7)
-
-
 @pytest.mark.parametrize(
     ("mesh", "paths"),
     [
@@ -201,13 +164,3 @@ def _neighbour(cutter, piece):
     shared = np.isin(body.piece_cells.rows, mine).sum(axis=1)
     others = np.flatnonzero(shared == 3)
     return int(others[0]) if len(others) else piece
-
-
-def _facets_in_any_order(surface, displacement):
-    """Corners of the facets in the material frame and moved, each from its first corner on."""
-    used = surface.facets.rows[surface.used]
-    corners = [x[used] for x in (surface.material.rows, surface.positions(displacement))]
-    places = np.concatenate(corners, axis=2).round(9) + 0.0
-    first = [min(range(3), key=lambda k, c=c: tuple(c[k])) for c in places]
-    rows = [np.roll(c, -k, axis=0).ravel() for c, k in zip(places, first, strict=True)]
-    return np.array(sorted(rows, key=tuple))

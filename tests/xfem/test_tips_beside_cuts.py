@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_sliver_policies import shaken
 
-from verify.xfem.cuts import PolygonPatch, Polyline
+from verify.xfem.cuts import PolygonPatch
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
+from verify.xfem.structured_meshes import box_mesh
 from verify.xfem.subdivision import subdivide
 
 
@@ -37,23 +37,6 @@ def assert_conforming(mesh, cuts):
     assert torn > 0.0
     boundary = 4.0 if mesh.dim == 2 else 6.0
     assert exterior(divided) == pytest.approx(boundary + 2.0 * torn, abs=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_a_tip_beside_other_cuts_leaves_no_hanging_nodes_in_the_plane(seed):
-    random = np.random.default_rng(seed)
-    mesh = shaken(rectangle_mesh((4, 4)), seed)
-    tip = random.uniform(0.35, 0.65, 2)
-    turn = random.uniform(0.0, 2.0 * np.pi)
-    towards = np.array([np.cos(turn), np.sin(turn)])
-    slit = Polyline([tip + 2.0 * towards, tip])
-    aside = tip + random.uniform(-0.1, 0.1, 2)
-    along = random.normal(size=2)
-    along *= 3.0 / np.linalg.norm(along)
-    line = Polyline([aside - along, aside + along])
-    other = Polyline([aside + 0.05, aside + 0.05 + 0.5 * along])
-    for cuts in permutations([slit, line, other]):
-        assert_conforming(mesh, cuts)
 
 
 @pytest.mark.parametrize("seed", range(12))
