@@ -5,6 +5,7 @@ import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
 from verify.scene import load_scene
+from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
 
 SQUARE = (
@@ -96,6 +97,23 @@ def test_before_a_cut_opens_its_two_sides_move_together(tmp_path):
     gaps = np.linalg.norm(apart, axis=2).max(axis=1)
     assert gaps[:3].max() <= 1e-12
     assert (gaps[3:] > 1e-3).all()
+
+
+@pytest.mark.parametrize("name", ["xfem", "conforming", "subdivision"])
+@pytest.mark.parametrize("off", [-8e-10, 3e-12, 1e-10, 8e-10])  # of the duration
+def test_a_cut_that_opens_just_beside_an_output_opens_at_it(tmp_path, name, off):
+    """Though a load jumps at the output: nothing is late by a step, or put out twice."""
+    pulled = '[[loads]]\nkind = "traction"\nwhere = "bottom"\ntraction = [300.0, 0.0]\n'
+    load, found = WEIGHT + pulled + "history = [[0.2, 1.0], [0.2, 0.9]]\n", []
+    for time in (0.2, 0.2 + 0.5 * off):
+        cut = CUT.replace("[1.1, 0.41]]", f"[1.1, 0.41]]\nopens_at = {time!r}")
+        (tmp_path / "motion.toml").write_text(SQUARE + HELD + cut + load)
+        found.append(find_solver(name).solve(load_scene(tmp_path / "motion.toml"), 0, 0))
+    at, beside = found
+    np.testing.assert_allclose(beside.displacement, at.displacement, atol=1e-8)
+    np.testing.assert_allclose(beside.velocity, at.velocity, atol=1e-7)
+    for name, column in at.ledger.items():
+        np.testing.assert_allclose(beside.ledger[name], column, atol=1e-6 * 1000.0 * GRAVITY)
 
 
 def test_the_energy_is_continuous_where_a_cut_opens(tmp_path):

@@ -16,8 +16,7 @@ from verify.xfem.phantom import PhantomMesh
 __all__ = ["Openings", "opening_times", "openings_of", "seam_times", "stops_of"]
 
 _Floats = NDArray[np.float64]
-_SAME = 1e-12  # of the duration: times that close are one
-_DUE = 1e-9  # of the duration: steps added up are off by less than that
+_DUE = 1e-9  # of the duration: times that close are one, steps added up are off by less
 
 
 @dataclass(frozen=True)
@@ -58,14 +57,14 @@ class Openings:
 def openings_of(scene: Scene, size: float) -> Openings:
     """Return when the cuts of a moving scene open on a mesh of a size, in m.
 
-    A time that is an output time up to round-off is that one.
+    A time that is an output time up to what steps are off by is that one.
     """
     outputs = np.array(scene.analysis.output_times)
-    end = float(outputs[-1])
+    due = _DUE * float(outputs[-1])
 
     def snapped(time: float) -> float:
         nearest = float(outputs[np.abs(outputs - time).argmin()])
-        return nearest if abs(nearest - time) <= _SAME * end else time
+        return nearest if abs(nearest - time) <= due else time
 
     times = [snapped(float(getattr(cut, "opens_at", 0.0))) for cut in scene.cuts]
     order, cuts = np.argsort(times, kind="stable"), cuts_of(scene, size)
@@ -74,7 +73,7 @@ def openings_of(scene: Scene, size: float) -> Openings:
         [cuts[k] for k in order],
         [times[k] for k in order],
         outputs,
-        _DUE * end,
+        due,
     )
 
 
