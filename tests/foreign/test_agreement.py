@@ -51,3 +51,23 @@ def test_the_live_program_gives_its_recorded_answer(one):
     found = measured(one["solver"], one["case"], one["level"], **one["parameters"])
     for name, value in found.items():
         assert value == pytest.approx(one[name], rel=DIGITS), name
+
+
+@pytest.mark.heavy
+@pytest.mark.skipif(
+    bool(state_of(foreign_solver("ngsxfem")).missing), reason="ngsxfem is not installed"
+)
+@pytest.mark.parametrize(
+    "case",
+    ["statics/griffith_inside", "meeting/edges_vertices_corner", "dynamics/plate_cut_vibrating",
+     "dynamics/block_falls_apart"],
+)  # fmt: skip
+def test_enriched_nodal_values_and_values_of_both_sides_are_one_space(case):
+    """ngsxfem's XFESpace and its CutFEM without a ghost penalty: in the plane, in space, moving."""
+    scene = load_scene(case)
+    sides, enriched = (
+        find_solver(f"ngsxfem ghost=0 space={space}").solve(scene, 0) for space in ("copies", "xfe")
+    )
+    scale = np.abs(sides.displacement).max()
+    assert enriched.notes["method"] != sides.notes["method"]
+    assert np.abs(enriched.displacement - sides.displacement).max() <= DIGITS * scale

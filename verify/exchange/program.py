@@ -1,6 +1,7 @@
 """Any program as a solver: the case is exported, the program is run, its answer is read."""
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -21,6 +22,7 @@ from verify.solvers import check_parameters
 __all__ = ["ProgramSolver"]
 
 _TAIL = 300
+_FRAME = re.compile(r'File "([^"]+)", line (\d+), in (.+)')
 
 
 class ProgramSolver:
@@ -110,7 +112,14 @@ class ProgramSolver:
         )  # fmt: skip
         wall = perf_counter() - start
         if done.returncode:
-            said = (done.stderr.strip() or done.stdout.strip() or "said nothing").splitlines()[-1]
-            said = said[-_TAIL:]
-            raise RuntimeError(f"{words[0]} ended with {done.returncode}: {said}")
+            said = done.stderr.strip() or done.stdout.strip() or "said nothing"
+            text = f"'{self.name}': {words[0]} ended with {done.returncode}"
+            raise RuntimeError(f"{text}: {said.splitlines()[-1][-_TAIL:]}{_raised_at(said)}")
         return wall
+
+
+def _raised_at(said: str) -> str:
+    """Where a program in Python raised: its last own line, not one of what it is built on."""
+    frames = [frame.groups() for frame in _FRAME.finditer(said)]
+    own = [frame for frame in frames if "site-packages" not in frame[0]]
+    return " ({}:{} in {})".format(*(own or frames)[-1]) if frames else ""

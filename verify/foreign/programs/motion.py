@@ -142,7 +142,7 @@ def run_engine(case, engine, **said):
         if any(cut["kind"] == "tool_path" for cut in case.content["cuts"]):
             raise RefusedError("tool paths: facets that open one by one")
         _march(case, engine, trial=True)  # what is compiled or read is, in it
-        marched = [_march(case, engine) for _ in range(case.repetitions)]
+        marched = [_march(case, engine) for _ in range(max(1, case.repetitions))]
         outputs, steps = marched[0][:2]
         case.timings = {"motion": [seconds for *_, seconds in marched]}
         names = ("displacement", "velocity", "acceleration")

@@ -3,7 +3,7 @@
 import numpy as np
 from cut_body import forces, prescribed
 from exchange_files import RefusedError
-from forms import Forms, bits, joining, mesh_of
+from forms import bits
 
 __all__ = ["Body", "PartedCase"]
 
@@ -18,11 +18,12 @@ class PartedCase:
     case : Case
     body : CutBody
     answer : SplitMesh
+    forms : Forms
     ghost : float
         Factor of the ghost penalty, as long as the cut is open.
     """
 
-    def __init__(self, case, body, answer, ghost):
+    def __init__(self, case, body, answer, forms, ghost):
         if len({cut["opens_at"] for cut in case.content["cuts"]}) > 1:
             raise RefusedError("cuts that open one after another are not offered")
         for name in ("content", "problem", "dimension", "repetitions", "constant"):
@@ -37,7 +38,7 @@ class PartedCase:
         whole = self.group[np.where(body.side == 0, 2, (body.side + 1) // 2)[:, None], case.cells]
         below, above = (self.group[side][case.cells[body.cut]] for side in (0, 1))
         self.cells = np.vstack([whole[~body.cut], below, above])
-        self.forms = Forms(case, body, mesh_of(case))
+        self.forms = forms
         self.timings = {}
 
     def held(self, time=0.0):
@@ -51,7 +52,7 @@ class PartedCase:
             if load["kind"] == "traction":
                 force = forces(self._case, self._body, [load])[self.used]
             elif "uniform" in load:
-                turned = joining(self.group, len(self.points), self.dimension).CreateTranspose()
+                turned = self.forms.joined(self.group, len(self.points)).CreateTranspose()
                 force = (turned * self.forms.load(load["uniform"])).Evaluate().FV().NumPy()
                 force = force.reshape(self.dimension, -1).T.copy()
             else:
@@ -78,7 +79,7 @@ class Body:
         self.d, self.shape = case.dimension, stage.points.shape
         # while the cut is closed there are no cut elements, and nothing to penalise
         ghost = case.ghost if len(stage.points) == len(case.points) else 0.0
-        joined = joining(stage.node[case.group], len(stage.points), self.d)
+        joined = case.forms.joined(stage.node[case.group], len(stage.points))
         turned, density = joined.CreateTranspose(), float(case.constant("density")[0])
 
         def matrix(stiffness, mass):

@@ -7,7 +7,7 @@ import ngsolve as ng
 import numpy as np
 from cut_body import CutBody, forces, prescribed
 from exchange_files import RefusedError, loose_parts, run
-from forms import Forms, bits, joining, mesh_of
+from forms import EnrichedForms, Forms, bits, mesh_of
 from motion import run_engine
 from newmark import Body, PartedCase
 from split_cells import SplitMesh
@@ -18,19 +18,27 @@ def solve(case):
     ghost = float(case.parameters.get("ghost", 0.1))
     if ghost < 0:
         raise RefusedError(f"ghost = {ghost}; expected a number from 0 on")
+    enriched = case.parameters.get("space") == "xfe"
+    if enriched and ghost:
+        raise RefusedError(f"space = 'xfe' with ghost = {ghost}; expected ghost = 0")
     body = CutBody(case)
+    forms = (EnrichedForms if enriched else Forms)(case, body, mesh_of(case))
     side = np.where(body.side == 0, 2, (body.side + 1) // 2)
     answer = SplitMesh(case.points, case.cells, body.phi, body.cut, side, body.group)
-    notes = {"method": "CutFEM", "ghost": str(ghost), "ngsolve": ng.__version__}
+    notes = {
+        "method": "XFEM" if enriched else "CutFEM",
+        "ghost": str(ghost),
+        "ngsolve": ng.__version__,
+    }
     if case.content["analysis"]["kind"] == "static":
-        solve_static(case, body, answer, ghost, notes)
+        solve_static(case, body, answer, forms, ghost, notes)
         return
     notes |= {"scheme": "trapezoidal rule", "mass": "consistent, of each side; no ghost penalty"}
-    parted = PartedCase(case, body, answer, ghost)
+    parted = PartedCase(case, body, answer, forms, ghost)
     run_engine(parted, Body, notes=notes)
 
 
-def solve_static(case, body, answer, ghost, notes):
+def solve_static(case, body, answer, forms, ghost, notes):
     """Solve linear statics and write the answer."""
     d, (held, value) = case.dimension, prescribed(case, body)
     loose = loose_parts(answer.points, answer.cells, answer.held(held))
@@ -44,8 +52,7 @@ def solve_static(case, body, answer, ghost, notes):
             if "uniform" not in one:
                 raise RefusedError("body forces in formulas are not offered")
             weight += one["uniform"]
-    forms, outer = Forms(case, body, mesh_of(case)), forces(case, body)
-    joined = joining(body.group, body.count, d)
+    outer, joined = forces(case, body), forms.joined(body.group, body.count)
     turned = joined.CreateTranspose()
 
     def assembled():
