@@ -57,6 +57,28 @@ def test_a_refusal_and_a_failure_of_the_program_come_through(talks):
         talks.solve(load_scene(CASE), 0, weight=0.0)
 
 
+@pytest.mark.parametrize(
+    "old, new, said",
+    [
+        ("weight = 1.0", "weight 1.0", "line 12"),
+        ('kind = "system"', 'kind = "snap"', "install.kind"),
+        ("dimensions", "dimension", "takes.dimension"),
+        ("[parameters]", "[paramters]", "paramters"),
+    ],
+)
+def test_a_bad_record_is_said_with_its_file_and_key(add_example, old, new, said):
+    record = add_example("linear") / "solver.toml"
+    record.write_text(record.read_text().replace(old, new))
+    with pytest.raises(InputError, match=said) as error:
+        find_solver("linear")
+    assert str(record) in str(error.value)
+
+
+def test_a_failed_program_names_its_file_and_line(talks):
+    with pytest.raises(RuntimeError, match=r"ValueError: the weight is zero \(.*program.py:9 in"):
+        talks.solve(load_scene(CASE), 0, weight=0.0)
+
+
 def test_the_template_answers_a_case_where_verify_cannot_be_imported(tmp_path, capsys):
     out = tmp_path / "case"
     assert main(["export", CASE, "--out", str(out), "--template", "python"]) == 0

@@ -113,7 +113,7 @@ def test_a_cut_that_opens_just_beside_an_output_opens_at_it(tmp_path, name, off)
     np.testing.assert_allclose(beside.displacement, at.displacement, atol=1e-8)
     np.testing.assert_allclose(beside.velocity, at.velocity, atol=1e-7)
     for name, column in at.ledger.items():
-        np.testing.assert_allclose(beside.ledger[name], column, atol=1e-6 * 1000.0 * GRAVITY)
+        np.testing.assert_allclose(beside.ledger[name], column, atol=1e-6 * 9800.0)
 
 
 def test_the_energy_is_continuous_where_a_cut_opens(tmp_path):

@@ -10,18 +10,19 @@
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from verify.errors import InputError
+from verify.printable import shown
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 
 __all__ = ["PROGRAMS", "ForeignSolver", "Install", "Takes", "foreign_solver", "foreign_solvers"]
 
 PROGRAMS = Path(__file__).resolve().parent / "programs"
-_ALL = ("static", "dynamic")
+_STRICT = ConfigDict(extra="forbid")
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Install:
         The command that installs a system package, for the user to read.
     """
 
-    kind: str
+    __pydantic_config__ = _STRICT
+    kind: Literal["packages", "system"]
     python: str
     how: str = ""
 
@@ -62,6 +64,7 @@ class Takes:
         Kinds of initial states.
     """
 
+    __pydantic_config__ = _STRICT
     dimensions: list[int]
     analyses: list[str]
     kinematics: list[str]
@@ -70,7 +73,7 @@ class Takes:
             "polyline", "arc", "polygon", "disc", "cylinder", "sphere", "swept",
         ]
     )  # fmt: skip
-    materials: str = "several"
+    materials: Literal["one", "several"] = "several"
     opening: bool = False
     histories: bool = False
     membranes: bool = False
@@ -126,6 +129,7 @@ class ForeignSolver:
         Whether the program wants the conforming mesh.
     """
 
+    __pydantic_config__ = _STRICT
     name: str
     title: str
     licence: str
@@ -169,13 +173,15 @@ def foreign_solver(name: str) -> ForeignSolver:
 
 
 def _read(path: Path) -> ForeignSolver:
-    content = tomllib.loads(path.read_text(encoding="utf-8"))
     try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
         return _RECORD.validate_python({"name": path.parent.name, **content})
     except ValidationError as error:
-        raise InputError(
-            f"{error.errors()[0]['loc']}: {error.errors()[0]['msg']}", str(path)
-        ) from None
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise InputError(f"{key}: {first['msg']}, not {shown(first['input'])}", str(path)) from None
+    except ValueError as error:  # no TOML, or no text: the former with its line
+        raise InputError(str(error), str(path)) from None
 
 
 _RECORD = TypeAdapter(ForeignSolver)

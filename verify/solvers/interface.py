@@ -1,17 +1,19 @@
 """The interface that every solver implements, and how a solver is found by its name."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import Parameter, signature
 from pathlib import Path
+from traceback import extract_tb
 from typing import Any, Protocol
 
 import numpy as np
 
 from verify.errors import InputError
-from verify.printable import shown
+from verify.printable import shown, words_of
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Solution
@@ -40,6 +42,7 @@ _GROUP = "verify.solvers"
 # programs of others, a folder each, of the class named here, which is told the name
 _PROGRAMS = Path(__file__).resolve().parents[1] / "foreign" / "programs"
 _FOREIGN = "verify.foreign.program:ForeignProgram"
+_ASKED = ("refuses", "levels", "solve")  # methods that every solver has
 _MOST_LEVELS = 32  # the coarsest cell halved so often is of round-off size
 
 
@@ -132,35 +135,69 @@ def find_solver(name: str) -> Solver:
     Raises
     ------
     InputError
-        If there is no such solver, what it needs is not installed, or it does not take these
-        parameters.
+        If there is no such solver, it cannot be loaded, what it needs is not installed, or it does
+        not take these parameters.
     """
     name, own = solver_in(name), parameters_in(name)
-    told = name in _METHODS or name in _foreign_names()
-    try:
-        if name in _BUILT_IN or told:
-            module, _, attribute = _BUILT_IN.get(name, _FOREIGN).partition(":")
-            found = getattr(import_module(module), attribute)
-        elif ":" in name:
-            module, _, attribute = name.partition(":")
-            found = getattr(import_module(module), attribute, None)
-            if found is None:
-                raise InputError(f"solver '{name}': no '{attribute}' in module '{module}'")
-        else:
-            points = {point.name: point for point in entry_points(group=_GROUP)}
-            if name not in points:
-                raise InputError(f"no solver '{name}'{nearest(name, solver_names())}")
-            found = points[name].load()
-    except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] in ("verify", "reference"):
-            raise  # our own mistake, not a missing dependency
-        raise InputError(f"solver '{name}' needs '{error.name}', which is not installed") from None
-    solver: Solver = found(name) if told else found()
+    with _loading(name):
+        found = _class_of(name)
+        told = name in _METHODS or name in _foreign_names()
+        solver: Solver = found(name) if told else found()
+    for method in _ASKED:
+        if not callable(getattr(solver, method, None)):
+            raise InputError(f"solver '{name}' has no {method}(); expected {', '.join(_ASKED)}")
     check_parameters(name, solver, own)
     for method in ("solve", "system") if own else ():
         if hasattr(solver, method):
             setattr(solver, method, partial(getattr(solver, method), **own))
     return solver
+
+
+def _class_of(name: str) -> Any:
+    if ":" in name or name in _BUILT_IN or name in _foreign_names():
+        module, _, attribute = _BUILT_IN.get(name, name if ":" in name else _FOREIGN).partition(":")
+        if not module or not attribute:
+            raise InputError(f"solver '{name}'; expected MODULE:CLASS")
+        found = getattr(import_module(module), attribute, None)
+        if found is None:
+            raise InputError(f"solver '{name}': no '{attribute}' in module '{module}'")
+        return found
+    points = {point.name: point for point in entry_points(group=_GROUP)}
+    if name not in points:
+        raise InputError(f"no solver '{name}'{nearest(name, solver_names())}")
+    return points[name].load()
+
+
+@contextmanager
+def _loading(name: str) -> Iterator[None]:
+    """Say what of a solver could not be loaded, where, and what was expected."""
+    try:
+        yield
+    except InputError:
+        raise
+    except ModuleNotFoundError as error:
+        missing = error.name or ""
+        if missing.partition(".")[0] in ("verify", "reference"):
+            raise  # our own mistake, not a missing dependency
+        if f"{name.partition(':')[0]}.".startswith(f"{missing}."):
+            text = f"solver '{name}': no module '{missing}' in this folder or on PYTHONPATH"
+            raise InputError(f"{text}; expected MODULE:CLASS") from None
+        text = f"solver '{name}' needs '{missing}', which is not installed"
+        raise InputError(text + ("" if name in _BUILT_IN else _place(error))) from None
+    except (Exception, SystemExit) as error:  # of a guest, who may raise anything
+        if name in _BUILT_IN:
+            raise
+        text = f"solver '{name}' cannot be loaded: {words_of(error)}{_place(error)}"
+        raise InputError(f"{text}; expected a class that is made without arguments") from error
+
+
+def _place(error: BaseException) -> str:
+    """File and line at which something raised, of what lies outside this file."""
+    if isinstance(error, SyntaxError):
+        return f" ({error.filename}:{error.lineno})"
+    frames = extract_tb(error.__traceback__)
+    own = [one for one in frames if not one.filename.startswith(("<frozen", __file__))]
+    return f" ({own[-1].filename}:{own[-1].lineno})" if own else ""
 
 
 def check_parameters(name: str, solver: Solver, given: Mapping[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """CutFEM in NGSolve with ngsxfem: two sides of a level set, ghost penalty, linear elasticity.
 
 The level set is that of `cut_body`; a cut that ends inside an element ends at its nearer facet.
+With ``space = xfe`` the unknowns are nodal values and those of ngsxfem's XFESpace.
 """
 
 import ngsolve as ng
@@ -25,11 +26,8 @@ def solve(case):
     forms = (EnrichedForms if enriched else Forms)(case, body, mesh_of(case))
     side = np.where(body.side == 0, 2, (body.side + 1) // 2)
     answer = SplitMesh(case.points, case.cells, body.phi, body.cut, side, body.group)
-    notes = {
-        "method": "XFEM" if enriched else "CutFEM",
-        "ghost": str(ghost),
-        "ngsolve": ng.__version__,
-    }
+    method = "XFEM" if enriched else "CutFEM"
+    notes = {"method": method, "ghost": str(ghost), "ngsolve": ng.__version__}
     if case.content["analysis"]["kind"] == "static":
         solve_static(case, body, answer, forms, ghost, notes)
         return
