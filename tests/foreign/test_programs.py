@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from verify.cli import main
-from verify.errors import UnsupportedSceneError
+from verify.errors import InputError, UnsupportedSceneError
 from verify.exchange import read_answers
 from verify.foreign.records import PROGRAMS
 from verify.scene import load_scene
@@ -53,7 +53,7 @@ def test_a_foreign_solver_is_found_by_its_name_and_solves_exactly(add_example):
 def test_a_refusal_and_a_failure_of_the_program_come_through(talks):
     with pytest.raises(UnsupportedSceneError, match="no negative weight"):
         talks.solve(load_scene(CASE), 0, weight=-1.0)
-    with pytest.raises(RuntimeError, match="weight"):
+    with pytest.raises(RuntimeError, match=r"ValueError: the weight is zero \(.*program.py:9 in"):
         talks.solve(load_scene(CASE), 0, weight=0.0)
 
 
@@ -72,11 +72,6 @@ def test_a_bad_record_is_said_with_its_file_and_key(add_example, old, new, said)
     with pytest.raises(InputError, match=said) as error:
         find_solver("linear")
     assert str(record) in str(error.value)
-
-
-def test_a_failed_program_names_its_file_and_line(talks):
-    with pytest.raises(RuntimeError, match=r"ValueError: the weight is zero \(.*program.py:9 in"):
-        talks.solve(load_scene(CASE), 0, weight=0.0)
 
 
 def test_the_template_answers_a_case_where_verify_cannot_be_imported(tmp_path, capsys):
