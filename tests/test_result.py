@@ -8,17 +8,8 @@ import pytest
 
 from verify.errors import InputError
 from verify.reference_record import ReferenceRecord
-from verify.result import (
-    CaseResult,
-    Metric,
-    Rate,
-    SolveRecord,
-    Status,
-    Verdict,
-    VerdictRecord,
-    read_result,
-    write_result,
-)
+from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
+from verify.result_files import read_result, write_result
 
 
 def judged(*verdicts):

@@ -5,15 +5,8 @@ from dataclasses import replace
 
 from verify.calibration import KERNEL
 from verify.reference_record import ReferenceRecord
-from verify.result import (
-    CaseResult,
-    Metric,
-    SolveRecord,
-    Status,
-    Verdict,
-    VerdictRecord,
-    write_result,
-)
+from verify.result import CaseResult, Metric, SolveRecord, Status, Verdict, VerdictRecord
+from verify.result_files import write_result
 from verify.scene import Scene
 
 SCENE = {

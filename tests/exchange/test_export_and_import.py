@@ -14,7 +14,8 @@ from case_texts import body_text, support_text, weight_text
 from verify.cli import main
 from verify.errors import InputError
 from verify.exchange import ProgramSolver, export_case, problem_of, read_answers
-from verify.result import Status, Verdict, read_result
+from verify.result import Status, Verdict
+from verify.result_files import read_result
 from verify.scene import load_scene
 
 CASE = "statics/f1_patch"

@@ -21,8 +21,8 @@ from verify.result import (
     Verdict,
     VerdictRecord,
     error_picture,
-    write_result,
 )
+from verify.result_files import write_result
 from verify.solution import Solution, write_solution
 
 __all__ = ["HOSTILE", "cut_square", "make_run", "write_error_field"]

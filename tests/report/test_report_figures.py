@@ -10,7 +10,7 @@ from verify.report import load_run
 from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
 from verify.report.figures import convergence
-from verify.report.figures.convergence import convergence_panel, error_range
+from verify.report.figures.convergence import error_panel, error_range
 from verify.report.figures.style import (
     Palette,
     drawing,
@@ -37,7 +37,7 @@ def drawn(monkeypatch):
 
         monkeypatch.setattr(convergence, "drawing", keep)
         slope = required_slope(result, metric)
-        assert convergence_panel("error", curves, y_range, Palette(), slope) is not None
+        assert error_panel("error", curves, y_range, Palette(), slope=slope) is not None
         return kept[0]
 
     return of

@@ -11,7 +11,8 @@ from page_parser import parsed
 from synthetic_run import make_run
 
 from verify.report import render
-from verify.result import Notice, NoticeKind, read_result, write_result
+from verify.result import Notice, NoticeKind
+from verify.result_files import read_result, write_result
 
 CLOSED = "its faces overlap by up to 18.5 mm at (0.05, 0.05) m"
 NO_TIP = "the end of the arc (0.1, 0) m is no tip"

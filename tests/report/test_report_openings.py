@@ -10,7 +10,8 @@ from synthetic_run import make_run
 from verify.report.figures import profiles
 from verify.report.figures.style import Palette, drawing
 from verify.report.opening_view import opening_figures
-from verify.result import OpeningCurve, OpeningProfile, read_result
+from verify.result import OpeningCurve, OpeningProfile
+from verify.result_files import read_result
 
 ARC = [0.0, 0.1, 0.2, 0.3]
 WIDTH = [0.0, 0.002, 0.002, 0.0]

@@ -1,9 +1,12 @@
 """Claims about the pages of studies: both forms from one record, its numbers, no markup."""
 
+import numpy as np
 import pytest
 from page_parser import parsed
 from synthetic_studies import HOSTILE, STUDIES
 
+from verify.report.figures import studies as figures
+from verify.report.figures.style import Palette
 from verify.report.study_page import render_study
 
 
@@ -36,3 +39,19 @@ def test_numbers_of_studies_are_those_of_the_record(studies):
         ("calibration", "2.00"), ("calibration", "1 marks, 0 not covered"),
     ):  # fmt: skip
         assert said in texts[kind], (kind, said)
+
+
+def test_a_place_that_is_not_known_is_a_gap_of_the_curve_and_not_bridged(monkeypatch):
+    kept = []
+
+    def keep(figure, alt):
+        kept.extend(line.get_xydata() for line in figure.axes[0].lines)
+        return alt
+
+    monkeypatch.setattr(figures, "drawing", keep)
+    places = [(0.25, 0.1), (None, 0.01), (4.0, 0.0), (8.0, 1e-3), (16.0, 1e-4)]
+    said = figures.loglog("error", "time", [figures.Series("strain energy", places)], Palette())
+    (curve,) = kept
+    assert np.isfinite(curve).all(axis=1).tolist() == [True, False, False, True, True]
+    assert curve[3:] == pytest.approx(np.array([(8.0, 1e-3), (16.0, 1e-4)]))
+    assert "strain energy: 0.1 at 0.25, 0.001 at 8, 0.0001 at 16." in said

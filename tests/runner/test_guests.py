@@ -2,7 +2,8 @@
 
 import pytest
 
-from verify.result import Status, read_result
+from verify.result import Status
+from verify.result_files import read_result
 from verify.runner.solve import solve_job
 from verify.runner.survey import survey
 from verify.scene import load_scene, scene_content

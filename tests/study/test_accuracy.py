@@ -6,7 +6,8 @@ from cut_meshes import STRAIGHT, layered, quadratic, scene, solution
 from judged_fields import Cubic, judged
 
 from verify.assess.accuracy import assess_accuracy
-from verify.result import SolveRecord, Status, Verdict, read_result, write_result
+from verify.result import SolveRecord, Status, Verdict
+from verify.result_files import read_result, write_result
 from verify.verdict import with_verdicts
 
 

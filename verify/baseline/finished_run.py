@@ -8,7 +8,8 @@ from pydantic import ValidationError
 
 from verify.errors import InputError
 from verify.json_files import read_json
-from verify.result import CaseResult, read_result
+from verify.result import CaseResult
+from verify.result_files import read_result
 from verify.runner.fingerprint import digest_of
 from verify.scene import Scene
 

@@ -13,6 +13,7 @@ from verify.solution import Solution, read_solution
 __all__ = ["Body", "deformed_body", "error_body", "read_stored", "zoomed"]
 
 _FEATURE_ANGLE = 30.0  # degrees between facets beyond which a 3D edge is drawn
+_SIDES = ((0, 1), (1, 2), (2, 0))  # of a triangle
 _MOST_EDGES = 4000  # of elements that are drawn; more would be too dense to be seen
 
 
@@ -149,18 +150,12 @@ def _body(
         np.column_stack([places, np.zeros(len(places))]) if flat else places
         for places in (points, points if material is None else material)
     )
-    if flat:
-        triangles = cells
-        edges = _single(cells, ((0, 1), (1, 2), (2, 0)))
-        inner = _all_edges(elements[:, :3], ((0, 1), (1, 2), (2, 0)))
-    elif cells.shape[1] == 3:  # a membrane
-        triangles = cells
-        edges = _creases(drawn, triangles, oriented=False)
-        inner = _all_edges(elements[:, :3], ((0, 1), (1, 2), (2, 0)))
+    if cells.shape[1] == 3:
+        triangles, inner = cells, _all_edges(elements[:, :3])
+        edges = _single(cells, _SIDES) if flat else _creases(drawn, triangles, oriented=False)
     else:
         triangles = _single(cells, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)))
-        edges = _creases(drawn, triangles)
-        inner = _all_edges(triangles, ((0, 1), (1, 2), (2, 0)))
+        edges, inner = _creases(drawn, triangles), _all_edges(triangles)
     return Body(drawn, triangles, edges, values, inner, still)
 
 
@@ -174,8 +169,8 @@ def _single(cells: NDArray[np.int64], faces: tuple[tuple[int, ...], ...]) -> NDA
     return single
 
 
-def _all_edges(cells: NDArray[np.int64], pairs: tuple[tuple[int, int], ...]) -> NDArray[np.int64]:
-    found = np.concatenate([cells[:, list(pair)] for pair in pairs])
+def _all_edges(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    found = np.concatenate([triangles[:, list(side)] for side in _SIDES])
     edges: NDArray[np.int64] = np.unique(np.sort(found, axis=1), axis=0)
     return edges
 
@@ -190,7 +185,7 @@ def _creases(
     a, b, c = (points[triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    edges = np.concatenate([triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
+    edges = np.concatenate([triangles[:, [i, j]] for i, j in _SIDES])
     owner = np.tile(np.arange(len(triangles)), 3)
     unique, first, inverse, count = np.unique(
         np.sort(edges, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field, replace
 from verify.printable import words_of
 from verify.report.blocks import Drawing, Figure, Table
 from verify.report.curves import Curve, error_curves, limits, metric_names
-from verify.report.figures.accuracy import accuracy_figure
 from verify.report.figures.colour_bar import colour_bar
-from verify.report.figures.convergence import convergence_panel, cost_panel, error_range
+from verify.report.figures.convergence import error_panel, error_range
 from verify.report.figures.sketch import sketch
 from verify.report.figures.style import Palette
 from verify.report.motion_view import MotionView, motion_view
@@ -30,7 +29,7 @@ from verify.report.tables import (
 )
 from verify.result import CaseResult, NoticeKind, Verdict, worst
 
-__all__ = ["CaseView", "PictureRow", "case_view", "floor_text", "required_slope", "verdict_of"]
+__all__ = ["CaseView", "PictureRow", "case_view", "floor_text", "required_slope"]
 
 
 @dataclass(frozen=True)
@@ -101,18 +100,13 @@ class CaseView:
     regularisations: Table | None = None
     reference: list[tuple[str, str]] = field(default_factory=list)
     reference_tables: list[Table] = field(default_factory=list)
-    accuracy: Figure | None = None
     lead: tuple[str, Drawing] | None = None
-
-
-def verdict_of(entry: CaseEntry) -> Verdict:
-    """Return the verdict of a case; one without a result could not be judged."""
-    return entry.result.verdict if entry.result else Verdict.ERROR
 
 
 def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Palette) -> CaseView:
     """Return what is shown of case number `index`; what cannot be shown is said."""
-    view = CaseView(f"case-{index + 1}", entry.name, entry.name, verdict_of(entry))
+    verdict = entry.result.verdict if entry.result else Verdict.ERROR
+    view = CaseView(f"case-{index + 1}", entry.name, entry.name, verdict)
     try:
         if entry.result is None:
             view.defect = f"Not judged: {entry.defect}."
@@ -157,8 +151,6 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     view.times, view.regularisations = times_table(result), regularisations_table(result)
     view.reference = reference_facts(result.reference)
     view.reference_tables = reference_tables(result.reference)
-    levels = result.reference.time_to_accuracy
-    view.accuracy = None if levels is None else accuracy_figure(levels)
 
 
 def _show(view: CaseView, pictures: CasePictures) -> None:
@@ -188,7 +180,7 @@ def _convergence(view: CaseView, result: CaseResult, palette: Palette) -> None:
         title = error_title(metric)
         if max(len([p for p in curve.points if p.value > 0]) for curve in curves) > 1:
             source = next(m.source for s in result.solves if (m := s.metric(metric)) is not None)
-            panel = convergence_panel(title, curves, y_range, palette, slope)
+            panel = error_panel(title, curves, y_range, palette, slope=slope)
             said = [
                 f"{title[:1].upper()}{title[1:]}, against {source or 'an unnamed reference'}.",
                 floor_text(curves),
@@ -197,9 +189,9 @@ def _convergence(view: CaseView, result: CaseResult, palette: Palette) -> None:
             if panel is not None:
                 view.convergence.append(Figure([panel], " ".join(filter(None, said))))
             if view.cost is None or metric == lead:
-                costs = [cost_panel(title, curves, y_range, palette, of)
-                         for of in ("unknowns", "time")]  # fmt: skip
-                view.cost = Figure([p for p in costs if p is not None]) if any(costs) else view.cost
+                costs = [p for over in ("unknowns", "time")
+                         if (p := error_panel(title, curves, y_range, palette, over))]  # fmt: skip
+                view.cost = Figure(costs) if costs else view.cost
                 if panel is not None:
                     view.lead = (f"{view.title}: {title}", panel)
     if drawn and not view.convergence:

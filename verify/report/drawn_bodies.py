@@ -29,18 +29,11 @@ def draw(body: Body, view: View) -> bytes:
     axes.set_axis_off()
     places = view.projected(body.points)
     if np.ptp(body.points[:, 2]) == 0 and len(body.values) == len(body.points):
-        axes.tripcolor(
-            Triangulation(places[:, 0], places[:, 1], body.triangles),
-            body.values,
-            shading="gouraud",
-            cmap=view.colours,
-            vmin=view.limits[0],
-            vmax=view.limits[1],
-        )
-        for edges, width, colour in (
-            (body.drawn_elements, 0.5, _ELEMENTS),
-            (body.edges, 1.6, _OUTLINE),
-        ):
+        mesh = Triangulation(places[:, 0], places[:, 1], body.triangles)
+        axes.tripcolor(mesh, body.values, shading="gouraud", cmap=view.colours,
+                       vmin=view.limits[0], vmax=view.limits[1])  # fmt: skip
+        for edges, width, colour in ((body.drawn_elements, 0.5, _ELEMENTS),
+                                     (body.edges, 1.6, _OUTLINE)):  # fmt: skip
             segments = list(places[edges][:, :, :2])
             axes.add_collection(LineCollection(segments, linewidths=width, colors=[colour]))
     else:

@@ -23,6 +23,8 @@ COLUMNS = (
     "seconds_max", "meshing_median", "repetitions", "wall", "peak_memory",
 )  # fmt: skip
 
+_OF_A_SOLVE = ("level", "status", "size", "unknowns", "wall", "peak_memory")
+
 
 def json_document(run: Run) -> str:
     """Return all results of a run as one JSON document of schema version `EXPORT_SCHEMA`.
@@ -30,22 +32,15 @@ def json_document(run: Run) -> str:
     Numbers that are not finite, for which JSON has no word, become null.
     """
     cases = [
-        {
-            "case": entry.name,
-            "defect": entry.defect,
-            "result": entry.result.content() if entry.result else None,
-            "unjudged": [asdict(solve) for solve in entry.unjudged],
-        }
+        {"case": entry.name, "defect": entry.defect,
+         "result": entry.result.content() if entry.result else None,
+         "unjudged": [asdict(solve) for solve in entry.unjudged]}
         for entry in run.entries
-    ]
+    ]  # fmt: skip
     document = {
-        "schema": EXPORT_SCHEMA,
-        "kind": "verification results",
-        "run": run.record,
-        "defects": run.defects,
-        "ranking": run.ranking,
-        "cases": cases,
-    }
+        "schema": EXPORT_SCHEMA, "kind": "verification results", "run": run.record,
+        "defects": run.defects, "ranking": run.ranking, "cases": cases,
+    }  # fmt: skip
     return json.dumps(_finite(document), indent=1, allow_nan=False) + "\n"
 
 
@@ -105,33 +100,19 @@ def _rows(entry: CaseEntry, solve: SolveRecord) -> Iterator[dict[str, Any]]:
     common = {
         "case": printable(entry.name),
         "solver": printable(solve.solver),
-        "level": solve.level,
         "parameters": json.dumps(solve.parameters, sort_keys=True) if solve.parameters else "",
-        "status": str(solve.status),
         "reason": printable(solve.reason),
-        "size": solve.size,
-        "unknowns": solve.unknowns,
-        "wall": solve.wall,
-        "peak_memory": solve.peak_memory,
+        **{key: getattr(solve, key) for key in _OF_A_SOLVE},
     }
     if meshing := solve.timings.get("meshing"):
         common["meshing_median"] = median(meshing)
     if time:
-        common |= {
-            "seconds_median": time.median,
-            "seconds_min": time.low,
-            "seconds_max": time.high,
-            "repetitions": time.repetitions,
-        }
+        common |= {"seconds_median": time.median, "seconds_min": time.low,
+                   "seconds_max": time.high, "repetitions": time.repetitions}  # fmt: skip
     for metric in solve.metrics:
-        yield common | {
-            "metric": printable(metric.name),
-            "value": metric.value,
-            "unit": printable(metric.unit),
-            "reference": metric.reference,
-            "uncertainty": metric.uncertainty,
-            "source": printable(metric.source),
-        }
+        own = {key: printable(getattr(metric, key)) for key in ("unit", "source")}
+        numbers = {key: getattr(metric, key) for key in ("value", "reference", "uncertainty")}
+        yield common | {"metric": printable(metric.name)} | own | numbers
     if not solve.metrics:
         yield common
 

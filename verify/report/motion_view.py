@@ -19,10 +19,8 @@ BALANCE_METRICS = (
     "linear_momentum_drift", "angular_momentum_drift",
     "part_linear_momentum_drift", "part_angular_momentum_drift", "released_mismatch",
 )  # fmt: skip
-# parts of an energy balance, the ones that tell most first; the first that are not zero are drawn
-_PARTS = ("kinetic", "strain", "algorithmic", "gravity", "work_of_loads", "work_of_supports",
-          "damping")  # fmt: skip
 _SHOWN = 3
+# parts of an energy balance, the ones that tell most first; the first that are not zero are drawn
 _WORDS = {
     "kinetic": "kinetic energy",
     "strain": "strain energy",
@@ -32,6 +30,8 @@ _WORDS = {
     "work_of_supports": "work of the supports",
     "damping": "energy that damping took",
 }
+Curve = tuple[str, list[float], list[float]]  # solver, times, values
+
 _MOMENTA = (("linear_momentum", "N s"), ("angular_momentum", "N m s"))
 
 
@@ -55,8 +55,8 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
     cuts = _cuts(result.scene)
     unit = "J/m" if any("linear_momentum_z" not in s.account for s in moving) else "J"
     hidden = _hidden(moving)
-    panels = [*_errors(moving, hidden, cuts, palette), *_energies(moving, cuts, unit, palette),
-              *_totals(moving, cuts, unit, palette), *_momenta(moving, cuts, palette)]  # fmt: skip
+    panels = [panel for title, curves in _over_time(moving, hidden, unit)
+              for panel in _panels(title, curves, cuts, palette)]  # fmt: skip
     if not panels:
         return None
     shown = ", ".join(f"{time:.4g} s" for time in cuts)
@@ -92,68 +92,41 @@ def _hidden(solves: Sequence[SolveRecord]) -> dict[str, list[str]]:
             for name, of in largest.items()}  # fmt: skip
 
 
-def _errors(
-    solves: Sequence[SolveRecord], hidden: dict[str, list[str]], cuts: list[float], palette: Palette
-) -> Iterator[Drawing]:
+def _over_time(
+    solves: Sequence[SolveRecord], hidden: dict[str, list[str]], unit: str
+) -> Iterator[tuple[str, list[Curve]]]:
+    """Yield the title of each panel and its curves: errors, energies, their total, momenta."""
     for name, below in hidden.items():
-        curves = [(s, s.series["time"], s.series[name]) for s in solves
-                  if name in s.series and s.solver not in below]  # fmt: skip
-        yield from _several(metric_title(name), curves, cuts, palette)
-
-
-def _energies(
-    solves: Sequence[SolveRecord], cuts: list[float], unit: str, palette: Palette
-) -> Iterator[Drawing]:
-    """Draw each part of the energy that is not zero, of all solvers together."""
-    drawn = [name for name in _PARTS if any(any(s.account.get(name, [])) for s in solves)]
-    for name in drawn[:_SHOWN]:
-        curves = [(s, s.account["time"], s.account[name]) for s in solves if name in s.account]
-        yield from _several(f"{_WORDS.get(name, name)}, {unit}", curves, cuts, palette)
-
-
-def _totals(
-    solves: Sequence[SolveRecord], cuts: list[float], unit: str, palette: Palette
-) -> Iterator[Drawing]:
-    curves = [
-        (s, s.account["time"], [v - s.account["total"][0] for v in s.account["total"]])
-        for s in solves
-        if "total" in s.account
-    ]
-    yield from _several(f"change of the total energy, {unit}", curves, cuts, palette)
-
-
-def _momenta(
-    solves: Sequence[SolveRecord], cuts: list[float], palette: Palette
-) -> Iterator[Drawing]:
-    for name, unit in _MOMENTA:
+        yield metric_title(name), [(s.solver, s.series["time"], s.series[name]) for s in solves
+                                   if name in s.series and s.solver not in below]  # fmt: skip
+    parts = [name for name in _WORDS if any(any(s.account.get(name, [])) for s in solves)]
+    for name in parts[:_SHOWN]:
+        yield f"{_WORDS[name]}, {unit}", [(s.solver, s.account["time"], s.account[name])
+                                          for s in solves if name in s.account]  # fmt: skip
+    totals = [(s, s.account["total"]) for s in solves if "total" in s.account]
+    yield (
+        f"change of the total energy, {unit}",
+        [(s.solver, s.account["time"], [v - total[0] for v in total]) for s, total in totals],
+    )
+    for name, unit_ in _MOMENTA:
         curves = []
-        for solve in solves:
-            parts = [row for key, row in solve.account.items() if key.startswith(name)]
-            if parts:
-                size = [math.hypot(*at) for at in zip(*parts, strict=True)]
-                curves.append((solve, solve.account["time"], size))
-        title = f"magnitude of the {name.replace('_', ' ')}, {unit}"
-        yield from _several(title, curves, cuts, palette)
+        for s in solves:
+            if rows := [row for key, row in s.account.items() if key.startswith(name)]:
+                size = [math.hypot(*at) for at in zip(*rows, strict=True)]
+                curves.append((s.solver, s.account["time"], size))
+        yield f"magnitude of the {name.replace('_', ' ')}, {unit_}", curves
 
 
-def _several(
-    title: str, curves: Sequence[tuple[SolveRecord, list[float], list[float]]], cuts: list[float],
-    palette: Palette,
-) -> Iterator[Drawing]:  # fmt: skip
+def _panels(
+    title: str, curves: Sequence[Curve], cuts: list[float], palette: Palette
+) -> Iterator[Drawing]:
     """Draw one curve per solver, those with common times together."""
     groups: dict[tuple[float, ...], list[tuple[str, list[float]]]] = {}
-    for solve, time, values in curves:
-        groups.setdefault(tuple(time), []).append((solver_title(solve.solver), values))
-    for time_, own in groups.items():
-        yield _panel(title, list(time_), own, cuts, palette)
-
-
-def _panel(
-    title: str, time: list[float], curves: Sequence[tuple[str, list[float]]], cuts: list[float],
-    palette: Palette,
-) -> Drawing:  # fmt: skip
-    inside = [cut for cut in cuts if time[0] < cut <= time[-1]]
-    return profile_panel(title, time, curves, palette, inside)
+    for solver, time, values in curves:
+        groups.setdefault(tuple(time), []).append((solver_title(solver), values))
+    for times, own in groups.items():
+        inside = [cut for cut in cuts if times[0] < cut <= times[-1]]
+        yield profile_panel(title, times, own, palette, inside)
 
 
 def _drifts_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | None:

@@ -40,8 +40,7 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         try:
             shown.append((solve, read_stored(root, solve.solution or "")))
         except InputError as error:
-            where = f"{solver_title(solve.solver)}, level {solve.level}"
-            pictures.notes.append(f"No picture of {where}: {error.what}.")
+            pictures.notes.append(f"No picture of {_named(solve)}: {error.what}.")
     shown = _without_wild(pictures, shown)
     dimensions = {solution.dimension for _, solution in shown}
     if len(dimensions) > 1:
@@ -53,6 +52,10 @@ def case_pictures(root: Path, entry: CaseEntry) -> CasePictures:
         pictures.notes.append("No pictures: no solution is stored.")
     add_error_maps(pictures, root, entry.result)
     return pictures
+
+
+def _named(solve: SolveRecord) -> str:
+    return f"{solver_title(solve.solver)}, level {solve.level}"
 
 
 def _finest_solves(result: CaseResult) -> list[SolveRecord]:
@@ -85,8 +88,7 @@ def _without_wild(
         if not defect:
             kept.append((solve, solution))
             continue
-        where = f"{solver_title(solve.solver)}, level {solve.level}"
-        pictures.notes.append(f"No picture of {where}: {defect}.")
+        pictures.notes.append(f"No picture of {_named(solve)}: {defect}.")
     return kept
 
 
@@ -99,7 +101,7 @@ def _deformed(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]])
     bodies = [deformed_body(solution, pictures.scale) for _, solution in shown]
     view = common_view(bodies, _COLOURS)
     for (solve, solution), body in zip(shown, bodies, strict=True):
-        title = f"{solver_title(solve.solver)}, level {solve.level}"
+        title = _named(solve)
         when = "" if len(solution.times) == 1 else f" at t = {solution.times[-1]:.4g} s"
         description = (
             f"Deformed body, {title}{when}; displacements drawn {pictures.scale:g} times, "
@@ -119,7 +121,7 @@ def _film(pictures: CasePictures, shown: list[tuple[SolveRecord, Solution]]) -> 
     every = [body for own in bodies for body in own]
     view = common_view(every, _COLOURS, pixels=_FRAME_PIXELS)
     for (solve, _), own in zip(shown, bodies, strict=True):
-        name = f"{solver_title(solve.solver)}, level {solve.level}"
+        name = _named(solve)
         pictures.film.append([
             Picture(f"{time:.3g} s", f"{name} at t = {time:.4g} s", body, view, turnable=False)
             for time, body in zip(times[steps], own, strict=True)

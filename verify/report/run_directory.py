@@ -3,7 +3,7 @@
 What is missing or damaged becomes a sentence of the report, never an omission.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,8 @@ from verify.errors import InputError
 from verify.json_files import read_json
 from verify.printable import words_of
 from verify.ranking import Ranking
-from verify.result import CaseResult, SolveRecord, checked, read_result
+from verify.result import CaseResult, SolveRecord
+from verify.result_files import checked, read_result
 
 __all__ = ["CaseEntry", "Run", "load_run"]
 
@@ -85,7 +86,7 @@ def load_run(directory: Path) -> Run:
         if entry is None:
             defect = "not started: the run was stopped before it, or its folder was removed"
             entry = CaseEntry(name, path, None, defect)
-        entries.append(entry if entry.result else CaseEntry(name, *_rest(entry)))
+        entries.append(entry if entry.result else replace(entry, name=name))
     entries += found.values()
     if record and not record.get("finished"):
         defects.append("the run has not finished: it was stopped, or is still going on")
@@ -153,7 +154,3 @@ def _folder_name(case: str) -> str:
     """Return the folder of a case below ``cases/``, as the runner names it."""
     name = case.replace("/", "__")
     return f"_{name}" if name.startswith(".") else name
-
-
-def _rest(entry: CaseEntry) -> tuple[Path, None, str, list[SolveRecord]]:
-    return entry.folder, None, entry.defect, entry.unjudged

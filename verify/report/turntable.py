@@ -11,15 +11,10 @@ from numpy.typing import NDArray
 from verify.report.bodies import Body
 from verify.report.view import View
 
-__all__ = ["is_solid", "packed"]
+__all__ = ["packed"]
 
 _TRIANGLES = 120_000  # of a surface beyond which only the still is shown
 _STEPS = 65535
-
-
-def is_solid(body: Body) -> bool:
-    """Whether a body has three dimensions."""
-    return bool(np.ptp(body.points[:, 2]) > 0)
 
 
 def packed(body: Body, view: View) -> dict[str, str]:
@@ -33,9 +28,8 @@ def packed(body: Body, view: View) -> dict[str, str]:
     dict of str to str
         Empty for a plane body, one too large, or one with values per triangle.
     """
-    if not is_solid(body) or len(body.triangles) > _TRIANGLES:
-        return {}
-    if len(body.values) != len(body.points):
+    flat = np.ptp(body.points[:, 2]) == 0
+    if flat or len(body.triangles) > _TRIANGLES or len(body.values) != len(body.points):
         return {}
     inside = _cut_faces(body)
     triangles = np.concatenate([body.triangles[~inside], body.triangles[inside]])
@@ -48,8 +42,8 @@ def packed(body: Body, view: View) -> dict[str, str]:
     vertices = np.column_stack([(points - low) / span, value]) * _STEPS
     x0, x1, y0, y1 = view.window
     axes = np.array([view.right, view.up, view.towards])
-    seen = points @ axes.T
-    centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2, (seen[:, 2].min() + seen[:, 2].max()) / 2])
+    depth = view.projected(points)[:, 2]
+    centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2, (depth.min() + depth.max()) / 2])
     middle = centre @ axes
     head: dict[str, Any] = {
         "low": low.tolist(),

@@ -11,7 +11,8 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.result import CaseResult, read_result
+from verify.result import CaseResult
+from verify.result_files import read_result
 from verify.runner.child import Child, Ending
 from verify.runner.childhood import JUDGING
 from verify.runner.outcome import death

@@ -7,7 +7,8 @@ from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json, write_json
-from verify.result import SolveRecord, Status, checked
+from verify.result import SolveRecord, Status
+from verify.result_files import checked
 from verify.runner.fingerprint import file_digest
 
 __all__ = [

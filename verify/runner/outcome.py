@@ -6,7 +6,8 @@ from typing import Any
 from verify.errors import InputError
 from verify.json_files import read_json
 from verify.printable import memory_text
-from verify.result import SolveRecord, Status, checked
+from verify.result import SolveRecord, Status
+from verify.result_files import checked
 from verify.runner.child import Ending
 from verify.runner.log import telling_line
 

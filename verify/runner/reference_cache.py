@@ -27,7 +27,8 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line, shown
 from verify.provenance import provenance
-from verify.result import SolveRecord, Status, checked
+from verify.result import SolveRecord, Status
+from verify.result_files import checked
 from verify.runner.fingerprint import code_of_solver, digest_of, file_digest, physics_digest
 from verify.runner.job import Job, is_file_name, solution_files
 from verify.scene import Scene

@@ -13,7 +13,8 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.printable import one_line
 from verify.provenance import provenance
-from verify.result import LOG, CaseResult, SolveRecord, Status, write_result
+from verify.result import LOG, CaseResult, SolveRecord, Status
+from verify.result_files import write_result
 from verify.runner.checking import check_scene
 from verify.runner.child import POLL_SECONDS, Ending
 from verify.runner.cluster import ClusterEngine

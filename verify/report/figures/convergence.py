@@ -9,11 +9,27 @@ from verify.report.curves import Curve, Point, floor, limits
 from verify.report.figures.style import Palette, Style, drawing, legend, log_axis, log_range, panel
 from verify.report.notation import number_text
 
-__all__ = ["convergence_panel", "cost_panel", "draw_curve", "error_range", "slope_triangle"]
+__all__ = ["error_panel", "error_range", "slope_triangle"]
 
 _BAND, _BAND_EDGE = "#e2e2e2", "#8f8f8f"
 
 Abscissa = Callable[[Point], float | None]
+
+
+def _unknowns(point: Point) -> float | None:
+    return float(point.unknowns) if point.unknowns else None
+
+
+def _seconds(point: Point) -> float | None:
+    return point.duration.median if point.duration and point.duration.median > 0 else None
+
+
+# title, unit and place of what the error is drawn over
+_OVER: dict[str, tuple[str, str, Abscissa]] = {
+    "size": ("element size h (m)", " m", lambda point: point.size),
+    "unknowns": ("unknowns", "", _unknowns),
+    "time": ("wall time (s), median", " s", _seconds),
+}
 
 
 def error_range(curves: Sequence[Curve], sloped: bool) -> tuple[float, float] | None:
@@ -31,15 +47,11 @@ def error_range(curves: Sequence[Curve], sloped: bool) -> tuple[float, float] | 
     return (low / 2.2 if sloped else low), high
 
 
-def convergence_panel(
-    title: str,
-    curves: Sequence[Curve],
-    y_range: tuple[float, float],
-    palette: Palette,
-    slope: tuple[float, str] | None = None,
-    x_title: str = "element size h (m)",
-) -> Drawing | None:
-    """Return the error over the element size, or None if no solve tells its size.
+def error_panel(
+    title: str, curves: Sequence[Curve], y_range: tuple[float, float], palette: Palette,
+    over: str = "size", slope: tuple[float, str] | None = None,
+) -> Drawing | None:  # fmt: skip
+    """Return the error over the element size, the unknowns or the wall time.
 
     Parameters
     ----------
@@ -47,74 +59,60 @@ def convergence_panel(
     curves : sequence of Curve
     y_range : (float, float)
     palette : Palette
+    over : {"size", "unknowns", "time"}
+        Over time: the median without meshing, bars that span the repetitions, and a dotted line
+        to the time with meshing. Over the size: crosses where levels failed.
     slope : (order, words), optional
         The required order of convergence.
-    x_title : str
-        What stands in the place of the size.
+
+    Returns
+    -------
+    Drawing or None
+        None if nothing tells the abscissa.
     """
-    placed = [p for c in curves for p in c.points if p.size is not None and p.value > 0]
+    x_title, unit, abscissa = _OVER[over]
+    placed = [(x, p) for c in curves for x, p in _placed(c.points, abscissa)]
     if not placed:
         return None
-    ends = {curve.label: _places_of_ends(curve, curves) for curve in curves}
-    sizes = [p.size for p in placed if p.size] + [x for own in ends.values() for x, _ in own]
-    with panel(title) as (figure, axes):
-        log_axis(axes, "x", log_range(sizes))
-        log_axis(axes, "y", y_range)
-        axes.set_xlabel(x_title)
-        _band(axes, floor(curves, lambda point: point.size))
-        if slope is not None and len(set(sizes)) > 1:
-            _required(axes, placed, *slope)
-        for curve in curves:
-            style = palette[curve.label]
-            draw_curve(axes, curve, style, lambda point: point.size, _named(curve))
-            _abandoned(axes, curve, style, ends[curve.label])
-        legend(axes)
-        return drawing(figure, _described(title, curves))
-
-
-def cost_panel(
-    title: str, curves: Sequence[Curve], y_range: tuple[float, float], palette: Palette, of: str
-) -> Drawing | None:
-    """Return the error over the unknowns or over the wall time, or None if nothing tells it.
-
-    Parameters
-    ----------
-    of : str
-        ``"unknowns"`` or ``"time"``: the median without meshing, bars that span the repetitions,
-        and a dotted line to the time with meshing.
-    """
-    timed = of == "time"
-    abscissa = _seconds if timed else _unknowns
-    points = [p for c in curves for p in c.points if p.value > 0 and abscissa(p) is not None]
-    if not points:
-        return None
-    times = [t for p in points if p.duration for t in (p.duration.low, p.duration.high) if t > 0]
-    times += [p.duration.median + p.duration.meshing for p in points if p.duration]
-    values = times if timed else [x for p in points if (x := abscissa(p)) is not None]
+    ends = {c.label: _places_of_ends(c, curves) if over == "size" else [] for c in curves}
+    values = [x for x, _ in placed] + [x for own in ends.values() for x, _ in own]
+    if over == "time":
+        times = [p.duration for _, p in placed if p.duration]
+        values += [t for d in times for t in (d.low, d.high, d.median + d.meshing) if t > 0]
     with panel(title) as (figure, axes):
         log_axis(axes, "x", log_range(values))
         log_axis(axes, "y", y_range)
-        axes.set_xlabel("wall time (s), median" if timed else "unknowns")
+        axes.set_xlabel(x_title)
         _band(axes, floor(curves, abscissa))
-        said = [f"{title} against {'wall time' if timed else 'unknowns'}."]
+        if slope is not None and len(set(values)) > 1:
+            _required(axes, [p for _, p in placed], *slope)
+        said = [f"{title} against {x_title}."]
         for curve in curves:
-            style = palette[curve.label]
-            draw_curve(axes, curve, style, abscissa, curve.label)
-            own = [(x, p) for p in curve.points if (x := abscissa(p)) is not None and p.value > 0]
-            if own:
-                x, point = max(own, key=lambda entry: entry[0])
-                said.append(f"{curve.label}: {number_text(point.value)} with {number_text(x)}"
-                            f"{' s' if timed else ''} on level {point.level}.")  # fmt: skip
-            if timed:
+            style, own = palette[curve.label], _placed(curve.points, abscissa)
+            name = _named(curve) if over == "size" else curve.label
+            _draw(axes, curve, style, abscissa, name)
+            _abandoned(axes, curve, style, ends[curve.label])
+            if over == "time":
                 _spans(axes, [point for _, point in own], style)
+            if own:
+                at = (
+                    f"{number_text(p.value)} at {number_text(x)}{unit}"
+                    for x, p in (own[0], *own[1:][-1:])
+                )
+                said.append(f"{curve.label}: {' to '.join(at)}.")
+            said += [f"{curve.label} ended at level {level}: {how}." for level, how in curve.ends]
         legend(axes)
         return drawing(figure, " ".join(said))
 
 
-def draw_curve(axes: Axes, curve: Curve, style: Style, abscissa: Abscissa, label: str) -> None:
+def _placed(points: Sequence[Point], abscissa: Abscissa) -> list[tuple[float, Point]]:
+    return [(x, p) for p in points if (x := abscissa(p)) is not None and p.value > 0]
+
+
+def _draw(axes: Axes, curve: Curve, style: Style, abscissa: Abscissa, label: str) -> None:
     """Draw the lines, error bars and markers of a curve; stretches are not joined."""
     for stretch in curve.stretches:
-        placed = [(x, p) for p in stretch if (x := abscissa(p)) is not None and p.value > 0]
+        placed = _placed(stretch, abscissa)
         if not placed:
             continue
         axes.plot(
@@ -139,14 +137,6 @@ def slope_triangle(axes: Axes, low: float, high: float, y: float, slope: float, 
               scalex=False, scaley=False)  # fmt: skip
     axes.annotate(name, (high, (y * top) ** 0.5), (3, 0), textcoords="offset points", fontsize=8,
                   va="center")  # fmt: skip
-
-
-def _unknowns(point: Point) -> float | None:
-    return float(point.unknowns) if point.unknowns else None
-
-
-def _seconds(point: Point) -> float | None:
-    return point.duration.median if point.duration and point.duration.median > 0 else None
 
 
 def _named(curve: Curve) -> str:
@@ -213,17 +203,3 @@ def _spans(axes: Axes, points: Sequence[Point], style: Style) -> None:
         if time.meshing > 0:
             axes.plot([time.median, time.median + time.meshing], [point.value] * 2, marker="|",
                       markevery=[1], color=style.colour, linestyle=":", linewidth=1.0)  # fmt: skip
-
-
-def _described(title: str, curves: Sequence[Curve]) -> str:
-    said = [f"{title} against element size."]
-    for curve in curves:
-        points = [p for p in curve.points if p.size is not None]
-        if points:
-            first, last = points[0], points[-1]
-            said.append(
-                f"{curve.label}: {number_text(first.value)} at h = {number_text(first.size)} m to "
-                f"{number_text(last.value)} at h = {number_text(last.size)} m."
-            )
-        said += [f"{curve.label} ended at level {level}: {how}." for level, how in curve.ends]
-    return " ".join(said)
