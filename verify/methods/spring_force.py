@@ -1,7 +1,5 @@
 """Mass–spring model of a cut body: springs on the edges of its cells."""
 
-from typing import get_args
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +8,7 @@ from verify.methods.spring_kernels import add_spring_stiffness, spring_force, sp
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_choice
 from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.phantom import PhantomMesh
@@ -112,9 +111,7 @@ class SpringForce(InternalForce):
         "rotation-fixed" and "geometric" leave out what compressed springs take away from it
         across, so that they are never indefinite.
         """
-        if kind not in get_args(TangentKind):
-            expected = ", ".join(get_args(TangentKind))
-            raise XfemError(f"stiffness '{kind}'; expected one of {expected}")
+        check_choice(kind, TangentKind, "stiffness")
         targets = pattern.targets[: len(self.phantom.cells)]
         add_spring_stiffness(
             targets, self._edges, self.springs, self._directions, self._excess,

@@ -9,9 +9,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, identity, kron
+from scipy.sparse import csc_array, csr_array, identity, kron
+from scipy.sparse.linalg import splu
 
 from verify.xfem.errors import BasisError, XfemError
+from verify.xfem.given_arrays import check_choice
 from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["Basis", "from_sidewise", "sidewise_from", "transformation", "transformed_matrix"]
@@ -31,6 +33,7 @@ def transformation(phantom: PhantomMesh, basis: Basis) -> csr_array:
         If the basis is unknown, or a node has more than two unknowns or two that no single cut
         separates: there the side-wise basis is the only one.
     """
+    check_choice(basis, Basis, "basis")
     own, other, sign = _pairs(phantom)
     nodes, count = len(phantom.mesh.points), len(own)
     extra = nodes + np.arange(count)
@@ -41,12 +44,10 @@ def transformation(phantom: PhantomMesh, basis: Basis) -> csr_array:
         rows = np.concatenate([everywhere, other, other])
         columns = np.concatenate([everywhere, own, extra])
         values = np.concatenate([plain, np.ones(count), -sign])
-    elif basis == "heaviside":
+    else:
         rows = np.concatenate([everywhere, own, other, other])
         columns = np.concatenate([everywhere, extra, own, extra])
         values = np.concatenate([plain, sign, np.ones(count), -sign])
-    else:
-        raise XfemError(f"basis '{basis}'; expected shifted or heaviside")
     return csr_array((values, (rows, columns)), shape=(phantom.node_count, nodes + count))
 
 
@@ -60,16 +61,7 @@ def sidewise_from(phantom: PhantomMesh, basis: Basis, unknowns: _Floats) -> _Flo
 def from_sidewise(phantom: PhantomMesh, basis: Basis, displacement: _Floats) -> _Floats:
     """Unknowns (n + enriched, d) of another basis from the side-wise displacement (N, d)."""
     _check_count(displacement, phantom.node_count, "displacements")
-    own, other, sign = _pairs(phantom)
-    nodes = len(phantom.mesh.points)
-    jump = sign[:, None] * (displacement[own] - displacement[other])
-    if basis == "shifted":
-        return np.concatenate([displacement[:nodes], jump])
-    if basis == "heaviside":
-        mean = displacement[:nodes].copy()
-        mean[own] = 0.5 * (displacement[own] + displacement[other])
-        return np.concatenate([mean, 0.5 * jump])
-    raise XfemError(f"basis '{basis}'; expected shifted or heaviside")
+    return np.asarray(splu(csc_array(transformation(phantom, basis))).solve(displacement))
 
 
 def transformed_matrix(phantom: PhantomMesh, basis: Basis, matrix: csr_array) -> csr_array:

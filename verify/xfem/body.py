@@ -16,11 +16,11 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import check_floats
+from verify.xfem.given_arrays import check_floats, finite_array
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
-from verify.xfem.supports import Supports
+from verify.xfem.supports import Supports, check_fixed
 
 __all__ = [
     "DynamicBody",
@@ -158,13 +158,8 @@ class DynamicBody:
             raise XfemError(
                 f"mass of {len(self.mass.weights)} dof nodes; the body has {self.shape[0]}"
             )
-        if self.weight is None:
-            self.weight = np.zeros(self.shape)
-        if np.shape(self.weight) != self.shape or not np.isfinite(self.weight).all():
-            raise XfemError(
-                f"weight of shape {np.shape(self.weight)}; expected finite {self.shape}"
-            )
-        self.weight = np.asarray(self.weight, dtype=float)
+        given = np.zeros(self.shape) if self.weight is None else self.weight
+        self.weight = finite_array(given, "weight", self.shape)
         if self.load is not None and not callable(self.load):
             raise XfemError("the load is no function of time; a dead load is a weight")
         if not isinstance(self.damping, RayleighDamping):
@@ -203,19 +198,9 @@ class DynamicBody:
         return other
 
     def _hold(self, supports: Supports | MovingSupports) -> None:
-        if supports.fixed.shape != self.shape or supports.fixed.dtype != bool:
-            raise XfemError(
-                f"supports: {supports.fixed.dtype} array of shape {supports.fixed.shape}; "
-                f"expected bool and {self.shape}"
-            )
-        if isinstance(supports, Supports) and (
-            np.shape(supports.values) != self.shape
-            or not np.isfinite(supports.values[supports.fixed]).all()
-        ):
-            raise XfemError(
-                f"supports: values of shape {np.shape(supports.values)}; expected {self.shape}, "
-                "finite where fixed"
-            )
+        check_fixed(supports.fixed, self.shape)
+        if isinstance(supports, Supports):
+            finite_array(supports.values, "supports: values", self.shape)
         self.__dict__["supports"], self.fixed = supports, supports.fixed
         self.moving = isinstance(supports, MovingSupports)
 

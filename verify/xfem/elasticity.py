@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import real_array
+from verify.xfem.given_arrays import check_choice, finite_array, real_array
 
 __all__ = ["Material", "State", "isotropic"]
 
@@ -37,10 +37,7 @@ class Material:
             or of size in the plane stores no energy (μ ≤ 0, λ ≤ -μ).
         """
         for name, values in (("λ", self.lam), ("μ", self.mu)):
-            if np.shape(values) not in ((), (count,)):
-                raise XfemError(f"{name} of shape {np.shape(values)}; expected () or ({count},)")
-            if not np.isfinite(values).all():
-                raise XfemError(f"{name} is not finite; expected Lamé parameters in pascal")
+            finite_array(values, name, (), (count,))
         if not ((self.mu > 0.0) & (self.lam + self.mu > 0.0)).all():
             raise XfemError(
                 f"Lamé parameters λ down to {np.min(self.lam):g} and μ down to "
@@ -68,8 +65,7 @@ def isotropic(young: ArrayLike, poisson: ArrayLike, state: State) -> Material:
         If a parameter is outside its bounds or the state is unknown.
     """
     E, nu = real_array(young, "Young's modulus"), real_array(poisson, "Poisson's ratio")
-    if state not in ("plane strain", "plane stress", "solid"):
-        raise XfemError(f"state '{state}'; expected plane strain, plane stress or solid")
+    check_choice(state, State, "state")
     if not (np.isfinite(E).all() and (E > 0.0).all()):
         raise XfemError(f"Young's modulus {E.min():g} Pa; expected positive and finite")
     bound = 1.0 if state == "plane stress" else 0.5

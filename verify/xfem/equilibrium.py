@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import finite_array
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.rigid_motion import RigidMotions
 from verify.xfem.static_newton import Descent, Newton, NotInEquilibriumError
+from verify.xfem.supports import check_fixed
 
 __all__ = ["LoadPath", "PathCheck", "StaticEquilibrium", "static_equilibrium"]
 
@@ -324,8 +326,7 @@ def static_equilibrium(
     """
     phantom = force.phantom
     shape = (phantom.node_count, phantom.mesh.space)
-    if fixed.shape != shape or fixed.dtype != bool:
-        raise XfemError(f"supports of shape {fixed.shape}, {fixed.dtype}; expected {shape}, bool")
+    check_fixed(fixed, shape)
     if force.is_membrane and not force.is_corotational:
         raise XfemError("linear kinematics of a membrane at finite rotation; expected corotational")
     if load_steps < 1 or iterations < 1 or not tolerance > 0.0:
@@ -333,14 +334,14 @@ def static_equilibrium(
             f"{load_steps} load steps, {iterations} iterations, tolerance {tolerance:g}; expected "
             "at least one, at least one, and more than zero"
         )
-    full_load = np.zeros(shape) if load is None else _checked("load", load, shape)
-    displacement = np.zeros(shape) if start is None else _checked("start", start, shape).copy()
+    full_load = np.zeros(shape) if load is None else finite_array(load, "load", shape)
+    displacement = np.zeros(shape) if start is None else finite_array(start, "start", shape)
 
     def wanted(share: float) -> _Floats:
         values = np.zeros(shape) if prescribed is None else prescribed(share)
         if values.shape == shape:  # what is not fixed may be anything
             values = np.where(fixed, values, 0.0)
-        return _checked("prescribed displacement", values, shape)
+        return finite_array(values, "prescribed displacement", shape)
 
     method = Descent if force.is_membrane else Newton
     newton = method(force, fixed, tolerance, iterations)
@@ -350,9 +351,3 @@ def static_equilibrium(
     internal, energy = force.evaluate(displacement)
     reactions = np.where(fixed, internal - full_load, 0.0)
     return StaticEquilibrium(displacement, energy, reactions, counts, path.check(), newton.solvers)
-
-
-def _checked(name: str, values: _Floats, shape: tuple[int, int]) -> _Floats:
-    if values.shape != shape or not np.isfinite(values).all():
-        raise XfemError(f"{name} of shape {values.shape}; expected finite {shape}")
-    return values

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import index_array, places, real_array
+from verify.xfem.given_arrays import finite_array, index_array, places
 from verify.xfem.mesh import facets_of, neighbours_across
 from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_distance
 
@@ -236,12 +236,10 @@ class Polyline(_FacetCut):
     _name = "polyline"
 
     def __init__(self, vertices: ArrayLike, closed: bool = False) -> None:
-        corners = real_array(vertices, "polyline with vertices")
+        corners = finite_array(vertices, "polyline with vertices", (None, 2))
         fewest = 3 if closed else 2
-        if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < fewest:
-            raise XfemError(f"polyline of shape {corners.shape}; expected (k, 2) with k ≥ {fewest}")
-        if not np.isfinite(corners).all():
-            raise XfemError("polyline with a vertex that is not finite")
+        if len(corners) < fewest:
+            raise XfemError(f"polyline of {len(corners)} vertices; expected {fewest} or more")
         object.__setattr__(self, "vertices", corners)
         object.__setattr__(self, "closed", bool(closed))
         _check_segments(self.vertices, self.closed)
@@ -314,10 +312,8 @@ class TriangulatedSurface(_FacetCut):
     _name = "surface"
 
     def __init__(self, points: ArrayLike, triangles: ArrayLike) -> None:
-        vertices = real_array(points, "surface points")
+        vertices = finite_array(points, "surface points", (None, 3))
         faces = index_array(triangles, "surface triangles")
-        if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
-            raise XfemError(f"surface points of shape {vertices.shape}; expected finite (n, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
             raise XfemError(f"surface triangles of shape {faces.shape}; expected (m, 3), m > 0")
         if faces.min() < 0 or faces.max() >= len(vertices):

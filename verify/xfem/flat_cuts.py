@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import places, real_array
+from verify.xfem.given_arrays import finite_array, places
 
 __all__ = ["Cut", "ImplicitCut", "Plane", "PolygonPatch"]
 
@@ -61,11 +61,10 @@ class Plane:
     normal: _Floats
 
     def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
-        origin, direction = real_array(point, "plane at"), real_array(normal, "plane with normal")
-        if origin.shape != direction.shape or origin.shape not in ((2,), (3,)):
-            raise XfemError(f"plane with point {origin.tolist()}, normal {direction.tolist()}")
+        origin = finite_array(point, "plane at", (2,), (3,))
+        direction = finite_array(normal, "plane with normal", origin.shape)
         length = np.linalg.norm(direction)
-        if not np.isfinite(origin).all() or not np.isfinite(length) or length == 0.0:
+        if length == 0.0:
             raise XfemError(f"plane with normal {direction.tolist()}; expected a non-zero vector")
         object.__setattr__(self, "point", origin)
         object.__setattr__(self, "normal", direction / length)
@@ -127,11 +126,9 @@ class PolygonPatch:
     plane: Plane
 
     def __init__(self, corners: ArrayLike) -> None:
-        polygon = real_array(corners, "polygon with corners")
-        if polygon.ndim != 2 or polygon.shape[1] != 3 or len(polygon) < 3:
-            raise XfemError(f"polygon of shape {polygon.shape}; expected (k, 3) with k ≥ 3")
-        if not np.isfinite(polygon).all():
-            raise XfemError("polygon with a corner that is not finite")
+        polygon = finite_array(corners, "polygon with corners", (None, 3))
+        if len(polygon) < 3:
+            raise XfemError(f"polygon of {len(polygon)} corners; expected three or more")
         sides = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
         if not (sides > 0.0).all():
             one = int(sides.argmin())

@@ -1,11 +1,25 @@
-"""Arrays as a user gives them: real numbers or indices, else one error that says what was given."""
+"""Arrays and words as a user gives them, else one error that says what was given."""
+
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
 
-__all__ = ["check_floats", "index_array", "places", "real_array"]
+__all__ = ["check_choice", "check_floats", "finite_array", "index_array", "places", "real_array"]
+
+
+def check_choice(given: str, choices: Any, what: str) -> None:
+    """Check that a word is one of those that a Literal type lists.
+
+    Raises
+    ------
+    XfemError
+        If it is another.
+    """
+    if given not in get_args(choices):
+        raise XfemError(f"{what} '{given}'; expected one of {', '.join(get_args(choices))}")
 
 
 def real_array(given: ArrayLike, what: str) -> NDArray[np.float64]:
@@ -17,6 +31,31 @@ def real_array(given: ArrayLike, what: str) -> NDArray[np.float64]:
         If there is text, None or a complex number among them, or rows differ in length.
     """
     return np.array(_as_real(given, what))
+
+
+def finite_array(
+    given: ArrayLike, what: str, *shapes: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """Finite real numbers in one of some shapes, a copy; None stands for any length.
+
+    Raises
+    ------
+    XfemError
+        If they are no real numbers, one is not finite, or the shape is another.
+    """
+    found = real_array(given, what)
+    fits = (
+        len(shape) == found.ndim
+        and all(n in (None, m) for n, m in zip(shape, found.shape, strict=True))
+        for shape in shapes
+    )
+    if not any(fits):
+        expected = " or ".join(str(shape).replace("None", "n") for shape in shapes)
+        raise XfemError(f"{what} of shape {found.shape}; expected {expected}")
+    if not np.isfinite(found).all():
+        first = np.argwhere(~np.isfinite(found))[0].tolist()
+        raise XfemError(f"{what}: number {first} is not finite")
+    return found
 
 
 def index_array(given: ArrayLike, what: str) -> NDArray[np.int64]:

@@ -4,7 +4,7 @@ Every cell of the phantom-node mesh has one polar rotation of its own, so that t
 cell need not agree on one. `verify.xfem.element` has the equations.
 """
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from verify.xfem.element import (
 )
 from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.given_arrays import check_floats
+from verify.xfem.given_arrays import check_choice, check_floats
 from verify.xfem.kernels import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
@@ -80,8 +80,7 @@ class InternalForce:
     ) -> None:
         if ghost is not None and ghost.phantom is not phantom:
             raise XfemError("the ghost penalty belongs to another body; expected one of this one")
-        if kinematics not in get_args(Kinematics):
-            raise XfemError(f"kinematics '{kinematics}'; expected corotational or linear")
+        check_choice(kinematics, Kinematics, "kinematics")
         self.phantom, self.kinematics, self.kernels = phantom, kinematics, kernels
         self.ghost, self.penalty_energy = ghost, 0.0
         self.elements = elements_of(phantom, material)
@@ -228,9 +227,7 @@ class InternalForce:
             the body.
         """
         self._check_blocks(pattern, blocks)
-        if kind not in get_args(TangentKind):
-            expected = ", ".join(get_args(TangentKind))
-            raise XfemError(f"stiffness '{kind}'; expected one of {expected}")
+        check_choice(kind, TangentKind, "stiffness")
         targets, added = pattern.targets[: len(self.phantom.cells)], pattern.unfold(blocks)
         if kind == "rotation-fixed" or not self.is_corotational:
             add_rotation_fixed(self.elements, self.rotations, scale, targets, added)

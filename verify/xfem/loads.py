@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import index_array, real_array
+from verify.xfem.given_arrays import finite_array, index_array
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.quadrature import simplex_rule
 
@@ -39,7 +39,9 @@ def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int =
     """
     load = np.zeros_like(phantom.corners.node_points)
     if not callable(density):
-        force = _of_pieces(phantom, density, load.shape[1])
+        shapes = load.shape[1:], (len(phantom.mesh.cells), load.shape[1])
+        force = finite_array(density, "load density", *shapes)
+        force = force if force.ndim == 1 else force[phantom.parent][:, None, :]
         np.add.at(load, phantom.cells, phantom.shape_integrals[:, :, None] * force)
         return phantom.restrict(load)
     piece, barycentric, share = phantom.solid_simplices
@@ -83,36 +85,16 @@ def traction(
     ):
         raise XfemError("a loaded facet is not a pair (cell, local node) of the mesh")
     load = np.zeros_like(phantom.corners.node_points)
-    function = density if callable(density) else _constant(_vector(density, load.shape[1]))
+    if callable(density):
+        function: Density = density
+    else:
+        force = finite_array(density, "load density", load.shape[1:])
+        function = lambda points, _: np.broadcast_to(force, points.shape)  # noqa: E731
     for local in range(mesh.dim + 1):
         cells = chosen[chosen[:, 1] == local, 0]
         piece, corners, area = _facet_parts(phantom, cells, local)
         _integrate(phantom, load, piece, corners, area, function, degree)
     return phantom.restrict(load)
-
-
-def _of_pieces(phantom: PhantomMesh, density: ArrayLike, dim: int) -> _Floats:
-    """Force per volume, one (d,) or that of each piece's cell (pieces, 1, d)."""
-    force = real_array(density, "load density")
-    if force.ndim < 2:
-        return _vector(force, dim)
-    if force.shape != (len(phantom.mesh.cells), dim) or not np.isfinite(force).all():
-        raise XfemError(
-            f"load density of shape {force.shape} or not finite; expected ({dim},) or "
-            f"({len(phantom.mesh.cells)}, {dim})"
-        )
-    return force[phantom.parent][:, None, :]
-
-
-def _vector(density: ArrayLike, dim: int) -> _Floats:
-    force = real_array(density, "load density")
-    if force.shape != (dim,) or not np.isfinite(force).all():
-        raise XfemError(f"load density {density!r}; expected {dim} finite components")
-    return force
-
-
-def _constant(force: _Floats) -> Density:
-    return lambda points, sides: np.broadcast_to(force, points.shape)
 
 
 def _facet_parts(phantom: PhantomMesh, cells: _Ints, local: int) -> tuple[_Ints, _Floats, _Floats]:
@@ -158,11 +140,6 @@ def _integrate(
     for point, weight in zip(rule, weights, strict=True):
         shape = np.einsum("k,qki->qi", point, corners)
         given = density(np.einsum("qi,qij->qj", shape, nodes), sides)
-        force = real_array(given, "load density")
-        if force.shape != (len(piece), load.shape[1]) or not np.isfinite(force).all():
-            raise XfemError(
-                f"load density of shape {force.shape} or not finite; expected "
-                f"({len(piece)}, {load.shape[1]})"
-            )
+        force = finite_array(given, "load density", (len(piece), load.shape[1]))
         share = (weight * measure)[:, None] * shape
         np.add.at(load, phantom.cells[piece], share[:, :, None] * force[:, None, :])

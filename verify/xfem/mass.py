@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from verify.xfem.assembly import body_pattern, find_places, pattern_places
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import real_array
+from verify.xfem.given_arrays import finite_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import Aggregation, PhantomMesh
 
@@ -98,10 +98,7 @@ class Mass:
         XfemError
             If gravity is not a finite vector.
         """
-        field = real_array(gravity, "gravity")
-        if field.ndim != 1 or not np.isfinite(field).all():
-            raise XfemError(f"gravity {gravity!r}; expected a finite vector")
-        return self.weights[:, None] * field
+        return self.weights[:, None] * finite_array(gravity, "vector of gravity", (None,))
 
     def pattern(self, phantom: PhantomMesh, couplings: _Ints | None = None) -> BlockPattern:
         """Sparsity of stiffness and mass together; its first cells are those of the body.
@@ -210,11 +207,9 @@ def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> _Floats:
         If it is not positive and finite, or neither one value nor one per cell.
     """
     count = len(mesh.cells)
-    values = real_array(density, "density")
-    if values.shape not in ((), (count,)):
-        raise XfemError(f"density of shape {values.shape}; expected () or ({count},)")
-    if not (np.isfinite(values).all() and (values > 0.0).all()):
-        raise XfemError(f"density {values.min():g}; expected positive and finite")
+    values = finite_array(density, "density", (), (count,))
+    if not (values > 0.0).all():
+        raise XfemError(f"density {values.min():g}; expected positive")
     return np.broadcast_to(values, count)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_choice
 from verify.xfem.mass import AggregatedMass, Mass, cell_densities, second_moments, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 
@@ -43,8 +44,7 @@ def shifted_mass(phantom: PhantomMesh, density: ArrayLike, lumping: ShiftedLumpi
     XfemError
         If the lumping is unknown or a node has more than two unknowns.
     """
-    if lumping not in ("enrichment", "row sum", "weighted diagonal"):
-        raise XfemError(f"lumping '{lumping}'; expected enrichment, row sum or weighted diagonal")
+    check_choice(lumping, ShiftedLumping, "lumping")
     if phantom.aggregation is not None:
         whole = shifted_mass(phantom.corners, density, lumping)
         return AggregatedMass.of(whole, phantom.aggregation)

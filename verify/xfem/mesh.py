@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import real_array
+from verify.xfem.given_arrays import finite_array
 
 __all__ = ["SimplexMesh", "equal_rows", "facets_of", "neighbours_across"]
 
@@ -45,7 +45,9 @@ class SimplexMesh:
     cells: NDArray[np.int64]
 
     def __init__(self, points: ArrayLike, cells: ArrayLike) -> None:
-        coordinates = np.ascontiguousarray(real_array(points, "mesh points"))
+        coordinates = np.ascontiguousarray(
+            finite_array(points, "mesh points", (None, 2), (None, 3))
+        )
         nodes = np.ascontiguousarray(_rows(cells))
         _check(coordinates, nodes)
         object.__setattr__(self, "points", coordinates)
@@ -151,10 +153,6 @@ def _rows(cells: ArrayLike) -> NDArray:
 
 
 def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise XfemError(f"points of shape {points.shape}; expected (n, 2) or (n, 3)")
-    if not np.isfinite(points).all():
-        raise XfemError(f"point {int(np.argmin(np.isfinite(points).all(axis=1)))} is not finite")
     if cells.ndim != 2 or not 3 <= cells.shape[1] <= points.shape[1] + 1:
         raise XfemError(
             f"cells of shape {cells.shape} on points in {points.shape[1]}D; expected (m, 3) "

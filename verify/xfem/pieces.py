@@ -10,7 +10,7 @@ across it, and are left out afterwards.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from verify.xfem.clip import bisected, divided
 from verify.xfem.crossing import Crossing, TipRule, crossed_through
 from verify.xfem.errors import XfemError
 from verify.xfem.flat_cuts import Cut
-from verify.xfem.given_arrays import real_array
+from verify.xfem.given_arrays import check_choice, finite_array
 from verify.xfem.junctions import (
     joint_cuts,
     meeting_cells,
@@ -89,8 +89,7 @@ def split_cells(
         If the cuts are no sequence, a level set is not finite, a depth is NaN, either has a wrong
         shape, the tip rule is unknown, or `opened` is of another mesh.
     """
-    if tip not in get_args(TipRule):
-        raise XfemError(f"tip rule '{tip}'; expected inside, through or nearest")
+    check_choice(tip, TipRule, "tip rule")
     if not isinstance(cuts, Sequence):
         raise XfemError(f"cuts of type {type(cuts).__name__}; expected a list of cuts")
     if opened is not None and opened.shape != (len(mesh.cells), len(cuts)):
@@ -141,12 +140,11 @@ def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
         if not hasattr(cut, "level_set"):
             raise XfemError(f"cut {index} of type {type(cut).__name__}; expected a cut")
         try:
-            column = real_array(cut.level_set(mesh.points), "level set")
+            values[:, index] = finite_array(
+                cut.level_set(mesh.points), "level set", values.shape[:1]
+            )
         except XfemError as error:
             raise XfemError(f"cut {index}: {error}") from None
-        if column.shape != (len(mesh.points),) or not np.isfinite(column).all():
-            raise XfemError(f"cut {index}: level set of shape {column.shape} or not finite")
-        values[:, index] = column
     tiny = (np.abs(values) <= ROUND_OFF * mesh.extent) & (values != 0.0)
     values[tiny] = 0.0
     return values, int(tiny.sum())

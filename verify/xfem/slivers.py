@@ -34,6 +34,7 @@ from verify.xfem.absorption import absorb
 from verify.xfem.aggregation import aggregate
 from verify.xfem.contacts import face_contacts, sibling_contacts
 from verify.xfem.errors import XfemError
+from verify.xfem.given_arrays import check_choice
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, loose_bodies
 
@@ -124,8 +125,7 @@ def treat_slivers(
     XfemError
         If the policy is unknown, the threshold outside its bounds, or `held` of another body.
     """
-    if policy not in ("keep", "drop", "merge"):
-        raise XfemError(f"sliver policy '{policy}'; expected keep, drop or merge")
+    check_choice(policy, SliverPolicy, "sliver policy")
     if not (isinstance(threshold, float | np.floating) and 0.0 < threshold < 0.5):
         raise XfemError(f"sliver threshold {threshold!r}; expected a volume fraction in (0, 0.5)")
     phantom = phantom.corners

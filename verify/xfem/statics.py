@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from verify.xfem.assembly import body_pattern, constrain
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
-from verify.xfem.errors import NotConvergedError, XfemError
+from verify.xfem.errors import NotConvergedError
 from verify.xfem.ghost_penalty import GhostPenalty
+from verify.xfem.given_arrays import check_choice, finite_array
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.phantom import PhantomMesh
@@ -20,6 +21,7 @@ from verify.xfem.supports import Supports, check_bodies
 __all__ = ["StaticSolution", "StaticSolver", "is_large", "solve_static"]
 
 _Floats = NDArray[np.float64]
+Method = Literal["auto", "direct", "iterative"]
 
 ITERATE_FROM = 2000  # nodes in space, from which iterations are faster (measured)
 _ROUNDING = 1e-13  # relative residual that a factorisation leaves, too
@@ -64,7 +66,7 @@ def solve_static(
     material: Material,
     supports: Supports,
     load: _Floats | None = None,
-    solver: Literal["auto", "direct", "iterative"] = "auto",
+    solver: Method = "auto",
     ghost: GhostPenalty | None = None,
     kernels: Kernels = PLAIN,
 ) -> StaticSolution:
@@ -98,14 +100,9 @@ def solve_static(
         If shapes do not match or a load is not finite.
     """
     shape = phantom.node_points.shape
-    force = np.zeros(shape) if load is None else np.asarray(load, dtype=float)
-    if force.shape != shape or supports.fixed.shape != shape or not np.isfinite(force).all():
-        raise XfemError(
-            f"load {force.shape} and supports {supports.fixed.shape}; expected finite {shape}"
-        )
+    force = finite_array(np.zeros(shape) if load is None else load, "load", shape)
     check_bodies(phantom, supports)
-    if solver not in ("auto", "direct", "iterative"):
-        raise XfemError(f"solver '{solver}'; expected auto, direct or iterative")
+    check_choice(solver, Method, "solver")
     stiffness = InternalForce(phantom, material, "linear", kernels, ghost)
     clock = [perf_counter()]
     pattern = ghost.pattern() if ghost else body_pattern(phantom)

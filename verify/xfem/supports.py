@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import index_array, real_array
+from verify.xfem.given_arrays import finite_array, index_array
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Supports", "UnsupportedBodyError", "check_bodies", "loose_bodies"]
+__all__ = ["Supports", "UnsupportedBodyError", "check_bodies", "check_fixed", "loose_bodies"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -100,21 +100,27 @@ class Supports:
         field = (
             values(phantom.node_points[at], phantom.node_side[at]) if callable(values) else values
         )
-        try:
-            given = np.broadcast_to(real_array(field, "prescribed values"), (len(at), dim))
-        except XfemError:
-            raise
-        except ValueError:
-            raise XfemError(
-                f"prescribed values of shape {np.shape(field)}; expected ({len(at)}, {dim})"
-            ) from None
-        if not np.isfinite(given).all():
-            raise XfemError("a prescribed displacement is not finite")
+        shapes = (), (dim,), (1,), (len(at), dim), (len(at), 1)
+        given = np.broadcast_to(finite_array(field, "prescribed values", *shapes), (len(at), dim))
         fixed, prescribed = self.fixed.copy(), self.values.copy()
         for axis in axes:
             fixed[at, axis] = True
             prescribed[at, axis] = given[:, axis]
         return Supports(fixed, prescribed)
+
+
+def check_fixed(fixed: NDArray[np.bool_], shape: tuple[int, int]) -> None:
+    """Check that fixed components are of a body with unknowns of a shape (N, d).
+
+    Raises
+    ------
+    XfemError
+        If they have another shape, or are not of type bool.
+    """
+    if np.shape(fixed) != shape or fixed.dtype != bool:
+        raise XfemError(
+            f"supports of shape {np.shape(fixed)} and type {fixed.dtype}; expected {shape}, bool"
+        )
 
 
 def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
@@ -127,14 +133,8 @@ def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
     XfemError
         If the supports are of another body, not of type bool, or a value is not finite.
     """
-    shape, fixed, values = phantom.node_points.shape, supports.fixed, supports.values
-    if np.shape(fixed) != shape or np.shape(values) != shape or fixed.dtype != bool:
-        raise XfemError(
-            f"supports of shape {np.shape(fixed)} and type {fixed.dtype}, values of shape "
-            f"{np.shape(values)}; expected {shape}, bool"
-        )
-    if not np.isfinite(values).all():
-        raise XfemError("a prescribed displacement is not finite")
+    check_fixed(supports.fixed, phantom.node_points.shape)
+    finite_array(supports.values, "supports: values", phantom.node_points.shape)
     for body in loose_bodies(phantom, supports, np.arange(phantom.bodies.max() + 1)):
         pieces = phantom.corners.bodies[phantom.cells[:, 0]] == body
         volume = phantom.volumes[pieces].sum()

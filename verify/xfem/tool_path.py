@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
 from verify.xfem.faceted_cuts import FacetArrays, Polyline, facet_arrays, probe_points
-from verify.xfem.given_arrays import places, real_array
+from verify.xfem.given_arrays import finite_array, places
 from verify.xfem.mesh import neighbours_across
 
 __all__ = ["PartOfSweep", "Sweep", "SweepSurface", "ToolPath"]
@@ -58,8 +58,8 @@ class ToolPath:
     times: _Floats
 
     def __init__(self, blades: ArrayLike, times: ArrayLike) -> None:
-        positions = real_array(blades, "blades")
-        moments = real_array(times, "times")
+        positions = finite_array(blades, "blades", (None, None, 2), (None, None, 3))
+        moments = finite_array(times, "times", positions.shape[:1])
         _check(positions, moments)
         object.__setattr__(self, "blades", positions)
         object.__setattr__(self, "times", moments)
@@ -84,14 +84,10 @@ class ToolPath:
         depth : (3,) or (k, 3) array_like, optional
             Vector from the tip to the other end of the blade, in metres; none in the plane.
         """
-        points = real_array(tips, "tip points")
-        if points.ndim != 2:
-            raise XfemError(f"tip points of shape {points.shape}; expected (k, 2) or (k, 3)")
+        points = finite_array(tips, "tip points", (None, 2), (None, 3))
         if depth is None:
             return cls(points[:, None], times)
-        vector = real_array(depth, "depth")
-        if vector.shape not in ((points.shape[1],), points.shape):
-            raise XfemError(f"depth of shape {vector.shape}; expected (3,) or {points.shape}")
+        vector = finite_array(depth, "depth", points.shape[1:], points.shape)
         return cls(np.stack([points, points + vector], axis=1), times)
 
     @cached_property
@@ -138,15 +134,9 @@ class ToolPath:
 
     def extended(self, blades: ArrayLike, times: ArrayLike) -> "ToolPath":
         """Append positions (k, b, s): for a tool that moves as one looks."""
-        more = real_array(blades, "further blades")
-        if more.ndim != 3 or more.shape[1:] != self.blades.shape[1:]:
-            raise XfemError(
-                f"further blades of shape {more.shape}; expected (k, *{self.blades.shape[1:]})"
-            )
-        return ToolPath(
-            np.concatenate([self.blades, more]),
-            np.concatenate([self.times, np.atleast_1d(real_array(times, "further times"))]),
-        )
+        more = finite_array(blades, "further blades", (None, *self.blades.shape[1:]))
+        later = np.atleast_1d(finite_array(times, "further times", (), (None,)))
+        return ToolPath(np.concatenate([self.blades, more]), np.concatenate([self.times, later]))
 
 
 @dataclass(frozen=True)
@@ -202,16 +192,12 @@ class PartOfSweep:
 
 
 def _check(blades: _Floats, times: _Floats) -> None:
-    if blades.ndim != 3 or blades.shape[2] not in (2, 3) or len(blades) == 0:
-        raise XfemError(f"blades of shape {blades.shape}; expected (k, b, 2) or (k, b, 3)")
+    if len(blades) == 0:
+        raise XfemError(f"blades of shape {blades.shape}; expected one position or more")
     if blades.shape[2] == 2 and blades.shape[1] != 1:
         raise XfemError(f"blade of {blades.shape[1]} points in the plane; expected one, its tip")
     if blades.shape[2] == 3 and blades.shape[1] < 2:
         raise XfemError("blade of one point in space; expected two or more (give its depth)")
-    if times.shape != (len(blades),):
-        raise XfemError(f"times of shape {times.shape}; expected ({len(blades)},)")
-    if not np.isfinite(blades).all() or not np.isfinite(times).all():
-        raise XfemError("tool path with a position or time that is not finite")
     if (np.diff(times) < 0.0).any():
         raise XfemError(f"time runs backwards after position {int(np.diff(times).argmin())}")
     if (np.linalg.norm(np.diff(blades, axis=1), axis=2) == 0.0).any():
