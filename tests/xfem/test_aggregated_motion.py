@@ -16,7 +16,7 @@ from verify.xfem.explicit import CentralDifferences, ForwardEuler
 from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.mass_variants import shifted_mass
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import treat_slivers

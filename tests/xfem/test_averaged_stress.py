@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from verify.xfem.averaged_stress import StepEnds, averaged_moduli, averaged_stress
 from verify.xfem.element import Elements
+from verify.xfem.energy_momentum import StepEnds, averaged_moduli, averaged_stress
 from verify.xfem.polar import nearest_rotations
 
 LAM, MU = 1.3, 0.7

@@ -11,7 +11,7 @@ from verify.xfem.cuts import Plane
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.mass_variants import shifted_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

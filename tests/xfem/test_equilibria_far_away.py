@@ -9,9 +9,10 @@ from scipy.special import ellipe, ellipk
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.equilibrium import static_equilibrium
-from verify.xfem.internal_force import InternalForce, collapsed_cells
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
+from verify.xfem.static_newton import collapsed_cells
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 YOUNG = 1e4

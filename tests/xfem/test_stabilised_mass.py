@@ -11,7 +11,7 @@ from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.xfem.cuts import ImplicitCut, Polyline
 from verify.xfem.mass import consistent_mass, second_moments
-from verify.xfem.mass_stabilised import (
+from verify.xfem.mass_variants import (
     eigenvalue_stabilised_mass,
     generalised_eigenvalue_stabilised_mass,
 )

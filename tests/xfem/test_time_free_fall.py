@@ -10,7 +10,7 @@ from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEul
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mass_shifted import shifted_mass
+from verify.xfem.mass_variants import shifted_mass
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 

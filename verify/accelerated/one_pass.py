@@ -25,10 +25,10 @@ from verify.accelerated.tetrahedron_batches import (
     resist_rotation,
     rotate,
 )
-from verify.xfem.averaged_stress import StepEnds, averaged_stress
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import Elements
 from verify.xfem.element import deform as deform_cells
+from verify.xfem.energy_momentum import StepEnds, averaged_stress
 from verify.xfem.polar import rotation_matrices
 
 __all__ = ["OnePassTetrahedra"]

@@ -105,6 +105,7 @@ class SpringForce(InternalForce):
         scale: float = 1.0,
         kind: TangentKind = "rotation-fixed",
         displacement: _Floats | None = None,
+        least: float = 0.0,
     ) -> None:
         """Add `scale` times the stiffness at the last `evaluate`; see `InternalForce`.
 

@@ -85,7 +85,7 @@ class XfemSolver:
         Dynamics: that of generalised_alpha at infinite frequency, from 0 to 1.
     mass : {"sidewise", "consistent", "evs", "gevs", "row_sum", "hrz", "thesis"}
         Dynamics: the last three are the lumpings of the thesis; EVS and GEVS raise eigenvalues of
-        the consistent mass of cut cells, see `verify.xfem.mass_stabilised`.
+        the consistent mass of cut cells, see `verify.xfem.mass_variants`.
     step_factor : float
         Dynamics: share of the critical step that an explicit scheme takes at most, and an
         implicit one if the scene states no time step.

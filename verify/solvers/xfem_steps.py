@@ -16,10 +16,10 @@ from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEul
 from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
-from verify.xfem.mass_shifted import shifted_mass
-from verify.xfem.mass_stabilised import (
+from verify.xfem.mass_variants import (
     eigenvalue_stabilised_mass,
     generalised_eigenvalue_stabilised_mass,
+    shifted_mass,
 )
 from verify.xfem.phantom import PhantomMesh
 

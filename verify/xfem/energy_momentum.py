@@ -1,21 +1,182 @@
-"""Energy-momentum scheme: the stress is averaged over the step, `averaged_stress`."""
+"""Energy-momentum scheme: the stress is averaged over the step.
+
+The work of the average is the change of strain energy, exactly.
+
+The potential is quadratic in F but for the trace of the stretch, t. Its discrete gradient needs
+only a T with T : (F₁ − F₀) = t₁ − t₀ that is R in the limit and has T Fₘᵀ symmetric, so that
+angular momentum is kept, Fₘ = (F₀ + F₁)/2. Then
+
+    P = 2μ (Fₘ − T) + λ (½(t₀ + t₁) − d) T.
+
+In the plane t R is linear in F, and T = (t₀ R₀ + t₁ R₁)/(t₀ + t₁). In space
+U₁² − U₀² = ½[(U₁−U₀)(U₀+U₁) + (U₀+U₁)(U₁−U₀)], hence t₁ − t₀ = (U₀+U₁)⁻¹ : (C₁ − C₀) and
+T = 2 Fₘ A⁻¹, A = U₀ + U₁. Neither has a quotient that is 0/0 at rest. Where an inverted element
+makes A indefinite, T = R(Fₘ) plus a multiple of Fₘ (C₁ − C₀) takes its place (Gonzalez 2000), and
+keeps it to the end of the step, so that Newton's method does not alternate between the two.
+
+The derivative by the end of the step, with c = λ(½(t₀ + t₁) − d) − 2μ, is
+
+    dP = μ dF + ½λ (R₁ : dF) T + c dT,   dT = (dF − T dU₁) A⁻¹,   dU₁ = R₁ᵀdF + dR₁ᵀF₁.
+"""
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.averaged_stress import StepEnds, averaged_moduli, averaged_stress
 from verify.xfem.body import DynamicBody, StepForces
-from verify.xfem.element import add_moduli
+from verify.xfem.element import Elements, add_moduli, polar_slope, restricted
 from verify.xfem.errors import XfemError
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
+from verify.xfem.polar import adjugate, nearest_rotations
 
-__all__ = ["EnergyMomentum"]
+__all__ = ["EnergyMomentum", "StepEnds", "averaged_moduli", "averaged_stress"]
 
 _Floats = NDArray[np.float64]
+_Bools = NDArray[np.bool_]
+
+_REGULAR = 1e-6  # smallest pivot of A over its trace
+_STILL = 1e-26  # square of a relative change of C that is round-off
+_SINGULAR = 1e-18  # determinant over the cube of the trace: a rotation without a derivative
+# ∂(t R)/∂F in the plane: t R = [[a, −b], [b, a]], a = F₀₀ + F₁₁, b = F₁₀ − F₀₁
+_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+_IN_PLANE = np.einsum("kn,lm->knlm", np.eye(2), np.eye(2))
+_IN_PLANE += np.einsum("kn,lm->knlm", _QUARTER, _QUARTER)
+
+
+class StepEnds(NamedTuple):
+    """Deformation gradients and rotations (p, d, d) at the start and at the end of a step."""
+
+    F0: _Floats
+    F1: _Floats
+    R0: _Floats
+    R1: _Floats
+
+    def of(self, some: _Bools) -> "StepEnds":
+        """Return those of some elements."""
+        return StepEnds(*(X[some] for X in self))
+
+    @property
+    def traces(self) -> tuple[_Floats, _Floats]:
+        """Traces t (p,) of both stretches."""
+        return _inner(self.R0, self.F0), _inner(self.R1, self.F1)
+
+
+def averaged_stress(elements: Elements, ends: StepEnds, substituted: _Bools) -> _Floats:
+    """Stress P (p, d, d) averaged over a step; elements that need the substitute are marked.
+
+    Parameters
+    ----------
+    elements : Elements
+    ends : StepEnds
+    substituted : (p,) bool array
+        Elements that have taken the substitute in this step; added to.
+    """
+    T = _secant(elements, ends, substituted)
+    _, mu, factor = _factors(elements, ends)
+    return mu * (ends.F0 + ends.F1) + factor * T
+
+
+def averaged_moduli(elements: Elements, ends: StepEnds, substituted: _Bools) -> _Floats:
+    """∂P/∂F₁ (p, d, d, d, d), the last two indices those of F₁; not symmetric.
+
+    Arguments as the last call of `averaged_stress` left them.
+    """
+    T = _secant(elements, ends, substituted)
+    if len(elements.axes) == 2:
+        t0, t1 = ends.traces
+        total = np.where(t0 + t1 > 0.0, t0 + t1, np.inf)[:, None, None, None, None]
+        dT = (_IN_PLANE - np.einsum("pkn,plm->pknlm", T, ends.R1)) / total
+    else:
+        dT, some = np.empty((len(T), 3, 3, 3, 3)), ~substituted
+        dT[some] = _plain_slope(elements, ends, T, some)
+        if substituted.any():
+            dT[substituted] = _substitute(ends.of(substituted))[1]
+    lam, mu, factor = _factors(elements, ends)
+    slope = factor[..., None, None] * dT
+    slope += np.einsum("pkn,plm->pknlm", 0.5 * lam * T, ends.R1)
+    identity = np.eye(len(elements.axes))
+    return slope + mu[..., None, None] * np.einsum("kl,nm->knlm", identity, identity)
+
+
+def _inner(A: _Floats, B: _Floats) -> _Floats:
+    return np.einsum("pkl,pkl->p", A, B)
+
+
+def _factors(elements: Elements, ends: StepEnds) -> tuple[_Floats, _Floats, _Floats]:
+    """λ, μ and c, each (p, 1, 1)."""
+    lam, mu = (x[elements.parent, None, None] for x in (elements.lam, elements.mu))
+    t0, t1 = ends.traces
+    dim = len(elements.corners) - 1
+    return lam, mu, lam * (0.5 * (t0 + t1) - dim)[:, None, None] - 2.0 * mu
+
+
+def _secant(elements: Elements, ends: StepEnds, substituted: _Bools) -> _Floats:
+    """T (p, d, d); elements that need the substitute are marked."""
+    t0, t1 = (t[:, None, None] for t in ends.traces)
+    if len(elements.axes) == 2:
+        defined = t0 + t1 > 0.0
+        substituted[:] = ~defined[:, 0, 0]
+        mean = (t0 * ends.R0 + t1 * ends.R1) / np.where(defined, t0 + t1, 1.0)
+        return np.where(defined, mean, ends.R1)
+    A, inverse, least = _mean_stretch(elements, ends)
+    minor = A[:, 0, 0] * A[:, 1, 1] - A[:, 0, 1] ** 2
+    determinant = np.linalg.det(A)
+    regular = (A[:, 0, 0] > least) & (minor > least * A[:, 0, 0]) & (determinant > least * minor)
+    substituted |= ~regular
+    T = (ends.F0 + ends.F1) @ inverse
+    if substituted.any():
+        T[substituted] = _substitute(ends.of(substituted))[0]
+    return T
+
+
+def _mean_stretch(elements: Elements, ends: StepEnds) -> tuple[_Floats, _Floats, _Floats]:
+    """Return A (p, 3, 3), of membranes regular across their plane, its inverse, a threshold."""
+    A = ends.R0.transpose(0, 2, 1) @ ends.F0 + ends.R1.transpose(0, 2, 1) @ ends.F1
+    A = 0.5 * (A + A.transpose(0, 2, 1)) + 2.0 * (np.eye(3) - restricted(elements))
+    cofactors, determinant = adjugate(A)
+    inverse = cofactors / np.where(determinant == 0.0, 1.0, determinant)[:, None, None]
+    return A, inverse, _REGULAR * np.einsum("pkk->p", A)
+
+
+def _plain_slope(elements: Elements, ends: StepEnds, T: _Floats, some: _Bools) -> _Floats:
+    inverse = _mean_stretch(elements, ends)[1][some]
+    R1, F1 = ends.R1[some], ends.F1[some]
+    dR, _ = polar_slope(R1, F1, _SINGULAR)
+    identity = np.eye(3)
+    dU = np.einsum("plk,nm->pknlm", R1, identity) + np.einsum("paklm,pan->pknlm", dR, F1)
+    change = np.einsum("kl,nm->knlm", identity, identity) - np.einsum(
+        "pka,panlm->pknlm", T[some], dU
+    )
+    return np.einsum("pkblm,pbn->pknlm", change, inverse)
+
+
+def _substitute(ends: StepEnds) -> tuple[_Floats, _Floats]:
+    """T and dT of the substitute."""
+    F0, F1, _, R1 = ends
+    t0, t1 = ends.traces
+    G = F0 + F1
+    middle = nearest_rotations(G)
+    dT, _ = polar_slope(middle, G, _SINGULAR)
+    C1 = F1.transpose(0, 2, 1) @ F1
+    change = C1 - F0.transpose(0, 2, 1) @ F0
+    half = np.einsum("ma,plb->pablm", np.eye(3), F1)
+    dC = half + half.transpose(0, 2, 1, 3, 4)
+    square = _inner(change, change)
+    moving = square > _STILL * _inner(C1, C1)
+    square = np.where(moving, square, 1.0)[:, None, None]
+    factor = np.where(moving, t1 - t0 - _inner(middle, F1 - F0), 0.0)[:, None, None] / square
+    slope = R1 - middle - np.einsum("pknlm,pkn->plm", dT, F1 - F0)
+    slope = (slope - 2.0 * factor * np.einsum("pab,pablm->plm", change, dC)) / square
+    slope[~moving] = 0.0
+    D = G @ change
+    dT += np.einsum("plm,pkn->pknlm", slope, D)
+    moved = np.einsum("kl,pmn->pknlm", np.eye(3), change) + np.einsum("pka,panlm->pknlm", G, dC)
+    return middle + factor * D, dT + factor[..., None, None] * moved
+
 
 # after so many evaluations in a step, cells that have taken the substitute keep it
 _FREE_EVALUATIONS = 8
@@ -25,7 +186,7 @@ class EnergyMomentum(NewtonIntegrator):
     """Conserves energy, linear and angular momentum of a free body at any amplitude and step.
 
     The internal force is a discrete gradient of the potential; see
-    `verify.xfem.averaged_stress`. Its stiffness is not symmetric, and differs
+    `verify.xfem.energy_momentum`. Its stiffness is not symmetric, and differs
     from half of that at the end by the square of the turn in a step. Corrections take the latter,
     which is found in a tenth of the time, as long as each takes half of the residual off.
 

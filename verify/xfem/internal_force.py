@@ -28,11 +28,11 @@ from verify.xfem.kernels import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
 
-__all__ = ["InternalForce", "Kinematics", "TangentKind", "collapsed_cells", "inverted_cells"]
+__all__ = ["InternalForce", "Kinematics", "TangentKind", "inverted_cells"]
 
 _Floats = NDArray[np.float64]
 Kinematics = Literal["corotational", "linear"]
-TangentKind = Literal["rotation-fixed", "geometric", "consistent"]
+TangentKind = Literal["rotation-fixed", "geometric", "consistent", "tension"]
 
 _CHUNK = 512  # cells whose moduli are held at once
 
@@ -51,8 +51,7 @@ class InternalForce:
     kernels : Kernels
         Of which `one_pass` serves tetrahedra here; the rest is for what solves with this force.
     ghost : GhostPenalty, optional
-        Of the same body. A quadratic potential without rotations: it joins energy, force and every
-        tangent.
+        Of the same body: a potential without rotations, in energy, force and every tangent.
 
     Attributes
     ----------
@@ -67,7 +66,7 @@ class InternalForce:
     ------
     XfemError
         If the material fits neither () nor (m,), the kinematics is unknown, or the penalty is of
-        another body.
+        another body. By every method: if an array has another shape or type than the body's.
     """
 
     def __init__(
@@ -137,11 +136,6 @@ class InternalForce:
             Of the dof nodes, in metres.
         out : (N, d) float array, optional
             Overwritten with the force.
-
-        Raises
-        ------
-        XfemError
-            If an array has a wrong shape or type.
         """
         force = np.empty(self._shape) if out is None else out
         self._check(force=force)
@@ -152,23 +146,18 @@ class InternalForce:
             else:
                 rotations_in_space(F, self._quaternions, self._rotations)
             self._passed = False
-        energy = self._restrict_force(F, 1.0, 1.0, force, overwrite=True)
+        force[:] = 0.0
+        energy = self._add_force(F, 1.0, 1.0, force)
         if self.ghost is not None:
             penalty, self.penalty_energy = self.ghost.force(displacement)
             force += penalty
         return force, energy + self.penalty_energy
 
     def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
-        """Add `scale` K v (N, d), K the rotation-fixed tangent of the last evaluation, to `out`.
-
-        Raises
-        ------
-        XfemError
-            If an array has a wrong shape or type.
-        """
+        """Add `scale` K v (N, d), K the rotation-fixed tangent of the last evaluation, to `out`."""
         self._check(vector=vector, force=out)
         deform(self.elements, self.phantom.extend(vector), 0.0, self._gradient)
-        self._restrict_force(self._gradient, 0.0, scale, out)
+        self._add_force(self._gradient, 0.0, scale, out)
         self.add_penalty(vector, scale, out)
 
     def add_penalty(self, vector: _Floats, scale: float, out: _Floats) -> None:
@@ -176,13 +165,9 @@ class InternalForce:
         if self.ghost is not None:
             out += scale * (self.ghost.matrix @ vector)
 
-    def _restrict_force(
-        self, F: _Floats, share: float, scale: float, out: _Floats, overwrite: bool = False
-    ) -> float:
+    def _add_force(self, F: _Floats, share: float, scale: float, out: _Floats) -> float:
         corner_force = np.zeros_like(self.phantom.corners.node_points)
         energy = add_force(self.elements, self.rotations, F, share, scale, corner_force)
-        if overwrite:
-            out[:] = 0.0
         out += self.phantom.restrict(corner_force)
         return float(energy)
 
@@ -194,10 +179,7 @@ class InternalForce:
         space = self._shape[1]
         check_floats("blocks", blocks, (len(pattern.columns), space, space))
         if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.phantom.cells):
-            raise XfemError(
-                f"pattern of {pattern.node_count} nodes and {len(pattern.targets)} cells; expected "
-                f"that of the body, {self._shape[0]} and {len(self.phantom.cells)}"
-            )
+            raise XfemError("pattern of other nodes or cells; expected that of the body")
 
     def add_stiffness(
         self,
@@ -206,6 +188,7 @@ class InternalForce:
         scale: float = 1.0,
         kind: TangentKind = "rotation-fixed",
         displacement: _Floats | None = None,
+        least: float = 0.0,
     ) -> None:
         """Add `scale` times a tangent at the last evaluation to the nodal blocks.
 
@@ -214,30 +197,37 @@ class InternalForce:
         pattern : BlockPattern
             Its first cells must be those of the body.
         blocks : (B, d, d) float array
-        kind : {"rotation-fixed", "geometric", "consistent"}
+        kind : {"rotation-fixed", "geometric", "consistent", "tension"}
             Rotations held; the same and the geometric stiffness of membranes, which has no
-            negative mode either; or the second derivative of the potential.
+            negative mode either; the second derivative of the potential; the geometric stiffness
+            of a membrane alone.
         displacement : (N, d) float array, optional
             That of the last evaluation; needed for all but the rotation-fixed tangent.
+        least : float
+            Tension over μ that every direction of a membrane is taken to have at least: without it
+            what is slack has no stiffness across its plane.
 
         Raises
         ------
         XfemError
-            If the kind is unknown or needs a displacement that is not given, or an array is not of
-            the body.
+            If the kind is unknown, needs a displacement that is not given or a membrane, or an
+            array is not of the body.
         """
         self._check_blocks(pattern, blocks)
         check_choice(kind, TangentKind, "stiffness")
-        targets, added = pattern.targets[: len(self.phantom.cells)], pattern.unfold(blocks)
-        if kind == "rotation-fixed" or not self.is_corotational:
-            add_rotation_fixed(self.elements, self.rotations, scale, targets, added)
-        elif displacement is None:
+        kind = kind if self.is_corotational or kind == "tension" else "rotation-fixed"
+        if kind != "rotation-fixed" and displacement is None:
             raise XfemError(f"{kind} stiffness without the displacement at which it is wanted")
-        elif kind == "geometric":
+        targets, added = pattern.targets[: len(self.phantom.cells)], pattern.unfold(blocks)
+        if kind in ("rotation-fixed", "geometric"):
             add_rotation_fixed(self.elements, self.rotations, scale, targets, added)
-            if self.is_membrane:
-                self._add_geometric(displacement, 0.0, scale, targets, added)
-        else:
+        if kind == "tension" or (kind == "geometric" and self.is_membrane):
+            assert displacement is not None
+            stiffness, n = self._tension(displacement, least)
+            across = (scale * n)[:, :, None] * n[:, None, :]
+            add_blocks(targets, stiffness[..., None, None] * across[:, None, None], added)
+        if kind == "consistent":
+            assert displacement is not None
             F, R, self.left_out = self.deformation(displacement), self.rotations, 0
             for start in range(0, len(F), _CHUNK):
                 some = slice(start, start + _CHUNK)
@@ -249,51 +239,7 @@ class InternalForce:
         if self.ghost is not None:
             self.ghost.add_stiffness(pattern, blocks, scale)
 
-    def add_geometric(
-        self,
-        pattern: BlockPattern,
-        displacement: _Floats,
-        blocks: _Floats,
-        scale: float,
-        least: float = 0.0,
-    ) -> None:
-        """Add `scale` times the geometric stiffness of a membrane at the last evaluation.
-
-        Parameters
-        ----------
-        pattern : BlockPattern
-        displacement : (N, 3) float array
-            That of the last evaluation.
-        blocks : (B, 3, 3) float array
-        scale : float
-        least : float
-            Tension over μ that every direction is taken to have at least: without it what is slack
-            has no stiffness across its plane.
-
-        Raises
-        ------
-        XfemError
-            If the body is no membrane, or an array not of it.
-        """
-        self._check_blocks(pattern, blocks)
-        added = pattern.unfold(blocks)
-        targets = pattern.targets[: len(self.phantom.cells)]
-        self._add_geometric(displacement, least, scale, targets, added)
-        pattern.fold(added, blocks)
-
-    def _add_geometric(
-        self,
-        displacement: _Floats,
-        least: float,
-        scale: float,
-        targets: NDArray[np.int32],
-        blocks: _Floats,
-    ) -> None:
-        stiffness, n = self._geometric(displacement, least)
-        across = (scale * n)[:, :, None] * n[:, None, :]
-        add_blocks(targets, stiffness[..., None, None] * across[:, None, None], blocks)
-
-    def add_geometric_product(
+    def add_tension_product(
         self, displacement: _Floats, vector: _Floats, scale: float, out: _Floats
     ) -> None:
         """Add `scale` times the geometric stiffness of a membrane times a vector (N, 3) to `out`.
@@ -304,7 +250,7 @@ class InternalForce:
             If the body is no membrane, or an array not of it.
         """
         self._check(vector=vector, force=out)
-        stiffness, n = self._geometric(displacement, 0.0)
+        stiffness, n = self._tension(displacement, 0.0)
         moved = self.phantom.extend(vector)[self.phantom.cells]
         across = np.einsum("pjk,pk->pj", moved, scale * n)
         out += self.nodal_force((stiffness @ across[:, :, None]) * n[:, None, :])
@@ -316,7 +262,7 @@ class InternalForce:
         columns = forces.reshape(-1, forces.shape[2]).T
         return v.restrict(np.stack([np.bincount(nodes, f, count) for f in columns], axis=1))
 
-    def _geometric(self, displacement: _Floats, least: float) -> tuple[_Floats, _Floats]:
+    def _tension(self, displacement: _Floats, least: float) -> tuple[_Floats, _Floats]:
         """Stiffness between corners (p, 3, 3) of displacements along turned normals (p, 3)."""
         if not self.is_membrane:
             raise XfemError("geometric stiffness of a solid; expected a membrane in space")
@@ -379,11 +325,6 @@ class InternalForce:
             Without it what is below the diagonal may be anything.
         rotational : float
             Of what the consistent tangent has beyond the rotation-fixed one.
-
-        Raises
-        ------
-        XfemError
-            If an array is not of the body, or not of the pattern.
         """
         rotational = rotational if self.is_corotational else 0.0
         if self.has_one_pass:
@@ -428,11 +369,6 @@ class InternalForce:
             Cells that have taken the substitute for the averaged stress; updated.
         pattern, scale, force, blocks, whole, rotational
             As for `linearise`.
-
-        Raises
-        ------
-        XfemError
-            If an array is not of the body, or not of the pattern.
         """
         assert self.has_one_pass
         self._check(start=start, end=end, force=force)
@@ -450,25 +386,3 @@ def inverted_cells(force: InternalForce, displacement: _Floats) -> NDArray[np.in
     if force.is_membrane:
         raise XfemError("inversion of a membrane in space is not defined")
     return np.flatnonzero(np.linalg.det(force.deformation(displacement)) < 0.0)
-
-
-def collapsed_cells(force: InternalForce, displacement: _Floats, ratio: float) -> NDArray[np.int64]:
-    """Cells whose rotation, and with it the force, is not unique, or nearly so.
-
-    That is where the two principal stretches of a plane cell cancel (of an inverted cell the
-    smallest is negative), where the two smallest do in space, and where a membrane has shrunk
-    to a line.
-
-    Parameters
-    ----------
-    force : InternalForce
-    displacement : (N, d) float array
-    ratio : float
-        Of what is left to the largest stretch, below which a cell counts.
-    """
-    F = force.deformation(displacement)
-    stretches = np.linalg.svd(F, compute_uv=False)
-    left = stretches[:, 1]
-    if not force.is_membrane:
-        left = np.abs(stretches[:, -2] + np.sign(np.linalg.det(F)) * stretches[:, -1])
-    return np.flatnonzero(left <= ratio * stretches[:, 0])

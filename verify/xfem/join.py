@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.clip import staircase, staircase_entries
+from verify.xfem.clip import Partition, staircase, staircase_entries
 from verify.xfem.mesh import SimplexMesh, facets_of
-from verify.xfem.partition import Partition
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["PatchNodes", "join_parts", "number_nodes"]

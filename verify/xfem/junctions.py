@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from verify.xfem.clip import Partition
 from verify.xfem.crossing import AT_END, REACH, level_and_depth
 from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import equal_rows, facets_of
-from verify.xfem.partition import Partition
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["joint_cuts", "meeting_cells", "reached", "tied_pieces", "without_specks"]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.clip import bisected, divided
+from verify.xfem.clip import Partition, bisected, divided
 from verify.xfem.crossing import Crossing, TipRule, crossed_through
 from verify.xfem.errors import XfemError
 from verify.xfem.flat_cuts import Cut
@@ -28,7 +28,6 @@ from verify.xfem.junctions import (
     without_specks,
 )
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.partition import Partition
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["ROUND_OFF", "Held", "nodal_values", "split_cells"]

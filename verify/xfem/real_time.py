@@ -74,7 +74,7 @@ class RealTimeEuler:
         force.add_tangent_product(state.velocity, h, internal)
         if force.is_membrane:
             change = state.velocity - before.velocity
-            force.add_geometric_product(before.displacement, change, h, internal)
+            force.add_tension_product(before.displacement, change, h, internal)
         return StepForces(internal, external, self.body.viscous(state.velocity))
 
     def advance(self, state: MotionState) -> None:
@@ -130,8 +130,8 @@ class RealTimeEuler:
         if body.force.is_membrane:
             # what tension holds it with across its plane is as stiff as it is thin: implicit too
             at = state.displacement
-            body.force.add_geometric_product(at, state.velocity, h, self._internal)
-            body.force.add_geometric(body.pattern, at, self.blocks, h * h)
+            body.force.add_tension_product(at, state.velocity, h, self._internal)
+            body.force.add_stiffness(body.pattern, self.blocks, h * h, "tension", at)
         add_mass(self.blocks, self._places, self._values, 1.0 + h * damping.mass)
         np.subtract(body.external(state.time + h), self._internal, out=self.load)
         if damping.mass > 0.0:

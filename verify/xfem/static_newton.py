@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from verify.xfem.assembly import body_pattern, constrain, held_entries
 from verify.xfem.errors import SingularStiffnessError
-from verify.xfem.internal_force import InternalForce, collapsed_cells
+from verify.xfem.internal_force import InternalForce
 from verify.xfem.statics import StaticSolver, is_large
 
-__all__ = ["Descent", "Newton", "NotInEquilibriumError", "Place"]
+__all__ = ["Descent", "Newton", "NotInEquilibriumError", "Place", "collapsed_cells"]
 
 _Floats = NDArray[np.float64]
 
@@ -246,7 +246,7 @@ class Newton:
         at = displacement
         force.linearise(pattern, at, at, 0.0, 1.0, self._internal, blocks, rotational=rotational)
         if rotational == 0.0 and force.is_membrane:
-            force.add_geometric(pattern, displacement, blocks, 1.0, least)
+            force.add_stiffness(pattern, blocks, 1.0, "tension", displacement, least)
 
     def _solved(self, load: _Floats) -> _Floats:
         """Solve with the blocks.
@@ -292,3 +292,25 @@ class Descent(Newton):
             except SingularStiffnessError:
                 pass
         return self._solve(displacement, residual, None, 0.0, least=max(least, _LEAST))
+
+
+def collapsed_cells(force: InternalForce, displacement: _Floats, ratio: float) -> NDArray[np.int64]:
+    """Cells whose rotation, and with it the force, is not unique, or nearly so.
+
+    That is where the two principal stretches of a plane cell cancel (of an inverted cell the
+    smallest is negative), where the two smallest do in space, and where a membrane has shrunk
+    to a line.
+
+    Parameters
+    ----------
+    force : InternalForce
+    displacement : (N, d) float array
+    ratio : float
+        Of what is left to the largest stretch, below which a cell counts.
+    """
+    F = force.deformation(displacement)
+    stretches = np.linalg.svd(F, compute_uv=False)
+    left = stretches[:, 1]
+    if not force.is_membrane:
+        left = np.abs(stretches[:, -2] + np.sign(np.linalg.det(F)) * stretches[:, -1])
+    return np.flatnonzero(left <= ratio * stretches[:, 0])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from verify.simulator.arrays.distinct import distinct
 from verify.simulator.cutting.patch import MeshPatch
-from verify.xfem.partition import Partition
+from verify.xfem.clip import Partition
 
 __all__ = ["Division"]
 

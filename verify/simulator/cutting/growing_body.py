@@ -28,11 +28,11 @@ from verify.simulator.cutting.renumber_kernels import (
     write_pieces,
 )
 from verify.simulator.cutting.tied_parts import TiedParts
+from verify.xfem.clip import Partition
 from verify.xfem.errors import XfemError
 from verify.xfem.flat_cuts import Cut
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.partition import Partition
 from verify.xfem.pieces import ROUND_OFF, Held, split_cells
 
 __all__ = ["CutsNear", "GrowingBody", "Increment"]
