@@ -41,17 +41,17 @@ def test_jumps_at_cuts_are_told_from_the_trend():
 
 
 def test_the_total_takes_off_what_was_put_in_and_never_reads_the_stated_one():
-    ledger = {
-        "kinetic": np.array([0.0, 1.0]),
-        "strain": np.array([0.0, 2.0]),
-        "work_of_loads": np.array([0.0, 4.0]),
-        "algorithmic": np.array([0.0, 1.0]),
-        "total": np.array([9.0, 9.0]),
-    }
-    assert total_energy(ledger) == pytest.approx([0.0, -1.0])
-    assert total_energy(ledger, scheme=True) == pytest.approx([0.0, 0.0])
+    stored, put_in = (
+        ("kinetic", "strain", "gravity", "damping"),
+        ("work_of_loads", "work_of_supports"),
+    )
+    names = (*stored, *put_in, "algorithmic", "removed_energy")
+    ledger = {name: np.array([0.0, 2.0**k]) for k, name in enumerate(names)}
+    ledger["total"] = np.array([9.0, 9.0])
+    assert total_energy(ledger) == pytest.approx([0.0, 1 + 2 + 4 + 8 - 16 - 32])
+    assert total_energy(ledger, scheme=True) == pytest.approx([0.0, -33 + 64 + 128])
     assert total_energy({"total": np.zeros(2)}) is None
-    assert energy_scale(ledger) == 4.0
+    assert energy_scale(ledger) == 32.0
 
 
 def spinning(points, spin, centre, push):
