@@ -71,6 +71,12 @@ def test_the_cells_fill_the_body_fit_together_and_end_at_the_tips(tip_mesh, angl
     assert np.linalg.norm(faces[:, 1] - faces[:, 0], axis=1).sum() == pytest.approx(0.62, rel=1e-9)
 
 
+def test_a_cut_that_ends_on_the_border_is_open_there(tip_mesh):
+    cut = np.array([[0.0, 0.52], [0.47, 0.61]])
+    mesh = tip_mesh(*square(4), cut.tolist(), cut[1:])
+    assert [(np.linalg.norm(mesh.points - end, axis=1) < 1e-9).sum() for end in cut] == [2, 1]
+
+
 @pytest.mark.heavy
 @pytest.mark.skipif(
     bool(state_of(foreign_solver("getfem")).missing), reason="GetFEM is not installed"

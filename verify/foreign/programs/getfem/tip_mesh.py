@@ -37,7 +37,7 @@ class TipMesh:
             self._part_to(tip)
         while self._refine(areas, case.problem["size"]):
             pass
-        self._double(body.cuts)
+        self._double(body.cuts, areas.tips)
 
     def _part_to(self, tip):
         """Divide the cells that a tip is in or on, so that it is a node of each."""
@@ -107,17 +107,18 @@ class TipMesh:
         self.parent = np.concatenate([self.parent[mark] for mark, _ in pieces])
         return True
 
-    def _double(self, cuts):
-        """Give the nodes on the cuts, their tips left out, a twin below and above."""
+    def _double(self, cuts, tips):
+        """Give the nodes on the cuts, tips in the body left out, a twin below and above."""
         middle = self.points[self.cells].mean(axis=1)
+        gap = np.linalg.norm(self.points[:, None] - tips, axis=2).min(axis=1)
         above, self._facets = np.zeros(self.cells.shape, dtype=int), []
         for cut in cuts:
             level, beyond = cut.level(self.points)[0], cut.beyond(self.points)
-            flat = np.abs(level) < self._near
-            inside = (flat & (beyond < -self._near))[self.cells]
+            flat = (np.abs(level) < self._near) & (beyond < self._near)
+            inside = (flat & (gap > self._near))[self.cells]
             upper = cut.level(middle)[0] > 0
             above[inside & upper[:, None]] = 1
-            on = (flat & (beyond < self._near))[self.cells]
+            on = flat[self.cells]
             rows = (on.sum(axis=1) == 2) & inside.any(axis=1) & ~upper
             self._facets.append(self.points[self.cells[rows][on[rows]].reshape(-1, 2)])
         keys = np.column_stack([self.cells.ravel(), above.ravel()])
