@@ -18,8 +18,17 @@ from pathlib import Path
 
 from verify.threads import ONE_THREAD
 
-__all__ = ["LONGEST_REQUEST", "PARENT_VARIABLE", "Forked", "fork", "warm_parent"]
+__all__ = [
+    "DRAWING",
+    "LONGEST_REQUEST",
+    "PARENT_VARIABLE",
+    "Forked",
+    "fork",
+    "prepare_fork",
+    "warm_parent",
+]
 
+DRAWING = "verify.report.drawing"
 PARENT_VARIABLE = "VERIFY_RUNNER_PID"
 LONGEST_REQUEST = 1 << 17  # bytes, most of them the environment
 _LOADING_SECONDS, _ENDING_SECONDS = 120.0, 0.2
@@ -66,13 +75,13 @@ class Forked:
 
 
 class _Parent:
-    """The process to fork from, which begins to import at once."""
+    """A process to fork from, which begins to import at once what the work of its kind needs."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str) -> None:
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.settimeout(_LOADING_SECONDS)
         self._forked = False
-        module = ["verify.runner.warm_parent", str(theirs.fileno())]
+        module = ["verify.runner.warm_parent", str(theirs.fileno()), kind]
         with theirs:
             self._process = subprocess.Popen(
                 # -P: a stray numpy.py in the working directory is not imported
@@ -109,24 +118,42 @@ class _Parent:
         self._process.wait()
 
 
-_own = threading.local()  # the parent dies with the thread that started it
+_own = threading.local()  # a parent dies with the thread that started it
 
 
 @contextlib.contextmanager
 def warm_parent() -> Iterator[None]:
-    """Keep a process for the time of the block from which this thread can `fork`.
+    """Keep processes for the time of the block from which this thread can `fork`.
 
-    It is that of the block around this one, if there is one.
+    They are those of the block around this one, if there is one.
     """
-    if not sys.platform.startswith("linux") or getattr(_own, "parent", None) is not None:
+    if not sys.platform.startswith("linux") or getattr(_own, "parents", None) is not None:
         yield
         return
-    with contextlib.suppress(OSError):  # no process to fork from: each job starts one of its own
-        _own.parent = _Parent()
+    _own.parents = {}
+    prepare_fork()
     try:
         yield
     finally:
-        _forget()
+        parents, _own.parents = _own.parents, None
+        for parent in filter(None, parents.values()):
+            parent.close()
+
+
+def prepare_fork(module: str = "") -> None:
+    """Begin to load, inside a block of `warm_parent`, the process that `module` is forked from.
+
+    What draws has one of its own: a solve shall not hold the memory of its libraries.
+    """
+    parents: dict[str, _Parent | None] | None = getattr(_own, "parents", None)
+    if parents is not None and (kind := _kind(module)) not in parents:
+        parents[kind] = None
+        with contextlib.suppress(OSError):  # no process to fork from: each job starts its own
+            parents[kind] = _Parent(kind)
+
+
+def _kind(module: str) -> str:
+    return "drawing" if module == DRAWING else "solving"
 
 
 def fork(module: str, argument: Path, log: int, environment: Mapping[str, str]) -> Forked | None:
@@ -146,7 +173,9 @@ def fork(module: str, argument: Path, log: int, environment: Mapping[str, str]) 
     Forked or None
         None outside a block of `warm_parent`, and where it could not be loaded.
     """
-    parent: _Parent | None = getattr(_own, "parent", None)
+    prepare_fork(module)
+    parents: dict[str, _Parent | None] = getattr(_own, "parents", None) or {}
+    parent = parents.get(_kind(module))
     said = {"module": module, "argument": str(argument), "folder": os.getcwd()}
     request = json.dumps({**said, "environment": dict(environment)}).encode()
     if parent is None or len(request) > LONGEST_REQUEST:
@@ -154,11 +183,6 @@ def fork(module: str, argument: Path, log: int, environment: Mapping[str, str]) 
     try:
         return parent.fork(request, log)
     except (OSError, ValueError):
-        _forget()
-        return None
-
-
-def _forget() -> None:
-    parent, _own.parent = getattr(_own, "parent", None), None
-    if parent is not None:
+        parents[_kind(module)] = None
         parent.close()
+        return None

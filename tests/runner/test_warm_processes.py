@@ -152,7 +152,7 @@ def test_all_of_them_die_with_the_runner(prepared):
             with warm.warm_parent():
                 job, log = Path("job.json"), Path("log.txt")
                 child = Child("verify.runner.solve", job, log, 600, 4e9, own=True)
-                Path("parent").write_text(str(warm._own.parent._process.pid))
+                Path("parent").write_text(str(warm._own.parents["solving"]._process.pid))
                 while child.poll() is None:
                     time.sleep(0.02)
         """)],

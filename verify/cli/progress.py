@@ -3,18 +3,28 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import monotonic
-from typing import Any, Protocol, TextIO
+from typing import Protocol, TextIO
 
 from verify.cli.streams import unfiltered
+from verify.cli.waiting import Waiting
 from verify.printable import one_line
 from verify.result import COMPILING, LOG, CaseResult, SolveRecord, Status
 from verify.runner import Progress
+from verify.runner.run import comparison_label
 
 __all__ = ["ClosableProgress", "progress_on"]
 
 
 class ClosableProgress(Progress, Protocol):
-    """A progress display that can leave the screen."""
+    """A progress display that is told of what is no solve too, and can leave the screen."""
+
+    def doing(self, what: str) -> None:
+        """Take note of what is done from now on, before or after the solves."""
+        ...
+
+    def say(self, text: str) -> None:
+        """Write a line."""
+        ...
 
     def close(self) -> None:
         """Stop drawing."""
@@ -50,33 +60,48 @@ def _case_text(result: CaseResult) -> str:
 
 
 class _Lines:
-    """One line per finished solve and case."""
+    """One line per finished solve and case, and for what is waited for."""
 
     def __init__(self, stream: TextIO, expected: str) -> None:
-        self.stream, self.expected, self.done, self.total = stream, expected, 0, 0
+        self.expected, self.done, self.total = expected, 0, 0
+        self.running: dict[str, float] = {}
+        self.waiting = Waiting(stream, lambda: _oldest(self.running))
+        self.say = self.waiting.say
+
+    def doing(self, what: str) -> None:
+        self.running = {what: monotonic()}
 
     def planned(self, solves: int, cases: int) -> None:
-        self.total = solves
+        self.total, self.running = solves, {}
         if self.expected:
-            self._say(self.expected)
-        self._say(f"{solves} solves of {cases} case{'s' if cases != 1 else ''}")
+            self.say(self.expected)
+        self.say(f"{solves} solves of {cases} case{'s' if cases != 1 else ''}")
 
     def started(self, label: str) -> None:
-        """Say nothing: a line per event that ended is enough in a log."""
+        self.running[label] = monotonic()
 
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
         self.done += 1
         self.total = max(self.total, self.done)  # a reference may get further levels
-        self._say(f"[{self.done}/{self.total}] {_solve_text(label, record, reused)}")
+        self.running.pop(label, None)
+        self.say(f"[{self.done}/{self.total}] {_solve_text(label, record, reused)}")
 
     def judged(self, result: CaseResult) -> None:
-        self._say(_case_text(result))
+        self.running.pop(comparison_label(result.case), None)
+        self.say(_case_text(result))
 
     def close(self) -> None:
-        """Nothing is drawn that would have to go."""
+        self.waiting.close()
 
-    def _say(self, text: str) -> None:
-        print(text, file=self.stream, flush=True)
+
+def _oldest(running: dict[str, float]) -> str:
+    """Return what has been under way for longest, with its seconds, and how much is beside it."""
+    under_way = dict(running)  # another thread changes it
+    if not under_way:
+        return ""
+    label = min(under_way, key=lambda one: under_way[one])
+    more = f", {len(under_way) - 1} more beside it" if len(under_way) > 1 else ""
+    return f"{label} ({monotonic() - under_way[label]:.0f} s{more})"
 
 
 class _Bars:
@@ -94,15 +119,20 @@ class _Bars:
             TextColumn("{task.description}", markup=False),
         )
         self.bars = RichProgress(*columns, console=Console(file=unfiltered(stream)), transient=True)
-        self.task: Any = None
         self.expected = expected
         self.running: dict[str, float] = {}
+        self.task = self.bars.add_task("", total=None)
+        self.bars.start()
+
+    def doing(self, what: str) -> None:
+        self.running = {what: monotonic()}
+        self._describe()
 
     def planned(self, solves: int, cases: int) -> None:
         if self.expected:
-            self._say(self.expected)
-        self.task = self.bars.add_task("", total=solves + cases)
-        self.bars.start()
+            self.say(self.expected)
+        self.running = {}
+        self.bars.update(self.task, description="", total=solves + cases)
 
     def started(self, label: str) -> None:
         self.running[label] = monotonic()
@@ -111,18 +141,18 @@ class _Bars:
     def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
         self.running.pop(label, None)
         if record.status is not Status.SOLVED:
-            self._say(_solve_text(label, record, reused))
+            self.say(_solve_text(label, record, reused))
         self._describe(1)
 
     def judged(self, result: CaseResult) -> None:
-        self.running.pop(f"{result.case} · comparison", None)
-        self._say(_case_text(result))
+        self.running.pop(comparison_label(result.case), None)
+        self.say(_case_text(result))
         self._describe(1)
 
     def close(self) -> None:
         self.bars.stop()
 
-    def _say(self, text: str) -> None:
+    def say(self, text: str) -> None:
         self.bars.console.print(text, markup=False, highlight=False)
 
     def _describe(self, advance: int = 0) -> None:

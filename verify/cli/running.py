@@ -5,7 +5,9 @@ import contextlib
 import json
 import shlex
 import sys
+import tempfile
 import threading
+from collections.abc import Iterator
 from dataclasses import asdict
 from importlib import import_module
 from importlib.util import find_spec
@@ -26,8 +28,6 @@ from verify.solvers.named import one_name, parameters_of
 
 __all__ = ["execute"]
 
-_SOON_DRAWN = 3  # cases whose report takes less than 2 s
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Select, run, render, and say what came out."""
@@ -47,14 +47,20 @@ def execute(arguments: argparse.Namespace) -> int:
         print("verify: no case matches; `verify list` shows them all", file=sys.stderr)
         return NOTHING_RAN
     options = _options(arguments, names, parameters)
+    beside = not arguments.no_report and options.jobs > 1 and len(scenes) > 1
     if not arguments.no_report:
         threading.Thread(target=_load_report).start()  # while processes solve
     expected = run_line([(s, costs_of(s, options)) for s in scenes], options.jobs)
-    with progress_on(sys.stderr, expected) as progress:
+    command = shlex.join(["verify", *sys.argv[1:]])
+    with progress_on(sys.stderr, expected) as progress, _drawings(beside) as drawings:
+
+        def announce(text: str) -> None:
+            progress.say(text)
+            progress.doing(text)
+
+        progress.doing("asking the solvers what they take")
         try:
-            summary = run_cases(
-                scenes, arguments.out, options, progress, shlex.join(["verify", *sys.argv[1:]])
-            )
+            summary = run_cases(scenes, arguments.out, options, progress, command, drawings)
         except RunStoppedError as stop:
             progress.close()
             print(
@@ -63,12 +69,10 @@ def execute(arguments: argparse.Namespace) -> int:
                 file=sys.stderr,
             )
             return 128 + stop.signum
-    rank_run(
-        arguments.out, summary.results, parameters, arguments.conform, arguments.timeout, _announce
-    )
-    if not arguments.no_report and len(summary.results) > _SOON_DRAWN:
-        _announce(f"drawing the report of {len(summary.results)} cases")
-    report = None if arguments.no_report else _rendered(arguments.out)
+        conform, timeout = arguments.conform, arguments.timeout
+        rank_run(arguments.out, summary.results, parameters, conform, timeout, announce)
+        progress.doing(f"the report of {len(summary.results)} cases")
+        report = None if arguments.no_report else _rendered(arguments.out, drawings)
     code = exit_code(summary.results, arguments.strict)
     if arguments.json:
         cases = [
@@ -113,8 +117,14 @@ def _options(
     )
 
 
-def _announce(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+@contextlib.contextmanager
+def _drawings(beside: bool) -> Iterator[Path | None]:
+    """Give a folder for the cases that are drawn beside solves; None if none is."""
+    if not beside:
+        yield None
+        return
+    with tempfile.TemporaryDirectory(prefix="verify-") as folder:
+        yield Path(folder)
 
 
 def _load_report() -> None:
@@ -122,7 +132,7 @@ def _load_report() -> None:
         import_module("verify.report")
 
 
-def _rendered(directory: Path) -> str:
+def _rendered(directory: Path, drawings: Path | None) -> str:
     from verify.report import render
 
-    return str(render(directory))
+    return str(render(directory, drawings))

@@ -10,6 +10,7 @@ with the lines of a structured mesh, and away from the cuts, so that strips are 
 """
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -260,6 +261,9 @@ def _slab(
     return found
 
 
+@cache
 def _gauss(n: int) -> tuple[Array, Array]:
     x, w = np.polynomial.legendre.leggauss(n)
-    return 0.5 * (x + 1), 0.5 * w
+    x, w = 0.5 * (x + 1), 0.5 * w
+    x.flags.writeable = w.flags.writeable = False  # every strip of every rule has the same
+    return x, w

@@ -29,7 +29,14 @@ from verify.report.tables import (
 )
 from verify.result import CaseResult, NoticeKind, Verdict, worst
 
-__all__ = ["CaseView", "PictureRow", "case_view", "floor_text", "required_slope"]
+__all__ = [
+    "CaseView",
+    "PictureRow",
+    "case_view",
+    "floor_text",
+    "required_slope",
+    "show_pictures",
+]
 
 
 @dataclass(frozen=True)
@@ -115,7 +122,7 @@ def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Pal
             view.failures = failures_table(entry.unjudged)
         else:
             _fill(view, entry.result, palette)
-            _show(view, pictures)
+            show_pictures(view, pictures)
     except Exception as error:
         said = f"This case cannot be shown: {words_of(error)}. Its numbers are in results.json."
         return CaseView(view.anchor, view.name, view.title, view.verdict, defect=said)
@@ -153,7 +160,9 @@ def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
     view.reference_tables = reference_tables(result.reference)
 
 
-def _show(view: CaseView, pictures: CasePictures) -> None:
+def show_pictures(view: CaseView, pictures: CasePictures) -> None:
+    """Put the pictures of a case into its view, in place of those that are there."""
+    view.rows, view.turnable = [], False
     view.scale = "" if pictures.scale == 1 else f"× {number(pictures.scale, 1)}"
     view.picture_notes, view.tip_at = pictures.notes, pictures.tip_at
     view.film = [(own[0].description.partition(" at t")[0], own) for own in pictures.film]
@@ -162,7 +171,8 @@ def _show(view: CaseView, pictures: CasePictures) -> None:
                              ("tip", pictures.tip, "error")):  # fmt: skip
         if group and group[0].image:
             view.rows.append(PictureRow(kind, group, colour_bar(group[0].view, bar)))
-            view.turnable |= any(picture.turned for picture in group)
+            turned = [bool(picture.turned) for picture in group]  # packed here, each of them
+            view.turnable |= any(turned)
 
 
 def _convergence(view: CaseView, result: CaseResult, palette: Palette) -> None:

@@ -4,12 +4,11 @@ from typing import Any
 
 from verify.printable import words_of
 from verify.report.blocks import Table
-from verify.report.case_view import case_view
+from verify.report.case_view import CaseView
 from verify.report.family_view import FamilyView, family_views
 from verify.report.figures.solver_profiles import profiles_figure
 from verify.report.figures.style import Palette
 from verify.report.overview import origin_facts, overview
-from verify.report.picture import CasePictures
 from verify.report.ranking_tables import (
     compared,
     conformance_table,
@@ -25,25 +24,22 @@ _QUESTIONS = (("accuracy", "Accuracy"), ("energy", "Energy"), ("cost", "Cost"))
 
 
 def page_view(
-    run: Run, pictures: list[CasePictures], notes: list[str], short: bool = False
+    run: Run, cases: list[CaseView], palette: Palette, notes: list[str], short: bool = False
 ) -> dict[str, Any]:
     """Return what ``report.j2`` shows.
 
     Parameters
     ----------
     run : Run
-    pictures : list of CasePictures
+    cases : list of CaseView
         One for each of the run's entries.
+    palette : Palette
+        By which they are drawn.
     notes : list of str
         What has to be said about the pictures of all cases.
     short : bool
         Whether cases, families and the reading aid are left out.
     """
-    palette = Palette()
-    cases = [
-        case_view(index, entry, shown, palette)
-        for index, (entry, shown) in enumerate(zip(run.entries, pictures, strict=True))
-    ]
     families: list[FamilyView] = []
     ranking: dict[str, Any] | None = None
     try:

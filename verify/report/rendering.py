@@ -3,14 +3,13 @@
 from pathlib import Path
 from typing import Any
 
-from verify.printable import words_of
-from verify.report.drawn_bodies import draw
+from verify.report.case_view import case_view, show_pictures
+from verify.report.drawing import drawn_before, drawn_case, run_palette
 from verify.report.exports import csv_rows, json_document, junit_document
 from verify.report.page import page_view
 from verify.report.picture import CasePictures
-from verify.report.pictures import case_pictures
 from verify.report.printing import print_page
-from verify.report.run_directory import CaseEntry, Run, load_run
+from verify.report.run_directory import Run, load_run
 from verify.report.template_sets import as_html, as_markdown
 from verify.whole_files import write_whole
 
@@ -24,11 +23,18 @@ _PUBLISHED = (
 _PAGE_BYTES = 14_500_000  # what a mail system or a code host still takes
 
 
-def render(directory: Path) -> Path:
+def render(directory: Path, drawings: Path | None = None) -> Path:
     """Write the report of the run in `directory`, finished or not, into it.
 
     Each file is replaced in one step. The same directory gives the same bytes again, pictures
     aside from what a renderer may change.
+
+    Parameters
+    ----------
+    directory : Path
+    drawings : Path, optional
+        Folder in which `verify.report.drawing` has left cases of this run. What is read there is
+        trusted: it is one that the caller has made for it.
 
     Returns
     -------
@@ -42,19 +48,27 @@ def render(directory: Path) -> Path:
     OSError
         If the files cannot be written.
     """
-    return _written(load_run(directory), directory)[0]
+    return _written(load_run(directory), directory, drawings)[0]
 
 
-def _written(run: Run, directory: Path) -> tuple[Path, dict[str, Any]]:
+def _written(
+    run: Run, directory: Path, drawings: Path | None = None
+) -> tuple[Path, dict[str, Any]]:
     """Write the page and the exports; return the page and what it shows."""
-    pictures = [_pictures(run.root, entry) for entry in run.entries]
+    palette, cases = run_palette(run.record), []
+    for index, entry in enumerate(run.entries):
+        made = drawn_before(drawings / f"{entry.folder.name}.pickle", palette) if drawings else None
+        cases.append(made or drawn_case(run.root, index, entry, palette))
+    pictures = [case.pictures for case in cases]
     notes: list[str] = []
-    view = page_view(run, pictures, notes)
+    view = page_view(run, [case.view for case in cases], palette, notes)
     text = as_html("report.j2", **view, turnable=_turnable(pictures))
     excess = len(text.encode("utf-8")) - _PAGE_BYTES
     if excess > 0:
         notes.append(_left_out(pictures, excess))
-        view = page_view(run, pictures, notes)
+        for case in cases:
+            show_pictures(case.view, case.pictures)
+        view = page_view(run, [case.view for case in cases], palette, notes)
         text = as_html("report.j2", **view, turnable=_turnable(pictures))
     write_whole(directory / "results.json", json_document(run))
     write_whole(directory / "results.csv", csv_rows(run))
@@ -66,17 +80,6 @@ def _written(run: Run, directory: Path) -> tuple[Path, dict[str, Any]]:
 
 def _turnable(pictures: list[CasePictures]) -> bool:
     return any(picture.turned for shown in pictures for picture in shown.all)
-
-
-def _pictures(root: Path, entry: CaseEntry) -> CasePictures:
-    """Prepare the pictures of a case; if that fails, nothing else of the report does."""
-    try:
-        pictures = case_pictures(root, entry)
-        for picture in pictures.all:
-            picture.image = draw(picture.body, picture.view)
-        return pictures
-    except Exception as error:
-        return CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
 
 
 def render_markdown(directory: Path) -> Path:
@@ -102,7 +105,9 @@ def render_summary(directory: Path) -> Path:
         As `render`.
     """
     run = load_run(directory)
-    view = page_view(run, [CasePictures() for _ in run.entries], [], short=True)
+    palette, none = run_palette(run.record), CasePictures()
+    cases = [case_view(i, entry, none, palette) for i, entry in enumerate(run.entries)]
+    view = page_view(run, cases, palette, [], short=True)
     view["origin"] = [fact for fact in view["origin"] if fact[0] in _PUBLISHED]
     target = directory / "summary.md"
     write_whole(target, as_markdown("report.j2", directory, **view))

@@ -16,7 +16,7 @@ from verify.ranking import Ranking
 from verify.result import CaseResult, SolveRecord
 from verify.result_files import checked, read_result
 
-__all__ = ["CaseEntry", "Run", "load_run"]
+__all__ = ["CaseEntry", "Run", "load_entry", "load_record", "load_run"]
 
 _RANKING = TypeAdapter(Ranking)
 
@@ -73,12 +73,12 @@ def load_run(directory: Path) -> Run:
     """
     if not directory.is_dir():
         raise InputError("no such directory; expected the directory of a run", str(directory))
-    record, defects = _run_record(directory / "run.json")
+    record, defects = load_record(directory)
     folder = directory / "cases"
     folders = sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
     if not record and not folders:
         raise InputError(f"holds no run ({defects[0]})", str(directory))
-    found = {entry.folder.name: entry for entry in map(_entry, folders)}
+    found = {entry.folder.name: entry for entry in map(load_entry, folders)}
     entries = []
     for name in record.get("cases", []):
         path = folder / _folder_name(name)
@@ -108,8 +108,9 @@ def _ranking(path: Path, cases: list[str]) -> tuple[dict[str, Any] | None, list[
     return found, []
 
 
-def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:
+def load_record(directory: Path) -> tuple[dict[str, Any], list[str]]:
     """Return the content of ``run.json`` in a form that can be relied on, and its defects."""
+    path = directory / "run.json"
     try:
         record = read_json(path)
     except InputError as error:
@@ -126,7 +127,8 @@ def _run_record(path: Path) -> tuple[dict[str, Any], list[str]]:
     return record, []
 
 
-def _entry(folder: Path) -> CaseEntry:
+def load_entry(folder: Path) -> CaseEntry:
+    """Read the case in `folder`; what is missing or damaged is a defect of the entry."""
     name = folder.name.replace("__", "/")
     try:
         result = read_result(folder / "result.json")

@@ -19,9 +19,9 @@ from verify.runner.outcome import death
 from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene
 
-__all__ = ["Comparison", "stored_result"]
+__all__ = ["LEAST_SECONDS", "Comparison", "stored_result"]
 
-_LEAST_SECONDS = 60.0
+LEAST_SECONDS = 60.0
 
 
 class Comparison:
@@ -62,7 +62,7 @@ class Comparison:
         memory: float,
     ) -> None:
         self.scene, self._folder, self._folders = scene, folder, list(folders)
-        self._timeout, self._memory = max(timeout, _LEAST_SECONDS), memory
+        self._timeout, self._memory = max(timeout, LEAST_SECONDS), memory
         self._unfit: dict[str, str] = {}
         self._question: dict[str, Any] = {
             "key": key,

@@ -16,9 +16,9 @@ from verify.provenance import provenance
 from verify.result import LOG, CaseResult, SolveRecord, Status
 from verify.result_files import write_result
 from verify.runner.checking import check_scene
-from verify.runner.child import POLL_SECONDS, Ending
+from verify.runner.child import POLL_SECONDS, Child, Ending
 from verify.runner.cluster import ClusterEngine
-from verify.runner.comparing import Comparison, stored_result
+from verify.runner.comparing import LEAST_SECONDS, Comparison, stored_result
 from verify.runner.deepening import further_level, levels_in_vain, take_up_known_levels
 from verify.runner.directory import RunDirectory, claimed, emptied, folder_name, write_run
 from verify.runner.engine import Engine, LocalEngine, Running
@@ -34,10 +34,10 @@ from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE, ReferenceCache
 from verify.scene import Scene, scene_content
 from verify.solvers.interface import is_built_in
-from verify.warm import warm_parent
+from verify.warm import DRAWING, prepare_fork, warm_parent
 from verify.whole_files import write_whole
 
-__all__ = ["Progress", "RunSummary", "run_cases"]
+__all__ = ["Progress", "RunSummary", "comparison_label", "run_cases"]
 
 
 class Progress(Protocol):
@@ -70,7 +70,12 @@ class RunSummary:
 
 
 def run_cases(
-    scenes: Sequence[Scene], out: Path, options: Options, progress: Progress, command: str = ""
+    scenes: Sequence[Scene],
+    out: Path,
+    options: Options,
+    progress: Progress,
+    command: str = "",
+    drawings: Path | None = None,
 ) -> RunSummary:
     """Solve, compare and judge `scenes` into the directory `out`; resume what is there.
 
@@ -84,6 +89,8 @@ def run_cases(
     progress : Progress
     command : str
         The command line, for the record.
+    drawings : Path, optional
+        Folder into which each case is drawn for the report as soon as it is judged.
 
     Raises
     ------
@@ -108,7 +115,7 @@ def run_cases(
     cluster = (
         ClusterEngine(options.cluster, options.timeout, options.memory) if options.cluster else None
     )
-    names = {name for scene in scenes for name in solvers_of(scene, options)}
+    names = list(dict.fromkeys(n for scene in scenes for n in solvers_of(scene, options)))
     if len(set(map(folder_name, names))) < len(names):
         said = f"{', '.join(sorted(names))}: two would have the same folder"
         raise InputError(f"{said}; expected other parameters", "--solver")
@@ -124,11 +131,13 @@ def run_cases(
                 "started": _now(),
                 "finished": None,
                 "options": options.record(),
+                "solvers": names,
                 "provenance": origin,
             }
             write_run(directory, record)
             plans = [plan_case(scene, options, survey, directory, bundle) for scene in scenes]
             work = _Work(plans, directory, options, origin, progress, bundle, cluster)
+            work.drawings = drawings
             results = work.until_done(stop)
             write_run(directory, {**record, "finished": _now()})
     return RunSummary(out, results, work.reused)
@@ -158,6 +167,9 @@ class _Work:
         self.to_judge = [name for name, count in self.open.items() if not count]
         self.running: dict[Running, Job] = {}
         self.comparing: list[Comparison] = []
+        self.drawings: Path | None = None
+        self.to_draw: list[str] = []
+        self.drawing: list[Child] = []
         self.results: dict[str, CaseResult] = {}
         self.families = Families((plan.scene for plan in plans), options.judge_only)
         self.records: dict[Path, bytes] = {}  # as they were written
@@ -175,7 +187,7 @@ class _Work:
         try:
             for plan in self.plans.values():
                 self._prepare(plan)
-            while self.waiting or self.to_judge or self.running or self.comparing:
+            while self._unfinished():
                 stop.check()
                 while self._has_room():
                     self._start()
@@ -187,25 +199,34 @@ class _Work:
                     if (result := comparison.poll()) is not None:
                         self.comparing.remove(comparison)
                         self._case_done(result)
+                # what could not be drawn is drawn, or said to be undrawable, by the report
+                self.drawing = [drawing for drawing in self.drawing if drawing.poll() is None]
                 sleep(POLL_SECONDS)
         finally:
             for solve in self.running:
                 solve.kill()
             for comparison in self.comparing:
                 comparison.kill()
+            for drawing in self.drawing:
+                drawing.kill()
             self.engine.close()
         return [self.results[name] for name in self.plans]
 
+    def _unfinished(self) -> bool:
+        todo = (self.waiting, self.to_judge, self.to_draw)
+        return any((*todo, self.running, self.comparing, self.drawing))
+
     def _has_room(self) -> bool:
-        """Whether something can be started: comparisons run here, solves where the engine is."""
-        if self._can_compare():
+        """Whether something can be started: solves run where the engine is, all else here."""
+        if self._has_room_here():
             return True
-        beside = 0 if self.options.cluster else len(self.comparing)
+        beside = 0 if self.options.cluster else len(self.comparing) + len(self.drawing)
         return bool(self.waiting) and len(self.running) + beside < self.engine.width
 
-    def _can_compare(self) -> bool:
-        here = len(self.comparing) + (0 if self.options.cluster else len(self.running))
-        return bool(self.to_judge) and here < self.options.jobs
+    def _has_room_here(self) -> bool:
+        here = len(self.comparing) + len(self.drawing)
+        here += 0 if self.options.cluster else len(self.running)
+        return bool(self.to_judge or self.to_draw) and here < self.options.jobs
 
     def _prepare(self, plan: CasePlan) -> None:
         folder = self.directory.case_folder(plan.scene.name)
@@ -216,8 +237,11 @@ class _Work:
             self.progress.solved(job.label, record, reused=False)
 
     def _start(self) -> None:
-        if self._can_compare():
-            self._judge(self.to_judge.pop(0))
+        if self._has_room_here():
+            if self.to_judge:
+                self._judge(self.to_judge.pop(0))
+            else:
+                self._draw(self.to_draw.pop(0))
             return
         job = self.waiting.pop(0)
         if (record := stored_record(job)) is not None:
@@ -348,6 +372,8 @@ class _Work:
         if (result := stored_result(folder, key)) is not None:
             self._case_done(result)
             return
+        if self.drawings is not None:
+            prepare_fork(DRAWING)
         comparison = Comparison(
             plan.scene,
             key,
@@ -364,7 +390,7 @@ class _Work:
             self.memory,
         )
         self.comparing.append(comparison)
-        self.progress.started(f"{case} · comparison")
+        self.progress.started(comparison_label(case))
 
     def _case_done(self, result: CaseResult) -> None:
         if (job := further_level(self.plans[result.case], result)) is not None:
@@ -377,6 +403,29 @@ class _Work:
                 write_result(done, folder / "result.json")
             self.results[done.case] = done
             self.progress.judged(done)
+            if self.drawings is not None:
+                self.to_draw.append(done.case)
+
+    def _draw(self, case: str) -> None:
+        assert self.drawings is not None
+        folder = self.directory.case_folder(case)
+        question = {
+            "root": str(self.directory.root.resolve()),
+            "index": list(self.plans).index(case),
+            "folder": str(folder.relative_to(self.directory.root)),
+            "target": str(self.drawings / f"{folder.name}.pickle"),
+        }
+        file = self.drawings / f"{folder.name}.json"
+        write_json(question, file)
+        limit = max(self.options.timeout, LEAST_SECONDS)
+        log = file.with_suffix(".txt")
+        drawing = Child(DRAWING, file, log, limit, self.memory, own=True)
+        self.drawing.append(drawing)
+
+
+def comparison_label(case: str) -> str:
+    """Return what `Progress` is told of the comparison of a case."""
+    return f"{case} · comparison"
 
 
 def _now() -> str:

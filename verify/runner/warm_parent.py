@@ -1,4 +1,4 @@
-"""The process from which others are forked: ``python -m verify.runner.warm_parent SOCKET``.
+"""A process from which others are forked: ``python -m verify.runner.warm_parent SOCKET KIND``.
 
 A fresh Python takes longer to import what solving and judging need than many a solve takes. What is
 forked here begins as a fresh one would, with an environment, a working directory and a log of its
@@ -21,14 +21,14 @@ import select
 import signal
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
 from verify.runner.child import descendants
 from verify.runner.childhood import die_with_parent
-from verify.warm import LONGEST_REQUEST, PARENT_VARIABLE
+from verify.warm import DRAWING, LONGEST_REQUEST, PARENT_VARIABLE
 
 __all__ = ["main"]
 
@@ -41,16 +41,17 @@ _NEEDED = {
     "verify.runner.assess": ("verify.runner.assess",),
 }  # fmt: skip
 _LATER = ("verify.solvers.methods_adapter",)
+_DRAWING = (DRAWING, "meshio")
 _IF_THERE = ("ufl", "basix.ufl", "ffcx.main", "reference.elasticity")
 _PR_SET_CHILD_SUBREAPER = 36
 
 
-def main(descriptor: int) -> None:
+def main(descriptor: int, kind: str) -> None:
     """Fork a process for every request until the runner hangs up; returns in the forked ones."""
     die_with_parent()
     gc.disable()  # imports make objects that live on
     signal.signal(signal.SIGCHLD, lambda *_: _reap())  # waited for, their times are counted
-    preparations = _preparations()
+    preparations = _loading(_DRAWING) if kind == "drawing" else _preparations()
     with socket.socket(fileno=descriptor) as runner:
         while True:
             while not select.select([runner], [], [], 0.0)[0] and next(preparations, False):
@@ -58,7 +59,7 @@ def main(descriptor: int) -> None:
             said, files, _, _ = socket.recv_fds(runner, LONGEST_REQUEST, 2)
             if not said:
                 os._exit(0)
-            _import_for(json.loads(said)["module"])
+            _import_for(json.loads(said)["module"], kind)
             if len(os.listdir("/proc/self/task")) > 1:
                 os._exit(1)  # a fork would lack that thread, and keep the locks that it holds
             gc.freeze()  # what all share is not touched by their collections
@@ -75,8 +76,11 @@ def main(descriptor: int) -> None:
     _leave()
 
 
-def _import_for(module: str) -> None:
+def _import_for(module: str, kind: str) -> None:
     """Import what those need that run `module`: all, if it is none of those that are known."""
+    if kind == "drawing":
+        import_module(module)
+        return
     for asked, names in _NEEDED.items():
         for name in names:
             import_module(name)
@@ -84,17 +88,20 @@ def _import_for(module: str) -> None:
             return
 
 
-def _preparations() -> Iterator[bool]:
-    """Import and load one thing after another, in the order in which they may be needed."""
-    for name in [name for names in _NEEDED.values() for name in names]:
-        import_module(name)
-        yield True
-    kernels = _kernels()
-    yield from itertools.islice(kernels, 2)
-    for name in (*_LATER, *_IF_THERE):
+def _loading(names: Iterable[str]) -> Iterator[bool]:
+    """Import one module after another, as far as they are there."""
+    for name in names:
         with contextlib.suppress(ImportError):
             import_module(name)
         yield True
+
+
+def _preparations() -> Iterator[bool]:
+    """Import and load one thing after another, in the order in which they may be needed."""
+    yield from _loading([name for names in _NEEDED.values() for name in names])
+    kernels = _kernels()
+    yield from itertools.islice(kernels, 2)
+    yield from _loading((*_LATER, *_IF_THERE))
     yield from kernels
 
 
@@ -194,4 +201,4 @@ def _leave() -> NoReturn:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), sys.argv[2])

@@ -3,7 +3,7 @@
 import io
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from textwrap import wrap
@@ -63,6 +63,14 @@ _OTHERS = (
 
 class Palette(dict[str, Style]):
     """Styles by label: the same in every figure of a page, distinct for the first twelve others."""
+
+    @classmethod
+    def of(cls, labels: Iterable[str]) -> "Palette":
+        """Return a palette in which `labels` have their styles already, in this order."""
+        palette = cls()
+        for label in labels:
+            palette[label]
+        return palette
 
     def __missing__(self, label: str) -> Style:
         known = _KNOWN.get(label)

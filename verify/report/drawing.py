@@ -1,0 +1,76 @@
+"""Cases drawn, here or beside solves: ``python -m verify.report.drawing QUESTION.json``.
+
+The question names a run directory, the folder of a case in it, and the file to write. What is
+written is read back by the process that asked for it, and by nobody else.
+"""
+
+import pickle
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from verify.json_files import read_json
+from verify.printable import words_of
+from verify.report.case_view import CaseView, case_view
+from verify.report.drawn_bodies import draw
+from verify.report.figures.style import Palette, Style
+from verify.report.notation import solver_title
+from verify.report.picture import CasePictures
+from verify.report.pictures import case_pictures
+from verify.report.run_directory import CaseEntry, load_entry, load_record
+from verify.whole_files import write_whole
+
+__all__ = ["Drawn", "drawn_before", "drawn_case", "main", "run_palette"]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A case as the page shows it, its pictures, and the styles that its figures give labels."""
+
+    view: CaseView
+    pictures: CasePictures
+    styles: dict[str, Style]
+
+
+def main(question: Path) -> None:
+    """Draw the case that the file `question` names."""
+    asked = read_json(question)
+    root = Path(asked["root"])
+    palette = run_palette(load_record(root)[0])
+    drawn = drawn_case(root, asked["index"], load_entry(root / asked["folder"]), palette)
+    write_whole(Path(asked["target"]), pickle.dumps(drawn))
+
+
+def run_palette(record: Mapping[str, Any]) -> Palette:
+    """Return the styles of the solvers of a run, whichever of its cases is drawn first."""
+    named = record.get("solvers")
+    names = [name for name in named if isinstance(name, str)] if isinstance(named, list) else []
+    return Palette.of(solver_title(name) for name in names)
+
+
+def drawn_case(root: Path, index: int, entry: CaseEntry, palette: Palette) -> Drawn:
+    """Draw case number `index` of a run; if its pictures fail, nothing else of it does."""
+    try:
+        pictures = case_pictures(root, entry)
+        for picture in pictures.all:
+            picture.image = draw(picture.body, picture.view)
+    except Exception as error:
+        pictures = CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
+    view = case_view(index, entry, pictures, palette)
+    return Drawn(view, pictures, dict(palette))
+
+
+def drawn_before(file: Path, palette: Palette) -> Drawn | None:
+    """Return what `main` wrote into `file`, if the figures would have the same styles now."""
+    try:
+        drawn: Drawn = pickle.loads(file.read_bytes())  # our own, in a folder of this process
+    except (OSError, EOFError, pickle.UnpicklingError):
+        return None
+    same = all(palette[label] == style for label, style in drawn.styles.items())
+    return drawn if same else None
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
