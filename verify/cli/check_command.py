@@ -12,6 +12,7 @@ from verify.printable import one_line
 from verify.runner.checking import check_scene
 from verify.runner.cost import LevelCost
 from verify.runner.options import Options
+from verify.runner.reference_cache import cache_folder
 from verify.scene import load_scenes
 
 __all__ = ["execute"]
@@ -31,6 +32,8 @@ def execute(arguments: argparse.Namespace) -> int:
                 print(f"{row['file']}: ok ({row['title']})")
                 for line in case_lines([LevelCost(**one) for one in row["cost"]]):
                     print(f"  {line}")
+    if not arguments.json and not cache_folder().exists():  # nothing was ever run here
+        print("which suite first: `verify run -k demo` (a minute) shows that all works here")
     return 2 if any(row["error"] for row in rows) else 0
 
 

@@ -9,7 +9,7 @@ from verify.runner.options import Options
 from verify.runner.plan import solvers_of
 from verify.scene import Scene
 
-__all__ = ["case_lines", "costs_of", "duration_text", "run_line"]
+__all__ = ["case_lines", "costs_of", "duration_text", "run_line", "suites_line"]
 
 _START = 0.8  # s: half of what a run takes before and after its cases; comparing a small case
 
@@ -48,6 +48,17 @@ def run_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> s
         f"expected (rough): {duration_text(2 * _START + spent / jobs)}{at}; at most about "
         f"{_unknowns(largest)} unknowns and {memory} a process"
     )
+
+
+def suites_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> str:
+    """Say which suite comes first, with the cases and the rough time of each."""
+    said = []
+    for option, tag in (("-k demo", "demo"), ("--quick", "quick")):
+        suite = [rows for scene, rows in costs if tag in scene.tags]
+        if suite:
+            spent = _START * (2 + len(suite) / jobs) + sum(map(_seconds, suite)) / jobs
+            said.append(f"`verify run {option}` ({len(suite)} cases, {duration_text(spent)})")
+    return f"which suite first: {', then '.join(said)}; rough" if said else ""
 
 
 def duration_text(seconds: float) -> str:

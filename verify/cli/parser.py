@@ -33,7 +33,7 @@ exit codes:
   2  bad input or usage; nothing was run, nothing was written
   3  a solve failed, timed out, ran out of memory, or could not be stored
   4  nothing ran: no case matches, or every solver refused
-  5  with --strict: something is UNDECIDED, refused, or without any verdict
+  5  with --strict: something is UNDECIDED, refused, warned of, or without any verdict
   128+n  stopped by signal n (130: Ctrl-C); what is finished stays"""
 
 _MAIN = f"""\
@@ -54,6 +54,9 @@ examples:
   verify run my_case.toml --out mine --solver xfem --timeout 60
   verify run -k "demo and not tissue" --out out -j 2
   verify run "statics/*" --quick --out out --strict --json > verdicts.json
+
+Which suite first: -k demo (a minute) shows that all works here; then --quick (minutes); without a
+selection all cases run that are not tagged heavy.
 
 A run that was stopped is resumed by the same command: finished solves are reused if their
 scene, their solver's parameters and the code are the same. Each solve runs in a process of its

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from verify.cli.cost_text import costs_of, run_line
+from verify.cli.cost_text import costs_of, run_line, suites_line
 from verify.cli.progress import progress_on
 from verify.cli.run_ranking import rank_run
 from verify.cli.solver_parameters import of_solvers
@@ -50,7 +50,10 @@ def execute(arguments: argparse.Namespace) -> int:
     beside = not arguments.no_report and options.jobs > 1 and len(scenes) > 1
     if not arguments.no_report:
         threading.Thread(target=_load_report).start()  # while processes solve
-    expected = run_line([(s, costs_of(s, options)) for s in scenes], options.jobs)
+    costs = [(scene, costs_of(scene, options)) for scene in scenes]
+    expected = run_line(costs, options.jobs)
+    if not (arguments.cases or arguments.expression or arguments.quick):
+        expected = f"{suites_line(costs, options.jobs)}\n{expected}"
     command = shlex.join(["verify", *sys.argv[1:]])
     with progress_on(sys.stderr, expected) as progress, _drawings(beside) as drawings:
 
@@ -129,7 +132,7 @@ def _drawings(beside: bool) -> Iterator[Path | None]:
 
 def _load_report() -> None:
     with contextlib.suppress(Exception):  # it is said when the report is to be written
-        import_module("verify.report")
+        import_module("verify.report").load()
 
 
 def _rendered(directory: Path, drawings: Path | None) -> str:

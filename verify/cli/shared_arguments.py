@@ -59,7 +59,8 @@ def add_json(command: argparse.ArgumentParser, text: str = "print JSON") -> None
 
 
 def add_strict(
-    command: argparse.ArgumentParser, text: str = "undecided verdicts and refusals: exit code 5"
+    command: argparse.ArgumentParser,
+    text: str = "undecided verdicts, refusals, warnings: exit code 5",
 ) -> None:
     """Add the exit code for what is undecided."""
     command.add_argument("--strict", action="store_true", help=text)

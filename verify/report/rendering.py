@@ -1,7 +1,10 @@
 """Renders a run directory: ``report.html``, ``results.json``, ``results.csv``, ``junit.xml``."""
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+from PIL import Image
 
 from verify.report.case_view import case_view, show_pictures
 from verify.report.drawing import drawn_before, drawn_case, run_palette
@@ -10,10 +13,10 @@ from verify.report.page import page_view
 from verify.report.picture import CasePictures
 from verify.report.printing import print_page
 from verify.report.run_directory import Run, load_run
-from verify.report.template_sets import as_html, as_markdown
+from verify.report.template_sets import as_html, as_markdown, load_templates
 from verify.whole_files import write_whole
 
-__all__ = ["render", "render_markdown", "render_pdf", "render_summary"]
+__all__ = ["load", "render", "render_markdown", "render_pdf", "render_summary"]
 
 # of the provenance, what says something to a reader elsewhere
 _PUBLISHED = (
@@ -21,6 +24,13 @@ _PUBLISHED = (
     "versions",
 )  # fmt: skip
 _PAGE_BYTES = 14_500_000  # what a mail system or a code host still takes
+
+
+def load() -> None:
+    """Load what `render` needs only when it begins: templates, readers and writers of files."""
+    import_module("meshio")
+    Image.init()
+    load_templates("html", "report.j2")
 
 
 def render(directory: Path, drawings: Path | None = None) -> Path:

@@ -28,7 +28,7 @@ from verify.report.notation import (
 )
 from verify.whole_files import write_whole
 
-__all__ = ["PICTURES", "Beside", "as_html", "as_markdown", "in_markdown"]
+__all__ = ["PICTURES", "Beside", "as_html", "as_markdown", "in_markdown", "load_templates"]
 
 PICTURES = "report-pictures"
 _SPECIAL = re.compile(r"([\\`*\[\]|])")
@@ -60,6 +60,12 @@ def as_markdown(template: str, folder: Path, pictures: str = PICTURES, **view: A
     target.mkdir(parents=True)
     text = _environment("markdown").get_template(template).render(assets=Beside(target), **view)
     return re.sub(r"[ \t]+\n", "\n", re.sub(r"\n\s*\n", "\n\n", text)).strip() + "\n"
+
+
+def load_templates(kind: str, template: str) -> None:
+    """Compile a page with all that it stands on, so that the first use finds them."""
+    for name in (template, "page.j2", "blocks.j2"):
+        _environment(kind).get_template(name)
 
 
 def in_markdown(text: str) -> str:

@@ -27,6 +27,7 @@ from verify.runner.fingerprint import code_of_comparison, code_of_solver, digest
 from verify.runner.interruption import StopRequest, listening
 from verify.runner.job import Job, load_record, store_record, stored_record
 from verify.runner.options import Options
+from verify.runner.order import order_of_solves
 from verify.runner.outcome import death, outcome_in
 from verify.runner.plan import CasePlan, check_judged, plan_case, solvers_of, survey_solvers
 from verify.runner.ranks import mpiexec
@@ -162,7 +163,7 @@ class _Work:
         self.plans = {plan.scene.name: plan for plan in plans}
         for plan in plans:
             take_up_known_levels(plan)
-        self.waiting: list[Job] = [job for plan in plans for job in (*plan.jobs, *plan.models)]
+        self.waiting = order_of_solves(plans, options)
         self.open = {n: len(plan.jobs) + len(plan.models) for n, plan in self.plans.items()}
         self.to_judge = [name for name, count in self.open.items() if not count]
         self.running: dict[Running, Job] = {}

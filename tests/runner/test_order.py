@@ -1,0 +1,33 @@
+"""Order in which the solves of a run are begun."""
+
+from pathlib import Path
+
+from verify.runner.job import Job
+from verify.runner.options import Options
+from verify.runner.order import order_of_solves
+from verify.runner.plan import CasePlan
+from verify.scene import load_scene
+
+SOLVERS = ["xfem", "reference"]
+
+
+def planned(name):
+    jobs = [Job(name, s, k, 1, "", Path()) for s in SOLVERS for k in range(2)]
+    other = Job(name, "reference", 0, 1, "", Path(), model="kinematics")
+    return CasePlan(load_scene(name), SOLVERS, jobs, models=[other])
+
+
+PLANS = [planned("statics/f1_patch"), planned("rotation/tissue_strip")]
+
+
+def test_side_by_side_the_longest_case_is_first_and_its_reference_before_all():
+    order = order_of_solves(PLANS, Options(jobs=2))
+    assert [job.case for job in order] == ["rotation/tissue_strip"] * 5 + ["statics/f1_patch"] * 5
+    levels = [(job.solver, job.model, job.level) for job in order[:5]]
+    reference = [("reference", "", 0), ("reference", "", 1), ("reference", "kinematics", 0)]
+    assert levels == [*reference, ("xfem", "", 0), ("xfem", "", 1)]
+
+
+def test_one_after_the_other_they_keep_the_order_of_the_run():
+    order = order_of_solves(PLANS, Options(jobs=1))
+    assert order == [job for plan in PLANS for job in (*plan.jobs, *plan.models)]
