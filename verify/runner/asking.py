@@ -15,7 +15,7 @@ from verify.json_files import read_json, write_json
 from verify.result import Status
 from verify.runner.child import Child, Ending
 from verify.runner.childhood import ANSWER, ASKING
-from verify.runner.log import telling_line, telling_place
+from verify.runner.log import telling_line
 from verify.scene import Scene, scene_content
 from verify.solvers.interface import is_built_in
 
@@ -96,9 +96,8 @@ class Asking:
 
     def _without_answer(self, number: int | None, ending: Ending) -> dict[str, Any] | None:
         if number is None:
-            said, place = telling_line(self._child.log), telling_place(self._child.log)
-            at = f"{place}: " if place else ""
-            return {"error": f"{at}solver '{self.name}' could not be loaded: {said}"}
+            said = telling_line(self._child.log)
+            return {"error": f"could not be loaded: {said}"}
         status, how = Status.FAILED, f"died when asked about the case: {self._said(ending)}"
         if ending.killed_for == "timeout":
             how = f"killed after {self._timeout:g} s without saying whether it takes the case"
