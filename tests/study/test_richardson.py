@@ -99,3 +99,5 @@ def test_the_uncertainty_of_a_field_bounds_its_error_whatever_its_order(order):
     error = sizes**order
     found = field_uncertainty(list(error[:-1] - error[1:]), list(sizes), theoretical=2)
     assert error[-1] <= found.half_width * (1 + 1e-9) <= 4 * error[-1]
+    if order == 2.0:  # as counted on: the error itself, times the safety factor
+        assert found.half_width == pytest.approx(1.25 * error[-1])
