@@ -217,6 +217,11 @@ def test_an_explicit_scheme_takes_no_more_than_its_share_of_the_critical_step(tm
     # five intervals between outputs, each in equal steps that do not exceed the largest
     assert free.iterations["steps"] == 5 * 6
     assert half.iterations["steps"] == 5 * 11
+    # so Δ/4.95 ≤ h < Δ/4.5 of the interval Δ, and damping of β = Δ/4.95 leaves h (1 + ξ²)^½ − h ξ
+    # with ξ = β/h from 0.91 to 1: 11.3 to 13.3 steps of 0.9 of it
+    damped = ("time_step = 0.01\n", "damping = [0.0, 0.0202]\n")
+    slow = solve(tmp_path, SQUARE + HELD + WEIGHT, damped, scheme="central_differences")
+    assert 12 <= slow.iterations["steps"] / 5 <= 14
 
 
 @pytest.mark.parametrize("height", [0.99, 0.95, 0.876])
