@@ -120,23 +120,7 @@ class CentralDifferences(_Explicit):
         )
 
 
-class _Euler(_Explicit):
-    def step(self, state: MotionState) -> StepForces:
-        """Advance by one step."""
-        check_state(state, self.body.shape)
-        h = self.step_size
-        acceleration, forces = self._acceleration(state.displacement, state.velocity, state.time)
-        velocity = state.velocity + h * acceleration
-        moving = self._moving(state.velocity, velocity)
-        self._finish(state, state.displacement + h * moving, velocity, state.time + h)
-        return forces
-
-    def _moving(self, before: _Floats, after: _Floats) -> _Floats:
-        """Velocity (N, d) with which the displacement goes on."""
-        raise NotImplementedError
-
-
-class SymplecticEuler(_Euler):
+class SymplecticEuler(_Explicit):
     """New velocity first, then the displacement with it: stable up to the critical step.
 
     Parameters
@@ -146,19 +130,23 @@ class SymplecticEuler(_Euler):
         In seconds.
     """
 
-    def _moving(self, before: _Floats, after: _Floats) -> _Floats:
-        return after
+    _moves_with_new_velocity = True
+
+    def step(self, state: MotionState) -> StepForces:
+        """Advance by one step."""
+        check_state(state, self.body.shape)
+        h = self.step_size
+        acceleration, forces = self._acceleration(state.displacement, state.velocity, state.time)
+        velocity = state.velocity + h * acceleration
+        moving = velocity if self._moves_with_new_velocity else state.velocity
+        self._finish(state, state.displacement + h * moving, velocity, state.time + h)
+        return forces
 
 
-class ForwardEuler(_Euler):
+class ForwardEuler(SymplecticEuler):
     """(2.43–44) as printed: unstable at every step without damping; a negative control.
 
-    Parameters
-    ----------
-    body : DynamicBody
-    step_size : float
-        In seconds.
+    Parameters are those of `SymplecticEuler`, with whose velocity before the step it moves.
     """
 
-    def _moving(self, before: _Floats, after: _Floats) -> _Floats:
-        return before
+    _moves_with_new_velocity = False

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
+from verify.xfem.faceted_cuts import Polyline
 from verify.xfem.given_arrays import finite_array, places
 
 __all__ = ["Cut", "ImplicitCut", "Plane", "PolygonPatch"]
@@ -124,6 +125,8 @@ class PolygonPatch:
 
     corners: _Floats
     plane: Plane
+    _axes: _Floats
+    _outline: Polyline
 
     def __init__(self, corners: ArrayLike) -> None:
         polygon = finite_array(corners, "polygon with corners", (None, 3))
@@ -147,6 +150,8 @@ class PolygonPatch:
             raise XfemError(f"polygon is not flat: a corner is {off:.3g} m off its plane")
         object.__setattr__(self, "corners", polygon)
         object.__setattr__(self, "plane", plane)
+        object.__setattr__(self, "_axes", np.stack(_tangents(plane.normal), axis=1))
+        object.__setattr__(self, "_outline", Polyline(self._in_plane(polygon), closed=True))
 
     def level_set(self, points: _Floats) -> _Floats:
         """Signed distance to the plane of the polygon."""
@@ -154,13 +159,10 @@ class PolygonPatch:
 
     def depth(self, points: _Floats) -> _Floats:
         """Distance to the outline in the plane, negative outside."""
-        first, second = _tangents(self.plane.normal)
-        axes = np.stack([first, second], axis=1)
-        at = places(points, 3, "polygon")
-        return _outline_depth((at - self.plane.point) @ axes, self._outline(axes))
+        return self._outline.level_set(self._in_plane(places(points, 3, "polygon")))
 
-    def _outline(self, axes: _Floats) -> _Floats:
-        return (self.corners - self.plane.point) @ axes
+    def _in_plane(self, points: _Floats) -> _Floats:
+        return (points - self.plane.point) @ self._axes
 
 
 def _tangents(normal: _Floats) -> tuple[_Floats, _Floats]:
@@ -168,18 +170,3 @@ def _tangents(normal: _Floats) -> tuple[_Floats, _Floats]:
     first = np.cross(normal, helper)
     first /= np.linalg.norm(first)
     return first, np.cross(normal, first)
-
-
-def _outline_depth(points: _Floats, outline: _Floats) -> _Floats:
-    """Signed distance to a closed polygon in the plane, positive inside."""
-    start, end = outline, np.roll(outline, -1, axis=0)
-    along = end - start
-    to_point = points[:, None, :] - start
-    share = np.clip((to_point * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
-    distance = np.linalg.norm(to_point - share[..., None] * along, axis=-1).min(axis=1)
-    # even-odd rule with half-open edges
-    crosses = (start[:, 1] <= points[:, None, 1]) != (end[:, 1] <= points[:, None, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = start[:, 0] + along[:, 0] * to_point[..., 1] / along[:, 1]
-    inside = (crosses & (points[:, None, 0] < at)).sum(axis=1) % 2 == 1
-    return np.where(inside, distance, -distance)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from verify.xfem.phantom import PhantomMesh
 
@@ -35,14 +36,9 @@ class RigidMotions:
         self._points = phantom.node_points
         whole = fixed.all(axis=1)
         bodies = phantom.bodies
-        held = np.flatnonzero(whole)
-        count = np.bincount(bodies[held], minlength=int(bodies.max(initial=-1)) + 1)
-        ends = np.cumsum(count)
-        order = held[np.argsort(bodies[held], kind="stable")]
-        self._held = [order[end - n : end] for end, n in zip(ends, count, strict=True)]
-        inside = np.argsort(bodies, kind="stable")
-        size = np.bincount(bodies)
-        self._nodes = [inside[end - n : end] for end, n in zip(np.cumsum(size), size, strict=True)]
+        ends = np.cumsum(np.bincount(bodies))[:-1]
+        self._nodes = np.split(np.argsort(bodies, kind="stable"), ends)
+        self._held = [nodes[whole[nodes]] for nodes in self._nodes]
         # corners that follow others have number −1: not held
         self._edges = _edges_within(phantom.corner_node[phantom.cells], np.append(whole, False))
 
@@ -139,18 +135,10 @@ def nearest_rotation(before: _Floats, after: _Floats) -> _Floats:
 def part_of_rotation(turn: _Floats, share: float) -> _Floats:
     """Rotation (d, d) about the same axis by a share of the angle, which is at most half a turn."""
     d = len(turn)
-    if d == 2:
-        angle, axis = np.arctan2(turn[1, 0], turn[0, 0]), np.array([[0.0, -1.0], [1.0, 0.0]])
-    else:
-        skew = 0.5 * np.array(
-            [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-        )
-        x, y, z = np.linalg.svd(turn - np.eye(3))[2][2]  # what the rotation leaves where it is
-        along = float(skew @ (x, y, z))
-        angle = np.arctan2(along, 0.5 * (np.trace(turn) - 1.0))
-        axis = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = share * angle
-    rotation: _Floats = np.eye(d) + np.sin(angle) * axis + (1.0 - np.cos(angle)) * axis @ axis
+    in_space = np.eye(3)
+    in_space[:d, :d] = turn
+    part = Rotation.from_rotvec(share * Rotation.from_matrix(in_space).as_rotvec())
+    rotation: _Floats = part.as_matrix()[:d, :d]
     return rotation
 
 
