@@ -9,7 +9,7 @@ reading:
 `zero_points`, `clip`, `crossing`, `junctions`, `pieces`, `tips`
     exact division of cells at zero points of level sets; parts of the cells that cuts go through;
     nodes at ends of cuts
-`join`, `sides`, `phantom`
+`join`, `phantom`
     which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
     the result: standard finite elements with weights
 `mass`

@@ -20,11 +20,11 @@ from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_
 
 __all__ = [
     "FacetArrays",
+    "FacetCut",
     "Polyline",
     "TriangulatedSurface",
     "facet_arrays",
     "probe",
-    "probe_points",
 ]
 
 _Floats = NDArray[np.float64]
@@ -157,7 +157,7 @@ def probe(x, facets, room):
 
 
 @njit(cache=True)
-def probe_points(points, facets):
+def _probe_points(points, facets):
     """(n, 3): level set, depth (distance to the rim, negative past it), travel."""
     found = np.empty((len(points), 3))
     space = points.shape[1]
@@ -184,7 +184,7 @@ def probe_points(points, facets):
     return found
 
 
-class _FacetCut:
+class FacetCut:
     """A cut made of facets."""
 
     _name: ClassVar[str]
@@ -207,11 +207,11 @@ class _FacetCut:
 
     def _probe(self, points: _Floats) -> _Floats:
         at = places(points, self.arrays.corners.shape[2], self._name)
-        return probe_points(np.ascontiguousarray(at), self.arrays)
+        return _probe_points(np.ascontiguousarray(at), self.arrays)
 
 
 @dataclass(frozen=True)
-class Polyline(_FacetCut):
+class Polyline(FacetCut):
     """A polyline in the plane.
 
     The positive side is on the left when one walks along it. Past an open end the level set is
@@ -290,7 +290,7 @@ def _cross(a: _Floats, b: _Floats) -> _Floats:
 
 
 @dataclass(frozen=True)
-class TriangulatedSurface(_FacetCut):
+class TriangulatedSurface(FacetCut):
     """An oriented triangulated surface, open or closed.
 
     Parameters

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import finite_array
+from verify.xfem.given_arrays import finite_array, index_array
 
 __all__ = ["SimplexMesh", "equal_rows", "facets_of", "neighbours_across"]
 
@@ -48,10 +48,10 @@ class SimplexMesh:
         coordinates = np.ascontiguousarray(
             finite_array(points, "mesh points", (None, 2), (None, 3))
         )
-        nodes = np.ascontiguousarray(_rows(cells))
+        nodes = np.ascontiguousarray(index_array(cells, "cells"))
         _check(coordinates, nodes)
         object.__setattr__(self, "points", coordinates)
-        object.__setattr__(self, "cells", nodes.astype(np.int64))
+        object.__setattr__(self, "cells", nodes)
         longest = self.longest_edges(np.arange(len(nodes)))
         flat = self.measures <= _DEGENERATE * longest**self.dim
         if flat.any():
@@ -145,13 +145,6 @@ class SimplexMesh:
         return float(max(np.abs(self.points).max(), box.max()))
 
 
-def _rows(cells: ArrayLike) -> NDArray:
-    try:
-        return np.asarray(cells)
-    except ValueError:
-        raise XfemError("cells with different numbers of nodes; expected one kind") from None
-
-
 def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
     if cells.ndim != 2 or not 3 <= cells.shape[1] <= points.shape[1] + 1:
         raise XfemError(
@@ -160,8 +153,6 @@ def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
         )
     if len(cells) == 0:
         raise XfemError("a mesh without cells")
-    if not np.issubdtype(cells.dtype, np.integer):
-        raise XfemError(f"cells of type {cells.dtype}; expected integers")
     if cells.min() < 0 or cells.max() >= len(points):
         raise XfemError(f"a cell has a node outside 0..{len(points) - 1}")
     used = np.bincount(cells.ravel(), minlength=len(points)) > 0

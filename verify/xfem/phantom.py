@@ -17,10 +17,9 @@ from scipy.sparse.csgraph import connected_components
 from verify.xfem.clip import Partition
 from verify.xfem.crossing import TipRule
 from verify.xfem.flat_cuts import Cut
-from verify.xfem.join import PatchNodes, join_parts, number_nodes
+from verify.xfem.join import PatchNodes, join_parts, node_sides, number_nodes, piece_sides
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import split_cells
-from verify.xfem.sides import node_sides, piece_sides
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["Aggregation", "PhantomMesh", "SubCells", "cut_mesh"]

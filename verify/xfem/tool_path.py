@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
-from verify.xfem.faceted_cuts import FacetArrays, Polyline, facet_arrays, probe_points
+from verify.xfem.faceted_cuts import FacetArrays, FacetCut, Polyline, facet_arrays
 from verify.xfem.given_arrays import finite_array, places
 from verify.xfem.mesh import neighbours_across
 
@@ -140,7 +140,7 @@ class ToolPath:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(FacetCut):
     """The surface swept by a path, as a cut.
 
     The side of a point is told by the angle-weighted normal of the nearest face, edge or vertex;
@@ -149,14 +149,12 @@ class Sweep:
     """
 
     path: ToolPath
+    _name = "sweep"
 
-    def level_set(self, points: _Floats) -> _Floats:
-        """Signed distance (n,) to the sweep, to its tangent plane past the rim, in metres."""
-        return self._probe(points)[:, 0]
-
-    def depth(self, points: _Floats) -> _Floats:
-        """Distance (n,) to the rim, negative past it, in metres."""
-        return self._probe(points)[:, 1]
+    @cached_property
+    def arrays(self) -> FacetArrays:
+        """Its facets, as kernels take them."""
+        return self.path.surface.arrays
 
     def travel(self, points: _Floats) -> _Floats:
         """How far (n,) the blade has come when it passes a point of the sweep, in metres."""
@@ -167,11 +165,11 @@ class Sweep:
         return PartOfSweep(self, travel)
 
     def _probe(self, points: _Floats) -> _Floats:
-        points = places(points, self.path.blades.shape[2], "sweep")
-        if not self.path.sweeps:
-            # nothing is swept: one side everywhere, and no point of the cut anywhere
-            return np.tile([1.0, -np.inf, 0.0], (len(points), 1))
-        return probe_points(np.ascontiguousarray(points, dtype=float), self.path.surface.arrays)
+        if self.path.sweeps:
+            return super()._probe(points)
+        # nothing is swept: one side everywhere, and no point of the cut anywhere
+        count = len(places(points, self.path.blades.shape[2], self._name))
+        return np.tile([1.0, -np.inf, 0.0], (count, 1))
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.simulator.cutting.growing_body import GrowingBody
+from verify.xfem.join import node_sides, piece_sides
 from verify.xfem.phantom import PhantomMesh, SubCells
-from verify.xfem.sides import node_sides, piece_sides
 from verify.xfem.zero_points import ZeroPoints
 
 __all__ = ["whole_mesh"]
