@@ -2,9 +2,11 @@
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 
 from verify.cli.solver_parameters import of_one_solver
+from verify.cli.waiting import said_to_wait
 from verify.conformance import CheckResult, conform, exit_code_of
 from verify.solvers.named import one_name, parameters_of, solver_in
 
@@ -15,7 +17,8 @@ def execute(arguments: argparse.Namespace) -> int:
     """Run the suite on one solver and print a line per check."""
     name = one_name(arguments.solver)
     parameters = parameters_of(name, {solver_in(name): of_one_solver(arguments.parameters)})
-    results = conform(name, parameters, arguments.timeout, arguments.checks)
+    with said_to_wait(sys.stderr, f"conformance of {name}"):
+        results = conform(name, parameters, arguments.timeout, arguments.checks)
     code = exit_code_of(results)
     if arguments.json:
         checks = [asdict(result) for result in results]

@@ -1,7 +1,9 @@
 """``verify report``: render again, compute nothing."""
 
 import argparse
+import sys
 
+from verify.cli.waiting import said_to_wait
 from verify.errors import InputError
 
 __all__ = ["execute"]
@@ -16,7 +18,9 @@ def execute(arguments: argparse.Namespace) -> int:
     if (directory / "run.json").is_file():
         made = {"html": render, "markdown": render_markdown, "pdf": render_pdf,
                 "summary": render_summary}  # fmt: skip
-        print(f"report: {made[arguments.format](directory)}")
+        with said_to_wait(sys.stderr, f"the report of {directory}"):
+            page = made[arguments.format](directory)
+        print(f"report: {page}")
         return 0
     if not (kinds := studies_in(directory)):
         raise InputError("not a run (it has no run.json) nor that of a study", str(directory))
