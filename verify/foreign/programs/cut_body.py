@@ -7,10 +7,10 @@ one value for each group.
 """
 
 import numpy as np
-from exchange_files import RefusedError, factor_at, parts
-from split_cells import place, split_cells
+from exchange_files import RefusedError, factor_at, loose_parts, parts
+from split_cells import SplitMesh, place, split_cells
 
-__all__ = ["Cut", "CutBody", "forces", "prescribed"]
+__all__ = ["Cut", "CutBody", "divided", "forces", "held_at_rest", "prescribed", "uniform_weight"]
 
 
 class Cut:
@@ -208,6 +208,30 @@ class CutBody:
             ]
             pairs.append(np.column_stack(ends))
         return np.vstack(pairs)
+
+
+def divided(case, wholly=False):
+    """Return the cut body and the mesh of its answer."""
+    body = CutBody(case, wholly)
+    side = np.where(body.side == 0, 2, (body.side + 1) // 2)
+    return body, SplitMesh(case.points, case.cells, body.phi, body.cut, side, body.group)
+
+
+def held_at_rest(case, body, answer):
+    """Return what `prescribed` does; a part that nothing holds has no equilibrium."""
+    held, value = prescribed(case, body)
+    loose = loose_parts(answer.points, answer.cells, answer.held(held))
+    if len(loose):
+        raise RuntimeError(f"nothing holds the part around {loose[0]}")
+    return held, value
+
+
+def uniform_weight(case):
+    """Return the sum (d,) of the body forces."""
+    loads = [one for one in case.problem["loads"] if one["kind"] == "body_force"]
+    if any("uniform" not in one for one in loads):
+        raise RefusedError("body forces in formulas are not offered")
+    return sum((np.array(one["uniform"]) for one in loads), np.zeros(case.dimension))
 
 
 def prescribed(case, body, time=0.0):

@@ -7,11 +7,10 @@ values of each side; those where it ends have none, so that it ends at the facet
 
 import getfem as gf
 import numpy as np
-from cut_body import CutBody, forces, prescribed
-from exchange_files import RefusedError, loose_parts, run
+from cut_body import divided, forces, held_at_rest, uniform_weight
+from exchange_files import RefusedError, run
 from scipy.sparse import csr_matrix, diags, hstack
 from scipy.sparse.linalg import splu
-from split_cells import SplitMesh
 from tip_functions import RULES, SHARE, TipAreas
 from tip_mesh import TipMesh
 
@@ -102,27 +101,41 @@ def unknown_of_groups(case, body, answer, space, middle):
     return found
 
 
+def system(case, space, weight):
+    """Return stiffness and forces of a uniform force per volume, regular unknowns first."""
+    lame, shear = float(case.constant("lame")[0]), float(case.constant("shear")[0])
+    data = gf.MeshFem(space.mesh, 1)
+    data.set_classical_fem(0)
+    ones = np.ones(data.nbdof())
+    found = gf.asm_linear_elasticity(space.rule, space.vector, data, lame * ones, shear * ones)
+    load = gf.asm_volumic_source(space.rule, space.vector, data, np.outer(weight, ones))
+    found, load = matrix_of(found), np.asarray(load).ravel()
+    if not space.areas:
+        return found, load
+    fields = space.rule, space.vector, space.tips[1]
+    more, added = space.areas.stiffness(*fields, lame, shear), space.areas.load(*fields, weight)
+    found.resize(added.size, added.size)
+    return found + matrix_of(more), np.pad(load, (0, added.size - load.size)) + added
+
+
+def solution(stiffness, load, u, free):
+    """Return `u` with its free components (k,) in equilibrium."""
+    scale = 1.0 / np.sqrt(stiffness.diagonal()[free])  # of functions that are much alike
+    rest, found = load - stiffness @ u, u.copy()
+    inner = diags(scale) @ stiffness[free][:, free] @ diags(scale)
+    found[free] += scale * splu(inner.tocsc()).solve(scale * rest[free])
+    return found
+
+
 def solve(case):
     """Solve linear statics and write the answer."""
-    d, tip = case.dimension, case.parameters.get("tip", "cells")
-    if tip == "functions" and d == 3:
+    d, functions = case.dimension, case.parameters.get("tip") == "functions"
+    if functions and d == 3:
         raise RefusedError("tip = 'functions' is offered in the plane")
-    body = CutBody(case, wholly=True)
-    held, value = prescribed(case, body)
-    side = np.where(body.side == 0, 2, (body.side + 1) // 2)
-    answer = SplitMesh(case.points, case.cells, body.phi, body.cut, side, body.group)
-    loose = loose_parts(answer.points, answer.cells, answer.held(held))
-    if len(loose):
-        raise RuntimeError(f"nothing holds the part around {loose[0]}")
-    outer = forces(case, body)
-    weight = np.zeros(d)
-    for load in case.problem["loads"]:
-        if load["kind"] == "body_force":
-            if "uniform" not in load:
-                raise RefusedError("body forces in formulas are not offered")
-            weight += load["uniform"]
-
-    areas = TipAreas(case, body) if tip == "functions" else None
+    body, answer = divided(case, wholly=True)
+    held, value = held_at_rest(case, body, answer)
+    outer, weight = forces(case, body), uniform_weight(case)
+    areas = TipAreas(case, body) if functions else None
     if areas and not len(areas.tips):
         areas = None  # cuts that go through, or none
     space = case.timed("enrichment", lambda: Space(case, body, areas))
@@ -136,41 +149,15 @@ def solve(case):
             "two level sets do not give this cut and its ends: it turns too far, or leaves slivers "
             "whose unknowns are not told apart"
         )
-
-    lame, shear = float(case.constant("lame")[0]), float(case.constant("shear")[0])
-    data = gf.MeshFem(space.mesh, 1)
-    data.set_classical_fem(0)
-    ones = np.ones(data.nbdof())
-
-    def assembled():
-        found = gf.asm_linear_elasticity(space.rule, space.vector, data, lame * ones, shear * ones)
-        load = gf.asm_volumic_source(space.rule, space.vector, data, np.outer(weight, ones))
-        found, load = matrix_of(found), np.asarray(load).ravel()
-        if not areas:
-            return found, load
-        fields = space.rule, space.vector, space.tips[1]
-        more, added = areas.stiffness(*fields, lame, shear), areas.load(*fields, weight)
-        found.resize(added.size, added.size)
-        return found + matrix_of(more), np.pad(load, (0, added.size - load.size)) + added
-
-    stiffness, load = case.timed("assembly", assembled)
+    stiffness, load = case.timed("assembly", lambda: system(case, space, weight))
     there, size = unknown >= 0, stiffness.shape[0] // d
     load = load.reshape(size, d).copy()
     np.add.at(load, unknown[there], outer[there])
-    load = load.ravel()
     u, free = np.zeros((size, d)), np.ones((size, d), dtype=bool)
     free[unknown[there]] = ~held[there]
     u[unknown[there]] = np.where(held[there], value[there], 0.0)
-    free, u = free.ravel(), u.ravel()
-    scale = 1.0 / np.sqrt(stiffness.diagonal()[free])  # of functions that are much alike
-
-    def solved():
-        rest = load - stiffness @ u
-        found, inner = u.copy(), diags(scale) @ stiffness[free][:, free] @ diags(scale)
-        found[free] += scale * splu(inner.tocsc()).solve(scale * rest[free])
-        return found
-
-    u = case.timed("solve", solved)
+    known = u.ravel()
+    u = case.timed("solve", lambda: solution(stiffness, load.ravel(), known, free.ravel()))
     energy = 0.5 * u @ (stiffness @ u)
     facets = answer.facets(body.on_a_cut)
     notes = {"method": "XFEM, values of both sides", "getfem": gf.getfem_env("version")}

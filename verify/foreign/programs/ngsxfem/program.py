@@ -5,13 +5,11 @@ With ``space = xfe`` the unknowns are nodal values and those of ngsxfem's XFESpa
 """
 
 import ngsolve as ng
-import numpy as np
-from cut_body import CutBody, forces, prescribed
-from exchange_files import RefusedError, loose_parts, run
+from cut_body import divided, forces, held_at_rest, uniform_weight
+from exchange_files import RefusedError, run
 from forms import EnrichedForms, Forms, bits, mesh_of
 from motion import run_engine
 from newmark import Body, PartedCase
-from split_cells import SplitMesh
 
 
 def solve(case):
@@ -22,10 +20,8 @@ def solve(case):
     enriched = case.parameters.get("space") == "xfe"
     if enriched and ghost:
         raise RefusedError(f"space = 'xfe' with ghost = {ghost}; expected ghost = 0")
-    body = CutBody(case)
+    body, answer = divided(case)
     forms = (EnrichedForms if enriched else Forms)(case, body, mesh_of(case))
-    side = np.where(body.side == 0, 2, (body.side + 1) // 2)
-    answer = SplitMesh(case.points, case.cells, body.phi, body.cut, side, body.group)
     method = "XFEM" if enriched else "CutFEM"
     notes = {"method": method, "ghost": str(ghost), "ngsolve": ng.__version__}
     if case.content["analysis"]["kind"] == "static":
@@ -38,18 +34,10 @@ def solve(case):
 
 def solve_static(case, body, answer, forms, ghost, notes):
     """Solve linear statics and write the answer."""
-    d, (held, value) = case.dimension, prescribed(case, body)
-    loose = loose_parts(answer.points, answer.cells, answer.held(held))
-    if len(loose):
-        raise RuntimeError(f"nothing holds the part around {loose[0]}")
-    weight = np.zeros(d)
+    d, (held, value) = case.dimension, held_at_rest(case, body, answer)
     if any(one.get("history") for one in case.problem["held"] + case.problem["loads"]):
         raise RefusedError("statics with histories are not offered")
-    for one in case.problem["loads"]:
-        if one["kind"] == "body_force":
-            if "uniform" not in one:
-                raise RefusedError("body forces in formulas are not offered")
-            weight += one["uniform"]
+    weight = uniform_weight(case)
     outer, joined = forces(case, body), forms.joined(body.group, body.count)
     turned = joined.CreateTranspose()
 
