@@ -77,5 +77,12 @@ def test_a_solver_found_with_parameters_has_them_in_every_solve_and_system():
     assert found.solve.keywords == found.system.keywords == {
         "mass": "consistent", "tip": "partial",
     }  # fmt: skip
-    with pytest.raises(InputError, match="no parameter"):
-        find_solver("xfem order=2")
+    for asked in (
+        "xfem order=2",
+        "snapping qualty=0.3",
+        "mass_spring fit=fine",
+        "conforming degree=3",
+    ):
+        with pytest.raises(InputError, match=r"no parameter|expected one of"):
+            find_solver(asked)
+    assert find_solver("mass_spring cut=removal scheme=implicit_euler fit=van_gelder").name

@@ -1,6 +1,6 @@
 """Adapters of the FEniCSx side: conforming elements at equal h, and the reference itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -23,6 +23,7 @@ from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, ToolPathCut
 from verify.solution import Regularisation, Solution
 from verify.solvers.conforming_meshes import not_imprinted, peer_mesh, reference_mesh, structure
 from verify.solvers.conforming_motion import SCHEMES, Marching, move, natural_step
+from verify.solvers.interface import check_choices
 from verify.system import System
 
 __all__ = ["ConformingSolver", "ReferenceSolver"]
@@ -84,6 +85,9 @@ class ConformingSolver:
     """
 
     name = "conforming"
+    choices: Mapping[str, Collection[Any]] = {
+        "mesh": ("imprinted", "remeshed"), "degree": (1, 2), "scheme": SCHEMES,
+    }  # fmt: skip
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `reference` does not do yet."""
@@ -105,12 +109,8 @@ class ConformingSolver:
         delay: float = 0.0,
     ) -> Solution:
         """Solve `scene` on mesh `level`; see `verify.solvers.interface.Solver`."""
-        if mesh not in ("imprinted", "remeshed") or degree not in (1, 2):
-            raise InputError(
-                f"mesh '{mesh}', degree {degree}; expected imprinted or remeshed, 1 or 2"
-            )
-        if scheme not in SCHEMES:
-            raise InputError(f"scheme '{scheme}'; expected one of {', '.join(SCHEMES)}")
+        given = {"mesh": mesh, "degree": degree, "scheme": scheme}
+        check_choices(self.name, self.choices, given)
 
         def marching(_level: int, size: float) -> Marching:
             largest = scene.analysis.time_step or natural_step(scene, size)
@@ -118,13 +118,9 @@ class ConformingSolver:
 
         size = structure(scene, level).size
         return _solve(
-            scene,
-            lambda level: (peer_mesh(scene, level, mesh), size),
-            level,
-            degree,
-            repetitions,
+            scene, lambda level: (peer_mesh(scene, level, mesh), size), level, degree, repetitions,
             marching,
-        )
+        )  # fmt: skip
 
     def system(
         self,
@@ -175,15 +171,11 @@ class ReferenceSolver:
             step = scene.analysis.time_step or natural_step(scene, size * 2**level)
             return Marching(scheme, step / 2**level, _RADIUS, delay)
 
+        degree = scene.reference.degree
         return _solve(
-            scene,
-            lambda level: reference_mesh(scene, level),
-            level,
-            scene.reference.degree,
-            min(repetitions, 1),
-            marching,
-            wants_pressure(scene, scene.reference.degree),
-        )
+            scene, lambda level: reference_mesh(scene, level), level, degree, min(repetitions, 1),
+            marching, wants_pressure(scene, degree),
+        )  # fmt: skip
 
 
 def _solve(
@@ -242,22 +234,14 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
     """Solve a scene by its kinematics; with a pressure if that is wanted."""
     if scene.analysis.kinematics == "linear":
         linear = (solve_mixed if pressure else solve_linear)(scene, space, exact)
-        return _Answer(
-            space,
-            np.zeros(1),
-            linear.displacement[None],
-            None,
-            None,
-            {"strain": np.array([linear.strain_energy])},
-            linear.timings,
-            {"cg": linear.answer.iterations} if linear.answer.iterations else {},
-            {
-                "unknowns": MIXED if pressure else "displacement",
-                "linear solver": linear.answer.method,
-                "round-off": f"{linear.answer.round_off:.1e}",
-                "residual": f"{linear.answer.residual:.1e}",
-            },
-        )
+        notes = {
+            "unknowns": MIXED if pressure else "displacement",
+            "linear solver": linear.answer.method,
+            "round-off": f"{linear.answer.round_off:.1e}",
+            "residual": f"{linear.answer.residual:.1e}",
+        }
+        counts = {"cg": linear.answer.iterations} if linear.answer.iterations else {}
+        return _at_rest(space, linear, counts, notes)
     unknowns, _ = constrained_values(scene, space, exact)
     # in space large saddle points of a tangent have no solver but a factorisation
     pressure = pressure and scene.dimension == 2
@@ -270,24 +254,27 @@ def _equilibrium(scene: Scene, space: ConformingSpace, exact: Any, pressure: boo
             lambda v: load_form(scene, space, v, exact),
             "corotated_mixed" if pressure else "corotated",
         )
+    notes = {
+        "unknowns": MIXED if pressure else "displacement",
+        "linear solver": "PETSc SNES, MUMPS Cholesky",
+        "smallest det F": f"{finite.smallest_jacobian:.3g}",
+        "area inside out": f"{finite.inverted:.1e}",
+        "steps taken again": "; ".join(finite.refused_steps) or "none",
+        "stability": _stability(finite),
+    }
+    counts = {"newton": finite.iterations, "load steps": finite.steps}
+    return _at_rest(space, finite, counts, notes)
+
+
+def _at_rest(
+    space: ConformingSpace, found: Any, iterations: dict[str, int], notes: dict[str, str]
+) -> _Answer:
+    """Return the answer of an equilibrium that was `found`."""
+    ledger = {"strain": np.array([found.strain_energy])}
     return _Answer(
-        space,
-        np.zeros(1),
-        finite.displacement[None],
-        None,
-        None,
-        {"strain": np.array([finite.strain_energy])},
-        finite.timings,
-        {"newton": finite.iterations, "load steps": finite.steps},
-        {
-            "unknowns": MIXED if pressure else "displacement",
-            "linear solver": "PETSc SNES, MUMPS Cholesky",
-            "smallest det F": f"{finite.smallest_jacobian:.3g}",
-            "area inside out": f"{finite.inverted:.1e}",
-            "steps taken again": "; ".join(finite.refused_steps) or "none",
-            "stability": _stability(finite),
-        },
-    )
+        space, np.zeros(1), found.displacement[None], None, None, ledger, found.timings,
+        iterations, notes,
+    )  # fmt: skip
 
 
 def _stability(finite: LargeStrainSolve) -> str:

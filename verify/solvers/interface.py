@@ -207,19 +207,19 @@ def check_parameters(name: str, solver: Solver, given: Mapping[str, Any]) -> Non
     Values are checked of those that stand in its ``choices``, if it has such.
     """
     taken, listed = signature(solver.solve).parameters, getattr(solver, "parameters", None)
-    takes_any = any(one.kind is Parameter.VAR_KEYWORD for one in taken.values())
-    known = {*taken, *(listed or ())} - {"scene", "level", "repetitions"}
-    for word in given if listed is not None or not takes_any else ():
+    named = {name for name, one in taken.items() if one.kind is not Parameter.VAR_KEYWORD}
+    known = {*named, *(listed or ())} - {"scene", "level", "repetitions"}
+    for word in given if listed is not None or len(named) == len(taken) else ():
         if word not in known:
             raise InputError(f"{name} has no parameter '{word}'{nearest(word, known)}")
     check_choices(name, getattr(solver, "choices", {}), given)
 
 
 def check_choices(
-    name: str, choices: Mapping[str, Collection[str]], given: Mapping[str, Any]
+    name: str, choices: Mapping[str, Collection[Any]], given: Mapping[str, Any]
 ) -> None:
     """Raise `InputError` for the first `given` parameter that is none of its `choices`."""
     for word, known in choices.items():
         if word in given and given[word] not in tuple(known):
-            expected = f"expected one of {', '.join(known)}"
+            expected = f"expected one of {', '.join(map(str, known))}"
             raise InputError(f"{name}.{word} = '{given[word]}'; {expected}")

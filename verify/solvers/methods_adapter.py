@@ -209,10 +209,8 @@ class MethodSolver:
         parameters: dict[str, Any],
     ) -> _Answer:
         """Cut, load, solve."""
-        body, exact = (
-            METHODS[self._method](mesh, cuts_of(scene, size), **parameters),
-            exact_of(scene),
-        )
+        exact = exact_of(scene)
+        body = METHODS[self._method](mesh, cuts_of(scene, size), **parameters)
         start = perf_counter()
         supports = supports_of(scene, body.phantom, exact)
         load = loads_of(scene, body.phantom, exact)
@@ -271,18 +269,15 @@ class MassSpringSolver(MethodSolver):
 
     @property
     def parameters(self) -> Collection[str]:
-        """Names of those of all methods, of which one cuts."""
-        return {name for method in METHODS for name in _parameters_of(method)}
+        """Names of those of `MethodSolver` and of all methods, of which one cuts."""
+        common = list(signature(MethodSolver.solve).parameters)[4:-1]
+        return {*common, *(name for method in METHODS for name in _parameters_of(method))}
 
-    def solve(
+    def solve(  # type: ignore[override]
         self,
         scene: Scene,
         level: int,
         repetitions: int = 1,
-        load_steps: int = 0,
-        scheme: str = "newmark",
-        step_factor: float = 0.9,
-        spectral_radius: float = 0.8,
         cut: str = "snapping",
         fit: str = "fitted",
         **parameters: Any,
@@ -291,16 +286,7 @@ class MassSpringSolver(MethodSolver):
         check_choices(self.name, self.choices, {"cut": cut, "fit": fit})
         self._method = cut
         self._force = partial(SpringForce, fit=fit)  # type: ignore[arg-type]
-        return super().solve(
-            scene,
-            level,
-            repetitions,
-            load_steps,
-            scheme,
-            step_factor,
-            spectral_radius,
-            **parameters,
-        )
+        return super().solve(scene, level, repetitions, **parameters)
 
     def system(self, scene: Scene, level: int, **parameters: Any) -> System:
         """Refuse: springs have no linear system of their own here."""
