@@ -120,7 +120,6 @@ def _without_slivers(
 def _scalpel(mesh: SimplexMesh, kind: State) -> None:
     """Move a blade through a body in motion, with its skin, an inner surface and collision."""
     # who loads the kernels of solves does not wait for the simulator
-    from verify.simulator.mapping.pull_back import pull_back
     from verify.simulator.session import Session
     from verify.simulator.stage import Stage
 
@@ -133,10 +132,7 @@ def _scalpel(mesh: SimplexMesh, kind: State) -> None:
         )
     )  # fmt: skip
     session.run()
-    place = mesh.points[mesh.cells[0]].mean(axis=0)
-    pull_back(session.cutter, session.state.displacement, [place], [0])
-    session.collider.nearest([place])
-    session.collider.pierced(place - 1.0, place + 1.0)
+    session.collider.nearest(mesh.points[:1])
 
 
 def _comparison() -> None:
@@ -148,8 +144,8 @@ def _comparison() -> None:
         for near in (np.empty((0, mesh.space)), points):
             no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
             cells = find_cells(
-                points, near, no_sides[0], tree.lower, tree.upper, tree.cells, shape.corners,
-                shape.normals, corners.mean(axis=1), no_sides[1], 1e-12,
+                points, near, no_sides[0], tree.over(shape.corners, shape.normals), no_sides[1],
+                1e-12,
             )  # fmt: skip
         origin = np.ascontiguousarray(corners[:, 0])
         evaluate_linear(points, cells, origin, origin, np.ascontiguousarray(shape.gradients[:, 1:]))

@@ -155,8 +155,8 @@ def measured(strips, face, crossed, slivers) -> Measured:
     ]
     shares = dict.fromkeys(LIMITS, 1.0)
     phases = {"motion": 5e-4, "step": 8e-4}
-    hand = RealTime(1005, 240, 1674, 276, 76, shares, shares, shares, phases, phases, 9e-4, 9e-4,
-                    0.01, 0.0, 0, 0, 0.0)  # fmt: skip
+    hand = RealTime(1005, 240, 1674, 276, 76, shares, shares, phases, phases, 9e-4, 0.01,
+                    0.0, 0, 0, 0.0)  # fmt: skip
     methods = [method("xfem", 0, 0.100), method("conforming", 0, 0.100), method("uncut", 0, 0.9)]
     return Measured(
         strips, face, steps, crossed, with_other_frames(200, crossed[2].speed, (0.1,)), hand,

@@ -1,4 +1,4 @@
-"""Collision: the tree answers as brute force does, before and after the surface has moved."""
+"""Collision: a query answers as brute force does, before and after the surface has moved."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def _model(dim, seed):
         body.update(cutter.advance(time))
         displacement = 0.05 * rng.normal(size=(cutter.body.node_count, dim))
         collider.refit(displacement)
-    collider.refit(displacement)  # once without a change of the surface: boxes only
+    collider.refit(displacement)  # once without a change of the surface
     rows = body.surface.used
     corners = body.surface.positions(displacement)[body.surface.facets.rows[rows]]
     return cutter, body, collider, rows, corners, rng

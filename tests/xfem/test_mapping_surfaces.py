@@ -6,7 +6,6 @@ import pytest
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.simulator.mapping.embedded_surface import EmbeddedSurface
-from verify.simulator.mapping.pull_back import pull_back
 from verify.xfem.cuts import ToolPath
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
@@ -124,43 +123,3 @@ def test_virtual_work_is_the_same_on_the_surface_and_on_the_unknowns() -> None:
         nodal = surface.facet_force(facet, at, push, np.zeros_like(motion))
         moved = at @ velocity[surface.facets.rows[facet]]
         assert (nodal * motion).sum() == pytest.approx(push @ moved, rel=1e-12)
-
-
-def test_a_tool_in_the_deformed_body_is_found_in_the_material() -> None:
-    cutter, _, _ = _cut(box_mesh((4, 4, 4)), PATHS)
-    body = cutter.body
-    rng = np.random.default_rng(9)
-    nodes = cutter.mesh.points[body.node_parent.rows]
-    # a rotation by 60 degrees and a stretch, and the cuts opened by a random 2 %
-    angle = np.pi / 3
-    turn = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.3]]
-    )
-    displacement = nodes @ turn.T - nodes + 0.005 * rng.normal(size=nodes.shape)
-    # in every piece a point of its material: the centroid of a sub-simplex, or of the element
-    phantom = cutter.phantom_mesh()
-    wanted = phantom.piece_centroids
-    share = phantom.shape_integrals / phantom.volumes[:, None]
-    place = np.einsum("pa,pas->ps", share, nodes[phantom.cells] + displacement[phantom.cells])
-    order = np.argsort(body.piece_parent.rows, kind="stable")
-    same, found = pull_back(cutter, displacement, place, order)
-    np.testing.assert_array_equal(found, order)
-    np.testing.assert_allclose(same, wanted, atol=1e-12)
-    # from a neighbour it walks there, through shared unknowns only
-    start = np.array([_neighbour(cutter, p) for p in order])
-    assert (start != order).sum() > 0.9 * len(order)
-    walked, found = pull_back(cutter, displacement, place, start)
-    np.testing.assert_array_equal(found, order)
-    np.testing.assert_allclose(walked, wanted, atol=1e-12)
-    outside, found = pull_back(cutter, displacement, place + 10.0, order)
-    assert (found == -1).all()
-    assert np.isfinite(outside).all()
-
-
-def _neighbour(cutter, piece):
-    """A piece that shares all but one unknown with this one, or the piece itself."""
-    body = cutter.body
-    mine = body.piece_cells.rows[piece]
-    shared = np.isin(body.piece_cells.rows, mine).sum(axis=1)
-    others = np.flatnonzero(shared == 3)
-    return int(others[0]) if len(others) else piece

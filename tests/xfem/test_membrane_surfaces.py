@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from cut_bodies import rotation
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
-from verify.simulator.mapping.pull_back import pull_back
 from verify.xfem.cuts import ToolPath
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import rectangle_mesh
@@ -106,31 +104,3 @@ def test_the_rims_open_with_the_material_and_forces_on_them_do_the_same_work() -
     u = random.normal(size=apart.shape)
     work = np.sum(force * (skin.surface.positions(u) - skin.surface.material.rows))
     assert np.sum(nodal * u) == pytest.approx(work, rel=1e-12)
-
-
-def test_a_tool_on_a_deformed_membrane_is_found_in_its_material() -> None:
-    """Turned, stretched, shaken by 1 %: centroids of all pieces, from a neighbour, off the skin."""
-    cutter, _ = stroked(curved(), INSIDE)
-    body = cutter.body
-    random = np.random.default_rng(9)
-    nodes = cutter.mesh.points[body.node_parent.rows]
-    R = rotation(3, 1.1) @ np.diag([1.2, 0.9, 1.0])
-    displacement = nodes @ R.T - nodes + 1e-3 * random.normal(size=nodes.shape)
-    phantom = cutter.phantom_mesh()
-    wanted = phantom.piece_centroids
-    share = phantom.shape_integrals / phantom.volumes[:, None]
-    x = nodes[phantom.cells] + displacement[phantom.cells]
-    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    order = np.argsort(body.piece_parent.rows, kind="stable")
-    for height in (0.0, 0.01, -0.01):
-        place = np.einsum("pa,pas->ps", share, x) + height * normal
-        same, found = pull_back(cutter, displacement, place, order)
-        np.testing.assert_array_equal(found, order)
-        np.testing.assert_allclose(same, wanted, atol=1e-12)
-        # from anywhere on the membrane, if the way is not through the cut
-        start = np.full(len(order), order[0])
-        walked, found = pull_back(cutter, displacement, place, start)
-        reached = found == order
-        assert reached.mean() > 0.6
-        np.testing.assert_allclose(walked[reached], wanted[reached], atol=1e-12)

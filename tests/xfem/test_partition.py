@@ -137,3 +137,21 @@ def test_a_thin_layer_between_two_cuts_keeps_its_volume():
     assert len(volumes) == 3
     # positions carry round-off of 1e-16, the gap a relative 1e-7 of it
     assert volumes.min() == pytest.approx(gap, rel=1e-6)
+
+
+@pytest.mark.parametrize("tip", ["inside", "through"])
+def test_a_cut_splits_as_it_does_beside_one_that_meets_nothing(tip) -> None:
+    mesh = box_mesh((3, 3, 3))
+    beyond = Plane((9.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    rng = np.random.default_rng(11)
+    cuts = [Plane(rng.random(3), rng.standard_normal(3)) for _ in range(6)]
+    cuts.append(Plane((1 / 3, 0.0, 0.0), (1.0, 0.0, 0.0)))  # along faces
+    cuts.append(Plane((0.0, 0.0, 0.0), (1.0, -1.0, 0.0)))  # through nodes
+    for cut in cuts:
+        alone, among = split_cells(mesh, [cut], tip), split_cells(mesh, [cut, beyond], tip)
+        np.testing.assert_array_equal(alone.parent, among.parent)
+        np.testing.assert_array_equal(alone.label, among.label[:, :1])
+        for name, mine in vars(alone.simplices).items():
+            np.testing.assert_allclose(mine, getattr(among.simplices, name), rtol=1e-14, atol=1e-16)
+        np.testing.assert_allclose(alone.points.positions, among.points.positions, atol=1e-15)
+        np.testing.assert_array_equal(alone.points.ends, among.points.ends)

@@ -15,7 +15,6 @@ from verify.accelerated.cholesky_kernels import BAND, factorise_fronts, solve_fr
 from verify.accelerated.front_plan_kernels import assembly_lists, front_rows
 from verify.accelerated.front_tree import levels, merge_and_order
 from verify.accelerated.minimum_degree import minimum_degree
-from verify.accelerated.resumable import Resumable, finished
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.given_arrays import check_floats
@@ -25,9 +24,6 @@ __all__ = ["Cholesky"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
-
-_ANYWHERE = np.empty(0, dtype=np.int64)
-_WORN = 1.25  # operations per unknown, over those when the order was found
 
 
 class Cholesky(LinearSolver):
@@ -51,92 +47,25 @@ class Cholesky(LinearSolver):
     def __init__(
         self, pattern: BlockPattern, block: int, held: NDArray[np.bool_] | None = None
     ) -> None:
-        self._block = block
-        self._take(pattern, held)
-        self._factor = self._diagonal = self._gathered = self._products = np.empty(0)
-        self._stacks = (np.empty(0), np.empty(0))
-        self._place = np.empty(0, dtype=np.uint64)
-        finished(self._finding_order(pattern))
-
-    def _take(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> None:
         nodes = pattern.node_count
-        self._held = np.zeros(nodes, dtype=bool) if held is None else held
-        if self._held.shape != (nodes,) or self._held.dtype != bool:
+        held = np.zeros(nodes, dtype=bool) if held is None else held
+        if held.shape != (nodes,) or held.dtype != bool:
             raise XfemError(
-                f"held nodes: {self._held.dtype} array of shape {self._held.shape}; expected bool "
+                f"held nodes: {held.dtype} array of shape {held.shape}; expected bool "
                 f"and ({nodes},)"
             )
-        self._block_count, self._is_factorised = len(pattern.columns), False
-
-    @property
-    def _free(self) -> int:
-        return max(1, int(np.count_nonzero(~self._held)))
-
-    def _finding_order(self, pattern: BlockPattern) -> Resumable[None]:
-        starts, columns, _ = coupled = _coupled(pattern.starts, pattern.columns, self._held)
+        self._block, self._block_count = block, len(pattern.columns)
+        self._is_factorised = False
+        starts, columns, _ = coupled = _coupled(pattern.starts, pattern.columns, held)
         order, bounds = minimum_degree(starts, columns)
-        yield
-        row_start, _, parent = front_rows(starts, columns, order, bounds, _ANYWHERE)
+        row_start, _, parent = front_rows(starts, columns, order, bounds)
         order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
-        self._plan(coupled, order, bounds, _ANYWHERE)
-        self._ordered = (self._work, self._free)
+        self._plan(coupled, order, bounds)
 
-    def extended(
-        self, pattern: BlockPattern, source: _Ints, held: NDArray[np.bool_] | None = None
-    ) -> "Cholesky":
-        """Solver for this body cut further, in the order of this one: no search for another.
-
-        A new unknown has some of the neighbours of the one from which it comes, and is eliminated
-        with it. Takes the memory of this solver, whose factors are lost with those of the other.
-        Only where one that is free was held, or comes from one that was, is another order sought.
-
-        Parameters
-        ----------
-        pattern : BlockPattern
-            Of more unknowns: old ones keep their numbers and are coupled, through themselves or
-            through what has come from them, to none that were not coupled before.
-        source : (k,) int array
-            Unknown before from which each new one comes.
-        held : (N,) bool array, optional
-            As for a new solver.
-        """
-        other = self._with_held(pattern, held)
-        was_held = np.concatenate([self._held, self._held[source]])
-        if (was_held & ~other._held).any():
-            finished(other._finding_order(pattern))
-            return other
-        order, bounds = _insert(self._order, self._bounds, source)
-        coupled = _coupled(pattern.starts, pattern.columns, other._held)
-        other._plan(coupled, order, bounds, self._parent)
-        return other
-
-    def renewing(
-        self, pattern: BlockPattern, held: NDArray[np.bool_] | None = None
-    ) -> "Resumable[Cholesky]":
-        """Make a solver for any pattern, in an order found anew, with the memory of this one."""
-        other = self._with_held(pattern, held)
-        yield from other._finding_order(pattern)
-        return other
-
-    def _with_held(self, pattern: BlockPattern, held: NDArray[np.bool_] | None) -> "Cholesky":
-        """Copy that has the memory of this solver."""
-        other = object.__new__(Cholesky)
-        other.__dict__.update(self.__dict__)
-        other._take(pattern, held)
-        return other
-
-    @property
-    def is_worn(self) -> bool:
-        """Whether extensions have made the order so bad that a new one would pay."""
-        work, nodes = self._ordered
-        return self._work > _WORN * work * (self._free / nodes)
-
-    def _plan(
-        self, coupled: tuple[_Ints, _Ints, _Ints], order: _Ints, bounds: _Ints, nearest: _Ints
-    ) -> None:
+    def _plan(self, coupled: tuple[_Ints, _Ints, _Ints], order: _Ints, bounds: _Ints) -> None:
         """Find fronts and room for an order, and where each block goes."""
         starts, columns, blocks = coupled
-        row_start, rows, parent = front_rows(starts, columns, order, bounds, nearest)
+        row_start, rows, parent = front_rows(starts, columns, order, bounds)
         lists = assembly_lists(starts, columns, order, bounds, row_start, rows, parent)
         self._order, self._bounds = order, bounds
         self._row_start, self._rows, self._parent = row_start, rows, parent
@@ -149,17 +78,15 @@ class Cholesky(LinearSolver):
         height = width + below
         self._offset = np.concatenate([[0], np.cumsum(width * height)])
         self._level, depths = levels(parent, below**2)
-        self._factor = _room(self._factor, int(self._offset[-1]))
-        even, odd = self._stacks
-        self._stacks = (_room(even, depths[0]), _room(odd, depths[1]))
+        self._factor = np.empty(int(self._offset[-1]))
+        self._stacks = (np.empty(depths[0]), np.empty(depths[1]))
         most = int(height.max(initial=0))
-        self._diagonal, self._gathered = _room(self._diagonal, most), _room(self._gathered, most)
-        if len(self._place) < most:
-            self._place = np.empty(most, dtype=np.uint64)
+        self._diagonal, self._gathered = np.empty(most), np.empty(most)
+        self._place = np.empty(most, dtype=np.uint64)
         products = np.maximum(
             width * below, BAND * (width + height) + (width - BAND) * (height - BAND)
         )
-        self._products = _room(self._products, int(products.max(initial=0)))
+        self._products = np.empty(int(products.max(initial=0)))
         self._permuted = np.empty((len(order), self._block))
 
     @property
@@ -218,11 +145,6 @@ class Cholesky(LinearSolver):
         return solution
 
 
-def _room(store: _Floats, size: int) -> _Floats:
-    """Array of at least that size: the given one, or a larger one with room to grow."""
-    return store if len(store) >= size else np.empty(size + size // 4)
-
-
 @njit(cache=True)
 def _coupled(starts, columns, held):
     """Rows without what couples held nodes: starts, columns, and which blocks are left."""
@@ -237,28 +159,3 @@ def _coupled(starts, columns, held):
                 count += 1
         fewer[i + 1] = count
     return fewer, left[:count], blocks[:count]
-
-
-@njit(cache=True)
-def _insert(order, bounds, source):
-    """Order and bounds of fronts with new nodes after those from which they come."""
-    nodes, fronts = len(order), len(bounds) - 1
-    # of each node the last new one that comes from it, and of each new one that before
-    newest, earlier = np.full(nodes, -1, dtype=np.int64), np.empty(len(source), dtype=np.int64)
-    for k in range(len(source)):
-        earlier[k] = newest[source[k]]
-        newest[source[k]] = k
-    grown = np.empty(nodes + len(source), dtype=np.int64)
-    ends = np.zeros(fronts + 1, dtype=np.int64)
-    count = 0
-    for s in range(fronts):
-        for k in range(bounds[s], bounds[s + 1]):
-            grown[count] = order[k]
-            count += 1
-            new = newest[order[k]]
-            while new >= 0:
-                grown[count] = nodes + new
-                count += 1
-                new = earlier[new]
-        ends[s + 1] = count
-    return grown, ends

@@ -9,11 +9,8 @@ __all__ = ["assembly_lists", "front_rows"]
 
 
 @njit(cache=True)
-def front_rows(starts, columns, order, bounds, nearest):
+def front_rows(starts, columns, order, bounds):
     """Rows of each front and the tree of fronts, from the sparsity and the order.
-
-    `nearest` (S,), or (0,), gives fronts beyond which the parents must not be: -1 where there is
-    none. A front then has the rows of its children even where it does not meet them itself.
 
     Returns
     -------
@@ -67,8 +64,6 @@ def front_rows(starts, columns, order, bounds, nearest):
         row_start[s + 1] = used
         if used > begin:
             above = front_of[rows[begin]]
-            if len(nearest) > 0 and 0 <= nearest[s] < above:
-                above = nearest[s]
             parent[s] = above
             following[s] = head[above]
             head[above] = s

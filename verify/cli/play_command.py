@@ -46,7 +46,7 @@ def execute(arguments: argparse.Namespace) -> int:
     if arguments.window or (out is None and has_display):
         from verify.simulator.window import play_in_window
 
-        play_in_window(stage, scene.title, arguments.stroke, arguments.spread)
+        play_in_window(stage, scene.title, arguments.stroke)
         return 0
     return _play(stage, scene, arguments)
 
@@ -63,14 +63,13 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
     )
     from verify.simulator.timings import timings_of
 
-    session = Session(stage, spread=arguments.spread)
+    session = Session(stage)
     every = max(1, round(stage.steps / (arguments.frames - 1)))
     frames = [Frame(0.0, session.picture(), session.blades())]
     while not session.finished:
         record = session.step()
         if arguments.out is not None and (record.step % every == 0 or session.finished):
             frames.append(Frame(record.time, session.picture(), session.blades(), session.hooks()))
-    session.settle()
     records, quality, timings = session.records, quality_of(session), timings_of(session.records)
     if arguments.out is not None:
         skin = scene.geometry.kind == "skin"
@@ -91,7 +90,6 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
         "case": scene.name,
         "steps": len(records),
         "elements": len(stage.mesh.cells),
-        "spread": arguments.spread,
         "split": int(session.cutter.body.split_cells.sum()),
         "unknowns": int(session.displacement.size),
         "median_seconds": {

@@ -35,11 +35,6 @@ def add_play_commands(add: Add) -> None:
     command.add_argument(
         "--records", metavar="CSV", type=Path, help="write what every step cost and did"
     )
-    command.add_argument(
-        "--spread", action="store_true",
-        help="spread the work of a cut over steps: the longest step is a third as long, and what "
-        "is cut opens some steps later",
-    )  # fmt: skip
     add_json(command, "print the summary as JSON")
 
     command = add(

@@ -6,13 +6,34 @@ built without recursion.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CellTree", "build_cell_tree", "morton_order"]
+__all__ = ["CellTree", "SearchedCells", "build_cell_tree", "morton_order"]
 
 LEAF = 4  # cells per leaf
+
+
+class SearchedCells(NamedTuple):
+    """A tree over cells, and the cells, as kernels take them.
+
+    Attributes
+    ----------
+    lower, upper, cells
+        See `CellTree`.
+    corners, normals : (m, k, d) float array
+        Of each cell; the normals are those of its facets, inwards, of length one.
+    centres : (m, d) float array
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    centres: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,6 +51,11 @@ class CellTree:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
     cells: NDArray[np.int64]
+
+    def over(self, corners: NDArray[np.float64], normals: NDArray[np.float64]) -> SearchedCells:
+        """Return the tree with corners and normals (m, k, d) of the cells that it is over."""
+        centres = corners.mean(axis=1)
+        return SearchedCells(self.lower, self.upper, self.cells, corners, normals, centres)
 
 
 def build_cell_tree(

@@ -74,8 +74,9 @@ class SolutionField:
         lower, upper = shape.corners.min(axis=1), shape.corners.max(axis=1)
         lower[shape.degenerate] = np.nan
         membrane = solution.cell_dimension < solution.dimension
-        self._tree = build_cell_tree(lower, upper, surface=membrane)
-        self._centres = shape.corners.mean(axis=1)
+        tree = build_cell_tree(lower, upper, surface=membrane)
+        self._searched = tree.over(shape.corners, shape.normals)
+        self._centres = self._searched.centres
         self.scale = float(np.linalg.norm(np.ptp(solution.points, axis=0)))
         self._origin = np.ascontiguousarray(shape.corners[:, 0])
         self._across = (
@@ -114,12 +115,7 @@ class SolutionField:
             points,
             np.ascontiguousarray(directions),
             self._wanted(points, near),
-            self._tree.lower,
-            self._tree.upper,
-            self._tree.cells,
-            self.shape.corners,
-            self.shape.normals,
-            self._centres,
+            self._searched,
             self._sides,
             ROUND_OFF * self.scale,
         )
@@ -133,9 +129,7 @@ class SolutionField:
         directions = np.zeros((0, 3)) if near is None else near - points
         found: tuple[NDArray[np.int64], Array] = nearest_triangles(
             points, np.ascontiguousarray(directions), self._wanted(points, near),
-            self._tree.lower, self._tree.upper, self._tree.cells, self.shape.corners,
-            self.shape.normals, self._across, self._centres, self._sides,
-            ROUND_OFF * self.scale,
+            self._searched, self._across, self._sides, ROUND_OFF * self.scale,
         )  # fmt: skip
         return found
 

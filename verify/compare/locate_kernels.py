@@ -95,10 +95,9 @@ def allowed(wish, side):
 
 
 @njit(cache=True)
-def _containing(
-    x, direction, sided, wish, lower, upper, cells, corners, normals, centres, sides, tolerance
-):
+def _containing(x, direction, sided, wish, searched, sides, tolerance):
     """Find the cell that holds `x`, on the side of `direction` if several do; -1 if none does."""
+    lower, upper, cells, corners, normals, centres = searched
     d = x.shape[0]
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
@@ -140,8 +139,9 @@ def _containing(
 
 
 @njit(cache=True)
-def _nearest(x, wish, lower, upper, cells, corners, normals, sides):
+def _nearest(x, wish, searched, sides):
     """Find the cell nearest to `x`, by branch and bound; -1 if none is allowed."""
+    lower, upper, cells, corners, normals, _ = searched
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
     stack = np.empty(64, dtype=np.int64)
@@ -187,14 +187,13 @@ def box_distance2(x, lower, upper):
 
 
 @njit(cache=True)
-def find_cells(
-    points, directions, wanted, lower, upper, cells, corners, normals, centres, sides, tolerance
-):
+def find_cells(points, directions, wanted, searched, sides, tolerance):
     """Find the cell (n,) of each point (n, d); see `verify.compare.locate.SolutionField`.
 
     `directions` is (n, d), or (0, d) where no side is wanted. `wanted` (n, c) is the side of c
     cuts, −1, 1 or 0 (either), that the cell must lie on, and `sides` (m, c) the one that each cell
-    lies on, 0 if unknown. A point whose wish no cell fulfils gets what it would without one.
+    lies on, 0 if unknown; `searched` is as `SearchedCells`. A point whose wish no cell fulfils
+    gets what it would without one.
     """
     n = points.shape[0]
     found = np.empty(n, dtype=np.int64)
@@ -204,12 +203,9 @@ def find_cells(
         direction = directions[i] if sided else nowhere
         wish = wanted[i]
         for _ in range(2):
-            cell = _containing(
-                points[i], direction, sided, wish, lower, upper, cells, corners, normals, centres,
-                sides, tolerance,
-            )  # fmt: skip
+            cell = _containing(points[i], direction, sided, wish, searched, sides, tolerance)
             if cell < 0:
-                cell = _nearest(points[i], wish, lower, upper, cells, corners, normals, sides)
+                cell = _nearest(points[i], wish, searched, sides)
             if cell >= 0:
                 break
             wish = either
@@ -218,17 +214,17 @@ def find_cells(
 
 
 @njit(cache=True)
-def holding_cells(points, lower, upper, cells, corners, normals, centres, tolerance):
+def holding_cells(points, searched, tolerance):
     """Find the cell (n,) that holds each point (n, d), within `tolerance`; −1 where none does."""
     n, d = points.shape
     found, nowhere = np.empty(n, dtype=np.int64), np.zeros(d)
-    no_wish, no_sides = np.zeros(0, dtype=np.int8), np.zeros((len(corners), 0), dtype=np.int8)
+    no_wish, no_sides = (
+        np.zeros(0, dtype=np.int8),
+        np.zeros((len(searched.corners), 0), dtype=np.int8),
+    )
     sided = np.bool_(False)  # as a constant it would have the search compiled once more
     for i in range(n):
-        found[i] = _containing(
-            points[i], nowhere, sided, no_wish, lower, upper, cells, corners, normals, centres,
-            no_sides, tolerance,
-        )  # fmt: skip
+        found[i] = _containing(points[i], nowhere, sided, no_wish, searched, no_sides, tolerance)
     return found
 
 

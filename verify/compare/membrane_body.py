@@ -53,9 +53,8 @@ class MembraneBody(SimplexBody):
         tree = build_cell_tree(corners.min(axis=1), corners.max(axis=1), surface=True)
         no_sides = [np.zeros((n, 0), dtype=np.int8) for n in (len(points), len(corners))]
         found = nearest_triangles(
-            points, np.zeros((0, 3)), no_sides[0], tree.lower, tree.upper, tree.cells, corners,
-            shape.normals, np.ascontiguousarray(frames[:, 2]), corners.mean(axis=1), no_sides[1],
-            1e-10 * self.size,
+            points, np.zeros((0, 3)), no_sides[0], tree.over(corners, shape.normals),
+            np.ascontiguousarray(frames[:, 2]), no_sides[1], 1e-10 * self.size,
         )[0]  # fmt: skip
         return frames[found]
 

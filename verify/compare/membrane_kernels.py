@@ -9,10 +9,7 @@ __all__ = ["nearest_triangles"]
 
 
 @njit(cache=True)
-def nearest_triangles(
-    points, directions, wanted, lower, upper, cells, corners, normals, across, centres, sides,
-    tolerance,
-):  # fmt: skip
+def nearest_triangles(points, directions, wanted, searched, across, sides, tolerance):
     """Triangle (n,) nearest to each of `points` (n, 3), and its distance (n,).
 
     Of those that are equally near within `tolerance` it is the one whose centre lies in the
@@ -20,9 +17,9 @@ def nearest_triangles(
 
     `wanted` (n, p) is the side of p planes, −1, 1 or 0 (either), that the triangle must lie on,
     and `sides` (m, p) the one that each triangle lies on, 0 if on both. A point whose wish no
-    triangle fulfils gets the nearest of all. `lower`, `upper`, `cells` are a tree over the
-    triangles, see `verify.compare.cell_tree`; `normals` (m, 3, 3) are those of the edges,
-    inwards, `across` (m, 3) those of the triangles. `directions` has no rows if none is wanted.
+    triangle fulfils gets the nearest of all. `searched` is as `SearchedCells`, with the normals of
+    the edges, `across` (m, 3) are those of the triangles. `directions` has no rows if none is
+    wanted.
     """
     n = points.shape[0]
     found = np.empty(n, dtype=np.int64)
@@ -34,9 +31,8 @@ def nearest_triangles(
         wish = wanted[i]
         for _ in range(2):
             found[i], distance[i] = _nearest(
-                points[i], direction, sided, wish, lower, upper, cells, corners, normals, across,
-                centres, sides, tolerance,
-            )  # fmt: skip
+                points[i], direction, sided, wish, searched, across, sides, tolerance
+            )
             if found[i] >= 0:
                 break
             wish = either
@@ -44,10 +40,8 @@ def nearest_triangles(
 
 
 @njit(cache=True)
-def _nearest(
-    x, direction, sided, wish, lower, upper, cells, corners, normals, across, centres, sides,
-    tolerance,
-):  # fmt: skip
+def _nearest(x, direction, sided, wish, searched, across, sides, tolerance):
+    lower, upper, cells, corners, normals, centres = searched
     leaves = lower.shape[0] // 2
     leaf_size = cells.shape[0] // leaves
     stack, gaps = np.empty(64, dtype=np.int64), np.empty(64)  # nodes and their distances

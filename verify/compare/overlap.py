@@ -207,8 +207,7 @@ class OverlapSearch:
 
     def _holding(self, cells: DeformedCells, points: Array) -> NDArray[np.int64]:
         found: NDArray[np.int64] = holding_cells(
-            np.ascontiguousarray(points), cells.tree.lower, cells.tree.upper, cells.tree.cells,
-            cells.shape.corners, cells.shape.normals, cells.shape.corners.mean(axis=1),
+            np.ascontiguousarray(points), cells.tree.over(cells.shape.corners, cells.shape.normals),
             _INSIDE * self._size,
         )  # fmt: skip
         return found

@@ -105,16 +105,15 @@ def _box_tetrahedra(box: Array) -> Array:
 def _in_mesh(points: Array, cells: NDArray[np.int64]) -> Inside:
     shape = simplices(points, cells)
     tree = build_cell_tree(shape.corners.min(axis=1), shape.corners.max(axis=1))
-    centres = shape.corners.mean(axis=1)
+    searched = tree.over(shape.corners, shape.normals)
     no_sides = np.zeros((len(cells), 0), dtype=np.int8)
     margin = _MARGIN * float(np.linalg.norm(np.ptp(points, axis=0)))
 
     def inside(x: Array) -> NDArray[np.bool_]:
         x = np.ascontiguousarray(x, dtype=float)
         at = find_cells(
-            x, np.zeros((0, 3)), np.zeros((len(x), 0), dtype=np.int8), tree.lower, tree.upper,
-            tree.cells, shape.corners, shape.normals, centres, no_sides, margin,
-        )  # fmt: skip
+            x, np.zeros((0, 3)), np.zeros((len(x), 0), dtype=np.int8), searched, no_sides, margin
+        )
         height = np.sum(shape.normals[at] * (x[:, None] - np.roll(shape.corners[at], -1, 1)), 2)
         return np.asarray(height.min(axis=1) >= -margin)
 

@@ -14,7 +14,7 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["BodyParts", "held_nodes"]
+__all__ = ["BodyParts"]
 
 _Floats = NDArray[np.float64]
 
@@ -69,8 +69,3 @@ class BodyParts:
             supports=self.grips.supports,
             damping=self.stage.damping,
         )
-
-
-def held_nodes(body: DynamicBody) -> NDArray[np.bool_]:
-    """(N,) dof nodes that are held altogether, which need not be solved for."""
-    return body.fixed.all(axis=1)

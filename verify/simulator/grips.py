@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from verify.simulator.stage import Hold, Hook
@@ -42,7 +41,11 @@ def held_unknowns(
     held[: len(nodes)] = nodes
     sub = phantom.sub_cells
     facets = held_facets(phantom.mesh, nodes) if on_held is None else on_held
-    _hold_parts(facets, phantom.cells, phantom.parent, sub.piece, sub.barycentric, held)
+    # of sub-simplices on held facets all corners but one lie on these
+    away = sub.barycentric != 0.0
+    part, facet = np.nonzero((away.sum(axis=1) == 1) & facets[phantom.parent[sub.piece]])
+    on_facet = np.arange(facets.shape[1]) != facet[:, None]
+    held[phantom.cells[sub.piece[part]][on_facet]] = True
     return held
 
 
@@ -54,24 +57,6 @@ def held_facets(mesh: SimplexMesh, nodes: NDArray[np.bool_]) -> NDArray[np.bool_
     on_held = np.zeros(mesh.cells.shape, dtype=bool)
     on_held[cell, local] = facet.all(axis=1)
     return on_held
-
-
-@njit(cache=True)
-def _hold_parts(on_held, cells, parent, piece, barycentric, held):
-    """Hold the unknowns of sub-simplices on held facets: all corners but one lie on these."""
-    corners = cells.shape[1]
-    for k in range(len(piece)):
-        for opposite in range(corners):
-            if not on_held[parent[piece[k]], opposite]:
-                continue
-            away = 0
-            for corner in range(corners):
-                away += barycentric[k, corner, opposite] != 0.0
-            if away != 1:
-                continue
-            for corner in range(corners):
-                if corner != opposite:
-                    held[cells[piece[k], corner]] = True
 
 
 class Grips:

@@ -65,7 +65,7 @@ class LiveScalpel:
     def lift(self) -> None:
         """End the stroke."""
         if self._cutting:
-            self.finished.append(self.session.cutter.strokes[-1].led)
+            self.finished.append(self.session.cutter.strokes[-1].path)
         self._first, self._cutting, self._last = None, False, None
 
     def _begin(self, blade: _Floats, time: float) -> None:

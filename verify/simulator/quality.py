@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.session import Session
-from verify.simulator.surface_part import SurfacePart
 from verify.xfem.mesh import SimplexMesh
 
 __all__ = ["Quality", "deformation_gradients", "quality_of"]
@@ -107,7 +106,7 @@ def _loose_edges(facets: _Ints) -> int:
 
 
 def _bad_facets(
-    surface: MovingSurface | SurfacePart, displacement: _Floats, gradients: _Floats, stretch: float
+    surface: MovingSurface, displacement: _Floats, gradients: _Floats, stretch: float
 ) -> tuple[int, int]:
     """Facets that face the wrong way, and facets that are stretched beyond the material."""
     used = surface.used

@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.accelerated.cholesky import Cholesky
-from verify.simulator.body_parts import BodyParts, held_nodes
+from verify.simulator.body_parts import BodyParts
 from verify.simulator.collision.surface_collider import Contacts, SurfaceCollider
-from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.grips import Grips, gripped, held_facets
 from verify.simulator.stage import Stage
-from verify.simulator.staged_cut import MOST, Followed, Pieces, StagedCut
 from verify.simulator.step_record import PHASES, StepRecord
 from verify.simulator.surfaces import Picture, Surfaces
-from verify.simulator.touched_memory import touch_memory
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import ToolPath
 from verify.xfem.energy_balance import BalanceRecorder
@@ -27,9 +24,6 @@ from verify.xfem.real_time import RealTimeEuler
 __all__ = ["Session"]
 
 _Floats = NDArray[np.float64]
-
-# steps before a hook begins: in these two pieces are done in each, in the last no cut is begun
-_SOON, _LAST = 8, 3
 
 
 class Session:
@@ -41,12 +35,6 @@ class Session:
     account : bool
         Whether to keep the account of the energies. Without it the hot path is that of a
         simulator: that is what is timed.
-    spread : bool
-        Whether what a cut asks for is spread over steps, of which each does one of the pieces of
-        `StagedCut`. At most `MOST` elements are split by a cut; the others wait for the next one. A
-        replay is the same on any machine. Before a hook begins two pieces are done in each step, so
-        that little is left when it does. Until the mechanics follow, new unknowns move as those
-        from which they come, so that nothing jumps.
     clock : callable
         What phases are timed by: wall time in s, or `time.thread_time` where other work on the
         machine shall not be counted.
@@ -71,14 +59,9 @@ class Session:
         self,
         stage: Stage,
         account: bool = True,
-        spread: bool = False,
         clock: Callable[[], float] = perf_counter,
     ) -> None:
-        touch_memory()
         self.stage, self._account, self._clock = stage, account, clock
-        self._spread, self._led = spread, float("-inf")  # time up to which the blades have been led
-        self._work: Pieces | None = None  # what is left to be done of a cut
-        self._ahead: Increment | None = None  # of which the mechanics do not know yet
         self.cutter = SemiProgressiveCutter(stage.mesh)
         for path in stage.strokes:
             self.cutter.begin(path)
@@ -91,10 +74,6 @@ class Session:
         self._spent = np.zeros(2)  # work and dissipation until the body was last made anew
         self._seconds = dict.fromkeys(PHASES, 0.0)
         self._held = [held_facets(stage.mesh, hold.nodes) for hold in stage.holds]
-        self._staged = StagedCut(
-            self.cutter, self.surfaces, self._parts_after, self._body_of, self._end_of_step,
-            self._timed,
-        )  # fmt: skip
         self.phantom: PhantomMesh
         self._assemble()
         self.state = self.body.rest()
@@ -114,21 +93,12 @@ class Session:
         """Play to the end."""
         while not self.finished:
             self.step()
-        self.settle()
         return self.records
 
     def begin(self, path: ToolPath) -> None:
         """Begin another stroke, to be extended through `cutter.extend` if the tool is live."""
-        self._finish()
         self.cutter.begin(path)
         self._assemble()
-
-    def settle(self) -> None:
-        """Finish what is left of cuts whose work is spread: the blades are where they are now."""
-        self._finish()
-        while self.cutter.waits or self._led < self.time:
-            self._work = self._cut(self._next_stroke(self.time))
-            self._finish()
 
     def step(self) -> StepRecord:
         """Take one step.
@@ -139,21 +109,9 @@ class Session:
             If the solver fails or the motion is not finite.
         """
         self._seconds = dict.fromkeys(PHASES, 0.0)
-        end = self._end_of_step()
-        hooks = self._hooks_to_begin(end)
-        if hooks:
-            self._finish()
-        busy = self._work is not None
-        if self._work is None and (hooks or not self._hook_is_due(_LAST)):
-            self._work = self._cut(self._next_stroke(end))
-        busy = self._advance() or busy
-        if self._hook_is_due(_SOON):
-            self._advance()
-        if not self._spread:
-            self._finish()
-        if hooks:
-            self.settle()  # a hook grips the body as it is cut by then
-            self._grip(hooks)
+        end = self.state.time + self.stage.time_step
+        self._cut(end)
+        self._grip(end)
         with self._timed("motion"):
             if not self._account:
                 self.integrator.advance(self.state)
@@ -163,15 +121,14 @@ class Session:
             self.surfaces.move(self.displacement)
         with self._timed("collision"):
             contacts = self._collide()
-        record = self._record(contacts, busy)
+        record = self._record(contacts)
         self.records.append(record)
         return record
 
     @property
     def displacement(self) -> _Floats:
-        """(N, s) displacement of all unknowns of the cut body, known to the mechanics or not, m."""
-        known = self.state.displacement
-        return known if self._ahead is None else self._ahead.inherit(known)
+        """(N, s) displacement of all unknowns of the cut body, m."""
+        return self.state.displacement
 
     def picture(self) -> Picture:
         """Draw the body as it is now."""
@@ -192,68 +149,34 @@ class Session:
                 found.append((edge + self.displacement[nodes].mean(axis=0), hook.vector))
         return found
 
-    def _next_stroke(self, end: float) -> float:
-        """How far to lead the blades: where work is spread, two strokes are not cut in one go."""
-        if self.cutter.waits:
-            return self._led
-        until = end
-        if self._spread:
-            begins = [stroke.path.times[0] for stroke in self.cutter.strokes]
-            later = [t for t in begins if t > np.nextafter(self._led, np.inf)]
-            until = min([end, *np.nextafter(later, -np.inf)])
-        self._led = until
-        return float(until)
-
-    def _advance(self) -> bool:
-        """Do the next piece of the work of a cut; whether there are more."""
-        if self._work is None:
-            return False
-        try:
-            self._ahead = next(self._work)
-        except StopIteration as done:
-            self._work = None
-            if done.value is not None:
-                self._follow_cut(done.value)
-            return False
-        return True
-
-    def _follow_cut(self, followed: Followed) -> None:
-        increment, body, grips, solver = followed
+    def _cut(self, until: float) -> None:
+        """Lead the blades to a time, and let body and surfaces follow what they have cut."""
+        with self._timed("cutting"):
+            increment = self.cutter.advance(until)
+        if increment is None:
+            return
         with self._timed("assembly"):
-            self._inherit(increment)
-            self._follow(body, grips, solver)
+            state = self.state
+            state.displacement = increment.inherit(state.displacement)
+            state.velocity = increment.inherit(state.velocity)
+            self._start = {hook: increment.inherit(at) for hook, at in self._start.items()}
+            self._assemble()
+        with self._timed("cutting"):
+            self.surfaces.update(increment)
         self._begin_account()
-
-    def _cut(self, until: float) -> Pieces:
-        return self._staged.pieces(until, MOST if self._spread else None, self._solver)
-
-    def _finish(self) -> None:
-        while self._advance():
-            pass
 
     def _begin_account(self) -> None:
         if self._account:
             self._spent = self._spent_so_far()
             self._ledger = BalanceRecorder(self.body, self.state)
 
-    def _inherit(self, increment: Increment) -> None:
-        self.state.displacement = increment.inherit(self.state.displacement)
-        self.state.velocity = increment.inherit(self.state.velocity)
-        self._start = {hook: increment.inherit(values) for hook, values in self._start.items()}
-
-    def _hooks_to_begin(self, time: float) -> list[int]:
+    def _grip(self, time: float) -> None:
+        """Let the hooks that begin before a time grip the body where it is now."""
         hooks = enumerate(self.stage.hooks)
-        return [n for n, hook in hooks if n not in self._start and hook.begin < time]
-
-    def _hook_is_due(self, steps: int) -> bool:
-        """Whether work that is spread must be done soon: a hook finishes it as it begins."""
-        if not self._spread:
-            return False
-        return bool(self._hooks_to_begin(self._end_of_step() + steps * self.stage.time_step))
-
-    def _grip(self, hooks: list[int]) -> None:
-        """Let hooks grip the body where it is now."""
-        for number in hooks:
+        beginning = [n for n, hook in hooks if n not in self._start and hook.begin < time]
+        if not beginning:
+            return
+        for number in beginning:
             self._start[number] = self.state.displacement.copy()
         with self._timed("assembly"):
             stage, weights = self.stage, self.body.mass.weights
@@ -261,31 +184,19 @@ class Session:
             self._follow(self.body.held_by(grips.supports), grips, self._solver)
         self._begin_account()
 
-    def _parts(self, phantom: PhantomMesh, start: dict[int, _Floats]) -> BodyParts:
-        return BodyParts.of(self.stage, phantom, start, self._held)
-
-    def _parts_after(self, increment: Increment, phantom: PhantomMesh) -> BodyParts:
-        start = {hook: increment.inherit(at) for hook, at in self._start.items()}
-        return self._parts(phantom, start)
-
-    def _body_of(self, parts: BodyParts) -> DynamicBody:
-        return parts.body(self._load)
-
-    def _end_of_step(self) -> float:
-        return self.state.time + self.stage.time_step
-
     def _assemble(self) -> None:
-        """Make the body anew that is there already, with what holds it from now on."""
-        parts = self._parts(self.cutter.phantom_mesh(), self._start)
-        body = self._body_of(parts)
-        solver = Cholesky(body.pattern, self.stage.mesh.space, held_nodes(body))
-        self._follow(body, parts.grips, solver)
+        """Make the body anew as it is cut now, with what holds it from now on."""
+        phantom = self.cutter.phantom_mesh()
+        parts = BodyParts.of(self.stage, phantom, self._start, self._held)
+        body = parts.body(self._load)
+        body.force.prepare(body.pattern)
+        held = body.fixed.all(axis=1)  # these need not be solved for
+        self._follow(body, parts.grips, Cholesky(body.pattern, self.stage.mesh.space, held))
 
     def _follow(self, body: DynamicBody, grips: Grips, solver: Cholesky) -> None:
         """Move with another body from now on."""
         self.body, self._grips, self.phantom = body, grips, body.force.phantom
-        self._tool_load, self._ahead = None, None
-        self._solver = solver
+        self._tool_load, self._solver = None, solver
         self.integrator = RealTimeEuler(body, self.stage.time_step, solver)
 
     def _load(self, time: float) -> _Floats:
@@ -324,11 +235,7 @@ class Session:
             force = self.stage.tool_force / (length * len(contacts.facet)) * (here - before)
             for facet, at in zip(contacts.facet, contacts.at, strict=True):
                 surface.facet_force(int(facet), at, force, load)
-        known = len(self.state.displacement)
-        if self._ahead is not None:
-            # what pulls at an unknown that still moves as another one does, pulls at that
-            np.add.at(load, self._ahead.source, load[known:])
-        self._tool_load = load[:known]
+        self._tool_load = load
 
     def _spent_so_far(self) -> _Floats:
         account = self._ledger.close()
@@ -336,7 +243,7 @@ class Session:
         lost = account.algorithmic[-1] + account.damping[-1]
         return self._spent + np.array([work, lost])
 
-    def _record(self, contacts: int, busy: bool) -> StepRecord:
+    def _record(self, contacts: int) -> StepRecord:
         delay = self.cutter.crossings.delay[self._crossed :]
         self._crossed += len(delay)
         state, body = self.state, self.body
@@ -357,7 +264,6 @@ class Session:
             work=float(work),
             dissipated=float(lost),
             contacts=contacts,
-            busy=busy,
         )
 
     @contextmanager

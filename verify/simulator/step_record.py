@@ -46,8 +46,6 @@ class StepRecord:
         By damping and by the scheme since the start, J; likewise.
     contacts : int
         Facets of the collision surface that the tool touches.
-    busy : bool
-        Whether elements were split in this step, or surfaces or mechanics followed a cut.
     """
 
     step: int
@@ -63,7 +61,6 @@ class StepRecord:
     work: float
     dissipated: float
     contacts: int
-    busy: bool = False
 
     @property
     def total_seconds(self) -> float:

@@ -6,13 +6,12 @@ Those of a solid can be separate meshes. A plane body and a membrane are their o
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.accelerated.resumable import Resumable
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
+from verify.simulator.mapping.embedded_surface import EmbeddedSurface
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.stage import Stage
-from verify.simulator.surface_part import SurfacePart, embed_together
 from verify.xfem.phantom import PhantomMesh
 
 __all__ = ["Picture", "Surfaces"]
@@ -53,43 +52,37 @@ class Surfaces:
     ----------
     material : BodySurface
         Closed around the material; of a membrane, its triangles.
-    visual, collision : SurfacePart or None
+    visual, collision : EmbeddedSurface or None
         Where the stage has separate ones.
     """
 
     def __init__(self, stage: Stage, cutter: SemiProgressiveCutter) -> None:
-        self._cutter = cutter
         self.material = BodySurface(cutter.body)
-        self._embedded, (self.visual, self.collision) = embed_together(
-            cutter, [stage.visual, stage.collision]
+        self.visual, self.collision = (
+            EmbeddedSurface(cutter, *given) if given is not None else None
+            for given in (stage.visual, stage.collision)
         )
-        followers = (self.material, self._embedded)
+        followers = (self.material, self.visual, self.collision)
         self._followers = [surface for surface in followers if surface is not None]
-        self._positions = [np.empty((0, stage.mesh.space)) for _ in self._followers]
 
-    def following(self, increment: Increment) -> Resumable[None]:
-        """Let them follow a cut, in pieces; each is sound all along."""
-        if self._embedded is not None:
-            yield from self._embedded.following(increment)
-        yield from self.material.following(increment)
+    def update(self, increment: Increment) -> None:
+        """Let them follow a cut."""
+        for follower in self._followers:
+            follower.update(increment)
 
     def move(self, displacement: _Floats) -> None:
         """Compute the positions of all vertices for a displacement (N, s) of the unknowns."""
-        for k, follower in enumerate(self._followers):
-            surface = follower.surface
-            if len(self._positions[k]) != len(surface.material.rows):
-                self._positions[k] = np.empty_like(surface.material.rows)
-            surface.positions(displacement, self._positions[k])
+        self._positions = [follower.surface.positions(displacement) for follower in self._followers]
 
     @property
-    def shown(self) -> MovingSurface | SurfacePart:
+    def shown(self) -> MovingSurface:
         """The surface that is seen, the faces of cuts apart."""
-        return self.visual or self.material.surface
+        return (self.visual or self.material).surface
 
     @property
-    def touchable(self) -> MovingSurface | SurfacePart:
+    def touchable(self) -> MovingSurface:
         """The surface that tools collide with."""
-        return self.collision or self.material.surface
+        return (self.collision or self.material).surface
 
     @property
     def touchable_positions(self) -> _Floats:
@@ -101,10 +94,10 @@ class Surfaces:
         if phantom.mesh.space == 2:
             return _pieces(phantom, displacement)
         inside = self.material.surface
-        parts: list[tuple[MovingSurface | SurfacePart, _Ints]] = [(inside, inside.used)]
+        parts = [(inside, inside.used)]
         if self.visual is not None:
             shown = inside.used[inside.inner.rows[inside.used]]
-            parts = [(inside, shown), (self.visual, self.visual.used)]
+            parts = [(inside, shown), (self.shown, self.shown.used)]
         points, material, triangles, inner, begin = [], [], [], [], 0
         for number, (surface, used) in enumerate(parts):
             points.append(surface.positions(displacement))

@@ -54,7 +54,7 @@ class Timings:
     Attributes
     ----------
     step, cutting, resting : Spread
-        Of whole steps: all, those in which a cut was made or followed, and the others.
+        Of whole steps: all, those in which elements were split, and the others.
     phases : dict
         By phase, the `Spread` over all steps, those that cut, and the others.
     """
@@ -83,8 +83,8 @@ class Timings:
 
 def timings_of(records: Sequence[StepRecord]) -> Timings:
     """Sum up the steps; the first and the first that cuts, which compile, are for the caller."""
-    cutting = [record for record in records if record.busy or record.newly_split > 0]
-    resting = [record for record in records if not (record.busy or record.newly_split > 0)]
+    cutting = [record for record in records if record.newly_split > 0]
+    resting = [record for record in records if record.newly_split == 0]
 
     def spreads(seconds: Callable[[StepRecord], float]) -> tuple[Spread, Spread, Spread]:
         of = [Spread.of(map(seconds, kind)) for kind in (records, cutting, resting)]

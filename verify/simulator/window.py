@@ -18,9 +18,9 @@ __all__ = ["PlayWindow", "play_in_window"]
 _DEPTH = 0.05  # of the body's size: how far the blade reaches from where it touches
 
 
-def play_in_window(stage: Stage, title: str, stroke_file: Path, spread: bool = False) -> None:
+def play_in_window(stage: Stage, title: str, stroke_file: Path) -> None:
     """Play until the window is closed; strokes of the mouse are written to a file as they end."""
-    window = PlayWindow(stage, title, stroke_file, spread=spread)
+    window = PlayWindow(stage, title, stroke_file)
     milliseconds = max(1, round(1e3 * stage.time_step))
     window.plotter.add_timer_event(
         max_steps=10**9, duration=milliseconds, callback=lambda _: window.tick()
@@ -37,8 +37,6 @@ class PlayWindow:
     title : str
     stroke_file : Path
         Where each stroke of the mouse is written as it ends.
-    spread : bool
-        Whether the work of a cut is spread over steps: see `Session`.
     off_screen : bool
         Without a display, for tests: events are then sent to `plotter.iren.interactor`.
 
@@ -55,11 +53,10 @@ class PlayWindow:
         title: str,
         stroke_file: Path,
         off_screen: bool = False,
-        spread: bool = False,
     ) -> None:
         import pyvista
 
-        self.session = Session(stage, account=False, spread=spread)
+        self.session = Session(stage, account=False)
         frame = self._frame()
         self._view = view = view_of([frame, frame])
         self.scalpel = LiveScalpel(self.session, _DEPTH * view.width)

@@ -67,7 +67,9 @@ class ZeroPoints:
         """
         edge = plus << 32 | minus
         known, point = self._known.get(cut, (_NONE, _NONE))
-        new = np.setdiff1d(edge, known)
+        new = np.unique(edge)
+        if len(known):
+            new = new[known[np.minimum(np.searchsorted(known, new), len(known) - 1)] != new]
         if len(new):
             known = np.concatenate([known, new])
             point = np.concatenate([point, self._append(cut, new >> 32, new & 0xFFFFFFFF)])

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from verify.simulator.arrays.growing_array import GrowingArray
 
-__all__ = ["RowNumbers", "find_row", "number_of_row"]
+__all__ = ["RowNumbers", "find_row", "first_of_new", "number_of_row"]
 
 _Ints = NDArray[np.int64]
 
@@ -37,13 +37,6 @@ class RowNumbers:
         """All rows so far (k, width)."""
         return self._known.rows
 
-    def number(self, rows: _Ints) -> _Ints:
-        """Numbers (q,) of rows (q, width), new ones in the order given."""
-        table, room, count = self.open_for(len(rows))
-        numbers = np.empty(len(rows), dtype=np.int64)
-        self.close(_number_rows(rows, table, room, count, numbers))
-        return numbers
-
     def open_for(self, more: int) -> tuple[_Ints, _Ints, int]:
         """Table, room for rows and their count, for a kernel that adds at most `more` rows."""
         count = len(self._known)
@@ -56,6 +49,12 @@ class RowNumbers:
     def close(self, count: int) -> None:
         """Tell how many rows there are after `open_for`."""
         self._known.rows = self._known.rows[:count]
+
+
+def first_of_new(numbers: _Ints, count: int) -> _Ints:
+    """Where each number from `count` on comes first, if they come in their order."""
+    before = np.maximum.accumulate(np.concatenate([[count - 1], numbers[:-1]]))
+    return np.flatnonzero(numbers > before)
 
 
 @njit(cache=True)
@@ -93,13 +92,6 @@ def number_of_row(row, table, known, count):
             known[count, k] = row[k]
         return count, count + 1
     return table[at], count
-
-
-@njit(cache=True)
-def _number_rows(rows, table, known, count, numbers):
-    for q in range(len(rows)):
-        numbers[q], count = number_of_row(rows[q], table, known, count)
-    return count
 
 
 @njit(cache=True)

@@ -1,63 +1,23 @@
-"""Collision of tools with a moving surface: boxes refitted each step, contacts per piece."""
+"""Collision of tools with a moving surface: contacts per piece, so that each side answers.
+
+A tool is asked against all boxes at once; only facets whose boxes it comes near are looked at.
+"""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.simulator.collision.bounding_tree import BoundingTree
-from verify.simulator.collision.tool_kernels import capsule_contacts, segment_hits
-from verify.simulator.collision.tree_kernels import nearest_facets
+from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.errors import XfemError
+from verify.xfem.nearest_points import nearest_on_facet
 
-__all__ = ["Contacts", "DeformingFacets", "SurfaceCollider"]
+__all__ = ["Contacts", "SurfaceCollider"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
-
-class _Rows(Protocol):
-    @property
-    def rows(self) -> NDArray[Any]: ...
-
-
-class DeformingFacets(Protocol):
-    """Deformed facets of a surface, as `mapping.moving_surface.MovingSurface` has them."""
-
-    @property
-    def material(self) -> _Rows:
-        """(v, s) vertices in the material frame, in metres."""
-        ...
-
-    @property
-    def facets(self) -> _Rows:
-        """(f, k) vertices of each facet."""
-        ...
-
-    @property
-    def facet_piece(self) -> _Rows:
-        """(f,) piece to which each belongs."""
-        ...
-
-    @property
-    def used(self) -> _Ints:
-        """Numbers of the facets in use."""
-        ...
-
-    @property
-    def in_order(self) -> bool:
-        """Whether neighbours among these are near each other."""
-        ...
-
-    @property
-    def retired(self) -> int:
-        """How many facets have been taken out of use."""
-        ...
-
-    def positions(self, displacement: _Floats, out: _Floats | None = None) -> _Floats:
-        """(v, s) vertices for a displacement of the dof nodes, in metres."""
-        ...
+_ROUND_OFF = 16.0 * np.finfo(float).eps  # of positions: what touches exactly is touched
 
 
 @dataclass(frozen=True)
@@ -86,11 +46,11 @@ class Contacts:
 
 
 class SurfaceCollider:
-    """A tree over the facets of a moving surface.
+    """Queries of tools against the facets of a moving surface.
 
     Parameters
     ----------
-    surface : DeformingFacets
+    surface : MovingSurface
 
     Attributes
     ----------
@@ -98,25 +58,13 @@ class SurfaceCollider:
         Of the vertices when last refitted, in metres.
     """
 
-    def __init__(self, surface: DeformingFacets) -> None:
+    def __init__(self, surface: MovingSurface) -> None:
         self.surface = surface
-        self._facets = np.empty((0, surface.facets.rows.shape[1]), dtype=np.int64)
-        self._numbers = np.empty(0, dtype=np.int64)
-        self._state = (-1, -1)
-        self.positions = surface.material.rows.copy()
-        self._rebuild()
+        self.follow(surface.material.rows.copy())
 
     def refit(self, displacement: _Floats) -> None:
-        """Move with the body; the tree is built anew only if the surface has changed.
-
-        Parameters
-        ----------
-        displacement : (N, s) float array
-            Of the dof nodes, in metres.
-        """
-        if len(self.positions) != len(self.surface.material.rows):
-            self.positions = np.empty_like(self.surface.material.rows)
-        self.follow(self.surface.positions(displacement, self.positions))
+        """Move with the body, by the displacement (N, s) of the dof nodes, in metres."""
+        self.follow(self.surface.positions(displacement))
 
     def follow(self, positions: _Floats) -> None:
         """Move to positions (v, s) of all vertices that are known already, kept by reference, m.
@@ -133,15 +81,9 @@ class SurfaceCollider:
         if not np.isfinite(positions).all():
             raise XfemError("positions of a surface that are not finite")
         self.positions = positions
-        if self._state != self._now():
-            self._rebuild()
-        else:
-            self._tree.refit(self.positions)
+        self._boxes: tuple[_Ints, _Floats, _Floats, _Floats] | None = None
 
-    def nearest(
-        self, points: ArrayLike, limit: float = np.inf, piece_body: _Ints | None = None,
-        body: int = -1,
-    ) -> Contacts:  # fmt: skip
+    def nearest(self, points: ArrayLike, limit: float = np.inf) -> Contacts:
         """Nearest point of the surface to each point (q, s), if nearer than the limit.
 
         Parameters
@@ -150,67 +92,71 @@ class SurfaceCollider:
             In metres.
         limit : float
             In metres.
-        piece_body, body
-            Body of each piece, and the only one that counts; all do if it is negative.
 
         Raises
         ------
         XfemError
-            If points are not finite or of another shape, the limit is negative, or pieces are
-            without a body.
+            If points are not finite or of another shape, or the limit is negative.
         """
         queries = self._check(points)
         if not limit >= 0.0:
             raise XfemError(f"limit {limit} m of a distance; expected zero or more")
-        facet_body = np.zeros(len(self._numbers), dtype=np.int64)
-        if piece_body is not None:
-            most = int(self.surface.facet_piece.rows[self._numbers].max(initial=-1))
-            if len(piece_body) <= most:
-                raise XfemError(f"bodies of {len(piece_body)} pieces; expected {most + 1} or more")
-            facet_body = piece_body[self.surface.facet_piece.rows[self._numbers]]
-        facet, distance, at = nearest_facets(
-            queries, self.positions, self._facets, facet_body, body, self._tree.low,
-            self._tree.high, self._tree.order, min(limit, 1e150),
-        )  # fmt: skip
-        distance[facet < 0] = np.inf
+        numbers, corners, low, high = self._facets()
+        facet, distance = np.full(len(queries), -1), np.full(len(queries), np.inf)
+        at, weights = np.zeros((len(queries), corners.shape[1])), np.empty(corners.shape[1])
+        for q, x in enumerate(queries):
+            gap = np.linalg.norm(np.maximum(0.0, np.maximum(low - x, x - high)), axis=1)
+            best = limit
+            for f in np.argsort(gap):
+                if gap[f] > best:
+                    break
+                nearest_on_facet(x, corners[f], weights)
+                away = float(np.linalg.norm(weights @ corners[f] - x))
+                if away < best or (away == best and facet[q] < 0):
+                    best, facet[q], distance[q], at[q] = away, numbers[f], away, weights
         return self._contacts(facet, distance, at, np.zeros(len(facet)))
 
     def pierced(self, start: ArrayLike, end: ArrayLike) -> Contacts:
         """Facets that a segment pierces, in order along it."""
-        ends = self._check(np.array([start, end], dtype=float))
-        facet, share, at = segment_hits(
-            ends[0], ends[1], self.positions, self._facets, self._tree.low, self._tree.high,
-            self._tree.order,
-        )  # fmt: skip
-        order = np.argsort(share)
-        return self._contacts(facet[order], np.zeros(len(facet)), at[order], share[order])
+        begin, stop = self._check(np.array([start, end], dtype=float))
+        facet, corners = self._near(begin, stop, 0.0)
+        share, at = _pierced(begin, stop, corners)
+        found = np.flatnonzero(share >= 0.0)
+        found = found[np.argsort(share[found])]
+        return self._contacts(facet[found], np.zeros(len(found)), at[found], share[found])
 
     def touched(self, start: ArrayLike, end: ArrayLike, radius: float) -> Contacts:
         """Facets within the radius of a tool's axis from start to end (a capsule)."""
         if not radius >= 0.0:
             raise XfemError(f"tool of radius {radius}; expected zero or more")
-        ends = self._check(np.array([start, end], dtype=float))
-        facet, distance, share, at = capsule_contacts(
-            ends[0], ends[1], radius, self.positions, self._facets, self._tree.low,
-            self._tree.high, self._tree.order,
-        )  # fmt: skip
-        return self._contacts(facet, distance, at, share)
+        begin, stop = self._check(np.array([start, end], dtype=float))
+        reach = radius + _ROUND_OFF * float(np.abs([begin, stop]).max())
+        facet, corners = self._near(begin, stop, reach)
+        distance, share, at = _segment_to_facets(begin, stop, corners)
+        found = np.flatnonzero(distance <= reach)
+        return self._contacts(
+            facet[found], np.minimum(distance[found], radius), at[found], share[found]
+        )
+
+    def _facets(self) -> tuple[_Ints, _Floats, _Floats, _Floats]:
+        """Numbers of the facets in use, their corners, and the corners of their boxes."""
+        if self._boxes is None:
+            used = self.surface.used
+            corners = self.positions[self.surface.facets.rows[used]]
+            self._boxes = used, corners, corners.min(axis=1), corners.max(axis=1)
+        return self._boxes
+
+    def _near(self, start: _Floats, end: _Floats, reach: float) -> tuple[_Ints, _Floats]:
+        """Facets whose box meets that of a segment, widened by a reach, and their corners."""
+        numbers, corners, low, high = self._facets()
+        beyond = (low > np.maximum(start, end) + reach) | (high < np.minimum(start, end) - reach)
+        near = np.flatnonzero(~beyond.any(axis=1))
+        return numbers[near], corners[near]
 
     def _contacts(self, facet: _Ints, distance: _Floats, at: _Floats, share: _Floats) -> Contacts:
-        if len(facet) == 0 or len(self._numbers) == 0:
-            return Contacts(facet, facet, distance, at, share)
-        number = np.where(facet >= 0, self._numbers[facet], -1)
-        piece = np.where(number >= 0, self.surface.facet_piece.rows[number], -1)
-        return Contacts(number, piece, distance, at, share)
-
-    def _now(self) -> tuple[int, int]:
-        return len(self.surface.facets.rows), self.surface.retired
-
-    def _rebuild(self) -> None:
-        self._numbers = self.surface.used
-        self._facets = self.surface.facets.rows.take(self._numbers, axis=0)
-        self._tree = BoundingTree(self.positions, self._facets, self.surface.in_order)
-        self._state = self._now()
+        piece = np.full(len(facet), -1)
+        piece[facet >= 0] = self.surface.facet_piece.rows[facet[facet >= 0]]
+        return Contacts(facet, piece, distance, at, share)
 
     def _check(self, points: ArrayLike) -> _Floats:
         queries = np.ascontiguousarray(points, dtype=float)
@@ -218,3 +164,77 @@ class SurfaceCollider:
         if queries.ndim != 2 or queries.shape[1] != space or not np.isfinite(queries).all():
             raise XfemError(f"query points of shape {queries.shape}; expected finite (q, {space})")
         return queries
+
+
+def _volumes(edges: _Floats) -> _Floats:
+    """Find the determinants (q,) of rows (q, s, s)."""
+    if edges.shape[2] == 2:
+        return edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    return np.einsum("qi,qi->q", edges[:, 0], np.cross(edges[:, 1], edges[:, 2]))
+
+
+def _pierced(start: _Floats, end: _Floats, corners: _Floats) -> tuple[_Floats, _Floats]:
+    """Share (q,) of a segment at which it pierces each facet, -1 if it does not, and weights."""
+    before, behind = _volumes(corners - start), _volumes(corners - end)
+    apart = ((before > 0.0) == (behind > 0.0)) & (before != 0.0) & (behind != 0.0)
+    weights = np.empty(corners.shape[:2])
+    for k in range(corners.shape[1]):
+        # each corner's weight is the volume that the segment spans with the others
+        edges = corners - start
+        edges[:, k] = end - start
+        weights[:, k] = _volumes(edges)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = before / (before - behind)
+        weights /= weights.sum(axis=1)[:, None]
+        inside = (weights >= 0.0).all(axis=1)  # never where a facet lies along the segment: NaN
+    return np.where(inside & ~apart & (before != behind), share, -1.0), weights
+
+
+def _segment_to_facets(
+    start: _Floats, end: _Floats, corners: _Floats
+) -> tuple[_Floats, _Floats, _Floats]:
+    """Distance (q,) of a segment from each facet, share of the segment, weights on the facet."""
+    count, size, _ = corners.shape
+    best, share, weights = np.full(count, np.inf), np.zeros(count), np.empty((count, size))
+
+    def take(distance: _Floats, at: _Floats | float, on_facet: _Floats) -> None:
+        nearer = distance < best
+        best[nearer], weights[nearer] = distance[nearer], on_facet[nearer]
+        share[nearer] = np.broadcast_to(at, count)[nearer]
+
+    through, on_facet = _pierced(start, end, corners)
+    take(np.where(through >= 0.0, 0.0, np.inf), through, on_facet)
+    for tip, x in ((0.0, start), (1.0, end)):
+        on_facet = np.empty((count, size))
+        for facet, at in zip(corners, on_facet, strict=True):
+            nearest_on_facet(x, facet, at)
+        foot = np.einsum("qk,qki->qi", on_facet, corners)
+        take(np.linalg.norm(foot - x, axis=1), tip, on_facet)
+    for k in range(size if size == 3 else 1):
+        j = (k + 1) % size
+        s, t = _nearest_of_segments(start, end, corners[:, k], corners[:, j])
+        on_facet = np.zeros((count, size))
+        on_facet[:, k], on_facet[:, j] = 1.0 - t, t
+        there = corners[:, k] + t[:, None] * (corners[:, j] - corners[:, k])
+        here = start + s[:, None] * (end - start)
+        take(np.linalg.norm(here - there, axis=1), s, on_facet)
+    return best, share, weights
+
+
+def _nearest_of_segments(p: _Floats, q: _Floats, a: _Floats, b: _Floats) -> tuple[_Floats, _Floats]:
+    """Shares (s on pq, t on each ab) of the nearest points of a segment and some others.
+
+    Ericson, Real-Time Collision Detection, section 5.1.9.
+    """
+    u, v, w = q - p, b - a, p - a
+    uu, vv, uv = float(u @ u), (v * v).sum(axis=1), v @ u
+    uw, vw = w @ u, (v * w).sum(axis=1)
+
+    def share(top: _Floats, bottom: _Floats | float) -> _Floats:
+        bottom = np.broadcast_to(bottom, top.shape)
+        return np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0.0)
+
+    s = np.clip(share(uv * vw - uw * vv, uu * vv - uv * uv), 0.0, 1.0)
+    t = share(uv * s + vw, vv)
+    held = np.clip(t, 0.0, 1.0)
+    return np.where(held != t, np.clip(share(uv * held - uw, uu), 0.0, 1.0), s), held

@@ -6,66 +6,62 @@ point whether it lies on the sweep and whether the blade has passed it. The tole
 A sweep comes as its `arrays`, `verify.xfem.faceted_cuts.FacetArrays`.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from verify.simulator.collision.tree_kernels import as_array, items_near_plane
 from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.faceted_cuts import probe
 
-__all__ = ["cells_hit", "walk"]
+__all__ = ["WalkState", "WalkedMesh", "walk"]
 
 
-@njit(cache=True)
-def _box_between(corners, travel, after, front, floor, ceiling):
-    """Write the box of the part of a facet between two travels; whether there is any."""
-    some = False
-    for i in range(len(floor)):
-        floor[i], ceiling[i] = np.inf, -np.inf
-    for k in range(len(travel)):
-        for j in range(k, len(travel)):
-            # corners between the two, and where an edge passes one of them
-            for limit in (after, front):
-                share = 0.0
-                if j == k:
-                    if travel[k] < after or travel[k] > front:
-                        continue
-                elif (travel[k] < limit) == (travel[j] < limit):
-                    continue
-                else:
-                    share = (limit - travel[k]) / (travel[j] - travel[k])
-                some = True
-                for i in range(len(floor)):
-                    x = (1.0 - share) * corners[k, i] + share * corners[j, i]
-                    floor[i], ceiling[i] = min(floor[i], x), max(ceiling[i], x)
-    return some
+class WalkedMesh(NamedTuple):
+    """Mesh, the longest edge (m,) of each cell, and below what a level set is zero, in metres."""
+
+    cells: NDArray[np.int64]
+    neighbours: NDArray[np.int64]
+    points: NDArray[np.float64]
+    size: NDArray[np.float64]
+    snap: float
 
 
-@njit(cache=True)
-def cells_hit(sweep, after, front, margin, low, high, order):
-    """Items of a tree near what is swept between two travels; may hold doubles."""
-    found = [np.int64(0) for _ in range(0)]
-    corners = sweep.corners
-    floor, ceiling = np.empty(corners.shape[2]), np.empty(corners.shape[2])
-    for t in range(len(corners)):
-        if not _box_between(corners[t], sweep.travel[t], after, front, floor, ceiling):
-            continue
-        for i in range(len(floor)):
-            floor[i] -= margin
-            ceiling[i] += margin
-        for item in items_near_plane(
-            low, high, order, floor, ceiling, sweep.normals[t], corners[t, 0], margin
-        ):
-            found.append(item)  # noqa: PERF402 - `extend` takes longer to compile
-    return as_array(found)
+class WalkState(NamedTuple):
+    """What a stroke knows of nodes and cells; see `verify.simulator.cutting.stroke.Stroke`.
+
+    Attributes
+    ----------
+    phi : (n,) float array
+        Level sets, NaN where nobody has asked for them yet.
+    entry, leave : (m,) float arrays
+    turns : (m,) int array
+        Look at which a cell was last met.
+    settled, recorded, near : (m,) bool arrays
+        Cells that the blade has left behind, those that it is known to have split, and all that
+        were ever near it.
+    strokes_near : (m,) int array
+        Of all strokes.
+    """
+
+    phi: NDArray[np.float64]
+    entry: NDArray[np.float64]
+    leave: NDArray[np.float64]
+    turns: NDArray[np.int64]
+    settled: NDArray[np.bool_]
+    recorded: NDArray[np.bool_]
+    near: NDArray[np.bool_]
+    strokes_near: NDArray[np.int64]
 
 
-@njit(cache=True)
-def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, room):
+@njit(inline="always")
+def _cross(cell, front, mesh, sweep, state, room):
     """(near the sweep, crossed through, latest travel) of a cell.
 
     Writes the travel at which the blade entered it, and crossed it through.
     """
+    cells, points, size, phi = mesh.cells, mesh.points, mesh.size, state.phi
     corners, space = cells.shape[1], points.shape[1]
     place = room[4, :space]
     near, through, any_zero, latest = False, True, False, 0.0
@@ -73,7 +69,7 @@ def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, roo
         node = cells[cell, a]
         if np.isnan(phi[node]):
             value = probe(points[node], sweep, room)[0]
-            phi[node] = 0.0 if abs(value) <= snap else value
+            phi[node] = 0.0 if abs(value) <= mesh.snap else value
     for a in range(corners):
         for b in range(a + 1, corners):
             p, m = cells[cell, a], cells[cell, b]
@@ -91,71 +87,55 @@ def _cross(cell, front, cells, points, size, snap, sweep, phi, entry, leave, roo
                 latest = max(latest, travel)
             on = abs(level) <= REACH * size[cell] and beyond <= AT_END * size[cell]
             if on and travel <= front + AT_END * size[cell]:
-                entry[cell] = min(entry[cell], travel)
+                state.entry[cell] = min(state.entry[cell], travel)
             else:
                 through = False
     if any_zero and through:
-        leave[cell] = latest
+        state.leave[cell] = latest
     return near, any_zero and through, latest
 
 
 @njit(cache=True)
-def walk(
-    seeds,
-    front,
-    cells,
-    neighbours,
-    points,
-    size,
-    snap,
-    sweep,
-    phi,
-    turn,
-    turns,
-    settled,
-    recorded,
-    near_cell,
-    strokes_near,
-    entry,
-    leave,
-):
-    """Walk from the seeds to all cells near what has been swept.
+def walk(seeds, front, turn, mesh, sweep, state):
+    """Walk from the seeds to all cells near what has been swept, at the look of that number.
 
     Returns the cells that may have to be split, and those from which to go on next time.
-    `settled` marks cells that the blade has left behind, `recorded` those that it is known to have
-    split, `near_cell` all that were ever near it.
     """
-    queue, candidates = [np.int64(0) for _ in range(0)], [np.int64(0) for _ in range(0)]
-    frontier, room = [np.int64(0) for _ in range(0)], np.empty((5, 3))
+    turns, settled, recorded, near_cell = state.turns, state.settled, state.recorded, state.near
+    room, count, total = np.empty((5, 3)), 0, 0
+    queue = np.empty(len(turns), dtype=np.int64)
+    candidates, frontier = np.empty_like(queue), np.empty_like(queue)
     for cell in seeds:
         if turns[cell] != turn:
             turns[cell] = turn
-            queue.append(cell)
-    at = 0
-    while at < len(queue):
+            queue[total] = cell
+            total += 1
+    at, wanted = 0, 0
+    while at < total:
         cell = queue[at]
         at += 1
         if settled[cell]:
             continue
-        near, through, latest = _cross(
-            cell, front, cells, points, size, snap, sweep, phi, entry, leave, room
-        )
+        near, through, latest = _cross(cell, front, mesh, sweep, state, room)
         if not near:
             continue
         if not near_cell[cell]:
             near_cell[cell] = True
-            strokes_near[cell] += 1
-        alone = strokes_near[cell] == 1
+            state.strokes_near[cell] += 1
+        alone = state.strokes_near[cell] == 1
         if (through and not recorded[cell]) or not alone:
-            candidates.append(cell)
+            candidates[wanted] = cell
+            wanted += 1
         # what other strokes have left of a cell may be crossed through later than its edges; and
         # what is crossed through only just may be split only when the blade is farther on
-        if alone and (recorded[cell] or latest < front - size[cell]):
+        if alone and (recorded[cell] or latest < front - mesh.size[cell]):
             settled[cell] = True
         else:
-            frontier.append(cell)
-        for other in neighbours[cell]:
+            frontier[count] = cell
+            count += 1
+        for other in mesh.neighbours[cell]:
             if other >= 0 and turns[other] != turn:
                 turns[other] = turn
-                queue.append(other)
-    return as_array(candidates), as_array(frontier)
+                queue[total] = other
+                total += 1
+    return candidates[:wanted], frontier[:count]

@@ -11,22 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.accelerated.resumable import Resumable, finished
-from verify.simulator.arrays.distinct import distinct
+from verify.simulator.arrays.distinct import distinct, ranges
 from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.cutting.division import Division
 from verify.simulator.cutting.patch import MeshPatch, PatchCutter
 from verify.simulator.cutting.point_numbers import PointNumbers
-from verify.simulator.cutting.renumber_kernels import (
-    labelled,
-    match_pieces,
-    number_unknowns,
-    retire,
-    separated,
-    simplices_of,
-    slots_before,
-    write_pieces,
-)
+from verify.simulator.cutting.renumbering import Slots, number_groups, slots_before
+from verify.simulator.cutting.stored_pieces import StoredPieces
 from verify.simulator.cutting.tied_parts import TiedParts
 from verify.xfem.clip import Partition
 from verify.xfem.errors import XfemError
@@ -157,9 +148,14 @@ class GrowingBody:
         """Pieces left out because their volume is exactly zero, or was when they were made."""
         return int(self._dropped.sum())
 
+    @property
+    def pieces(self) -> StoredPieces:
+        """Stored pieces as they are now."""
+        return StoredPieces(self.piece_label.rows, self.first_piece, self.next_piece.rows)
+
     def split_by(self, cells: _Ints, cut: int) -> NDArray[np.bool_]:
         """Whether a cut has split cells, or pieces of them."""
-        return labelled(cells, cut, self.piece_label.rows, self.first_piece, self.next_piece.rows)
+        return self.pieces.labelled(cells, cut)
 
     def add_cut(self) -> int:
         """Make room for one more cut; its number."""
@@ -170,14 +166,12 @@ class GrowingBody:
         return self.cut_count - 1
 
     def split(self, candidates: _Ints, cuts_near: CutsNear) -> Increment | None:
-        """Bring some cells up to date with the cuts; None if nothing changes: see `looking`."""
-        division = finished(self.looking(candidates, cuts_near))
+        """Bring some cells up to date with the cuts; None if nothing changes."""
+        division = self.division(candidates, cuts_near)
         return None if division is None else self.divide(division)
 
-    def looking(self, candidates: _Ints, cuts_near: CutsNear) -> Resumable[Division | None]:
+    def division(self, candidates: _Ints, cuts_near: CutsNear) -> Division | None:
         """Find how some cells are to be divided, None if they are not; the body stays as it is.
-
-        Done in pieces, between which neither the body nor the cuts may change.
 
         Parameters
         ----------
@@ -198,7 +192,6 @@ class GrowingBody:
             numbers, cuts = cuts_near(patch)
             held, joint = self._held_in(patch, numbers), self._tied.joint[patch.whole_cells]
             partition = split_cells(patch, cuts, held=held, joint=joint)
-            yield
             division = self._compare(patch, partition, numbers)
             all_wanted = distinct(np.concatenate([wanted, division.changed_cells]))
             if len(all_wanted) == len(wanted):
@@ -233,15 +226,8 @@ class GrowingBody:
         """Make the rule that what a cut has separated it separates, whatever came later."""
 
         def held(parent: _Ints, label: NDArray[np.int8], index: int) -> NDArray[np.bool_]:
-            before = separated(
-                patch.whole_cells[parent],
-                label,
-                numbers,
-                numbers[index],
-                self.piece_label.rows,
-                self.first_piece,
-                self.next_piece.rows,
-            )
+            cells = patch.whole_cells[parent]
+            before = self.pieces.separated(cells, label, numbers, int(numbers[index]))
             self.held += int(before.sum())
             return before
 
@@ -254,18 +240,15 @@ class GrowingBody:
         label = np.zeros((len(solid), self.cut_count), dtype=np.int8)
         label[:, numbers] = partition.label
         cell = patch.whole_cells[partition.parent]
-        old = np.empty(len(solid), dtype=np.int64)
-        changed = np.zeros(len(solid), dtype=bool)
-        store = (self.piece_label.rows, self.first_piece, self.next_piece.rows)
-        orphan = match_pieces(cell, label, label, solid, *store, old, changed)
-        if orphan >= 0:
+        old, changed = self.pieces.match(cell, label, label)
+        if (solid & (old < 0)).any():
             # a piece on one side of a cut that does not split it is part of what is on that side
             side = label.copy()
             side[:, numbers] = _sides(partition)
-            orphan = match_pieces(cell, label, side, solid, *store, old, changed)
-        if orphan >= 0:
+            old, changed = self.pieces.match(cell, label, side)
+        orphans = solid & (old < 0)
+        if orphans.any():
             # what had no volume was left out, and rounded otherwise it must not come back
-            orphans = solid & (old < 0)
             solid &= ~(orphans & (self._dropped[cell] > 0) & (fraction <= _NOTHING))
             left = np.flatnonzero(orphans & solid)
             if len(left):
@@ -276,112 +259,72 @@ class GrowingBody:
             changed |= self._tied.parted(partition.tied, of)
         return Division(patch, partition, numbers, cell, label, fraction, solid, old, changed)
 
-    def _renumber(self, state: Division) -> _Ints:
+    def _renumber(self, division: Division) -> _Ints:
         """Set the unknowns at the nodes of changed cells; return the stored place of each piece."""
-        patch, partition = state.patch, state.partition
-        slots = join_parts(patch, partition, state.solid)
-        cell, touched, home, solid, old = slots_before(
-            slots.cells[slots.piece_cell],
-            np.searchsorted(patch.whole_cells, state.changed_cells),
-            patch.cells,
-            len(patch.whole_nodes),
-            patch.whole_cells,
-            partition.parent,
-            partition.label,
-            partition.points.values,
-            state.solid,
-            state.old,
-            self.first_piece,
+        joined = join_parts(division.patch, division.partition, division.solid)
+        local, group = joined.cells[joined.piece_cell], joined.group
+        slots = slots_before(division, local, self.first_piece)
+        number, self._source, conflict = number_groups(
+            slots, group, self.piece_cells.rows, len(self.mesh.points), self.node_count
         )
-        number = np.empty(int(slots.group.max(initial=-1)) + 1, dtype=np.int64)
-        source = np.empty(len(number), dtype=np.int64)
-        before = self.node_count
-        after = number_unknowns(
-            slots.group,
-            solid,
-            home,
-            touched,
-            old,
-            self.piece_cells.rows,
-            len(self.mesh.points),
-            before,
-            number,
-            source,
-        )
-        if after < 0:
-            raise XfemError(f"a cut would join parts of cell {cell[-1 - after]} that are separate")
-        self._source = source[: after - before]
+        if conflict >= 0:
+            cell = slots.cell[conflict]
+            raise XfemError(f"a cut would join parts of cell {cell} that are separate")
         self.node_parent.append(self.node_parent.rows[self._source])
-        return self._write(cell, slots.group, touched, number, solid, old, state)
+        place = self._store_pieces(division, slots)
+        there = np.flatnonzero(slots.solid)
+        rows, touched = place[there], slots.touched[there]
+        before = self.piece_cells.rows[rows]
+        after = np.where(touched, number[group[there]], before)
+        self.piece_cells.rows[rows] = after
+        self._moved = slots.cell[there[(before != after).any(axis=1)]]
+        return place
 
-    def _write(
-        self,
-        cell: _Ints,
-        group: _Ints,
-        touched: NDArray[np.bool_],
-        number: _Ints,
-        solid: NDArray[np.bool_],
-        old: _Ints,
-        state: Division,
-    ) -> _Ints:
-        place = np.empty(len(old), dtype=np.int64)
-        moved = np.zeros(len(old), dtype=bool)
-        changed = np.zeros(len(old), dtype=bool)
-        changed[: len(state.changed)] = state.changed
-        stores = (
-            self.next_piece,
-            self.piece_cells,
-            self.piece_parent,
-            self.piece_fraction,
-            self.piece_label,
-        )
-        count = len(self.piece_cells)
-        for store in stores:
-            store.extend(len(state.old))
-        after = write_pieces(
-            cell,
-            group,
-            touched,
-            number,
-            solid,
-            changed,
-            old,
-            state.fraction,
-            state.label,
-            self.next_piece.rows,
-            self.piece_cells.rows,
-            self.piece_parent.rows,
-            self.piece_fraction.rows,
-            self.piece_label.rows,
-            count,
-            place,
-            moved,
-        )
-        self._moved = cell[moved]
-        for store in stores:
-            store.rows = store.rows[:after]
+    def _store_pieces(self, division: Division, slots: Slots) -> _Ints:
+        """Store pieces: the first part of a stored one takes its place, others are appended.
+
+        Returns the place (p,) of each, -1 for those without volume.
+        """
+        there, count = np.flatnonzero(slots.solid), len(self.piece_cells)
+        place = np.full(len(slots.old), -1)
+        stored, first = np.unique(slots.old[there], return_index=True)
+        place[there[first]] = stored
+        more = there[place[there] < 0]
+        source = slots.old[more]
+        place[more] = count + np.arange(len(more))
+        self.piece_cells.append(self.piece_cells.rows[source])
+        self.piece_parent.append(slots.cell[more])
+        self.piece_fraction.append(self.piece_fraction.rows[source])
+        self.piece_label.append(self.piece_label.rows[source])
+        self.next_piece.extend(len(more))
+        chain = self.next_piece.rows
+        for new, old in zip(place[more].tolist(), source.tolist(), strict=True):
+            chain[new], chain[old] = chain[old], new
+        changed = np.flatnonzero(division.changed & division.solid)
+        self.piece_fraction.rows[place[changed]] = division.fraction[changed]
+        self.piece_label.rows[place[changed]] = division.label[changed]
         return place
 
     def _store_simplices(self, division: Division, cells: _Ints, place: _Ints) -> None:
         """Replace the sub-simplices of the changed cells."""
         patch, partition = division.patch, division.partition
         ids = self.points.number(partition.points, patch.whole_nodes, division.numbers)
-        rows, bounds = simplices_of(
-            cells,
-            patch.whole_cells,
-            partition.parent,
-            partition.simplices.piece,
-            place,
-            partition.simplices.fraction,
-        )
-        retire(self.sub_piece.rows, self.sub_range, cells)
+        simplices = partition.simplices
+        stored = place[simplices.piece]
+        cell = patch.whole_cells[partition.parent[simplices.piece]]
+        owner = np.searchsorted(cells, cell)
+        mine = cells[np.minimum(owner, len(cells) - 1)] == cell
+        rows = np.flatnonzero(mine & (simplices.fraction > 0.0) & (stored >= 0))
+        rows = rows[np.argsort(owner[rows], kind="stable")]
+        ends = np.cumsum(np.bincount(owner[rows], minlength=len(cells)))
+        self.sub_piece.rows[ranges(self.sub_range[cells])] = -1
         begin = len(self.sub_piece)
-        self.sub_piece.append(place[partition.simplices.piece[rows]])
-        self.sub_points.append(ids[partition.simplices.points[rows]])
-        self.sub_barycentric.append(partition.simplices.barycentric[rows])
-        self.sub_fraction.append(partition.simplices.fraction[rows])
-        self.sub_sign.append(partition.simplices.sign[rows])
-        self.sub_range[cells] = begin + bounds
+        self.sub_piece.append(stored[rows])
+        self.sub_points.append(ids[simplices.points[rows]])
+        self.sub_barycentric.append(simplices.barycentric[rows])
+        self.sub_fraction.append(simplices.fraction[rows])
+        self.sub_sign.append(simplices.sign[rows])
+        self.sub_range[cells] = begin + np.stack([np.concatenate([[0], ends[:-1]]), ends], axis=1)
 
 
 def _sides(partition: Partition) -> NDArray[np.int8]:

@@ -12,15 +12,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from verify.simulator.arrays.growing_array import GrowingArray
-from verify.simulator.arrays.row_numbers import RowNumbers, find_row, number_of_row
+from verify.simulator.arrays.row_numbers import RowNumbers, first_of_new, number_of_row
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["FoundPoints", "PointNumbers", "runs_through", "spans"]
+__all__ = ["CUTS", "NODES", "FoundPoints", "PointNumbers"]
 
 _Ints = NDArray[np.int64]
 
-_NODES, _CUTS = 4, 3  # a point of a tetrahedron has at most that many
-_WIDTH = _NODES + _CUTS
+NODES, CUTS = 4, 3  # a point of a tetrahedron has at most that many
+_WIDTH = NODES + CUTS
 
 
 class FoundPoints(NamedTuple):
@@ -45,6 +45,8 @@ class PointNumbers:
         (k, 2) numbers of the ends (plus, minus) of an edge on which each lies.
     cut : GrowingArray
         (k,) cut whose zero it is on that edge.
+    met : (nodes, cuts) bool array
+        Whether a cut runs exactly through a mesh node; of a growing cut that may change.
     """
 
     def __init__(self, nodes: int, space: int) -> None:
@@ -53,19 +55,13 @@ class PointNumbers:
         self.ends = GrowingArray(np.empty((0, 2), dtype=np.int64))
         self.cut = GrowingArray(np.empty(0, dtype=np.int64))
         self._table = RowNumbers(_WIDTH)
-        self._nodes_met = RowNumbers(2)
-        self._still_met = GrowingArray(np.empty(0, dtype=np.bool_))
+        self.met = np.zeros((nodes, 0), dtype=bool)
         self._supports = GrowingArray(np.empty((0, _WIDTH), dtype=np.int64))
 
     @property
     def supports(self) -> _Ints:
         """(k, 7) mesh nodes (4) and cuts (3) of each zero point, ascending, padded at the end."""
         return self._supports.rows
-
-    @property
-    def nodes_on_cuts(self) -> tuple[_Ints, _Ints, NDArray[np.bool_]]:
-        """Table of rows (mesh node, cut), the rows, and whether the cut runs through the node."""
-        return self._nodes_met.table, self._nodes_met.rows, self._still_met.rows
 
     def number(self, points: ZeroPoints | FoundPoints, whole_nodes: _Ints, cuts: _Ints) -> _Ints:
         """Numbers of all points of a patch: its nodes, then its zero points.
@@ -84,86 +80,34 @@ class PointNumbers:
         numbers[:local] = whole_nodes
         if more == 0:
             return numbers
-        self._meet_nodes(points.values[:local], whole_nodes, cuts)
+        if (beyond := int(cuts.max()) + 1 - self.met.shape[1]) > 0:
+            self.met = np.hstack([self.met, np.zeros((self.nodes, beyond), dtype=bool)])
+        self.met[whole_nodes[:, None], cuts] = points.values[:local] == 0.0
         table, known, count = self._table.open_for(more)
         self._supports.extend(more)
         after = _number_points(
-            points.ends,
-            cuts[points.cut],
-            local,
-            self.nodes,
-            numbers,
-            self._supports.rows,
-            self.nodes_on_cuts,
-            table,
-            known,
+            points.ends, cuts[points.cut], numbers, self.met, self._supports.rows, table, known,
             count,
-        )
+        )  # fmt: skip
         self._table.close(after)
         self._supports.rows = self._supports.rows[:after]
-        for store in (self.positions, self.ends, self.cut):
-            store.extend(after - count)
-        _write_new(
-            numbers,
-            local,
-            self.nodes,
-            count,
-            (points.positions, points.ends, cuts[points.cut]),
-            (self.positions.rows, self.ends.rows, self.cut.rows),
-        )
+        new = first_of_new(numbers[local:], self.nodes + count)  # of equal points the first
+        self.positions.append(points.positions[local + new])
+        self.ends.append(numbers[points.ends[new]])
+        self.cut.append(cuts[points.cut[new]])
         return numbers
 
-    def _meet_nodes(self, values: NDArray[np.float64], nodes: _Ints, cuts: _Ints) -> None:
-        """Note which cuts run exactly through mesh nodes; of a growing one that may change."""
-        zero = values == 0.0
-        table, known, count = self._nodes_met.open_for(int(zero.sum()))
-        self._still_met.extend(len(known) - count)
-        count = _meet_nodes(zero, nodes, cuts, table, known, count, self._still_met.rows)
-        self._nodes_met.close(count)
-        self._still_met.rows = self._still_met.rows[:count]
+    def spans(self, nodes: _Ints, points: _Ints) -> NDArray[np.bool_]:
+        """Whether each of some mesh nodes (q, c) spans the simplex of each point (q, k): q, k, c.
 
-
-@njit(cache=True)
-def _write_new(numbers, local, nodes, count, found, stores):
-    """Write where points with numbers from `count` on are; of equal points the first is taken."""
-    positions, ends, cut = found
-    all_positions, all_ends, all_cuts = stores
-    for z in range(len(ends)):
-        if numbers[local + z] - nodes != count:
-            continue
-        for i in range(positions.shape[1]):
-            all_positions[count, i] = positions[local + z, i]
-        for e in range(2):
-            all_ends[count, e] = numbers[ends[z, e]]
-        all_cuts[count] = cut[z]
-        count += 1
-
-
-@njit(cache=True)
-def spans(node, point, count, supports):
-    """Whether a mesh node is among those that span the simplex of a point; `count` are nodes."""
-    if point < count:
-        return point == node
-    found = False
-    for k in range(_NODES):
-        found = found or supports[point - count, k] == node
-    return found
-
-
-@njit(cache=True)
-def _meet_nodes(zero, nodes, cuts, table, known, count, met):
-    row = np.empty(2, dtype=np.int64)
-    for n in range(len(nodes)):
-        for c in range(len(cuts)):
-            row[0], row[1] = nodes[n], cuts[c]
-            if zero[n, c]:
-                number, count = number_of_row(row, table, known, count)
-                met[number] = True
-            else:
-                number = find_row(row, table, known)
-                if number >= 0:
-                    met[number] = False
-    return count
+        The weights of the others at the point are zero; its own may round to zero.
+        """
+        found: NDArray[np.bool_] = points[:, :, None] == nodes[:, None]
+        zero = points >= self.nodes
+        at, _ = np.nonzero(zero)
+        supports = self.supports[points[zero] - self.nodes, :NODES]
+        found[zero] = (supports[:, None] == nodes[at, :, None]).any(axis=2)
+        return found
 
 
 @njit(cache=True)
@@ -177,19 +121,11 @@ def _merge(row, begin, end, value):
 
 
 @njit(cache=True)
-def runs_through(cut, node, met, pair):
-    """Whether a cut runs exactly through a mesh node; `pair` (2,) is overwritten."""
-    table, known, still = met
-    pair[0], pair[1] = node, cut
-    at = find_row(pair, table, known)
-    return at >= 0 and still[at]
-
-
-@njit(cache=True)
-def _number_points(ends, cut, local, nodes, numbers, supports, met, table, known, count):
-    none, start, middle = np.iinfo(np.int64).max, np.int64(0), np.int64(_NODES)
+def _number_points(ends, cut, numbers, met, supports, table, known, count):
+    """Write the numbers of zero points after those of the nodes of a patch; give their count."""
+    local, nodes = len(numbers) - len(ends), len(met)
+    none, start, middle = np.iinfo(np.int64).max, np.int64(0), np.int64(NODES)
     row = np.empty(_WIDTH, dtype=np.int64)
-    pair = np.empty(2, dtype=np.int64)
     edge = -np.ones(_WIDTH, dtype=np.int64)
     for z in range(len(ends)):
         for k in range(_WIDTH):
@@ -197,23 +133,23 @@ def _number_points(ends, cut, local, nodes, numbers, supports, met, table, known
         for e in range(2):
             number = numbers[ends[z, e]]
             if number < nodes:
-                _merge(row, start, _NODES, number)
+                _merge(row, start, NODES, number)
                 continue
-            for k in range(_NODES):
+            for k in range(NODES):
                 if supports[number - nodes, k] < none:
-                    _merge(row, start, _NODES, supports[number - nodes, k])
+                    _merge(row, start, NODES, supports[number - nodes, k])
         _merge(row, middle, _WIDTH, cut[z])
         first, second = numbers[ends[z, 0]] - nodes, numbers[ends[z, 1]] - nodes
         if first >= 0 and second >= 0:
-            for i in range(_NODES, _WIDTH):
-                for j in range(_NODES, _WIDTH):
+            for i in range(NODES, _WIDTH):
+                for j in range(NODES, _WIDTH):
                     common = supports[first, i]
                     if common < none and common == supports[second, j]:
                         _merge(row, middle, _WIDTH, common)
         support, on = 0, 0
-        for k in range(_NODES):
+        for k in range(NODES):
             support += row[k] < none
-        for k in range(_NODES, _WIDTH):
+        for k in range(NODES, _WIDTH):
             on += row[k] < none
         before = count
         if support == on + 1:
@@ -224,10 +160,10 @@ def _number_points(ends, cut, local, nodes, numbers, supports, met, table, known
         if count > before:
             # a cut on which one end lies, and that runs exactly through the other
             for node, other in ((first, second), (second, first)):
-                for k in range(_NODES, _WIDTH):
+                for k in range(NODES, _WIDTH):
                     if not node < 0 <= other or supports[other, k] == none:
                         continue
-                    if runs_through(supports[other, k], node + nodes, met, pair):
+                    if met[node + nodes, supports[other, k]]:
                         _merge(row, middle, _WIDTH, supports[other, k])
             for k in range(_WIDTH):
                 supports[number, k] = row[k]

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.accelerated.resumable import MANY, Resumable, finished
-from verify.simulator.collision.bounding_tree import BoundingTree
+from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.simulator.cutting.division import Division
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.cutting.patch import MeshPatch
@@ -135,76 +134,17 @@ class SemiProgressiveCutter:
         XfemError
             If the time is no number.
         """
-        division = finished(self.looking(time))
-        return None if division is None else self.divide(division, time)
-
-    def looking(self, time: float, most: int | None = None) -> Resumable[Division | None]:
-        """Move all tools to where they are at that time, and find what they have crossed.
-
-        Done in pieces. A path that is extended in between is followed afterwards.
-
-        Parameters
-        ----------
-        time : float
-            In seconds.
-        most : int, optional
-            How many of the elements that a stroke has crossed through may be split. If there are
-            more, the others wait, and no tool moves on before they have had their turn.
-
-        Returns
-        -------
-        Division or None
-            For `divide`, with which the body must be divided before it is looked at again.
-
-        Raises
-        ------
-        XfemError
-            If the time is no number, or `most` is not a positive integer.
-        """
         if np.ndim(time) != 0 or not isinstance(time, int | float | np.number) or np.isnan(time):
             raise XfemError(f"time {time!r}; expected a number of seconds")
-        if most is not None and not (isinstance(most, int | np.integer) and most > 0):
-            raise XfemError(f"at most {most!r} elements; expected an integer, 1 or more")
-        for stroke in self.strokes:
-            stroke.hold()
-        try:
-            return (yield from self._looking(time, most))
-        finally:
-            for stroke in self.strokes:
-                stroke.release()
-
-    def _looking(self, time: float, most: int | None) -> Resumable[Division | None]:
-        if self.waits:
-            found = [stroke.waiting for stroke in self.strokes]
-        else:
-            found = [stroke.advance(time, self.interior) for stroke in self.strokes]
-        if most is not None or self.waits:
-            limit = len(self.mesh.cells) if most is None else most
-            pairs = zip(self.strokes, found, strict=True)
-            found = [stroke.admit(candidates, limit) for stroke, candidates in pairs]
+        found = [stroke.advance(time, self.interior) for stroke in self.strokes]
         candidates = np.concatenate([_NONE, *found])
-        division = None
-        if len(candidates):
-            if len(candidates) > MANY:
-                yield
-            division = yield from self.body.looking(candidates, self._cuts_near)
-        if division is not None:
-            self._fix(division)
-        elif self.waits:
-            # the first are crossed through so barely that they wait for the blade to go on
-            return (yield from self._looking(time, None))
-        return division
-
-    def divide(self, division: Division, time: float) -> Increment:
-        """Divide the body as has been found; elements count as split at that time, in seconds."""
+        division = self.body.division(candidates, self._cuts_near) if len(candidates) else None
+        if division is None:
+            return None
+        self._fix(division)
         increment = self.body.divide(division)
         self._record(increment, time)
         return increment
-
-    @property
-    def waits(self) -> bool:
-        """Whether elements that have been crossed through wait for their turn."""
-        return any(len(stroke.waiting) > 0 for stroke in self.strokes)
 
     @property
     def cuts(self) -> list[Cut]:
@@ -261,7 +201,7 @@ class SemiProgressiveCutter:
                 continue
             stroke.recorded[mine] = True
             # a stroke that splits only a piece has not passed all edges of the element
-            leave = np.minimum(stroke.leave[mine], stroke.shown)
+            leave = np.minimum(stroke.leave[mine], stroke.front)
             entry = np.minimum(stroke.entry[mine], leave)
             self._records.append(_Record(mine, stroke.number, entry, leave, time, stroke.path))
 

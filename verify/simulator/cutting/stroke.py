@@ -1,12 +1,15 @@
 """One stroke of a tool: its path, where it is in the mesh, and when it entered and left cells."""
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.simulator.collision.bounding_tree import BoundingTree
-from verify.simulator.cutting.blade_walk_kernels import cells_hit, walk
+from verify.simulator.cutting.blade_walk_kernels import WalkedMesh, WalkState, walk
+from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.simulator.cutting.patch import MeshPatch
 from verify.xfem.crossing import REACH
+from verify.xfem.faceted_cuts import FacetArrays
 from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import Sweep, ToolPath
@@ -68,11 +71,6 @@ class Stroke:
     ----------
     front : float
         How far the blade has come, in metres; negative before it starts.
-    shown : float
-        Travel up to which the body may be divided, in metres: `front`, or less where elements that
-        the blade has crossed through wait for their turn.
-    waiting : int array
-        Cells near those, to be asked again.
     entry, leave : (m,) float array
         Travel of the blade when it entered a cell and when it had crossed it through, in metres;
         infinite if it has not.
@@ -88,23 +86,23 @@ class Stroke:
         self, mesh: SimplexMesh, path: ToolPath, number: int, strokes_near: _Ints, size: _Floats
     ) -> None:
         self.path, self.number = path, number
-        self.front = self.shown = -1.0
-        self.waiting = np.empty(0, dtype=np.int64)
+        self.front = -1.0
         self.near = np.zeros(len(mesh.cells), dtype=bool)
         self.entry = np.full(len(mesh.cells), np.inf)
         self.leave = np.full(len(mesh.cells), np.inf)
         self.recorded = np.zeros(len(mesh.cells), dtype=bool)
-        self._mesh, self._strokes_near, self._size = mesh, strokes_near, size
+        self._mesh, self._strokes_near = mesh, strokes_near
         self._margin = REACH * float(size.max())
         self._snap = _ROUND_OFF * mesh.extent
         self.values = np.full(len(mesh.points), np.nan)
         self._fixed = np.zeros(len(mesh.points), dtype=bool)
-        self._settled = np.zeros(len(mesh.cells), dtype=bool)
-        self._turns = np.zeros(len(mesh.cells), dtype=np.int64)
+        self._walked = WalkedMesh(mesh.cells, mesh.neighbours, mesh.points, size, self._snap)
+        self._state = WalkState(
+            self.values, self.entry, self.leave, np.zeros(len(mesh.cells), dtype=np.int64),
+            np.zeros(len(mesh.cells), dtype=bool), self.recorded, self.near, strokes_near,
+        )  # fmt: skip
         self._turn = 0
         self._frontier = np.empty(0, dtype=np.int64)
-        self._longer: ToolPath | None = None  # the path from the next look on
-        self._held = False
 
     def advance(self, time: float, elements: BoundingTree) -> _Ints:
         """Move the blade to where it is at that time; cells that may have to be split.
@@ -120,75 +118,19 @@ class Stroke:
         if front <= self.front or not self.path.sweeps:
             return np.empty(0, dtype=np.int64)
         sweep = self.path.surface.arrays
-        hit = cells_hit(
-            sweep,
-            self.front,
-            front,
-            self._margin,
-            elements.low,
-            elements.high,
-            elements.order,
-        )
-        self.front = self.shown = front
+        hit = _cells_hit(sweep, self.front, front, self._margin, elements)
+        self.front = front
         self._turn += 1
+        seeds = np.concatenate([self._frontier, hit])
         candidates, self._frontier = walk(
-            np.concatenate([self._frontier, hit]),
-            front,
-            self._mesh.cells,
-            self._mesh.neighbours,
-            self._mesh.points,
-            self._size,
-            self._snap,
-            sweep,
-            self.values,
-            self._turn,
-            self._turns,
-            self._settled,
-            self.recorded,
-            self.near,
-            self._strokes_near,
-            self.entry,
-            self.leave,
+            seeds, front, self._turn, self._walked, sweep, self._state
         )
-        return candidates
-
-    def admit(self, candidates: _Ints, most: int) -> _Ints:
-        """Let at most some of the elements crossed through be split, the first first.
-
-        Returns the candidates for that; if elements are left, all of these are `waiting`.
-        """
-        self.shown = self.front
-        self.waiting = np.empty(0, dtype=np.int64)
-        candidates = candidates[~self.recorded[candidates] | (self._strokes_near[candidates] > 1)]
-        leave = self.leave[candidates[~self.recorded[candidates]]]
-        leave = leave[np.isfinite(leave)]
-        if len(leave) > most:
-            self.shown = min(self.front, float(np.partition(leave, most - 1)[most - 1]))
-            self.waiting = candidates
-            return candidates[self.leave[candidates] <= self.shown]
         return candidates
 
     def extend(self, blades: ArrayLike, times: ArrayLike) -> None:
         """Add positions to the path; level sets of nodes already used for a cut stay."""
-        self._longer = self.led.extended(blades, times)
-        if not self._held:
-            self.release()
-
-    @property
-    def led(self) -> ToolPath:
-        """The path with all that has been added to it."""
-        return self._longer or self.path
-
-    def hold(self) -> None:
-        """Keep the path as it is until `release`, though it may be extended meanwhile."""
-        self._held = True
-
-    def release(self) -> None:
-        """Follow the path as it has been extended."""
-        self._held = False
-        if self._longer is not None:
-            self.path, self._longer = self._longer, None
-            self.values[~self._fixed] = np.nan
+        self.path = self.path.extended(blades, times)
+        self.values[~self._fixed] = np.nan
 
     def fix(self, nodes: _Ints) -> None:
         """From now on the level sets of these nodes do not change."""
@@ -205,10 +147,38 @@ class Stroke:
     def seen_by(self, patch: MeshPatch) -> Cut:
         """Give the cut so far, as a patch sees it."""
         values = self.level_sets(patch.whole_nodes)
-        return SeenCut(patch.points, values, self.path.sweep, self.shown)
+        return SeenCut(patch.points, values, self.path.sweep, self.front)
 
     @property
     def cut(self) -> Cut:
         """The cut so far, for `cut_mesh` on the whole mesh."""
         values = self.level_sets(np.arange(len(self._mesh.points)))
-        return SeenCut(self._mesh.points, values, self.path.sweep, self.shown)
+        return SeenCut(self._mesh.points, values, self.path.sweep, self.front)
+
+
+def _cells_hit(
+    sweep: FacetArrays, after: float, front: float, margin: float, elements: BoundingTree
+) -> _Ints:
+    """Cells near what is swept between two travels; may hold doubles."""
+    corners, travel = sweep.corners, sweep.travel
+    points, there = [corners], [(travel >= after) & (travel <= front)]
+    # where an edge passes one of the two
+    for k, j in combinations(range(travel.shape[1]), 2):
+        begin, step = travel[:, k], travel[:, j] - travel[:, k]
+        for limit in (after, front):
+            passes = (begin < limit) != (begin + step < limit)
+            share = np.divide(limit - begin, step, out=np.zeros_like(step), where=passes)[:, None]
+            points.append(((1.0 - share) * corners[:, k] + share * corners[:, j])[:, None])
+            there.append(passes[:, None])
+    place, known = np.concatenate(points, axis=1), np.concatenate(there, axis=1)
+    some = np.flatnonzero(known.any(axis=1))
+    place, known = place[some], known[some, :, None]
+    floor = np.where(known, place, np.inf).min(axis=1, initial=np.inf) - margin
+    ceiling = np.where(known, place, -np.inf).max(axis=1, initial=-np.inf) + margin
+    starts, cells = elements.meeting(floor, ceiling)
+    # of these the ones that come near the plane of the facet
+    facet = np.repeat(some, np.diff(starts))
+    normal, low, high = sweep.normals[facet], elements.floor[cells], elements.ceiling[cells]
+    away = np.einsum("qi,qi->q", normal, 0.5 * (low + high) - corners[facet, 0])
+    reach = margin + 0.5 * np.einsum("qi,qi->q", np.abs(normal), high - low)
+    return cells[np.abs(away) <= reach]

@@ -61,6 +61,9 @@ class TiedParts:
             Number of stored pieces.
         """
         self._part.append(np.arange(len(self._part), count))
+        if len(tied) == 0:
+            self._part.rows[place[place >= 0]] = place[place >= 0]
+            return
         now = _components(len(place), tied)
         stored = np.flatnonzero(place >= 0)
         leader = np.full(len(place), count)

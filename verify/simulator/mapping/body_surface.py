@@ -9,10 +9,8 @@ with two new rims along a cut instead of inner facets.
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.accelerated.resumable import Resumable, finished
 from verify.simulator.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody, Increment
-from verify.simulator.mapping.corner_kernels import place_corners
 from verify.simulator.mapping.cut_elements import cut_elements, sub_simplices
 from verify.simulator.mapping.edge_points import EdgePoints
 from verify.simulator.mapping.exposed_kernels import exposed_facets
@@ -46,20 +44,16 @@ class BodySurface:
         self._facet_range = np.zeros((len(mesh.cells), 2), dtype=np.int64)
         split = np.flatnonzero(body.split_cells)
         if self._membrane:
-            finished(self._covering(np.arange(len(mesh.cells)), split))
+            self._cover(np.arange(len(mesh.cells)), split)
             return
         self._orientation = np.sign(np.linalg.det(mesh.edge_vectors)).astype(np.int8)
         boundary = np.unique(mesh.boundary_facets[:, 0])
-        finished(self._covering(np.union1d(boundary, split), split))
+        self._cover(np.union1d(boundary, split), split)
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
         if increment is not None:
-            finished(self.following(increment))
-
-    def following(self, increment: Increment) -> Resumable[None]:
-        """Follow a cut in pieces; the body must not be cut again in between."""
-        return self._covering(increment.touched, increment.cells)
+            self._cover(increment.touched, increment.cells)
 
     @property
     def rims(self) -> _Ints:
@@ -71,21 +65,20 @@ class BodySurface:
             return np.empty((0, 2), dtype=np.int64)
         return rim_edges(self._body, self.surface)
 
-    def _covering(self, cells: _Ints, split: _Ints) -> Resumable[None]:
+    def _cover(self, cells: _Ints, split: _Ints) -> None:
         """Make the facets of some cells anew; `split` are those with new sub-simplices."""
         body, mesh = self._body, self._body.mesh
         self._edges.add(body.sub_points.rows[ranges(body.sub_range[split])].ravel())
         ids, at, piece, cell, inner = self._facets_of(cells)
-        yield
         ids, at, source = self._edges.bisect(ids, at)
-        material, counts, pieces, cell, inner = place_corners(
-            ids, at, source, piece, cell, inner, mesh.cells, mesh.points, body.points.supports
-        )
+        cell = cell[source]
+        nodes = mesh.cells[cell]
+        pieces = np.repeat(piece[source, None], ids.shape[1], axis=1)
         self.surface.retire(ranges(self._facet_range[cells]))
         self._facet_range[cells] = 0
         self.surface.add(
-            ids, material, at, counts, pieces, inner, body.piece_cells.rows, cell,
-            self._facet_range,
+            ids, at @ mesh.points[nodes], at, body.points.spans(nodes, ids), pieces, inner[source],
+            body.piece_cells.rows, cell, self._facet_range,
         )  # fmt: skip
 
     def _facets_of(self, cells: _Ints) -> tuple[_Ints, _Floats, _Ints, _Ints, NDArray[np.bool_]]:

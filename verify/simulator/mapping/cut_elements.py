@@ -1,4 +1,4 @@
-"""Elements of a cut body, and the tree over them, as kernels take them."""
+"""Elements of a cut body, as kernels take them."""
 
 from typing import NamedTuple
 
@@ -9,8 +9,6 @@ from verify.simulator.cutting.growing_body import GrowingBody
 
 __all__ = [
     "CutElements",
-    "ElementTree",
-    "NearCells",
     "SubSimplices",
     "cut_elements",
     "sub_simplices",
@@ -20,40 +18,12 @@ _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
 
-class ElementTree(NamedTuple):
-    """Elements (m, d + 1) of a mesh, the gradients of their shape functions, and boxes over them.
-
-    A place belongs to an element whose box, of `verify.simulator.collision.tree_kernels`, comes
-    within `reach`, in metres.
-    """
-
-    reach: float
-    low: _Floats
-    high: _Floats
-    order: _Ints
-    cells: _Ints
-    points: _Floats
-    gradients: _Floats
-
-
-class NearCells(NamedTuple):
-    """Elements near each given facet, from `starts` (f + 1,) on, and boxes (m, s) of all."""
-
-    starts: _Ints
-    cells: _Ints
-    floor: _Floats
-    ceiling: _Floats
-
-
 class CutElements(NamedTuple):
     """Elements of a mesh and their pieces; see `GrowingBody`."""
 
     cells: _Ints
-    points: _Floats
     neighbours: _Ints
     piece_cells: _Ints
-    piece_parent: _Ints
-    piece_label: NDArray[np.int8]
     first_piece: _Ints
     next_piece: _Ints
 
@@ -72,8 +42,7 @@ def cut_elements(body: GrowingBody) -> CutElements:
     """Elements of a body as it is now."""
     mesh = body.mesh
     return CutElements(
-        mesh.cells, mesh.points, mesh.neighbours, body.piece_cells.rows, body.piece_parent.rows,
-        body.piece_label.rows, body.first_piece, body.next_piece.rows,
+        mesh.cells, mesh.neighbours, body.piece_cells.rows, body.first_piece, body.next_piece.rows
     )  # fmt: skip
 
 

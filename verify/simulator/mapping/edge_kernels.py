@@ -7,15 +7,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from verify.simulator.arrays.row_numbers import find_row, number_of_row
-from verify.simulator.cutting.point_numbers import runs_through
+from verify.simulator.cutting.point_numbers import CUTS, NODES
 
-__all__ = ["CUTS", "LINE", "EdgeRecord", "bisect_facets", "record_points", "unrecorded"]
+__all__ = ["LINE", "EdgeRecord", "bisect_facets", "record_points"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 
-CUTS = 3  # as `PointNumbers.supports` lists them, after the nodes
-_NODES = 4
 _FACE = 3  # corners of a face
 LINE = _FACE + 1  # a line: the nodes of an edge or a face, and the cut that crosses it
 _NONE = np.iinfo(np.int64).max
@@ -47,8 +45,8 @@ class EdgeRecord(NamedTuple):
         Along which the points of a line are ordered; zero until it is first asked for.
     turned : (1,) int array
         How often a direction was replaced: what was bisected before must be bisected anew.
-    met : tuple of arrays
-        Mesh nodes through which cuts run, see `PointNumbers.nodes_on_cuts`.
+    met : (n, cuts) bool array
+        See `PointNumbers`.
     """
 
     nodes: _Floats
@@ -64,70 +62,54 @@ class EdgeRecord(NamedTuple):
     entries: _Ints
     directions: _Floats
     turned: _Ints
-    met: tuple[_Ints, _Ints, NDArray[np.bool_]]
+    met: NDArray[np.bool_]
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _write_ends(x, y, row):
     """Write the row of the edge between two points, none of which is that of a line."""
     row[0], row[1], row[2], row[_FACE] = -1, min(x, y), max(x, y), _NONE
 
 
 @njit(cache=True)
-def unrecorded(numbers, nodes, recorded):
-    """Zero points among some points that have not been recorded, each once; they are from now."""
-    found, count = np.empty(len(numbers), dtype=np.int64), 0
-    for number in numbers:
-        if number >= nodes and not recorded[number - nodes]:
-            recorded[number - nodes] = True
-            found[count] = number - nodes
-            count += 1
-    return found[:count]
-
-
-@njit(cache=True)
-def record_points(
-    zero, supports, ends, crossed, faced, edge_line, table, known, lines, first, tally, entries,
-    used,
-):  # fmt: skip
+def record_points(zero, ends, record, lines, used):
     """Enter points into the lists of their lines; the counts of lines and entries."""
+    supports, first, tally, entries = record.supports, record.first, record.tally, record.entries
     row = np.empty(LINE, dtype=np.int64)
     for z in zero:
         if supports[z, _FACE] != _NONE:
             continue  # inside an element: nobody else meets it
-        if supports[z, _FACE - 1] != _NONE:
-            # in a face, where the edge on which it was found may be a diagonal
-            for k in range(_FACE):
-                faced[supports[z, k]] = True
-            _write_ends(ends[z, 0], ends[z, 1], row)
-            line, lines = number_of_row(row, table, known, lines)
-            entries[used, 0], entries[used, 1] = z, first[line]
-            first[line] = used
-            tally[line] += 1
-            used += 1
-        for k in range(_FACE):
-            row[k] = supports[z, k]
-        for k in range(_NODES, _NODES + CUTS):
-            if supports[z, k] == _NONE:
-                continue
-            # on an edge of the mesh the cut does not matter
-            row[_FACE] = supports[z, k] if row[_FACE - 1] != _NONE else _NONE
-            line, lines = number_of_row(row, table, known, lines)
-            entries[used, 0], entries[used, 1] = z, first[line]
-            first[line] = used
-            tally[line] += 1
-            used += 1
-            if row[_FACE] == _NONE:
-                crossed[row[0]] = crossed[row[1]] = True
-                edge_line[z] = line
-                break
+        # in a face, where the edge on which it was found may be a diagonal; then on cuts
+        in_face = supports[z, _FACE - 1] != _NONE
+        k = NODES - 1 if in_face else NODES
+        while k < NODES + CUTS:
+            if k < NODES:
+                for j in range(_FACE):
+                    record.faced[supports[z, j]] = True
+                _write_ends(ends[z, 0], ends[z, 1], row)
+            else:
+                # on an edge of the mesh the cut does not matter
+                for j in range(_FACE):
+                    row[j] = supports[z, j]
+                row[_FACE] = supports[z, k] if in_face else _NONE
+            if k < NODES or supports[z, k] != _NONE:
+                line, lines = number_of_row(row, record.table, record.known, lines)
+                entries[used, 0], entries[used, 1] = z, first[line]
+                first[line] = used
+                tally[line] += 1
+                used += 1
+                if row[_FACE] == _NONE and row[0] >= 0:
+                    record.crossed[row[0]] = record.crossed[row[1]] = True
+                    record.edge_line[z] = line
+                    break
+            k += 1
     return lines, used
 
 
 @njit(cache=True)
 def _join(number, nodes, supports, row):
     """Insert the mesh nodes of a point into the ascending row[:3]; False if there is no room."""
-    for k in range(1 if number < nodes else _NODES):
+    for k in range(1 if number < nodes else NODES):
         value = number if number < nodes else supports[number - nodes, k]
         for j in range(_FACE):
             if row[j] == value:
@@ -145,7 +127,7 @@ def _place(number, i, record):
     return record.nodes[number, i] if number < nodes else record.positions[number - nodes, i]
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _after(at, number, than, other):
     """Whether a point comes after another on a line; equal places are ordered by number."""
     return at > than or (at == than and number > other)
@@ -188,7 +170,7 @@ def _direct(x, y, line, record):
         direction[i] = step if along >= 0.0 else -step
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _between(x, y, line, record):
     """Give (a point of the line's list strictly between x and y or -1, its share from x to y).
 
@@ -221,26 +203,27 @@ def _between(x, y, line, record):
 
 
 @njit(cache=True)
-def _on_cut(number, line, record, row):
+def _on_cut(number, line, record):
     """Whether a point lies on the cut of a line, if that is a line in a face."""
     nodes, cut = len(record.nodes), record.known[line, _FACE]
     if cut == _NONE:
         return True
     if number < nodes:
-        return runs_through(cut, number, record.met, row[LINE:])
+        return record.met[number, cut]
     found = False
-    for j in range(_NODES, _NODES + CUTS):
+    for j in range(NODES, NODES + CUTS):
         found = found or record.supports[number - nodes, j] == cut
     return found
 
 
-@njit(cache=True)
-def _lines(x, y, nodes, supports, faced, edge_line, table, known, tally, row, found):
+@njit(inline="always")
+def _lines(x, y, record, row, found):
     """Write the lines on which an edge may lie that have other points than its ends; their count.
 
     A line in a face holds no points on edges of the mesh, which are on the lines of these.
     """
-    own = 0
+    nodes, supports, faced, own = len(record.nodes), record.supports, record.faced, 0
+    table, known, tally = record.table, record.known, record.tally
     row[_FACE - 1] = row[_FACE] = _NONE
     if x < nodes and y < nodes:  # nearly always: an edge of the mesh
         row[0], row[1] = min(x, y), max(x, y)
@@ -250,9 +233,9 @@ def _lines(x, y, nodes, supports, faced, edge_line, table, known, tally, row, fo
             return 0
     if row[_FACE - 1] == _NONE:
         zero = max(x, y) - nodes
-        found[0] = edge_line[zero] if zero >= 0 else -1
+        found[0] = record.edge_line[zero] if zero >= 0 else -1
         if found[0] < 0:
-            found[0] = find_row(row[:LINE], table, known)
+            found[0] = find_row(row, table, known)
         own = (x >= nodes) + (y >= nodes)
         return 1 if found[0] >= 0 and tally[found[0]] > own else 0
     if not (faced[row[0]] and faced[row[1]] and faced[row[_FACE - 1]]):
@@ -261,18 +244,18 @@ def _lines(x, y, nodes, supports, faced, edge_line, table, known, tally, row, fo
     number, count = (x if x >= nodes else y) - nodes, 0
     for end in (x, y):
         own += end >= nodes and supports[end - nodes, _FACE - 1] != _NONE
-    for k in range(_NODES, _NODES + CUTS):
+    for k in range(NODES, NODES + CUTS):
         row[_FACE] = supports[number, k]
         if row[_FACE] != _NONE:
-            found[count] = find_row(row[:LINE], table, known)
+            found[count] = find_row(row, table, known)
             count += found[count] >= 0 and tally[found[count]] > own
     _write_ends(x, y, row)
-    found[count] = find_row(row[:LINE], table, known)
+    found[count] = find_row(row, table, known)
     count += found[count] >= 0
     return count
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _copy(ids, places, k, into_ids, into_places, at):
     for a in range(3):
         into_ids[at, a] = ids[k, a]
@@ -280,7 +263,7 @@ def _copy(ids, places, k, into_ids, into_places, at):
             into_places[at, a, i] = places[k, a, i]
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _replace(ids, places, k, begin, end, replaced, z, share):
     """Move a corner of a triangle to a point of its edge; whether it is still a triangle."""
     for i in range(places.shape[2]):
@@ -314,12 +297,9 @@ def bisect_facets(facets, at, record, room):
     width, nodes, more = at.shape[2], len(record.nodes), room - len(facets)
     ids, places = np.empty((room, 3), dtype=np.int64), np.empty((room, 3, width))
     later_ids, later_places = np.empty((more, 3), dtype=np.int64), np.empty((more, 3, width))
-    source, row = np.empty(room, dtype=np.int64), np.empty(LINE + 2, dtype=np.int64)
+    source, row = np.empty(room, dtype=np.int64), np.empty(LINE, dtype=np.int64)
     lines = np.empty(CUTS + 1, dtype=np.int64)
-    # arrays taken out once: taking them out for every edge costs more than most edges do
-    crossed, supports, tally = record.crossed, record.supports, record.tally
-    faced, edge_line = record.faced, record.edge_line
-    table, known = record.table, record.known
+    crossed = record.crossed
     zero = np.int64(0)  # a literal 0 would be a type of its own to compile for
     count = zero
     for t in range(len(facets)):
@@ -338,11 +318,9 @@ def bisect_facets(facets, at, record, room):
                 k += 1
                 if x < nodes and y < nodes and not (crossed[x] and crossed[y]):
                     continue
-                some = _lines(
-                    x, y, nodes, supports, faced, edge_line, table, known, tally, row, lines
-                )
-                for line in lines[:some]:
-                    if z < 0 and _on_cut(x, line, record, row) and _on_cut(y, line, record, row):
+                for n in range(_lines(x, y, record, row, lines)):
+                    line = lines[n]
+                    if z < 0 and _on_cut(x, line, record) and _on_cut(y, line, record):
                         z, share = _between(x, y, line, record)
             if z < 0:
                 source[count] = t

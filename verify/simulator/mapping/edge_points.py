@@ -9,17 +9,11 @@ record is by these.
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.simulator.arrays.distinct import distinct
 from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.arrays.row_numbers import RowNumbers
-from verify.simulator.cutting.point_numbers import PointNumbers
-from verify.simulator.mapping.edge_kernels import (
-    CUTS,
-    LINE,
-    EdgeRecord,
-    bisect_facets,
-    record_points,
-    unrecorded,
-)
+from verify.simulator.cutting.point_numbers import CUTS, PointNumbers
+from verify.simulator.mapping.edge_kernels import LINE, EdgeRecord, bisect_facets, record_points
 from verify.xfem.errors import XfemError
 
 __all__ = ["EdgePoints"]
@@ -56,7 +50,9 @@ class EdgePoints:
         self._recorded.rows[fresh:] = False
         self._edge_line.extend(len(self._recorded) - fresh)
         self._edge_line.rows[fresh:] = -1
-        zero = np.sort(unrecorded(numbers, self._points.nodes, self._recorded.rows))
+        zero = distinct(numbers[numbers >= self._points.nodes] - self._points.nodes)
+        zero = zero[~self._recorded.rows[zero]]
+        self._recorded.rows[zero] = True
         table, known, lines = self._lines.open_for((CUTS + 1) * len(zero))
         begin = self._first.extend((CUTS + 1) * len(zero))
         self._first.rows[begin:] = -1
@@ -65,10 +61,8 @@ class EdgePoints:
         used = len(self._entries)
         self._entries.extend((CUTS + 1) * len(zero))
         lines, used = record_points(
-            zero, self._points.supports, self._points.ends.rows, self._crossed, self._faced,
-            self._edge_line.rows, table, known, lines, self._first.rows, self._tally.rows,
-            self._entries.rows, used,
-        )  # fmt: skip
+            zero, self._points.ends.rows, self._record(table, known), lines, used
+        )
         self._lines.close(lines)
         self._first.rows = self._first.rows[:lines]
         self._tally.rows = self._tally.rows[:lines]
@@ -94,22 +88,7 @@ class EdgePoints:
         """
         if facets.shape[1] == 2 or len(self._lines) == 0 or len(facets) == 0:
             return facets, at, np.arange(len(facets))
-        record = EdgeRecord(
-            self._nodes,
-            self._crossed,
-            self._faced,
-            self._edge_line.rows,
-            self._points.positions.rows,
-            self._points.supports,
-            self._lines.table,
-            self._lines.rows,
-            self._first.rows,
-            self._tally.rows,
-            self._entries.rows,
-            self._directions.rows,
-            np.zeros(1, dtype=np.int64),
-            self._points.nodes_on_cuts,
-        )
+        record = self._record(self._lines.table, self._lines.rows)
         room = len(facets) + len(facets) // 4 + 64
         # each point bisects a few facets, those around its edge
         while room < 64 * (len(facets) + len(self._entries) + 64):
@@ -119,3 +98,11 @@ class EdgePoints:
                 return tuple(parts)
             room *= 1 if enough else 2
         raise XfemError(f"points on the edges of {len(facets)} facets are in no order")
+
+    def _record(self, table: _Ints, known: _Ints) -> EdgeRecord:
+        return EdgeRecord(
+            self._nodes, self._crossed, self._faced, self._edge_line.rows,
+            self._points.positions.rows, self._points.supports, table, known, self._first.rows,
+            self._tally.rows, self._entries.rows, self._directions.rows,
+            np.zeros(1, dtype=np.int64), self._points.met,
+        )  # fmt: skip

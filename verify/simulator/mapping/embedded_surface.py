@@ -11,29 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.accelerated.resumable import MANY, Resumable, finished
-from verify.simulator.arrays.distinct import (
-    distinct,
-    distinct_in_lists,
-    distinct_in_rows,
-    ranges,
-)
+from verify.simulator.arrays.distinct import distinct, of_lists, ranges
 from verify.simulator.cutting.growing_body import Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.point_numbers import FoundPoints, PointNumbers
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.simulator.mapping.cut_elements import ElementTree, NearCells, cut_elements
-from verify.simulator.mapping.cut_facet_kernels import divide_facets
+from verify.simulator.mapping.divided_facets import divide_facets
 from verify.simulator.mapping.edge_points import EdgePoints
-from verify.simulator.mapping.locate_kernels import (
-    corner_cells,
-    corner_pieces,
-    cut_at,
-    locate_many,
-    place_parts,
-)
+from verify.simulator.mapping.material_places import MaterialPlaces
 from verify.simulator.mapping.moving_surface import MovingSurface
-from verify.simulator.mapping.near_facet_kernels import concerned_facets, levels_at
 from verify.xfem.errors import XfemError
 from verify.xfem.pieces import ROUND_OFF, split_cells
 
@@ -41,16 +27,29 @@ __all__ = ["EmbeddedSurface"]
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+_Bools = NDArray[np.bool_]
+_Labels = NDArray[np.int8]
+
+_INWARDS = 1e-5  # how far from a corner to the centre of its facet its piece is looked up
+_SNAP = 1e-12  # barycentric coordinates below that are zero: the vertex is on the face
 
 
 class _Fragments(NamedTuple):
-    """Parts of facets: points (q, k), facet, barycentric corners in it, sides, if whole."""
+    """Parts of facets: points (q, k), facet, barycentric corners in it, sides of cuts, if whole."""
 
     ids: _Ints
     source: _Ints
     at: _Floats
-    label: NDArray[np.int8]
-    whole: NDArray[np.bool_]
+    label: _Labels
+    whole: _Bools
+
+
+class _Corners(NamedTuple):
+    """Cell (q, k) of each corner of facets, its coordinates, those of a place inside the facet."""
+
+    cell: _Ints
+    weights: _Floats
+    inside: _Floats
 
 
 class _SurfaceCut:
@@ -99,153 +98,163 @@ class EmbeddedSurface:
         _check(self.points, self.facets, mesh.space)
         self.surface = MovingSurface(mesh.dim + 1, mesh.space, self.facets.shape[1])
         self._cutter, self._snap = cutter, ROUND_OFF * mesh.extent
-        tree = cutter.interior
-        self._tree = ElementTree(
-            1e-9 * mesh.extent, tree.low, tree.high, tree.order, mesh.cells, mesh.points,
-            mesh.gradients,
-        )  # fmt: skip
-        self._vertex_cell, self._vertex_at = locate_many(self.points, self._tree)
+        self._places = MaterialPlaces(mesh, cutter.interior)
+        self._vertex_cell, self._vertex_at = self._places.cells_of(self.points)
         self._numbers = PointNumbers(len(self.points), mesh.space)
         self._edges = EdgePoints(self.points, self._numbers)
-        leaf, count = np.argsort(tree.order), len(tree.order)
-        boxes = tree.low[count + leaf], tree.high[count + leaf]
-        self._near, around = self._facets_near_cells(boxes)
-        self._around = NearCells(*around, *boxes)
+        # cells near each facet, and facets near each cell, as (first of each, all)
+        facet, cell = self._facets_and_cells()
+        self._around = np.searchsorted(facet, np.arange(len(self.facets) + 1)), cell
+        order = np.argsort(cell, kind="stable")
+        cells = np.arange(len(mesh.cells) + 1)
+        self._near = np.searchsorted(cell[order], cells), facet[order]
         every = np.arange(len(self.facets))
-        own, corners = self._vertex_cell[self.facets], (*self.facets.shape, mesh.dim + 1)
-        self._corners = np.empty_like(own), np.empty(corners), np.empty(corners)
-        corner_cells(
-            every, self.points[self.facets], every, own, self._around, self._tree, *self._corners
-        )
+        self._corners = self._place_corners(every, self.points[self.facets])
         self._facet_range = np.zeros((len(self.facets), 2), dtype=np.int64)
-        most = max(len(self.points), len(self.facets), len(mesh.points))
-        self._place, self._is_moved = np.full(most, -1), np.zeros(len(mesh.cells), dtype=bool)
         nodes = distinct(self.facets)
-        finished(self._replacing(every, nodes, *self._values(nodes), many=False))
+        self._replace(every, nodes, *self._values(nodes))
 
     def update(self, increment: Increment | None) -> None:
         """Follow a cut."""
-        if increment is not None:
-            finished(self.following(increment))
-
-    def following(self, increment: Increment) -> Resumable[None]:
-        """Follow a cut in pieces; the body must not be cut again in between."""
-        near = np.sort(distinct_in_lists(*self._near, increment.moved, self._place))
-        if len(near) == 0:
+        if increment is None:
             return
-        nodes = np.sort(distinct_in_rows(self.facets, near, self._place))
+        near = distinct(of_lists(*self._near, increment.moved))
+        nodes = distinct(self.facets[near])
         numbers, values = self._values(nodes)
         # a facet on one side of all cuts, in cells that are as they were, stays as it is
-        concerned = concerned_facets(
-            near, self.facets, nodes, values, increment.moved, self._corners[0], self._is_moved,
-            self._place,
-        )  # fmt: skip
+        moved = increment.moved
+        cell = self._corners.cell[near]
+        place = np.minimum(np.searchsorted(moved, cell), len(moved) - 1)
+        level = values[np.searchsorted(nodes, self.facets[near])]
+        both = ~((level > 0.0).all(axis=1) | (level < 0.0).all(axis=1)).all(axis=1)
+        concerned = near[(moved[place] == cell).any(axis=1) | both]
         if len(concerned):
-            many = len(increment.cells) > MANY
-            yield from self._replacing(concerned, nodes, numbers, values, many)
+            self._replace(concerned, nodes, numbers, values)
 
-    def parts_of(self, given: _Ints) -> _Ints:
-        """Facets in use that are parts of some given ones, in the order of these."""
-        return ranges(self._facet_range.take(given, axis=0))
-
-    def is_cut(self, places: _Floats, cut: int) -> NDArray[np.bool_]:
+    def is_cut(self, places: _Floats, cut: int) -> _Bools:
         """Whether the element at each material place (q, s) is split by a cut."""
-        return cut_at(places, cut, self._tree, cut_elements(self._cutter.body))
+        place, cell = self._places.holding(places)
+        found = np.zeros(len(places), dtype=bool)
+        found[place[self._cutter.body.split_by(cell, cut)]] = True
+        return found
 
-    def _facets_near_cells(
-        self, boxes: tuple[_Floats, _Floats]
-    ) -> tuple[tuple[_Ints, _Ints], tuple[_Ints, _Ints]]:
-        """Facets near each cell, and cells near each facet, as (first of each, all).
+    def _facets_and_cells(self) -> tuple[_Ints, _Ints]:
+        """Facet, ascending, and cell of all pairs that are near each other.
 
-        They are near if their boxes meet, or if a vertex of the facet belongs to the cell. Outside
-        the mesh `locate` looks up to twice as far as it is to the next box: so does this.
+        They are if their boxes meet, or if a vertex of the facet belongs to the cell. Outside the
+        mesh a cell is looked for up to twice as far as it is to the next box: so it is here.
         """
-        tree = self._cutter.interior
-        cells, facets = [], []
-        corners = self.points[self.facets]
-        floor, ceiling = (box[self._vertex_cell] for box in boxes)
-        outside = np.maximum(floor - self.points, self.points - ceiling).max(axis=1, initial=0.0)
-        reach = self._tree.reach + 2.0 * outside[self.facets].max(axis=1)
-        for f, (low, high) in enumerate(zip(corners.min(axis=1), corners.max(axis=1), strict=True)):
-            near = np.union1d(
-                tree.meeting_box(low - reach[f], high + reach[f]), self._vertex_cell[self.facets[f]]
-            )
-            cells.append(near)
-            facets.append(np.full(len(near), f))
-        cell, facet = np.concatenate(cells), np.concatenate(facets)
-        order = np.argsort(cell, kind="stable")
-        counts = np.bincount(cell, minlength=len(self._cutter.mesh.cells))
-        around = np.cumsum([0, *map(len, cells)])
-        return (np.concatenate([[0], np.cumsum(counts)]), facet[order]), (around, cell)
+        corners, size = self.points[self.facets], self.facets.shape[1]
+        outside = np.maximum(0.0, self._places.gap(self._vertex_cell, self.points))
+        reach = (self._places.reach + 2.0 * outside[self.facets].max(axis=1))[:, None]
+        starts, cells = self._cutter.interior.meeting(
+            corners.min(axis=1) - reach, corners.max(axis=1) + reach
+        )
+        every = np.arange(len(self.facets))
+        facet = np.concatenate([np.repeat(every, np.diff(starts)), np.repeat(every, size)])
+        cells = np.concatenate([cells, self._vertex_cell[self.facets].ravel()])
+        pairs = distinct(facet * len(self._cutter.mesh.cells) + cells)
+        return np.divmod(pairs, len(self._cutter.mesh.cells))
 
-    def _replacing(
-        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats, many: bool
-    ) -> Resumable[None]:
+    def _place_corners(self, facets: _Ints, places: _Floats) -> _Corners:
+        """Find cells for the corners (q, k, s) of parts of facets, a little inside of each part."""
+        count, size, space = places.shape
+        inside = (1.0 - _INWARDS) * places + _INWARDS * places.mean(axis=1, keepdims=True)
+        facet, (starts, _) = np.repeat(facets, size), self._around
+        near = np.concatenate([[0], np.cumsum(starts[facet + 1] - starts[facet])])
+        cell, at = self._places.cells_of(
+            inside.reshape(-1, space), (near, of_lists(*self._around, facet))
+        )
+        weights = self._places.barycentric(cell, places.reshape(-1, space))
+        weights[np.abs(weights) <= _SNAP] = 0.0
+        weights /= weights.sum(axis=1, keepdims=True)
+        shape = (count, size, weights.shape[1])
+        return _Corners(cell.reshape(count, size), weights.reshape(shape), at.reshape(shape))
+
+    def _replace(self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats) -> None:
         """Put the parts of some facets in the place of what there is of these.
 
         They are divided, given the cuts and their level sets (q, cuts) at the vertices; then it is
         found with which pieces the parts move.
         """
-        body = self._cutter.body
-        several = len(numbers) > 1 or self.facets.shape[1] == 2
-        divide = self._divided_by_several if several else self._divided_by_one
-        divided = divide(facets, nodes, numbers, values)
-        yield
-        ids, source, at, label, whole = self._fragments(facets, numbers, *divided)
-        if many:
-            yield
+        parts = self._fragments(facets, nodes, numbers, values)
+        material = parts.at @ self.points[self.facets[parts.source]]
         # where the corners of a whole facet are is known; only which piece that is may be new
-        material, cell, weights, inside = place_parts(
-            self.points, self.facets, source, at, whole, self._corners, self._around, self._tree
-        )
-        yield
-        piece = corner_pieces(cell, inside, label, self._cutter.level_sets, cut_elements(body))
+        divided = np.flatnonzero(~parts.whole)
+        found = self._place_corners(parts.source[divided], material[divided])
+        source, known = parts.source, self._corners
+        corners = _Corners(known.cell[source], known.weights[source], known.inside[source])
+        corners.cell[divided], corners.weights[divided] = found.cell, found.weights
+        corners.inside[divided] = found.inside
         self.surface.retire(ranges(self._facet_range[facets]))
         self.surface.add(
-            ids, material, weights, weights != 0.0, piece, np.zeros(len(ids), dtype=bool),
-            body.piece_cells.rows, source, self._facet_range,
+            parts.ids, material, corners.weights, corners.weights != 0.0,
+            self._pieces(corners, parts.label), np.zeros(len(parts.ids), dtype=bool),
+            self._cutter.body.piece_cells.rows, parts.source, self._facet_range,
         )  # fmt: skip
 
+    def _pieces(self, corners: _Corners, label: _Labels) -> _Ints:
+        """Piece (q, k) of each corner of parts of facets, from its cell and the place inside.
+
+        `label` (q, cuts) are the sides on which the cuts that split a facet have left it; on which
+        side of the others a corner is, the level sets tell.
+        """
+        cells, cutter = corners.cell.ravel(), self._cutter
+        at = corners.inside.reshape(len(cells), -1)
+        level = np.einsum("qa,qac->qc", at, cutter.level_sets[cutter.mesh.cells[cells]])
+        known = np.repeat(label, corners.cell.shape[1], axis=0)
+        side = np.where(known != 0, known, np.where(level >= 0.0, 1, -1))
+        found, agree = np.full(len(cells), -1), np.full(len(cells), np.iinfo(np.int64).min)
+        for rows, pieces in cutter.body.pieces.in_turn(cells):
+            stored = cutter.body.piece_label.rows[pieces]
+            # of all pieces the right one agrees with every cut; else the nearest to it
+            points = np.where(stored == side[rows], 1, -1000)
+            points[stored == 0] = 0
+            total = points.sum(axis=1)
+            better = total > agree[rows]
+            found[rows[better]], agree[rows[better]] = pieces[better], total[better]
+        return found.reshape(corners.cell.shape)
+
     def _fragments(
-        self,
-        facets: _Ints,
-        numbers: _Ints,
-        ids: _Ints,
-        source: _Ints,
-        at: _Floats,
-        side: NDArray[np.int8],
-    ) -> "_Fragments":
-        """Bisect divided facets where others are, and say on which sides of the cuts they lie."""
+        self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
+    ) -> _Fragments:
+        """Divide facets, bisect them where others are, and say on which sides they lie.
+
+        `values` (q, cuts) are the level sets of the cuts with these `numbers` at the `nodes`.
+        """
+        several = len(numbers) != 1 or self.facets.shape[1] == 2
+        divide = self._divided_by_several if several else self._divided_by_one
+        ids, source, at, side = divide(facets, nodes, numbers, values)
         self._edges.add(ids.ravel())
         ids, at, origin = self._edges.bisect(ids, at)
-        source, side = source[origin], side[origin]
+        source = source[origin]
         label = np.zeros((len(ids), self._cutter.body.cut_count), dtype=np.int8)
-        label[:, numbers] = side
+        label[:, numbers] = side[origin]
         alone = np.bincount(source, minlength=len(facets)) == 1
-        is_whole = alone[source] & ~side.any(axis=1)
+        is_whole = alone[source] & ~label.any(axis=1)
         return _Fragments(ids, facets[source], at, label, is_whole)
 
     def _divided_by_one(
         self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
-    ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8]]:
+    ) -> tuple[_Ints, _Ints, _Floats, _Labels]:
         """Divide facets by the only cut there is: points, which facet, corners in it, side."""
-        if len(numbers) == 0:
-            at = np.tile(np.eye(3), (len(facets), 1, 1))
-            return self.facets[facets], np.arange(len(facets)), at, np.zeros((len(facets), 0), "i1")
-        corners = self.points[nodes]
-        ends, positions, ids, at, source, side = divide_facets(
-            np.searchsorted(nodes, self.facets[facets]), values[:, 0], corners, numbers[0],
-            self._tree, cut_elements(self._cutter.body),
-        )  # fmt: skip
-        positions = np.concatenate([corners, positions])
-        found = FoundPoints(positions, values, ends, np.zeros(len(ends), dtype=np.int64))
-        return self._numbers.number(found, nodes, numbers)[ids], source, at, side[:, None]
+        corners, local = self.points[nodes], np.searchsorted(nodes, self.facets[facets])
+        parts = divide_facets(
+            local, values[:, 0], corners, lambda places: self.is_cut(places, int(numbers[0]))
+        )
+        positions = np.concatenate([corners, parts.positions])
+        cut = np.zeros(len(parts.ends), dtype=np.int64)
+        found = FoundPoints(positions, values, parts.ends, cut)
+        point = self._numbers.number(found, nodes, numbers)
+        return point[parts.ids], parts.source, parts.at, parts.side[:, None]
 
     def _divided_by_several(
         self, facets: _Ints, nodes: _Ints, numbers: _Ints, values: _Floats
-    ) -> tuple[_Ints, _Ints, _Floats, NDArray[np.int8]]:
+    ) -> tuple[_Ints, _Ints, _Floats, _Labels]:
         """Divide facets by any number of cuts, as elements are."""
-        patch = self._patch(facets, nodes)
+        local = np.searchsorted(nodes, self.facets[facets])
+        across = np.full(local.shape, -1)
+        patch = MeshPatch(self.points, self._cutter.mesh.extent, facets, nodes, local, across)
         cuts = [
             _SurfaceCut(patch.points, values[:, k], int(cut), self) for k, cut in enumerate(numbers)
         ]
@@ -269,25 +278,18 @@ class EmbeddedSurface:
         order = np.argsort(source, kind="stable")
         return ids[order], source[order], at[order], side[order]
 
-    def _patch(self, facets: _Ints, nodes: _Ints) -> MeshPatch:
-        local = np.searchsorted(nodes, self.facets[facets])
-        extent = self._cutter.mesh.extent
-        across = np.full((len(facets), self.facets.shape[1]), -1)
-        return MeshPatch(self.points, extent, facets, nodes, local, across)
-
     def _values(self, vertices: _Ints) -> tuple[_Ints, _Floats]:
         """Cuts between vertices, or through one, and their realised level sets (q, cuts) there."""
-        cells = self._cutter.mesh.cells
         strokes = [stroke for stroke in self._cutter.strokes if stroke.front >= 0.0]
-        nodes = distinct_in_rows(cells, self._vertex_cell.take(vertices), self._place)
+        cells, at = self._cutter.mesh.cells[self._vertex_cell[vertices]], self._vertex_at[vertices]
+        nodes = distinct(cells)
         numbers, columns = [], []
         for stroke in strokes:
             stroke.level_sets(nodes)
-            values, crossed = levels_at(
-                vertices, self._vertex_cell, self._vertex_at, cells, stroke.values, self._snap
-            )
+            values = (at * stroke.values[cells]).sum(axis=1)
+            values[np.abs(values) <= self._snap] = 0.0
             # the last stroke may still be led elsewhere: what it met before is asked again
-            if crossed or stroke is strokes[-1]:
+            if ((values >= 0.0).any() and (values <= 0.0).any()) or stroke is strokes[-1]:
                 numbers.append(stroke.number)
                 columns.append(values)
         found = np.stack(columns, axis=1) if columns else np.empty((len(vertices), 0))

@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-from verify.simulator.mapping.partner_kernels import partner
-
 __all__ = ["exposed_facets"]
 
 
@@ -20,7 +18,7 @@ def _same_facet(s, skip, t, other, sub_points):
     return same
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _find_facet(s, skip, begin, end, sub_points):
     """Give another simplex from `begin` to `end` with the facet of s opposite to `skip`, or -1."""
     corners, total = sub_points.shape[1], -sub_points[s, skip]
@@ -39,7 +37,7 @@ def _find_facet(s, skip, begin, end, sub_points):
     return -1
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _mark_shared(begin, end, sub_piece, sub_points, sums, shared):
     """Mark the facets (k, d + 1) that two simplices of one piece share; `sums` (k,) is room."""
     corners = sub_points.shape[1]
@@ -85,6 +83,16 @@ def _meets(piece, other, cell, across, opposite, body):
 
 
 @njit(cache=True)
+def _partner(piece, cell, opposite, body):
+    """Give the piece across the face of the cell opposite to a corner, -1 if there is none."""
+    across = body.neighbours[cell, opposite]
+    found = body.first_piece[across] if across >= 0 else -1
+    while found >= 0 and not _meets(piece, found, cell, across, opposite, body):
+        found = body.next_piece[found]
+    return found
+
+
+@njit(inline="always")
 def _is_whole(points, skip, nodes):
     """Whether a facet is a whole face of the element: all its points are nodes."""
     whole = True
@@ -130,7 +138,7 @@ def _beyond(piece, cell, opposite, body, parts, orientation, out, count):
     return count
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _rows(room, corners):
     """Point numbers, barycentric corners, piece, cell and whether on a cut, not yet written."""
     return (
@@ -143,16 +151,58 @@ def _rows(room, corners):
 
 
 @njit(cache=True)
-def _with_room(out, count, more):
-    """Give the same rows with room for more, and as many again."""
-    new = _rows(2 * (count + more), out[1].shape[2])
-    for row in range(count):
-        for k in range(out[0].shape[1]):
-            new[0][row, k] = out[0][row, k]
-            for a in range(out[1].shape[2]):
-                new[1][row, k, a] = out[1][row, k, a]
-        new[2][row], new[3][row], new[4][row] = out[2][row], out[3][row], out[4][row]
-    return new
+def _write_facet(points, at, skip, whose, sign, out, count):
+    """Expose the facet of a simplex opposite to a corner; `whose` is piece, cell, if on a cut."""
+    k = 0
+    for b in range(len(points)):
+        if b == skip:
+            continue
+        out[0][count, k] = points[b]
+        for a in range(len(points)):
+            out[1][count, k, a] = at[b, a]
+        k += 1
+    out[2][count], out[3][count], out[4][count] = whose
+    _turn(out[0][count], out[1][count], sign, skip)
+    return count + 1
+
+
+@njit(inline="always")
+def _expose_whole(cell, split, body, parts, orientation, unit, out, count):
+    """Expose the facets of an element that is not split; give the count of facets."""
+    piece = body.first_piece[cell]
+    for a in range(body.cells.shape[1]):
+        across = body.neighbours[cell, a]
+        if _partner(piece, cell, a, body) < 0:
+            whose = (piece, cell, across >= 0)
+            count = _write_facet(body.cells[cell], unit, a, whose, orientation[cell], out, count)
+        elif split[across]:
+            count = _beyond(piece, cell, a, body, parts, orientation, out, count)
+    return count
+
+
+@njit(inline="always")
+def _expose_split(cell, body, parts, orientation, shared, out, count):
+    """Expose facets of sub-simplices that no other of their piece shares; give the count."""
+    sub_range, sub_piece, sub_points, sub_barycentric, sub_sign = parts
+    neighbours = body.neighbours
+    begin, end = sub_range[cell, 0], sub_range[cell, 1]
+    for s in range(begin, end):
+        for skip in range(sub_points.shape[1]):
+            if shared[s - begin, skip]:
+                continue
+            piece, face = sub_piece[s], _face_of(sub_barycentric[s], skip)
+            across = neighbours[cell, face] if face >= 0 else -1
+            if across >= 0 and _partner(piece, cell, face, body) >= 0:
+                # the same facet of the cell across may be that of a piece that moves otherwise
+                same = _find_facet(s, skip, sub_range[across, 0], sub_range[across, 1], sub_points)
+                if same < 0 or _meets(piece, sub_piece[same], cell, across, face, body):
+                    if _is_whole(sub_points[s], skip, body.cells[cell]):
+                        count = _beyond(piece, cell, face, body, parts, orientation, out, count)
+                    continue
+            whose = (piece, cell, face < 0 or across >= 0)
+            sign = orientation[cell] * sub_sign[s]
+            count = _write_facet(sub_points[s], sub_barycentric[s], skip, whose, sign, out, count)
+    return count
 
 
 @njit(cache=True)
@@ -163,82 +213,30 @@ def exposed_facets(wanted, split, body, parts, orientation):
     and whether it lies on a cut. Facets are oriented outwards. `body` is as `CutElements`, `parts`
     as `SubSimplices`, `orientation` (m,) that of the elements.
     """
-    sub_range, sub_piece, sub_points, sub_barycentric, sub_sign = parts
-    cells, neighbours, first_piece = body.cells, body.neighbours, body.first_piece
-    corners = cells.shape[1]
-    room = 256
+    sub_range, sub_piece, sub_points = parts.sub_range, parts.sub_piece, parts.sub_points
+    corners, most, longest = body.cells.shape[1], 0, 1
     for cell in wanted:
-        room += corners + 2 * (sub_range[cell, 1] - sub_range[cell, 0])
-    out, count = _rows(room, corners), np.int64(0)
-    sums, shared = np.empty(32, dtype=np.int64), np.empty((32, corners), dtype=np.bool_)
-    for cell in wanted:
-        begin, end = sub_range[cell, 0], sub_range[cell, 1]
-        most = corners * max(1, end - begin)
+        own = sub_range[cell, 1] - sub_range[cell, 0]
+        most += corners * max(1, own)
+        longest = max(longest, own)
         for a in range(corners):
-            across = neighbours[cell, a]
+            across = body.neighbours[cell, a]
             if across >= 0:
                 most += corners * (sub_range[across, 1] - sub_range[across, 0])
-        if count + most > len(out[0]):
-            out = _with_room(out, count, most)
-        ids, at, piece_of, cell_of, inner = out
-        if not split[cell]:
-            piece = first_piece[cell]
-            for a in range(corners):
-                across = neighbours[cell, a]
-                other = partner(piece, cell, a, body)
-                if other < 0:
-                    k = 0
-                    for b in range(corners):
-                        if b != a:
-                            ids[count, k] = cells[cell, b]
-                            for c in range(corners):
-                                at[count, k, c] = 1.0 if c == b else 0.0
-                            k += 1
-                    piece_of[count], cell_of[count] = piece, cell
-                    inner[count] = across >= 0
-                    _turn(ids[count], at[count], orientation[cell], a)
-                    count += 1
-                    continue
-                if not split[across]:
-                    continue
-                count = _beyond(piece, cell, a, body, parts, orientation, out, count)
-            continue
-        if end - begin > len(sums):
-            sums = np.empty(2 * (end - begin), dtype=np.int64)
-            shared = np.empty((2 * (end - begin), corners), dtype=np.bool_)
-        _mark_shared(begin, end, sub_piece, sub_points, sums, shared)
-        for s in range(begin, end):
-            for skip in range(corners):
-                if shared[s - begin, skip]:
-                    continue
-                face = _face_of(sub_barycentric[s], skip)
-                if face >= 0:
-                    other = partner(sub_piece[s], cell, face, body)
-                    across = neighbours[cell, face]
-                    first, last = (np.int64(0), np.int64(0))
-                    if across >= 0:
-                        first, last = sub_range[across, 0], sub_range[across, 1]
-                    # the same facet of the cell across may be that of a piece that moves otherwise
-                    same = _find_facet(s, skip, first, last, sub_points)
-                    if other >= 0 and (
-                        same < 0 or _meets(sub_piece[s], sub_piece[same], cell, across, face, body)
-                    ):
-                        if _is_whole(sub_points[s], skip, cells[cell]):
-                            count = _beyond(
-                                sub_piece[s], cell, face, body, parts, orientation, out, count
-                            )
-                        continue
-                k = 0
-                for b in range(corners):
-                    if b != skip:
-                        ids[count, k] = sub_points[s, b]
-                        for a in range(corners):
-                            at[count, k, a] = sub_barycentric[s, b, a]
-                        k += 1
-                piece_of[count], cell_of[count] = sub_piece[s], cell
-                inner[count] = face < 0 or neighbours[cell, face] >= 0
-                _turn(ids[count], at[count], orientation[cell] * sub_sign[s], skip)
-                count += 1
+    out, count = _rows(most, corners), np.int64(0)
+    unit = np.empty((corners, corners))
+    for a in range(corners):
+        for b in range(corners):
+            unit[a, b] = 1.0 if a == b else 0.0
+    sums = np.empty(longest, dtype=np.int64)
+    shared = np.empty((longest, corners), dtype=np.bool_)
+    for cell in wanted:
+        if split[cell]:
+            begin, end = sub_range[cell, 0], sub_range[cell, 1]
+            _mark_shared(begin, end, sub_piece, sub_points, sums, shared)
+            count = _expose_split(cell, body, parts, orientation, shared, out, count)
+        else:
+            count = _expose_whole(cell, split, body, parts, orientation, unit, out, count)
     ids, at, piece_of, cell_of, inner = out
     return ids[:count], at[:count], piece_of[:count], cell_of[:count], inner[:count]
 

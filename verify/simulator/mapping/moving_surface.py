@@ -9,9 +9,10 @@ gets is the same.
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from verify.simulator.arrays.growing_array import GrowingArray
-from verify.simulator.arrays.row_numbers import RowNumbers, number_of_row
+from verify.simulator.arrays.row_numbers import RowNumbers, first_of_new, number_of_row
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import check_floats
 
@@ -45,11 +46,7 @@ class MovingSurface:
         (f,) whether it lies on a cut.
     retired : int
         How many facets have been taken out of use.
-    in_order : bool
-        Whether neighbours among the facets in use are near each other: not always.
     """
-
-    in_order = False
 
     def __init__(self, corners: int, space: int, facet_corners: int) -> None:
         self.material = GrowingArray(np.empty((0, space)))
@@ -96,23 +93,22 @@ class MovingSurface:
         bounds : (o, 2) int array
             First facet of each owner and one past the last; written.
         """
-        corners = point.size
-        table, known, before = self._keys.open_for(corners)
-        stores = (self.material, self.nodes, self.weights)
-        for store in stores:
-            store.extend(corners)
-        begin = self.facets.extend(len(point))
-        self.facet_piece.extend(len(point))
-        self.inner.extend(len(point))
-        self.facet_piece.rows[begin:] = piece[:, 0]
-        self.inner.rows[begin:] = inner
-        count = _add(
-            point, material, weights, counts, piece, piece_cells, owner, table, known, before,
-            begin, self.material.rows, self.nodes.rows, self.weights.rows, self.facets.rows, bounds,
-        )  # fmt: skip
-        self._keys.close(count)
-        for store in stores:
-            store.rows = store.rows[:count]
+        if len(point) == 0:
+            return
+        count, begin = len(self.material), len(self.facets)
+        table, known, _ = self._keys.open_for(point.size)
+        vertex, after = _number_corners(point, piece, counts, piece_cells, table, known, count)
+        self._keys.close(after)
+        new = first_of_new(vertex, count)
+        self.material.append(material.reshape(point.size, -1)[new])
+        self.nodes.append(piece_cells[piece.ravel()[new]])
+        self.weights.append(weights.reshape(point.size, -1)[new])
+        self.facets.append(vertex.reshape(point.shape))
+        self.facet_piece.append(piece[:, 0])
+        self.inner.append(inner)
+        change = np.flatnonzero(np.diff(owner, prepend=-1))
+        bounds[owner[change], 0] = begin + change
+        bounds[owner[change], 1] = begin + np.append(change[1:], len(owner))
 
     def retire(self, facets: _Ints) -> None:
         """Take facets out of use."""
@@ -141,10 +137,11 @@ class MovingSurface:
             or type.
         """
         self._check(displacement)
+        found = self.material.rows + self._mapping @ displacement[: self._mapping.shape[1]]
         if out is None:
-            out = np.empty_like(self.material.rows)
-        check_floats("positions", out, self.material.rows.shape)
-        _interpolate(self.material.rows, self.nodes.rows, self.weights.rows, displacement, out)
+            return np.asarray(found)
+        check_floats("positions", out, found.shape)
+        out[:] = found
         return out
 
     def nodal_forces(self, forces: _Floats, out: _Floats) -> _Floats:
@@ -157,7 +154,7 @@ class MovingSurface:
         """
         self._check(out)
         check_floats("forces", forces, self.material.rows.shape)
-        _spread(self.nodes.rows, self.weights.rows, forces, out)
+        out[: self._mapping.shape[1]] += self._mapping.T @ forces
         return out
 
     def facet_force(self, facet: int, at: _Floats, force: _Floats, out: _Floats) -> _Floats:
@@ -190,7 +187,8 @@ class MovingSurface:
                 f"{out.shape[1:]} and {vertices.shape}"
             )
         at, force = np.asarray(at, dtype=float), np.asarray(force, dtype=float)
-        _spread(self.nodes.rows[vertices], self.weights.rows[vertices], at[:, None] * force, out)
+        shares = at[:, None] * self.weights.rows[vertices]
+        np.add.at(out, self.nodes.rows[vertices], shares[:, :, None] * force)
         return out
 
     def _check(self, nodal: _Floats) -> None:
@@ -199,32 +197,31 @@ class MovingSurface:
             raise XfemError(
                 f"nodal values of shape {np.shape(nodal)}, {kind}; expected (N, {space}), float64"
             )
-        if len(self.nodes) and len(nodal) <= self._largest_node():
+        if len(nodal) < self._mapping.shape[1]:
             raise XfemError(
-                f"{len(nodal)} nodal values; expected at least {self._largest_node() + 1}"
+                f"{len(nodal)} nodal values; expected at least {self._mapping.shape[1]}"
             )
 
-    def _largest_node(self) -> int:
-        seen = getattr(self, "_largest", (0, -1))
-        if seen[0] < len(self.nodes):
-            seen = (len(self.nodes), max(seen[1], int(self.nodes.rows[seen[0] :].max())))
-            self._largest = seen
-        return seen[1]
+    @property
+    def _mapping(self) -> csr_array:
+        """W (v, N), with the dof nodes up to the last from which a vertex moves."""
+        nodes = self.nodes.rows
+        known: csr_array | None = getattr(self, "_known_mapping", None)
+        if known is None or known.shape[0] != len(nodes):
+            starts = np.arange(0, nodes.size + 1, nodes.shape[1])
+            shape = (len(nodes), int(nodes.max(initial=-1)) + 1)
+            known = csr_array((self.weights.rows.ravel(), nodes.ravel(), starts), shape)
+            self._known_mapping = known
+        return known
 
 
 @njit(cache=True)
-def _add(
-    point, material, weights, counts, piece, piece_cells, owner, table, known, count,
-    begin, places, nodes, shares, facets, bounds,
-):  # fmt: skip
-    """Write facets, new vertices and the facets of each owner; the count of vertices."""
-    size = nodes.shape[1]
-    key = np.empty(size + 1, dtype=np.int64)
+def _number_corners(point, piece, counts, piece_cells, table, known, count):
+    """Vertex (q * k,) of each corner: one for a point and the nodes that count; how many."""
+    size, corners = piece_cells.shape[1], point.shape[1]
+    vertex, key = np.empty(point.size, dtype=np.int64), np.empty(size + 1, dtype=np.int64)
     for f in range(len(point)):
-        if f == 0 or owner[f] != owner[f - 1]:
-            bounds[owner[f], 0] = begin + f
-        bounds[owner[f], 1] = begin + f + 1
-        for c in range(point.shape[1]):
+        for c in range(corners):
             key[0] = point[f, c]
             for a in range(size):
                 node, k = piece_cells[piece[f, c], a] if counts[f, c, a] else -1, a
@@ -232,31 +229,5 @@ def _add(
                     key[k + 1] = key[k]
                     k -= 1
                 key[k + 1] = node
-            before = count
-            vertex, count = number_of_row(key, table, known, count)
-            facets[begin + f, c] = vertex
-            if count > before:
-                for i in range(places.shape[1]):
-                    places[vertex, i] = material[f, c, i]
-                for a in range(size):
-                    nodes[vertex, a] = piece_cells[piece[f, c], a]
-                    shares[vertex, a] = weights[f, c, a]
-    return count
-
-
-@njit(cache=True)
-def _interpolate(material, nodes, weights, displacement, out):
-    for v in range(len(nodes)):
-        for i in range(material.shape[1]):
-            total = material[v, i]
-            for k in range(nodes.shape[1]):
-                total += weights[v, k] * displacement[nodes[v, k], i]
-            out[v, i] = total
-
-
-@njit(cache=True)
-def _spread(nodes, weights, forces, out):
-    for v in range(len(nodes)):
-        for k in range(nodes.shape[1]):
-            for i in range(forces.shape[1]):
-                out[nodes[v, k], i] += weights[v, k] * forces[v, i]
+            vertex[f * corners + c], count = number_of_row(key, table, known, count)
+    return vertex, count

@@ -29,17 +29,15 @@ class RealTime:
     tetrahedra, cuts, unknowns, steps, cutting_steps : int
         Cuts are split elements, unknowns displacement components, both at the end.
     within : dict
-        Share of all steps within each of the `LIMITS`, in processor time of one thread.
+        Share of all steps within each of the `LIMITS`, in processor time of one thread, of each
+        step the median over replays.
     within_wall : dict
         Likewise in wall time, the other work of the machine included.
-    within_spread : dict
-        Likewise in processor time, the work of a cut spread over steps, of each step the median
-        over replays: by these it is judged.
     resting, cutting : dict
         Median by phase, and of the whole step, of steps without and with newly split elements:
         processor time, s.
-    slowest, slowest_spread : float
-        Processor time, at once and with the work of a cut spread, s.
+    slowest : float
+        Processor time, s.
     kernel : float
         Processor time of the calibration kernel beside it, s.
     volume_error, loose_edges, inverted : float, int, int
@@ -55,11 +53,9 @@ class RealTime:
     cutting_steps: int
     within: dict[str, float]
     within_wall: dict[str, float]
-    within_spread: dict[str, float]
     resting: dict[str, float]
     cutting: dict[str, float]
     slowest: float
-    slowest_spread: float
     kernel: float
     volume_error: float
     loose_edges: int
@@ -73,23 +69,21 @@ def real_time() -> RealTime:
     more = [stroke_along(stage, place, begin, _STROKE) for place, begin in _STROKES]
     stage = replace(stage, strokes=[*stage.strokes, *more], duration=_DURATION)
     volume, loose, inverted, gain = _soundness(stage)  # compiles what is timed below
-    session = Session(stage, account=False, clock=thread_time)
-    wall = []
-    while not session.finished:
-        start = perf_counter()
-        session.step()
-        wall.append(perf_counter() - start)
     # each replay is the same work step by step: the median over them is what a step costs
-    replays = [
-        [r.total_seconds for r in Session(stage, False, True, thread_time).run()]
-        for _ in range(_REPLAYS)
-    ]
-    spread_total = np.median(replays, axis=0)
+    replays, walls = [], []
+    for _ in range(_REPLAYS):
+        session = Session(stage, account=False, clock=thread_time)
+        while not session.finished:
+            start = perf_counter()
+            session.step()
+            walls.append(perf_counter() - start)
+        replays.append([[r.seconds[name] for name in PHASES] for r in session.records])
+    wall = np.median(np.reshape(walls, (_REPLAYS, -1)), axis=0)
+    by_phase = np.median(replays, axis=0)
     kernel = float(np.median(kernel_seconds(clock=thread_time)))
-    total = np.array([record.total_seconds for record in session.records])
+    total = by_phase.sum(axis=1)
     cutting = np.array([record.newly_split > 0 for record in session.records])
-    phases = {name: np.array([r.seconds[name] for r in session.records]) for name in PHASES}
-    phases["step"] = total
+    phases = dict(zip(PHASES, by_phase.T, strict=True)) | {"step": total}
     return RealTime(
         tetrahedra=len(stage.mesh.cells),
         cuts=session.records[-1].split,
@@ -97,12 +91,10 @@ def real_time() -> RealTime:
         steps=len(total),
         cutting_steps=int(cutting.sum()),
         within=_shares(total),
-        within_wall=_shares(np.array(wall)),
-        within_spread=_shares(spread_total),
+        within_wall=_shares(wall),
         resting={name: float(np.median(values[~cutting])) for name, values in phases.items()},
         cutting={name: float(np.median(values[cutting])) for name, values in phases.items()},
         slowest=float(total.max()),
-        slowest_spread=float(spread_total.max()),
         kernel=kernel,
         volume_error=volume,
         loose_edges=loose,

@@ -121,17 +121,15 @@ def _steps(steps: Sequence[StepTime]) -> Iterator[Finding]:
 
 def _real_time(hand: RealTime, contended: str) -> Iterator[Finding]:
     for name, limit in LIMITS.items():
-        # a simulator would spread the work of a cut, at the price that the guide states
-        kept = hand.within_spread[name] == 1.0
+        kept = hand.within[name] == 1.0
         verdict = _said(kept)
-        if not kept and contended and hand.slowest_spread <= _CONTENDED * limit:
+        if not kept and contended and hand.slowest <= _CONTENDED * limit:
             verdict = Verdict.UNDECIDED
         yield Finding(
             f"real time: every step within {name}",
-            f"{hand.within_spread[name]:.1%} of {hand.steps} steps in processor time of one "
-            f"thread with the work of a cut spread over steps (medians of replays), slowest "
-            f"{1e3 * hand.slowest_spread:.2f} ms; {hand.within[name]:.1%} with cuts done at once "
-            f"({hand.within_wall[name]:.1%} in wall time), median {1e3 * hand.resting['step']:.2f} "
+            f"{hand.within[name]:.1%} of {hand.steps} steps in processor time of one thread "
+            f"({hand.within_wall[name]:.1%} in wall time; medians of replays), "
+            f"median {1e3 * hand.resting['step']:.2f} "
             f"ms, {1e3 * hand.cutting['step']:.2f} ms of the {hand.cutting_steps} that cut, "
             f"slowest {1e3 * hand.slowest:.2f} ms; "
             f"{hand.tetrahedra} tetrahedra, {hand.cuts} cut, "
