@@ -40,24 +40,19 @@ def _study(arguments: argparse.Namespace) -> int:
         from verify.cli import case_studies
 
         study = getattr(case_studies, arguments.study)(arguments, announce)
-        findings, record, rows = study.findings, study.as_record(), study.rows()
     elif arguments.study == "calibration":
         from verify.study.calibration import calibration_study
 
-        calibration = calibration_study(arguments.quick, announce)
-        findings, record, rows = (
-            calibration.findings, calibration.as_record(), calibration.rows()
-        )  # fmt: skip
+        study = calibration_study(arguments.quick, announce)
     else:
-        over = _over_scenes(arguments, announce)
-        findings, record, rows = over.findings, over.as_record(), over.rows()
-    written = write_study(arguments.out, arguments.study, record, rows, command)
+        study = _over_scenes(arguments, announce)
+    written = write_study(arguments.out, arguments.study, study, command)
     page = render_study(arguments.out, arguments.study)
     if arguments.json:
-        said = [asdict(finding) for finding in findings]
+        said = [asdict(finding) for finding in study.findings]
         print(json.dumps({"record": str(written), "report": str(page), "findings": said}, indent=2))
         return 0
-    for finding in findings:
+    for finding in study.findings:
         mark = "shown" if finding.verdict is None else str(finding.verdict)
         print(f"{mark}: {finding.topic}: {finding.sentence} [expected: {finding.expected}]")
     print(f"report: {page}")

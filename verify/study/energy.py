@@ -1,7 +1,6 @@
 """The energy study: what any solver keeps of energy, momenta and mass in motions."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
@@ -10,6 +9,7 @@ from verify.result import Verdict
 from verify.scene import Scene, scene_content
 from verify.study.finding import Finding
 from verify.study.measured_scenes import (
+    MeasuredStudy,
     Measurement,
     measured_families,
     measured_scenes,
@@ -17,39 +17,12 @@ from verify.study.measured_scenes import (
 )
 from verify.study.variants import Variant
 
-__all__ = ["EnergyStudy", "account_findings", "energy_study"]
+__all__ = ["account_findings", "energy_study"]
 
 _DRIFT = 1e-2  # of the energy in play: what a spectator would not see
 _KEPT = 1e-8
 # momenta are in the table: the supports of most scenes change them
 _BESIDE = ("energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch")
-
-
-@dataclass(frozen=True)
-class EnergyStudy:
-    """What the study found.
-
-    Attributes
-    ----------
-    quick : bool
-    measurements : list of Measurement
-    findings : list of Finding
-    seconds : float
-        Wall time.
-    """
-
-    quick: bool
-    measurements: list[Measurement]
-    findings: list[Finding]
-    seconds: float
-
-    def as_record(self) -> dict[str, Any]:
-        """Return all of it as plain data."""
-        return asdict(self)
-
-    def rows(self) -> list[dict[str, Any]]:
-        """Return the lines of its table."""
-        return [asdict(one) for one in self.measurements]
 
 
 def energy_study(
@@ -58,7 +31,7 @@ def energy_study(
     announce: Callable[[str], None] = lambda text: None,
     processes: int = 1,
     quick: bool = False,
-) -> EnergyStudy:
+) -> MeasuredStudy:
     """Run every motion with every solver, and measure what is kept.
 
     Parameters
@@ -85,7 +58,10 @@ def energy_study(
         raise InputError("no case with a dynamic analysis; see `verify list`")
     start = perf_counter()
     every = measured_families(measured_scenes, cases, variants, announce, processes)
-    return EnergyStudy(quick, every, list(_findings(every)), perf_counter() - start)
+    return MeasuredStudy(
+        findings=list(_findings(every)), seconds=perf_counter() - start, quick=quick,
+        measurements=every,
+    )  # fmt: skip
 
 
 def _findings(measured: Sequence[Measurement]) -> Iterator[Finding]:

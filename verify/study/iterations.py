@@ -19,6 +19,7 @@ from verify.result import SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution, handed_over
 from verify.study.finding import Finding
+from verify.study.record import Study
 from verify.study.variants import Variant
 
 __all__ = ["Grid", "IterationsStudy", "Setting", "iterations_study"]
@@ -92,8 +93,8 @@ class Setting:
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class IterationsStudy:
+@dataclass(frozen=True, kw_only=True)
+class IterationsStudy(Study):
     """What the study found."""
 
     case: str
@@ -101,12 +102,6 @@ class IterationsStudy:
     truth: str
     tolerance: float
     settings: list[Setting]
-    findings: list[Finding]
-    seconds: float
-
-    def as_record(self) -> dict[str, Any]:
-        """Return all of it as plain data."""
-        return asdict(self)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the lines of its table."""
@@ -168,8 +163,9 @@ def iterations_study(
                 one = _measured(scene, answer, one)
             settings.append(one)
     return IterationsStudy(
-        scene.name, variant.label, truth.label, tolerance, settings,
-        _findings(variant.label, settings, tolerance, grid.names), perf_counter() - clock,
+        case=scene.name, solver=variant.label, truth=truth.label, tolerance=tolerance,
+        settings=settings, seconds=perf_counter() - clock,
+        findings=_findings(variant.label, settings, tolerance, grid.names),
     )  # fmt: skip
 
 

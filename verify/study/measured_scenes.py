@@ -1,7 +1,7 @@
 """Scenes solved by a variant of a solver in this process, and read by the comparison."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,16 @@ from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
 from verify.study.finding import Finding
 from verify.study.in_processes import in_processes
+from verify.study.record import Study
 from verify.study.variants import Variant
 
-__all__ = ["Measurement", "measured_families", "measured_scenes", "missing_solutions"]
+__all__ = [
+    "MeasuredStudy",
+    "Measurement",
+    "measured_families",
+    "measured_scenes",
+    "missing_solutions",
+]
 
 # quantity, unit, value, reason and, if the case states one, limit
 Row = tuple[str, str, float | None, str] | tuple[str, str, float | None, str, float]
@@ -56,6 +63,18 @@ class Measurement:
     value: float | None
     reason: str = ""
     limit: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredStudy(Study):
+    """What a study of measured scenes found; `quick` for the record."""
+
+    quick: bool
+    measurements: list[Measurement]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the lines of its table."""
+        return [asdict(one) for one in self.measurements]
 
 
 def measured_scenes(

@@ -1,6 +1,6 @@
 """Files of a study: a versioned JSON record and the same numbers as CSV."""
 
-from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -9,20 +9,38 @@ from verify.csv_files import csv_text
 from verify.errors import InputError
 from verify.json_files import write_json
 from verify.provenance import provenance
+from verify.study.finding import Finding
 from verify.whole_files import write_whole
 
-__all__ = ["SCHEMA", "make_directory", "write_study"]
+__all__ = ["SCHEMA", "Study", "make_directory", "write_study"]
 
 SCHEMA = 1
 
 
-def write_study(
-    directory: Path,
-    kind: str,
-    record: Mapping[str, Any],
-    rows: Iterable[Mapping[str, Any]],
-    command: str,
-) -> Path:
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What a study found.
+
+    Attributes
+    ----------
+    findings : list of Finding
+    seconds : float
+        Wall time.
+    """
+
+    findings: list[Finding]
+    seconds: float = 0.0
+
+    def as_record(self) -> dict[str, Any]:
+        """Return all of it as plain data."""
+        return asdict(self)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the lines of its table, all with the same keys."""
+        raise NotImplementedError
+
+
+def write_study(directory: Path, kind: str, study: Study, command: str) -> Path:
     """Write ``<kind>.json`` and ``<kind>.csv``; each file is replaced in one step.
 
     Parameters
@@ -31,10 +49,8 @@ def write_study(
         Made if it is not there.
     kind : str
         Name of the study, ``slivers`` or ``energy``.
-    record : mapping
-        Plain data. Numbers that are not finite, for which JSON has no word, become null.
-    rows : iterable of mapping
-        Lines of the CSV; all with the keys of the first.
+    study : Study
+        Numbers that are not finite, for which JSON has no word, become null.
     command : str
         What was typed.
 
@@ -54,11 +70,11 @@ def write_study(
         "kind": f"{kind} study",
         "command": command,
         "provenance": provenance(),
-        **record,
+        **study.as_record(),
     }
     target = directory / f"{kind}.json"
     write_json(document, target)
-    listed = list(rows)
+    listed = study.rows()
     table = csv_text(list(listed[0]) if listed else [], listed)
     write_whole(directory / f"{kind}.csv", table)
     return target

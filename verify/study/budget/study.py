@@ -1,6 +1,6 @@
 """The budget study of a case: a chain of answers taken apart, and the choice among the models."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
@@ -22,14 +22,15 @@ from verify.study.budget.distances import Times, norm_names
 from verify.study.budget.links import Chain, Missing
 from verify.study.budget.solved import JUDGED, Solve
 from verify.study.finding import Finding
+from verify.study.record import Study
 
 __all__ = ["BudgetStudy", "budget_study"]
 
 _QUICK_LEVELS = 2
 
 
-@dataclass(frozen=True)
-class BudgetStudy:
+@dataclass(frozen=True, kw_only=True)
+class BudgetStudy(Study):
     """What the budget study found.
 
     Attributes
@@ -45,14 +46,12 @@ class BudgetStudy:
         The links, in words.
     budgets : list of Budget
     candidates : list of Candidate
-    findings : list of Finding
     missing : list of Missing
         Links that could not be made, with their reasons.
     notes : list of str
     ends : list of CutEnd
         Where the ends of cuts in the plane are realised, and where the answer has them.
     quick : bool
-    seconds : float
     """
 
     case: str
@@ -62,16 +61,10 @@ class BudgetStudy:
     chain: list[str]
     budgets: list[Budget]
     candidates: list[Candidate]
-    findings: list[Finding]
-    missing: list[Missing] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    ends: list[CutEnd] = field(default_factory=list)
-    quick: bool = False
-    seconds: float = 0.0
-
-    def as_record(self) -> dict[str, Any]:
-        """Return all of it as plain data."""
-        return asdict(self)
+    missing: list[Missing]
+    notes: list[str]
+    ends: list[CutEnd]
+    quick: bool
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a line per part, for a table."""

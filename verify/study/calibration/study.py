@@ -10,6 +10,7 @@ from verify.result import Verdict
 from verify.study.calibration.families import families
 from verify.study.calibration.trial import NORMS, Trial, trials
 from verify.study.finding import Finding
+from verify.study.record import Study
 
 __all__ = ["CalibrationStudy", "calibration_findings", "calibration_study"]
 
@@ -18,22 +19,18 @@ WASTED = 10.0  # an error bar that is so many times the error judges little
 FEWEST, FEWEST_SCENES = 60, 15  # triples and scenes of a family from which a share says something
 
 
-@dataclass(frozen=True)
-class CalibrationStudy:
+@dataclass(frozen=True, kw_only=True)
+class CalibrationStudy(Study):
     """What the calibration study found.
 
     Attributes
     ----------
     trials : list of Trial
-    findings : list of Finding
     quick : bool
-    seconds : float
     """
 
     trials: list[Trial]
-    findings: list[Finding]
     quick: bool
-    seconds: float
 
     def as_record(self) -> dict[str, Any]:
         """Return all of it as plain data."""
@@ -61,7 +58,9 @@ def calibration_study(quick: bool, announce: Callable[[str], None]) -> Calibrati
         for index in range(family.scenes):
             found += trials(family, index)
     findings = calibration_findings(found, quick)
-    return CalibrationStudy(found, findings, quick, perf_counter() - start)
+    return CalibrationStudy(
+        findings=findings, seconds=perf_counter() - start, trials=found, quick=quick
+    )
 
 
 def calibration_findings(found: Sequence[Trial], quick: bool = False) -> list[Finding]:

@@ -7,6 +7,7 @@ from typing import Any
 from verify.result import CaseResult, SolveRecord, Status, Verdict
 from verify.study.cost.work import WorkPoint, pareto_front, time_at, work_points
 from verify.study.finding import Finding
+from verify.study.record import Study
 
 __all__ = ["CostStudy", "cost_study"]
 
@@ -14,8 +15,8 @@ REFERENCE = "reference"
 SAMPLE = 3  # repetitions from which on their range bounds a time
 
 
-@dataclass(frozen=True)
-class CostStudy:
+@dataclass(frozen=True, kw_only=True)
+class CostStudy(Study):
     """What the cost study found.
 
     Attributes
@@ -33,7 +34,6 @@ class CostStudy:
         Solver and level of those of them that no other beats in time and error.
     left_out : list of dict
         Solves that failed or were refused, with reasons.
-    findings : list of Finding
     contended : str
         Why times may be off, if they may.
     """
@@ -45,13 +45,7 @@ class CostStudy:
     points: list[dict[str, Any]]
     front: list[tuple[str, int]]
     left_out: list[dict[str, Any]]
-    findings: list[Finding]
     contended: str
-    seconds: float = 0.0
-
-    def as_record(self) -> dict[str, Any]:
-        """Return all of it as plain data."""
-        return asdict(self)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a line per solver and step, for a table."""

@@ -20,8 +20,12 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.printable import one_line
 from verify.scene import Box, Rectangle, Scene, scene_content
 from verify.solvers import Solver
-from verify.study.finding import Finding
-from verify.study.measured_scenes import Measurement, measured_families, measured_scenes
+from verify.study.measured_scenes import (
+    MeasuredStudy,
+    Measurement,
+    measured_families,
+    measured_scenes,
+)
 from verify.study.slivers.findings import findings
 from verify.study.slivers.growth import growth
 from verify.study.slivers.step_by_running import step_by_running
@@ -34,34 +38,17 @@ _FITTED = (CONDITION, SCALED, STEP)
 Row = tuple[str, str, float | None, str]
 
 
-@dataclass(frozen=True)
-class SliverStudy:
+@dataclass(frozen=True, kw_only=True)
+class SliverStudy(MeasuredStudy):
     """What the study found.
 
     Attributes
     ----------
-    quick : bool
-    measurements : list of Measurement
     growths : list of dict
         Exponent of each series over small ε, with its uncertainty and reason.
-    findings : list of Finding
-    seconds : float
-        Wall time.
     """
 
-    quick: bool
-    measurements: list[Measurement]
     growths: list[dict[str, Any]]
-    findings: list[Finding]
-    seconds: float
-
-    def as_record(self) -> dict[str, Any]:
-        """Return all of it as plain data."""
-        return asdict(self)
-
-    def rows(self) -> list[dict[str, Any]]:
-        """Return the lines of its table."""
-        return [asdict(one) for one in self.measurements]
 
 
 def sliver_study(
@@ -101,8 +88,10 @@ def sliver_study(
     start = perf_counter()
     every = measured_families(_measured, families, variants, announce, processes)
     growths = _growths(every)
-    judged = list(findings(every, growths))
-    return SliverStudy(quick, every, growths, judged, perf_counter() - start)
+    return SliverStudy(
+        findings=list(findings(every, growths)), seconds=perf_counter() - start, quick=quick,
+        measurements=every, growths=growths,
+    )  # fmt: skip
 
 
 def _measured(variant: Variant, rows: list[dict[str, Any]]) -> list[Measurement]:

@@ -13,7 +13,7 @@ from verify.simulator.thesis.delays import SPEEDS, delays, with_other_frames
 from verify.simulator.thesis.published import published_rows, published_source
 from verify.simulator.thesis.real_time import real_time
 from verify.simulator.thesis.step_times import CUTS, TETRAHEDRA, step_times
-from verify.study.finding import Finding
+from verify.study.record import Study
 from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import compare_methods
 from verify.study.thesis.sliver_systems import sliver_systems
@@ -35,34 +35,26 @@ _FAMILIES = ("slivers/plane_edges", "slivers/space_faces")
 _ROWS = (10, 50, 100, 500, 1000)  # of Table 4.3
 
 
-@dataclass(frozen=True)
-class ThesisStudy:
+@dataclass(frozen=True, kw_only=True)
+class ThesisStudy(Study):
     """What the study found.
 
     Attributes
     ----------
     measured : Measured
-    findings : list of Finding
     quick : bool
-    seconds : float
-        Wall time.
     """
 
     measured: Measured
-    findings: list[Finding]
     quick: bool
-    seconds: float
 
     def as_record(self) -> dict[str, Any]:
         """Return all of it as plain data, the thesis' rows beside."""
         tables = {name: published_rows(name) for name in ("4.3", "4.4", "4.5", "4.6")}
-        return {
-            "quick": self.quick,
-            "seconds": self.seconds,
-            "published": {"source": published_source(), "tables": tables},
-            "findings": [asdict(finding) for finding in self.findings],
-            **asdict(self.measured),
-        }
+        found = asdict(self)
+        measured = found.pop("measured")
+        published = {"source": published_source(), "tables": tables}
+        return {**found, **measured, "published": published}
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the entries of the tables, one a line: what it is here and in the thesis."""
@@ -145,7 +137,9 @@ def thesis_study(
         contended=contended,
     )
     findings = [*verdicts_on_cost(measured), *verdicts_on_mechanics(measured)]
-    return ThesisStudy(measured, findings, quick, seconds + perf_counter() - start)
+    return ThesisStudy(
+        findings=findings, seconds=seconds + perf_counter() - start, measured=measured, quick=quick
+    )
 
 
 def _contention() -> str:
