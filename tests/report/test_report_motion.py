@@ -52,3 +52,19 @@ def test_errors_energies_and_momenta_of_every_solver_are_drawn_over_time(tmp_pat
     assert "XFEM: 0 to 5" in linear  # |(3, 4)|
     (total,) = [text for text in labels if "change of the total" in text]
     assert "conforming P1: 0 to 0" in total
+
+
+def test_an_error_below_the_uncertainty_of_its_reference_is_named_and_not_drawn(tmp_path):
+    root = moving_run(tmp_path / "run")
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    result = json.loads(file.read_text())
+    for solve, width in zip(result["solves"], (0.02, 1e-4), strict=True):  # errors 0.01 and 0.02
+        largest = {"name": "displacement_l2_max", "value": max(solve["series"]["displacement_l2"]),
+                   "unit": "1", "reference": None, "uncertainty": width, "source": ""}  # fmt: skip
+        solve["metrics"].append(largest)
+    file.write_text(json.dumps(result))
+    page, labels = panels(root)
+    (drawn,) = [text for text in labels if "L² error" in text]
+    assert "conforming P1: 0 to 0.02" in drawn
+    assert "XFEM" not in drawn
+    assert "not above the uncertainty of the comparison: " in page.text
