@@ -95,22 +95,46 @@ def block_pattern(cells: NDArray[np.int64], node_count: int) -> BlockPattern:
         )
     if cells.size and not 0 <= cells.min() <= cells.max() < node_count:
         raise XfemError(f"a cell has a node outside 0..{node_count - 1}")
-    corners = cells.shape[1]
-    rows, columns = np.repeat(cells, corners, axis=1).ravel(), np.tile(cells, corners).ravel()
-    order = _order(columns, node_count)
-    order = order[_order(rows[order], node_count)]
-    rows, columns = rows[order], columns[order]
-    is_first = (np.diff(rows, prepend=-1) != 0) | (np.diff(columns, prepend=-1) != 0)
-    starts = np.searchsorted(rows[is_first], np.arange(node_count + 1))
-    empty = np.flatnonzero(starts[1:] == starts[:-1])
-    if len(empty):
-        raise XfemError(f"node {empty[0]} belongs to no cell")
-    targets = np.empty(len(order), dtype=np.int32)
-    targets[order] = np.cumsum(is_first) - 1
-    return BlockPattern(
-        starts.astype(np.int32), columns[is_first].astype(np.int32),
-        targets.reshape(len(cells), corners, corners),
-    )  # fmt: skip
+    counts = np.bincount(cells.ravel(), minlength=node_count)
+    if not counts.all():
+        raise XfemError(f"node {int(np.argmin(counts > 0))} belongs to no cell")
+    first = np.concatenate([[0], np.cumsum(counts)])
+    around = _order(cells.ravel(), node_count) // cells.shape[1]
+    return BlockPattern(*_pattern(np.ascontiguousarray(cells), first, around))
+
+
+@njit(cache=True)
+def _pattern(cells, first, around):
+    """Rows, columns and targets; `around` holds the cells of node n from first[n] on."""
+    (count, corners), nodes = cells.shape, len(first) - 1
+    mark, used = np.full(nodes, -1), 0
+    starts = np.zeros(nodes + 1, dtype=np.int32)
+    found = np.empty(corners * corners * count, dtype=np.int32)
+    for node in range(nodes):
+        for k in range(first[node], first[node + 1]):
+            for b in range(corners):
+                other = cells[around[k], b]
+                if mark[other] != node:
+                    mark[other], found[used] = node, other
+                    used += 1
+        starts[node + 1] = used
+    # the pattern is symmetric: nodes that enter the rows of others one by one come in order
+    columns, fill = np.empty(used, dtype=np.int32), starts[:-1].copy()
+    for node in range(nodes):
+        for k in range(starts[node], starts[node + 1]):
+            columns[fill[found[k]]] = node
+            fill[found[k]] += 1
+    place = np.empty(nodes, dtype=np.int32)
+    targets = np.empty((count, corners, corners), dtype=np.int32)
+    for node in range(nodes):
+        for k in range(starts[node], starts[node + 1]):
+            place[columns[k]] = k
+        for k in range(first[node], first[node + 1]):
+            for a in range(corners):
+                if cells[around[k], a] == node:
+                    for b in range(corners):
+                        targets[around[k], a, b] = place[cells[around[k], b]]
+    return starts, columns, targets
 
 
 def _order(keys: NDArray, count: int) -> _Ints:
