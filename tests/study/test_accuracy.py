@@ -107,6 +107,8 @@ def test_a_fine_reference_judges_as_the_exact_field_does():
         truth = true.solves[2].metric(name)
         assert abs(measured.value - truth.value) <= measured.uncertainty + truth.uncertainty
         assert measured.uncertainty < 0.1 * measured.value
+        # the change of the last level, over the error that the levels before it stated: 1 − 2⁻ᵖ
+        assert 0.5 < against.reference.metrics[name]["disagreement"] < 1.25
     assert against.reference.source == "conforming P2, 3 levels, GCI"
 
 
