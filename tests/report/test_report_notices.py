@@ -1,10 +1,6 @@
 """Notices of a case: nobody can miss a warning, and what cannot be had stands with its reason."""
 
-import csv
-import io
-import json
 from dataclasses import replace
-from xml.etree import ElementTree
 
 import pytest
 from page_parser import parsed
@@ -44,15 +40,3 @@ def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge
     assert CLOSED in inside[banner : banner + 400]
     assert inside.index("1 warning") < banner
     parsed(page)
-
-
-def test_notices_stand_in_every_export(warned):
-    root, _ = warned
-    rows = list(csv.DictReader(io.StringIO((root / "results.csv").read_text())))
-    assert [(r["metric"], r["solver"], r["reason"]) for r in rows if r["status"] == "warning"] == [
-        ("cut 0", "xfem", CLOSED)
-    ]
-    document = json.loads((root / "results.json").read_text())
-    assert document["cases"][0]["result"]["notices"][1]["text"] == NO_TIP
-    out = ElementTree.parse(root / "junit.xml").getroot().find(".//system-out").text
-    assert CLOSED in out

@@ -9,7 +9,6 @@ from synthetic_run import cut_square, make_run
 from verify.report import load_run
 from verify.report.bodies import Body, deformed_body
 from verify.report.pictures import case_pictures
-from verify.report.view import common_view
 
 
 def lengths(body: Body) -> float:
@@ -21,17 +20,6 @@ def lengths(body: Body) -> float:
 def test_the_outline_is_the_boundary_with_both_faces_of_the_cut(order):
     body = deformed_body(cut_square(8, order), 0.0)
     assert lengths(body) == pytest.approx(4 + 2 * np.hypot(1, 1 / 3), rel=1e-12)
-
-
-def test_all_bodies_of_a_case_fit_into_one_view():
-    bodies = [deformed_body(cut_square(8), scale) for scale in (0.0, 5.0, 40.0)]
-    view = common_view(bodies, "cividis")
-    x0, x1, y0, y1 = view.window
-    for body in bodies:
-        assert (body.points[:, 0].min() > x0) & (body.points[:, 0].max() < x1)
-        assert (body.points[:, 1].min() > y0) & (body.points[:, 1].max() < y1)
-    assert (x1 - x0) / (y1 - y0) == pytest.approx(view.size[0] / view.size[1], rel=0.01)
-    assert view.limits[1] == max(body.values.max() for body in bodies)
 
 
 def test_missing_and_damaged_solutions_become_notes(tmp_path):

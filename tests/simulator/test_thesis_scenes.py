@@ -103,23 +103,6 @@ def test_the_incision_in_the_face_opens_and_the_face_keeps_its_nodes() -> None:
     assert 0.8 < added / last.split < 1.7
 
 
-def test_a_thousand_cuts_into_the_face_cost_about_a_node_each() -> None:
-    whole = stage("face_thousand_cuts")
-    # cut only: there is nothing to solve for while nothing pulls
-    from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-
-    cutter = SemiProgressiveCutter(whole.mesh)
-    for path in whole.strokes:
-        cutter.begin(path)
-    for time in np.arange(0.0, whole.duration, 0.05):
-        cutter.advance(time)
-    split = int(cutter.body.split_cells.sum())
-    added = cutter.body.node_count - len(whole.mesh.points)
-    assert split >= 1000
-    assert 0.9 < added / split < 1.2  # 1100 for 1000 in the thesis
-    assert abs(cutter.phantom_mesh().volumes.sum() / whole.mesh.measures.sum() - 1.0) < 1e-12
-
-
 def test_no_solver_takes_a_played_scene() -> None:
     from verify.solvers.interface import find_solver
 

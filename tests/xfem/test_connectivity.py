@@ -9,7 +9,6 @@ from xfem_bodies import zero_modes
 from verify.xfem.cuts import Plane, PolygonPatch, Polyline
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
-from verify.xfem.subdivision import subdivide
 
 SQUARE = rectangle_mesh((4, 4))
 CUBE = box_mesh((2, 2, 2))
@@ -99,21 +98,6 @@ def test_turning_a_cut_round_changes_nothing_but_the_name_of_its_sides(x, y, slo
     assert one.bodies.max() == other.bodies.max()
     assert one.volumes.sum() == pytest.approx(other.volumes.sum(), rel=1e-14)
     assert np.allclose(np.sort(one.fraction), np.sort(other.fraction), atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    "tip, length", [("inside", 0.25), ("through", 0.5), ("nearest", 0.5)], ids=lambda x: str(x)
-)
-def test_a_tip_inside_an_element_moves_to_an_edge_by_the_chosen_rule(tip, length):
-    mesh = rectangle_mesh((4, 4))
-    # the row of triangles is crossed at x = 0, 0.02.., 0.25, ...; the tip is in the third square
-    phantom = cut_mesh(mesh, [line(-1.0, 0.52, 0.40, 0.52)], tip)
-    facets = subdivide(phantom).cut_facets
-    realised = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum()
-    crossings = np.array([0.25, 0.27, 0.5])  # vertical edge, diagonal, vertical edge
-    want = {"inside": crossings[1], "through": crossings[2], "nearest": crossings[2]}[tip]
-    assert realised == pytest.approx(want, abs=1e-12)
-    assert phantom.bodies.max() == 0
 
 
 def test_the_area_inside_a_circular_cut_converges_at_second_order():

@@ -89,18 +89,6 @@ def test_a_part_that_is_turned_and_stretched_stores_what_stretching_it_stores(ki
         assert found.energy == pytest.approx(stretched.energy, rel=1e-8)
 
 
-def test_halves_that_turn_by_their_own_angles_about_their_own_axes_store_nothing() -> None:
-    body = turned_body(2, 3, 4)
-    up = turn(body, 230.0)
-    points = body.phantom.node_points
-    Q = rotation(3, np.radians(-140.0), (1.0, 0.2, -0.7))
-    down = (points - 0.4) @ Q.T + 0.4 - points
-    found = static_equilibrium(
-        body.force, body.fixed, lambda s: np.where(body.upper[:, None], up(s), down)
-    )
-    assert found.energy < LEAST
-
-
 def twisted_bar(degrees, load_steps=1):
     """A bar of 3 x 1 x 1 whose ends are turned against one another about its axis."""
     v = cut_mesh(box_mesh((9, 3, 3), (0.0, 0.0, 0.0), (3.0, 1.0, 1.0)), [])
@@ -160,13 +148,3 @@ def test_the_nearest_rotation_is_the_one_made_and_the_smallest_where_points_leav
     assert nearest_rotation(line, line @ Q.T) == pytest.approx(Q, abs=1e-8)
     nothing = np.zeros((1, 3))
     np.testing.assert_array_equal(nearest_rotation(nothing, nothing), np.eye(3))
-
-
-def test_a_straight_path_of_supports_that_turn_is_followed_along_the_turn() -> None:
-    """Half way to a half turn its points are all in one place: the path there is not taken."""
-    body = turned_body(1, 2, 7, strip=True)
-    straight = turn(body, 180.0, stretch=0.3)(1.0)
-    found = static_equilibrium(body.force, body.fixed, lambda s: s * straight, load_steps=3)
-    slowly = static_equilibrium(body.force, body.fixed, turn(body, 0.0, stretch=0.3))
-    assert len(found.iterations) == 3
-    assert found.energy == pytest.approx(slowly.energy, rel=1e-8)
