@@ -203,6 +203,7 @@ class _Work:
                 # what could not be drawn is drawn, or said to be undrawable, by the report
                 self.drawing = [drawing for drawing in self.drawing if drawing.poll() is None]
                 sleep(POLL_SECONDS)
+            stop.check()  # asked while the last of it ended
         finally:
             for solve in self.running:
                 solve.kill()

@@ -28,6 +28,8 @@ reading:
     linear statics; Newton's method on the potential energy and load steps at finite rotation
 `body`, `energy_balance`, `explicit`, `implicit`, `generalised_alpha`, `real_time`, `inherit`
     a body in motion and its schemes; `energy_momentum`: the conserving one
+`given_arrays`, `quadrature`, `nearest_points`, `block_pattern`, `errors`
+    what several of them use
 
 Example
 -------
