@@ -18,7 +18,7 @@ import gc, json, statistics, sys
 from dataclasses import asdict
 from time import process_time
 import numba, numpy
-from verify.first_use import compile_here
+from verify.first_use import STAGES, compile_here
 
 def product(A, B, C):
     for i in range(3):
@@ -37,7 +37,7 @@ def unit():
 gc.disable()
 unit()  # the compiler's own start
 units = [unit() for _ in range(5)]
-found = asdict(compile_here(sys.argv[1:]))
+found = asdict(compile_here(sys.argv[1:] or list(STAGES)))
 units += [unit() for _ in range(5)]
 print(json.dumps(found | {"unit": statistics.median(units)}))
 """
@@ -63,12 +63,15 @@ def in_units(found):
     return whole / found["unit"]
 
 
-# 8 s on a core that takes 0.1 s for the unit (measured: 24); the scalpel: all that it needs alone
-@pytest.mark.parametrize(("stage", "most"), [("plane: statics", 80.0), ("space: scalpel", 700.0)])
+# 8 s on a core that takes 0.1 s for the unit; the scalpel: all that it needs alone; everything:
+# twice the goal of 30 s, which one process misses
+@pytest.mark.parametrize(
+    ("stages", "most"), [(["plane: statics"], 80.0), (["space: scalpel"], 450.0), ([], 600.0)]
+)
 def test_first_use_of_a_kind_of_scene_compiles_for_a_bounded_number_of_small_kernels(
-    stage, most, tmp_path
+    stages, most, tmp_path
 ):
-    assert in_units(measure(tmp_path, stage)) < most
+    assert in_units(measure(tmp_path, *stages)) < most
 
 
 def test_kernels_compile_once_and_are_found_in_the_cache_after_that(tmp_path):
