@@ -124,3 +124,14 @@ def test_a_solver_with_its_tips_stands_beside_its_default_in_one_report(tmp_path
         solver, f"{solver} {variant}",
     ]  # fmt: skip
     assert variant in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.heavy
+@pytest.mark.skipif(
+    bool(state_of(foreign_solver("getfem")).missing), reason="GetFEM is not installed"
+)
+def test_a_body_without_a_tip_in_it_needs_no_functions():
+    checks = [
+        word for name in ("uncut-2d", "closed-cut", "cut-patch") for word in ("--check", name)
+    ]
+    assert main(["conform", "getfem", "--set", "tip=functions", *checks]) == 0

@@ -47,7 +47,8 @@ class TipAreas:
                     near[case.cells[here]] = True
             self.nodes.append(near & ~boundary)
         self.tips = np.array(tips).reshape(-1, 2)
-        self.elements = np.any(self.nodes, axis=0)[case.cells].any(axis=1)
+        near = np.any([np.zeros_like(boundary), *self.nodes], axis=0)  # there may be no cut
+        self.elements = near[case.cells].any(axis=1)
 
     def spaces(self, case, space, hats):
         """Return the spaces of the functions, scalar and of displacements."""
