@@ -32,3 +32,10 @@ def test_changed_verdicts_are_listed_with_what_was_observed(baseline, tmp_path):
         ("rate of energy_norm (xfem)", "UNDECIDED", "PASS", "better"),
     ]
     assert [answer["changes"][0][k] for k in ("old_observed", "new_observed")] == [0.01, 0.09]
+
+
+def test_a_fail_is_worse_than_a_check_that_could_not_be_judged(baseline, tmp_path):
+    old_run = runs.run(tmp_path / "old", runs.result(verdicts=[verdict("error", "sag", "ERROR")]))
+    new_run = runs.run(tmp_path / "new", runs.result(verdicts=[verdict("error", "sag", "FAIL")]))
+    code, answer = baseline("diff", old_run, new_run)
+    assert (code, [c["direction"] for c in answer["changes"]]) == (1, ["worse"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from verify.report.notation import error_text, with_interval
+from verify.report.notation import error_text, number, with_interval
 from verify.report.sliver_view import graded
 from verify.report.tables import check_row
 from verify.result import Verdict, VerdictRecord
@@ -79,3 +79,7 @@ def test_a_graded_number_is_not_rounded_up_to_the_grade_that_it_misses(value, gr
 def test_a_graded_number_is_not_rounded_down_to_what_it_exceeds(value, grade, written):
     cell = graded(value, (1e3, 1e4, 1e6), most=True)
     assert (cell.grade, cell.text.split(" ")[1]) == (grade, written)
+
+
+def test_an_error_that_is_no_number_is_shown_as_none():
+    assert error_text(float("nan"), 1e-3) == number(float("nan"))

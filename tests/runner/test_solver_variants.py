@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from verify.cli import run_ranking
 from verify.errors import InputError
 from verify.solvers import find_solver, named
 
@@ -47,6 +48,7 @@ def test_what_is_set_for_a_solver_holds_for_its_variants_unless_they_say_another
 
 
 BAD = [
+    ("xfem step_factor=nan", "expected a finite value"),
     ("xfem tip=middle", "xfem.tip = 'middle'; expected one of"),
     ("xfem tip", "expected NAME PARAMETER=VALUE"),
     (f"{GUEST} way=up", "Straining.way = 'up'"),
@@ -86,3 +88,13 @@ def test_a_solver_found_with_parameters_has_them_in_every_solve_and_system():
         with pytest.raises(InputError, match=r"no parameter|expected one of"):
             find_solver(asked)
     assert find_solver("mass_spring cut=removal scheme=implicit_euler fit=van_gelder").name
+
+
+def test_a_guest_whose_file_changes_is_checked_for_conformance_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = []
+    for text in ("class A: ...", "class A: pass"):
+        (tmp_path / "guest_of_a_test.py").write_text(text)
+        found.append(run_ranking._source_of_guest("guest_of_a_test:A x=1"))
+    assert len({*found, ""}) == 3
+    assert run_ranking._source_of_guest("xfem") == ""

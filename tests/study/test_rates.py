@@ -86,3 +86,17 @@ def test_slopes_that_fall_still_bound_the_order():
     errors = [1.0, 2**-0.29, 2**-0.37, 2**-0.38]
     found = rate(errors)
     assert found.pairwise[-1] + found.uncertainty == pytest.approx(0.01 + 1.25 * 0.07)
+
+
+def test_a_fall_that_the_comparison_cannot_explain_is_no_floor():
+    """Slopes 0.36, 0.27 of errors that are known 190 times better: a rate of 0.45 is missed."""
+    errors, width = (0.0987, 0.0767, 0.0638), 3.5e-4
+    rate = observed_rate("a", "energy_norm", [0.08, 0.04, 0.02], errors, [width] * 3)
+    assert rate.reason.startswith("slowing")
+    assert rate.pairwise[-1] + rate.uncertainty < 0.45
+
+
+def test_an_error_of_zero_on_an_early_level_leaves_the_order_of_the_others():
+    sizes = [0.5**k for k in range(5)]
+    errors = [0.0, *(size**2 for size in sizes[1:])]
+    assert observed_rate("a", "m", sizes, errors, [0.0] * 5).order == pytest.approx(2.0)

@@ -61,6 +61,7 @@ def observed_rate(
                 f"floor: the uncertainty {width:.1e} of the comparison is not clearly below the "
                 f"error {error:.1e}"
             )
+    slopes = pairwise_slopes  # an error of exactly 0 on an early level has none
     if all(slope <= 0 for slope in slopes):
         return without(f"diverging: slopes {shown}")
     span = log(sizes[-2] / sizes[-1])
@@ -70,7 +71,9 @@ def observed_rate(
     if min(slopes) >= 0:
         if spread < 0.5 * slopes[-1]:
             return Rate(solver, metric, slopes[-1], spread, "", slopes)
-        if 0.5 * slopes[-1] > change:
+        # a fall that the comparison cannot explain is one
+        falls = all(b < a for a, b in pairwise(slopes)) and allowed < change
+        if 0.5 * slopes[-1] > change and not falls:
             return without(
                 f"floor: slopes {shown}, which the uncertainty of the comparison leaves open by "
                 f"{allowed:.2f}"

@@ -5,12 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from verify.baseline.finished_run import FinishedRun
-from verify.result import CaseResult, Verdict, VerdictRecord
+from verify.result import CaseResult, Verdict, VerdictRecord, worst
 
 __all__ = ["VerdictChange", "any_worse", "verdict_changes"]
-
-# from good to bad
-_ORDER = [Verdict.PASS, Verdict.UNDECIDED, Verdict.FAIL, Verdict.ERROR]
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,7 @@ def _change(
     if old is None or new is None:
         direction = "new" if old is None else "gone"
     else:
-        worse = _ORDER.index(new.verdict) > _ORDER.index(old.verdict)
+        worse = worst([old.verdict, new.verdict]) is new.verdict
         direction = "worse" if worse else "better"
     return VerdictChange(
         case=case,

@@ -45,8 +45,8 @@ def run_line(costs: Sequence[tuple[Scene, Sequence[LevelCost]]], jobs: int) -> s
     largest = max(rows, key=lambda row: row.at_most)
     memory = memory_text(max(row.memory for row in rows))
     return (
-        f"expected (rough): {duration_text(2 * _START + spent / jobs)}{at}; at most about "
-        f"{_unknowns(largest)} unknowns and {memory} a process"
+        f"expected (rough): {duration_text(2 * _START + spent / jobs)}{at}; about "
+        f"{_unknowns(largest)} unknowns and {memory} a process at most"
     )
 
 

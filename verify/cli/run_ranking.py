@@ -4,6 +4,8 @@ Conformance is a matter of a solver and its parameters, not of the cases: what w
 the run directory and is reused as long as the code of the solver is the same.
 """
 
+import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,7 +16,7 @@ from verify.json_files import read_json, write_json
 from verify.printable import words_of
 from verify.ranking import ranked_solvers
 from verify.result import CaseResult, Status
-from verify.runner.fingerprint import code_of_solver, digest_of
+from verify.runner.fingerprint import code_of_solver, digest_of, file_digest
 from verify.solvers import solver_names
 from verify.solvers.named import solver_in
 
@@ -69,7 +71,8 @@ def rank_run(
         if solver_in(solver) not in solver_names() and ":" not in solver:
             found[solver] = {"unchecked": "imported answers: there is no solver to be asked"}
             continue
-        key = digest_of([solver, own, code_of_solver(solver), code_of_suite()])
+        code = [code_of_solver(solver), _source_of_guest(solver)]
+        key = digest_of([solver, own, code, code_of_suite()])
         known = before.get(solver, {})
         if known.get("key") == key:
             found[solver] = known
@@ -88,6 +91,16 @@ def rank_run(
         return None
     write_json(ranked, target)
     return target
+
+
+def _source_of_guest(solver: str) -> str:
+    """Return the hash of the file of ``module:Class``, or an empty text."""
+    module, _, attribute = solver_in(solver).partition(":")
+    if not attribute:
+        return ""
+    places = [Path(root, *module.split(".")) for root in (*sys.path, os.getcwd())]
+    files = (file for place in places for file in (place.with_suffix(".py"), place / "__init__.py"))
+    return next((file_digest(file) for file in files if file.is_file()), "")
 
 
 def code_of_suite() -> str:

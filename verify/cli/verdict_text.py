@@ -26,8 +26,8 @@ def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
         for solve in result.solves:
             if solve.status is not Status.SOLVED:
                 said = f"{solve.solver}, level {solve.level}: {solve.status}: {solve.reason}"
-                where = f" (see {solve.notes[LOG]})" if LOG in solve.notes else ""
-                yield f"    {one_line(said)}{one_line(where)}"
+                where = f" (see {one_line(solve.notes[LOG])})" if LOG in solve.notes else ""
+                yield f"    {one_line(said)}{where}"
 
 
 def notice_text(notice: Notice) -> str:

@@ -139,7 +139,7 @@ def with_interval(value: float | None, low: float | None, high: float | None) ->
 
 def error_text(value: float, uncertainty: float, digits: int = 4) -> str:
     """Return an error ± its uncertainty; one that is not above it, as what it is below."""
-    if uncertainty <= 0:
+    if uncertainty <= 0 or not math.isfinite(value):
         return number(value, digits)
     if abs(value) > uncertainty or not math.isfinite(uncertainty):
         return f"{number(value, digits)} ± {number(uncertainty, 2)}"

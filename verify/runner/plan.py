@@ -20,6 +20,7 @@ from verify.runner.reference_bundle import ReferenceBundle
 from verify.runner.reference_cache import REFERENCE
 from verify.scene import Scene
 from verify.scene.nearest import nearest
+from verify.solvers.named import parameters_of
 
 __all__ = ["CasePlan", "Survey", "check_judged", "plan_case", "solvers_of", "survey_solvers"]
 
@@ -105,7 +106,7 @@ def survey_solvers(
                     running[name] = Asking(
                         name,
                         asked[name],
-                        options.parameters.get(name, {}),
+                        parameters_of(name, options.parameters),
                         Path(folder, str(len(asked) - len(waiting))),
                         options.timeout,
                         options.memory,
@@ -144,7 +145,7 @@ def plan_case(
     physics = physics_digest(scene)
     for name in plan.solvers:
         answer = survey[name]
-        parameters = options.parameters.get(name, {})
+        parameters = parameters_of(name, options.parameters)
         code = [code_of_solver(name), answer.get("source", "")]
         asked = answer.get("cases", {}).get(scene.name, {})
         planned = asked.get("levels", 0)

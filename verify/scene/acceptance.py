@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from verify.scene.strict import Finite, Line, NonNegative, Point3, Positive, Strict, Vector
 
@@ -177,6 +177,11 @@ class _Check(Strict):
         description="displacement_l2, energy_norm, jump_l2 (relative errors), strain_energy, "
         "or the name of a quantity"
     )
+
+    @field_validator("solver", "to", mode="after", check_fields=False)
+    @classmethod
+    def _one_name(cls, name: str | None) -> str | None:
+        return " ".join(name.split()) if name else name
 
     @property
     def compared(self) -> str | None:

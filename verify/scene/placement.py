@@ -343,8 +343,8 @@ def _check_acceptance(scene: SceneTables) -> None:
             raise ValueError(f"{place}: {check.metric} needs a cut")
         if check.metric in OF_MOTION and scene.analysis.duration is None:
             raise ValueError(f"{place}: {check.metric} belongs to a dynamic analysis")
-        if check.check == "rate" and scene.mesh.count < 2:
-            raise ValueError(f"acceptance[{i}]: a rate needs at least two mesh levels")
+        if check.check == "rate" and scene.mesh.count < 3:
+            raise ValueError(f"acceptance[{i}]: a rate needs at least three mesh levels")
 
 
 def _check_adequacy(scene: SceneTables) -> None:

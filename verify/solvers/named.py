@@ -4,6 +4,7 @@ Such a name is a solver of its own, with rows and verdicts beside those of ``xfe
 """
 
 import json
+from math import inf
 from typing import Any
 
 from verify.errors import InputError
@@ -36,6 +37,8 @@ def parameters_in(name: str) -> dict[str, Any]:
             form = "NAME PARAMETER=VALUE …, each parameter once"
             raise InputError(f"'{word}' in '{name}'; expected {form}", "--solver")
         parameters[key] = plain_value(value)
+        if parameters[key] != parameters[key] or parameters[key] in (inf, -inf):
+            raise InputError(f"'{word}' in '{name}'; expected a finite value", "--solver")
     return parameters
 
 

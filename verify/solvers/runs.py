@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import inf
 from time import perf_counter
 from typing import Any
 
@@ -51,7 +52,8 @@ class Repeated[A: Answer]:
 
 def check_steps(load_steps: int, step_factor: float) -> None:
     """Raise `InputError` unless load steps are counted from 0 and a factor of steps is positive."""
-    if load_steps < 0 or not step_factor > 0.0:
+    whole = isinstance(load_steps, int) and load_steps >= 0
+    if not whole or not isinstance(step_factor, int | float) or not 0.0 < step_factor < inf:
         text = f"load_steps {load_steps}, step_factor {step_factor}"
         raise InputError(f"{text}; expected at least 0, and a positive number")
 
