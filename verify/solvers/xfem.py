@@ -78,9 +78,9 @@ class XfemSolver:
     load_steps : int
         Corotational statics: equal parts in which supports and loads grow, halved where the energy
         asks for it; 0: one.
-    scheme : {"newmark", "implicit_euler", "energy_momentum", "generalised_alpha",
-              "central_differences", "symplectic_euler", "forward_euler"}
-        Dynamics: time integration.
+    scheme : str
+        Dynamics: time integration, "newmark", "implicit_euler", "energy_momentum",
+        "generalised_alpha", "central_differences", "symplectic_euler" or "forward_euler".
     spectral_radius : float
         Dynamics: that of generalised_alpha at infinite frequency, from 0 to 1.
     mass : {"sidewise", "consistent", "evs", "gevs", "row_sum", "hrz", "thesis"}
