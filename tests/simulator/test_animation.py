@@ -17,6 +17,7 @@ from verify.simulator.animation import (
     _outer,
     beside,
     scale_length,
+    view_of,
     write_film,
 )
 from verify.simulator.stage import Hook
@@ -68,6 +69,17 @@ def test_a_hook_grips_at_the_edge_of_its_cut_wherever_along_the_blade():
     hook = Hook(at, 0.02, 0, 1, across, False, 0.0, 1.0)
     sample = 0.05 / 99  # of a path of 0.05 m in 100 places
     assert hook.at_edge(path) == pytest.approx(at - across, abs=sample / 2)
+
+
+def test_a_near_view_is_about_what_the_hooks_hold_apart():
+    hooks = [
+        (np.array([0.03, 0.02, 0.0]), np.eye(3)[0]),
+        (np.array([0.05, 0.04, 0.0]), np.eye(3)[1]),
+    ]
+    frames = [Frame(0.0, sheet(0.0)), Frame(1.0, sheet(0.01), hooks=hooks)]
+    far, near = view_of(frames), view_of(frames, zoom=2.0)
+    assert near.width == pytest.approx(far.width / 2)
+    assert near.centre == pytest.approx([0.04, 0.03, 0.0])
 
 
 @pytest.mark.parametrize(("width", "length"), [(0.2, 0.02), (0.28, 0.05), (1.0, 0.2), (0.5, 0.1)])

@@ -74,7 +74,7 @@ def _play(stage: "Stage", scene: Scene, arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         skin = scene.geometry.kind == "skin"
         under = Underlay(frames[0].picture, scene.material.thickness or 0.0) if skin else None
-        view = view_of(frames, underlay=under)
+        view = view_of(frames, underlay=under, zoom=arguments.zoom)
         with asked_place(arguments.out):
             if arguments.out.suffix == ".png":
                 write_picture(frames[-1], view, arguments.out)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from verify.cli.argument_types import positive
 from verify.cli.shared_arguments import Add, add_case, add_json
 
 __all__ = ["add_play_commands"]
@@ -32,6 +33,10 @@ def add_play_commands(add: Add) -> None:
     command.add_argument(
         "--frames", metavar="N", type=int, default=48, help="frames drawn (default: 48)"
     )
+    command.add_argument(
+        "--zoom", metavar="F", type=positive, default=1.0,
+        help="look at the wound, F times as near (default: 1, the whole body)",
+    )  # fmt: skip
     command.add_argument(
         "--records", metavar="CSV", type=Path, help="write what every step cost and did"
     )

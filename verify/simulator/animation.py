@@ -92,10 +92,13 @@ def view_of(
     frames: Sequence[Frame],
     towards: Sequence[float] | None = None,
     underlay: Underlay | None = None,
+    zoom: float = 1.0,
 ) -> View:
     """Choose a view that holds the first and the last frame.
 
-    A plane body is looked at from above its plane, a sheet almost so, a block from a corner.
+    With `zoom` above 1 it is so many times as near, about what the hooks of the last frame hold
+    apart, else about its blades, else about the middle. A plane body is looked at from above its
+    plane, a sheet almost so, a block from a corner.
     """
     points = np.concatenate([frames[k].picture.points for k in (0, -1)])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -104,7 +107,11 @@ def view_of(
     usual = (0.0, 0.0, 1.0) if flat else (0.25, -0.45, 1.0) if sheet else (0.6, -0.9, 0.7)
     eye = np.array(towards if towards is not None else usual)
     up = np.array([0.0, 1.0, 0.0]) if abs(eye[2]) >= 0.5 * np.linalg.norm(eye) else np.eye(3)[2]
-    centre, width = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    centre, width = 0.5 * (low + high), float(np.linalg.norm(high - low)) / zoom
+    held = frames[-1].hooks or frames[-1].blades
+    if zoom > 1.0 and held:
+        places = np.mean([place for place, _ in held], axis=0)
+        centre = np.pad(places, (0, 3 - len(places)))
     return View(centre, eye / np.linalg.norm(eye), up, width, underlay=underlay)
 
 
