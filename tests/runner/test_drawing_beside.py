@@ -80,7 +80,7 @@ def test_an_interrupted_run_leaves_no_drawing_process(tmp_path, drawn, monkeypat
 
     def child(module, *arguments, **named):
         started.append(real(module, *arguments, **named))
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGTERM)  # SIGINT is ignored behind an `&`
         return started[-1]
 
     monkeypatch.setattr(run, "Child", child)
