@@ -100,3 +100,9 @@ def test_an_error_of_zero_on_an_early_level_leaves_the_order_of_the_others():
     sizes = [0.5**k for k in range(5)]
     errors = [0.0, *(size**2 for size in sizes[1:])]
     assert observed_rate("a", "m", sizes, errors, [0.0] * 5).order == pytest.approx(2.0)
+
+
+def test_an_error_of_zero_on_the_first_of_three_levels_leaves_no_two_slopes():
+    rate = observed_rate("a", "m", [1.0, 0.5, 0.25], [0.0, 1e-2, 2.5e-3], [0.0] * 3)
+    assert rate.order is None
+    assert rate.reason.startswith("too few levels")

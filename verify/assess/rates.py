@@ -62,6 +62,8 @@ def observed_rate(
                 f"error {error:.1e}"
             )
     slopes = pairwise_slopes  # an error of exactly 0 on an early level has none
+    if len(slopes) < 2:
+        return without("too few levels: the error of one is 0; an order needs 3 others")
     if all(slope <= 0 for slope in slopes):
         return without(f"diverging: slopes {shown}")
     span = log(sizes[-2] / sizes[-1])

@@ -4,7 +4,7 @@ Such a name is a solver of its own, with rows and verdicts beside those of ``xfe
 """
 
 import json
-from math import inf
+from math import isfinite
 from typing import Any
 
 from verify.errors import InputError
@@ -28,7 +28,8 @@ def parameters_in(name: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If a word of it is not ``PARAMETER=VALUE``, or a parameter stands there twice.
+        If a word of it is not ``PARAMETER=VALUE``, a parameter stands there twice, or a value is
+        not finite.
     """
     parameters: dict[str, Any] = {}
     for word in name.split()[1:]:
@@ -37,8 +38,6 @@ def parameters_in(name: str) -> dict[str, Any]:
             form = "NAME PARAMETER=VALUE …, each parameter once"
             raise InputError(f"'{word}' in '{name}'; expected {form}", "--solver")
         parameters[key] = plain_value(value)
-        if parameters[key] != parameters[key] or parameters[key] in (inf, -inf):
-            raise InputError(f"'{word}' in '{name}'; expected a finite value", "--solver")
     return parameters
 
 
@@ -48,10 +47,19 @@ def parameters_of(name: str, given: dict[str, dict[str, Any]]) -> dict[str, Any]
 
 
 def plain_value(text: str) -> Any:
-    """Return what a value says: a number or another value of JSON, else the text itself."""
+    """Return what a value says: a number or another value of JSON, else the text itself.
+
+    Raises
+    ------
+    InputError
+        If it is no finite number: records have no word for it.
+    """
     for read in (json.loads, float):
         try:
-            return read(text)
+            found = read(text)
         except ValueError:
             continue
+        if isinstance(found, float) and not isfinite(found):
+            raise InputError(f"'{text}' as a parameter; expected a finite value")
+        return found
     return text

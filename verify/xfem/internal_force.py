@@ -179,7 +179,10 @@ class InternalForce:
         space = self._shape[1]
         check_floats("blocks", blocks, (len(pattern.columns), space, space))
         if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.phantom.cells):
-            raise XfemError("pattern of other nodes or cells; expected that of the body")
+            raise XfemError(
+                f"pattern of {pattern.node_count} nodes and {len(pattern.targets)} cells; expected "
+                f"that of the body, {self._shape[0]} and {len(self.phantom.cells)}"
+            )
 
     def add_stiffness(
         self,
