@@ -18,8 +18,6 @@ import sysconfig
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-__all__ = ["APT_PREFIX", "LIBRARIES", "apt_line", "missing", "missing_beyond_apt"]
-
 # What the loader must find -> Debian package, who asks for it.
 LIBRARIES = {
     "libGLU.so.1": ("libglu1-mesa", "gmsh"),

@@ -11,8 +11,6 @@ from verify.errors import InputError
 from verify.scene import Scene
 from verify.scene.parts import copies_on_part
 
-__all__ = ["constrained_values", "nodes_on_part"]
-
 _HELD = 1e-9  # lever of the supports over the size of the piece, below which it may turn
 
 

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["OLDEST", "create_simplex_mesh", "import_dolfinx", "take_whole_steps"]
-
 OLDEST = (0, 9)  # before, vectors and expressions are others
 
 

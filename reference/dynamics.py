@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from reference.space import ConformingSpace
 from verify.errors import InputError
 
-__all__ = ["Scheme", "generalised_alpha", "implicit_euler", "inherit"]
-
 Array = NDArray[np.float64]
 
 

@@ -18,8 +18,6 @@ from verify.scene import Gravity, Scene
 from verify.scene.history import factor_at, first_factor
 from verify.scene.prescribed import PrescribedMotion
 
-__all__ = ["MovingBody"]
-
 Array = NDArray[np.float64]
 _ROUND_OFF = 1e-14  # of the accelerations
 _MOST_ITERATIONS = 1000

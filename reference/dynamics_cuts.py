@@ -19,8 +19,6 @@ from verify.scene import (
 )
 from verify.scene.planar import distance_to_outline, distance_to_polyline, inside_polygon
 
-__all__ = ["opening_times", "partly_opened"]
-
 Array = NDArray[np.float64]
 
 

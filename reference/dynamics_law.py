@@ -38,8 +38,6 @@ from reference.space import ConformingSpace, SharedUnknowns
 from reference.strain_energies import corotated, virtual_work
 from verify.scene import Material
 
-__all__ = ["CorotatedLaw", "Law", "LinearLaw", "MixedLaw", "law_of"]
-
 Array = NDArray[np.float64]
 
 

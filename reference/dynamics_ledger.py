@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from reference.dynamics_body import MovingBody
 from reference.dynamics_step import State, StepForces
 
-__all__ = ["Ledger"]
-
 Array = NDArray[np.float64]
 _DONE = ("work_of_loads", "work_of_supports", "damping", "algorithmic", "unbalanced")
 _STATE = ("kinetic", "strain", "gravity")

@@ -11,8 +11,6 @@ from reference.dynamics_body import MovingBody
 from reference.nodal_algebra import NodalSolver
 from reference.tied_solver import TiedSolver
 
-__all__ = ["State", "StepForces", "Stepper"]
-
 Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-11  # of the largest force that the residual balances

@@ -16,8 +16,6 @@ from scipy.sparse.csgraph import connected_components
 from reference.meshing.opening import cell_facets, interior_facets
 from reference.space import ConformingSpace, SharedUnknowns
 
-__all__ = ["TiedUnknowns", "facing_nodes"]
-
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 

@@ -23,16 +23,6 @@ from verify.errors import InputError
 from verify.scene import BodyForce, CutFaces, Gravity, Material, Scene, Traction, is_uniform
 from verify.scene.parts import on_part
 
-__all__ = [
-    "LinearSolve",
-    "held_system",
-    "load_form",
-    "mass_form",
-    "mean_stiffness",
-    "solve_linear",
-    "stiffness_form",
-]
-
 # Unknowns in space up to which MUMPS was measured to be quicker (in the plane it always is)
 _MOST_DIRECT = 30_000
 # marks of the faces of cuts in a measure, beyond those of the loads on the boundary

@@ -9,8 +9,6 @@ from reference.space import ConformingSpace
 from verify.errors import InputError
 from verify.scene import CutFaces, Scene, faces_of
 
-__all__ = ["CutFacets", "cut_facets_of"]
-
 
 class CutFacets(NamedTuple):
     """Facets of both faces of a cut.

@@ -12,8 +12,6 @@ from reference.space import ConformingSpace
 from reference.strain_equations import StrainEquations
 from verify.scene import Material
 
-__all__ = ["Energy", "LargeStrainSolve", "solve_large_strain"]
-
 Array = NDArray[np.float64]
 Energy = Literal[
     "corotated", "corotated_mixed", "neo_hookean", "neo_hookean_mixed", "st_venant_kirchhoff"

@@ -8,23 +8,6 @@ from numpy.typing import NDArray
 
 from reference.space import ConformingSpace
 
-__all__ = [
-    "LARGEST_CORRECTION",
-    "Answer",
-    "IllConditionedError",
-    "direct_solver",
-    "general_solver",
-    "iterate",
-    "modes_not_positive",
-    "near_null_space",
-    "preconditioned_gradients",
-    "rigid_motions",
-    "set_multigrid",
-    "solve_by_multigrid",
-    "solve_directly",
-    "symmetric_solver",
-]
-
 LARGEST_CORRECTION = 1e-6  # relative; a direct solve of a regular system stays far below it
 _MOST_ITERATIONS = 2000
 _RUNS = 6

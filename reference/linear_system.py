@@ -12,8 +12,6 @@ from reference.nodal_algebra import assembled_matrix
 from reference.space import ConformingSpace
 from verify.scene import Scene
 
-__all__ = ["linear_system"]
-
 
 def linear_system(
     scene: Scene, space: ConformingSpace, exact: Any

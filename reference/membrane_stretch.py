@@ -12,8 +12,6 @@ bending stiffness, and one folded over is as good as turned.
 
 from typing import Any
 
-__all__ = ["MembraneStretch"]
-
 
 class MembraneStretch:
     """Like `PolarStretch`, of a displacement on triangles in space.

@@ -5,8 +5,6 @@ from typing import Any
 from reference.linear_solvers import Answer, iterate, near_null_space
 from reference.mixed_space import MixedSpace
 
-__all__ = ["solve_saddle"]
-
 _MOST_ITERATIONS = 2000
 _BLOCKS = {
     "pc_type": "fieldsplit",

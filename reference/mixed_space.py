@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from reference.space import ConformingSpace, SharedUnknowns
 
-__all__ = ["MixedDeformation", "MixedSpace", "mixed_space"]
-
 Array = NDArray[np.float64]
 
 

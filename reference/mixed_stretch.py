@@ -4,8 +4,6 @@ from typing import Any
 
 from reference.polar_stretch import PolarStretch
 
-__all__ = ["MixedStretch"]
-
 
 class MixedStretch(PolarStretch):
     """Like `PolarStretch`, with a pressure that is an unknown of its own.

@@ -7,8 +7,6 @@ import numpy as np
 
 from verify.scene import Material
 
-__all__ = ["density", "lame", "lame_constants", "wave_speed"]
-
 
 def lame(material: Material) -> tuple[float, float]:
     """Lamé constants (λ, μ) in Pa of one material; of a plane or thin body the reduced λ.

@@ -21,8 +21,6 @@ from reference.weak_place import naming_weak_places
 from verify.errors import InputError
 from verify.scene import Material, Scene
 
-__all__ = ["LEAST_POISSON", "saddle_form", "solve_mixed", "wants_pressure"]
-
 # Poisson's ratio from which the pressure pays, measured: docs/theory/reference.md
 LEAST_POISSON = 0.45
 # unknowns in space up to which the saddle point is factorised

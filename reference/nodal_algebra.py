@@ -20,8 +20,6 @@ from reference.linear_solvers import (
 )
 from reference.space import ConformingSpace, SharedUnknowns
 
-__all__ = ["NodalMatrix", "NodalSolver", "assembled_matrix", "nodal_forces", "nodal_integral"]
-
 Array = NDArray[np.float64]
 _MOST = 10_000  # iterations
 _LEFT = 1e-12  # of a right side, by conjugate gradients: one solution for a linear step

@@ -23,8 +23,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PolarStretch", "stretch_trace"]
-
 Array = NDArray[np.float64]
 _MOST_ITERATIONS = 80  # a double root (an inverted cell without a nearest rotation) halves errors
 

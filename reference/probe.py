@@ -12,8 +12,6 @@ import numpy as np
 
 from reference.dolfinx_versions import import_dolfinx
 
-__all__ = ["PROBES", "main"]
-
 # direct solvers, preconditioners and orderings that PETSc may have been built with
 _PACKAGES = ("mumps", "superlu_dist", "hypre", "metis", "parmetis", "ptscotch", "hdf5")
 

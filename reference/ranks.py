@@ -2,8 +2,6 @@
 
 from typing import Any
 
-__all__ = ["all_ranks"]
-
 
 def all_ranks() -> tuple[Any, str]:
     """Return the communicator of all MPI ranks that find each other, and whose MPI it is."""

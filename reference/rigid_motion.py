@@ -5,8 +5,6 @@ from numpy.typing import NDArray
 
 from reference.space import ConformingSpace
 
-__all__ = ["RigidMotions", "best_rotation"]
-
 Array = NDArray[np.float64]
 _OPEN = 1e-12  # of the spread of the points: what they leave open is turned as little as possible
 _SMALL = 1e-2  # angle below which the linear response to a turn serves

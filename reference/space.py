@@ -12,8 +12,6 @@ from reference.dolfinx_versions import create_simplex_mesh
 from reference.meshing import ConformingMesh
 from reference.meshing.edge_splitting import mesh_edges
 
-__all__ = ["ConformingSpace", "SharedUnknowns", "conforming_space"]
-
 # basix numbers the mid-nodes by the opposite edge, VTK along the outline
 _TO_VTK = {
     (2, 1): [0, 1, 2],

@@ -2,17 +2,6 @@
 
 from typing import Any
 
-__all__ = [
-    "ENERGIES",
-    "corotated",
-    "corotated_mixed",
-    "corotated_stress",
-    "neo_hookean",
-    "neo_hookean_mixed",
-    "st_venant_kirchhoff",
-    "virtual_work",
-]
-
 
 def corotated(polar: Any, lam: Any, mu: Any) -> Any:
     """μ‖U−I‖² + ½λ tr²(U−I), the potential of corotational linear elasticity with polar rotations.

@@ -24,8 +24,6 @@ from reference.strain_energies import ENERGIES, virtual_work
 from verify.errors import InputError
 from verify.scene import Material
 
-__all__ = ["StrainEquations"]
-
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the force scale ‖K u‖: a Newton iteration that converges passes below it
 _UNBALANCED = 0.25  # of the energy, between it and the trapezoidal rule for the work

@@ -17,8 +17,6 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from reference.dynamics_ties import TiedUnknowns
 from reference.nodal_algebra import NodalSolver
 
-__all__ = ["TiedSolver", "lasting_ties"]
-
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 

@@ -11,8 +11,6 @@ from reference.space import ConformingSpace, SharedUnknowns
 from verify.errors import InputError
 from verify.scene import Scene
 
-__all__ = ["naming_weak_places"]
-
 
 @contextmanager
 def naming_weak_places(

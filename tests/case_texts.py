@@ -3,8 +3,6 @@
 Numbers that tests replace are given as text, so that they stand in the file as they are given.
 """
 
-__all__ = ["STRETCHED", "body_text", "cut_text", "sheet_text", "support_text", "weight_text"]
-
 # what every solver can do, exactly
 STRETCHED = """[[supports]]
 where = "boundary"

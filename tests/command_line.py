@@ -8,8 +8,6 @@ from unittest.mock import patch
 
 from verify.cli import main
 
-__all__ = ["run_here", "without_waits"]
-
 
 def without_waits(text):
     """Return what a command said, but not what it waited for: that depends on the machine."""

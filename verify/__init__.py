@@ -5,5 +5,3 @@ imported when it is asked for.
 """
 
 __version__ = "0.1.0"
-
-__all__ = ["__version__"]

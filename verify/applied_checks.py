@@ -7,8 +7,6 @@ from typing import Any
 from verify.result import SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, ValueCheck
 
-__all__ = ["REFERENCE", "AppliedCheck", "applied_checks", "judged_by", "limit_text", "unjudged"]
-
 REFERENCE = "reference"  #: judges the others; judged itself only by a check that names it
 
 

@@ -13,8 +13,6 @@ from time import perf_counter
 
 import numpy as np
 
-__all__ = ["KERNEL", "calibration_note", "kernel_seconds", "seconds_of_note"]
-
 KERNEL = 2  # another number when the work changes: ratios of different kernels do not compare
 _REPETITIONS = 5
 

@@ -12,8 +12,6 @@ from dataclasses import dataclass, field
 from time import process_time
 from typing import Any
 
-__all__ = ["CompileTimes", "compile_times"]
-
 
 @dataclass
 class CompileTimes:

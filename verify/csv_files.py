@@ -7,8 +7,6 @@ from typing import Any
 
 from verify.printable import visible
 
-__all__ = ["csv_text"]
-
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 

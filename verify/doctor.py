@@ -19,8 +19,6 @@ from verify.printable import memory_text
 from verify.provenance import provenance
 from verify.threads import ONE_THREAD
 
-__all__ = ["DEBIAN_PACKAGES", "Finding", "examine"]
-
 _SECONDS = 120.0
 _FENICSX = (
     'python -m pip install "dolfinx-solver-real>=0.11", or the fenics-dolfinx of conda-forge, '

@@ -1,7 +1,5 @@
 """The errors that users see as one line and exit code 2."""
 
-__all__ = ["InputError", "UnsupportedSceneError"]
-
 
 class InputError(ValueError):
     """Bad input (case file, mesh, result directory, command line).

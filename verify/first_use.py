@@ -49,8 +49,6 @@ from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports
 
-__all__ = ["STAGES", "FirstUse", "FirstUseError", "compile_all", "compile_here"]
-
 _SECONDS = 1200.0  # ten times what a slow core takes
 
 

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.printable import shown
 
-__all__ = ["check_accounts", "check_cells", "check_field", "check_vectors"]
-
 # squares of displacements are multiplied by moduli, summed, and squared again
 _LARGEST = 1e100
 _LONGEST = 200  # characters of a name

@@ -10,8 +10,6 @@ from verify.errors import InputError
 from verify.printable import words_of
 from verify.whole_files import read_bounded, write_whole
 
-__all__ = ["deeper_than", "parse_json", "plain", "read_json", "write_json"]
-
 _DEEPEST = 60  # levels of nesting; none of our files has more than a dozen
 _TOO_DEEP = f"not a JSON file of ours (nested too deep; expected at most {_DEEPEST} levels)"
 _LONGEST = 40  # digits of a whole number

@@ -6,8 +6,6 @@ could clear the screen, set its title or hide a verdict; a mark of direction cou
 
 import unicodedata
 
-__all__ = ["memory_text", "one_line", "shown", "visible", "words_of"]
-
 _LONGEST = 2000  # characters of a message; more is no message
 # ESC and the like; marks of direction, which reorder what stands beside them; lone surrogates
 _HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")

@@ -16,8 +16,6 @@ from typing import Any
 
 import verify
 
-__all__ = ["provenance"]
-
 # what is reported -> the distributions that may carry it, the likelier first
 _DISTRIBUTIONS = {
     "numpy": ["numpy"],

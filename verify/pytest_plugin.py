@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from verify.runner import Options
     from verify.scene import Scene
 
-__all__ = ["CaseFile", "CheckItem"]
-
 _OWN_FILES = "*.verify.toml"
 _RUNS = pytest.StashKey["_Runs"]()
 _NO_CHECK = "no-acceptance"

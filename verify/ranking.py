@@ -6,17 +6,6 @@ from typing import Any, Literal
 
 from verify.result import CaseResult
 
-__all__ = [
-    "Comparison",
-    "LeftOut",
-    "Profile",
-    "Ranking",
-    "StabilityStanding",
-    "Standing",
-    "Strength",
-    "ranked_solvers",
-]
-
 _REFERENCE = "reference"
 
 

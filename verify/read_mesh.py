@@ -18,8 +18,6 @@ from typing import Any
 from verify.errors import InputError
 from verify.printable import words_of
 
-__all__ = ["read_with_meshio"]
-
 _SECONDS, _SECONDS_PER_MB = 5.0, 4.0  # of processor time; meshio reads a megabyte in less than one
 
 

@@ -12,27 +12,6 @@ from typing import Any
 from verify.reference_record import ReferenceRecord
 from verify.regularisation import Regularisation
 
-__all__ = [
-    "COMPILING",
-    "CRITICAL_STEP",
-    "LOG",
-    "SCHEMA_VERSION",
-    "CaseResult",
-    "Metric",
-    "Notice",
-    "NoticeKind",
-    "OpeningCurve",
-    "OpeningProfile",
-    "PartRecord",
-    "Rate",
-    "SolveRecord",
-    "Status",
-    "Verdict",
-    "VerdictRecord",
-    "error_picture",
-    "worst",
-]
-
 SCHEMA_VERSION = 1
 LOG = "log"  #: of the notes of a solve without an answer: its log, in the run directory
 COMPILING = "compiling"  #: of the notes of a solve: seconds that numba compiled kernels for

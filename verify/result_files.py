@@ -9,8 +9,6 @@ from verify.json_files import plain, read_json, write_json
 from verify.printable import one_line, words_of
 from verify.result import SCHEMA_VERSION, CaseResult
 
-__all__ = ["checked", "read_result", "write_result"]
-
 
 def write_result(result: CaseResult, path: Path) -> None:
     """Write `result` as JSON, in one step (a reader never sees half a file).

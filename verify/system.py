@@ -9,8 +9,6 @@ from scipy.sparse import csr_array, issparse
 
 from verify.errors import InputError
 
-__all__ = ["System", "checked_system"]
-
 
 @dataclass(frozen=True)
 class System:

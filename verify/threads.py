@@ -6,8 +6,6 @@ BLAS with a thread per core also costs: the quick sliver study took 82 s of two 
 
 import os
 
-__all__ = ["ONE_THREAD", "pin_to_one_thread"]
-
 # what the libraries read when they are loaded
 ONE_THREAD = dict.fromkeys(
     (

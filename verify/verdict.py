@@ -15,8 +15,6 @@ from verify.assess.rates import ROUND_OFF
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.scene import BoundCheck, RateCheck, RatioCheck, Scene, ValueCheck
 
-__all__ = ["judge", "judged_against_rows", "with_verdicts"]
-
 Check = BoundCheck | RateCheck | RatioCheck | ValueCheck
 
 # "equal mesh size" of two solvers: unstructured meshes do not meet a size exactly

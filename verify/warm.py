@@ -18,16 +18,6 @@ from pathlib import Path
 
 from verify.threads import ONE_THREAD
 
-__all__ = [
-    "DRAWING",
-    "LONGEST_REQUEST",
-    "PARENT_VARIABLE",
-    "Forked",
-    "fork",
-    "prepare_fork",
-    "warm_parent",
-]
-
 DRAWING = "verify.report.drawing"
 PARENT_VARIABLE = "VERIFY_RUNNER_PID"
 LONGEST_REQUEST = 1 << 17  # bytes, most of them the environment

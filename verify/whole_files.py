@@ -12,8 +12,6 @@ from pathlib import Path
 
 from verify.errors import InputError
 
-__all__ = ["DISK_FAILURES", "asked_place", "read_bounded", "whole_file", "write_whole"]
-
 DISK_FAILURES = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 
 

@@ -8,8 +8,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
 from reference.exact.straight_cut import StraightCutSolution, side
 
-__all__ = ["Airy"]
-
 
 class Airy(StraightCutSolution):
     """Airy stress function cos ks·[C (t cosh kt − sinh kt/k) + D t sinh kt] per side.

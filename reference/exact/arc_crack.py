@@ -10,8 +10,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import Array, ExactSolution
 from verify.errors import InputError
 
-__all__ = ["ArcCrack"]
-
 Complex = NDArray[np.complex128]
 
 # Within this of the centre (over the radius) potentials are summed from their Taylor series,

@@ -8,8 +8,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
 from reference.exact.straight_cut import StraightCutSolution, side
 
-__all__ = ["Bending"]
-
 
 class Bending(StraightCutSolution):
     """σ_ss = k t: u_s = k/E'·s t, u_t = −k/(2E')·(s² + η t²) + shift.

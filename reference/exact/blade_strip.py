@@ -12,8 +12,6 @@ from reference.exact.solution import Array, ExactSolution
 from verify.errors import InputError
 from verify.scene import Scene
 
-__all__ = ["BladeStrip"]
-
 Complex = NDArray[np.complex128]
 
 

@@ -27,8 +27,6 @@ from verify.errors import InputError
 from verify.scene import Material, Scene
 from verify.scene.nearest import nearest
 
-__all__ = ["exact_of", "exact_solution", "exact_solution_names"]
-
 _CATALOGUE: dict[str, tuple[Callable[[Hooke, Parameters], ExactSolution], str]] = {
     "linear": (Linear, "uniform strain, uncut: matrix, shift"),
     "patch": (

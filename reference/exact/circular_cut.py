@@ -11,8 +11,6 @@ from reference.exact.solution import Array, ExactSolution
 from verify.errors import InputError
 from verify.scene import Scene
 
-__all__ = ["CircularCut"]
-
 
 class CircularCut(ExactSolution):
     """The disc or ball r < b at rest; outside u_r = A r + B r^(1−d), free of traction at r = b.

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from reference.exact.hooke import Hooke
 from reference.exact.solution import Array, ExactSolution
 
-__all__ = ["ComplexCrack", "Potentials"]
-
 Complex = NDArray[np.complex128]
 
 

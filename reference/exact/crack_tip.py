@@ -8,8 +8,6 @@ from reference.exact.hooke import Hooke
 from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
 
-__all__ = ["CrackTip"]
-
 
 class CrackTip(ComplexCrack):
     """φ = ω = (K_I − i K_II) √(z/2π); the crack lies on x < 0 of the frame of the tip.

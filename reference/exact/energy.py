@@ -9,8 +9,6 @@ from reference.exact.field import Array, ExactField
 from verify.errors import InputError
 from verify.scene import Polygon, Rectangle, Scene
 
-__all__ = ["boundary_work", "elastic_energy", "outline_of"]
-
 Density = Callable[[Array], Array]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from reference.exact.hooke import Hooke
 
-__all__ = ["Array", "ExactField", "Plane"]
-
 Array = NDArray[np.float64]
 Plane = tuple[Array, Array]
 

@@ -11,8 +11,6 @@ from reference.exact.solution import Array
 from verify.scene import Scene
 from verify.scene.planar import inner_parts
 
-__all__ = ["Griffith"]
-
 
 class Griffith(ComplexCrack):
     """φ = ½ S R + Γ z, ω = ½ S R − Γ z, with R = √(z−a) √(z+a).

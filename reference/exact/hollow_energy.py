@@ -7,8 +7,6 @@ import numpy as np
 
 from reference.exact.field import Array
 
-__all__ = ["radial_energy"]
-
 _GAUSS = np.polynomial.legendre.leggauss(40)
 
 

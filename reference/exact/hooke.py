@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from verify.scene import Material
 
-__all__ = ["Hooke", "hooke"]
-
 
 @dataclass(frozen=True)
 class Hooke:

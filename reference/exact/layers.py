@@ -16,8 +16,6 @@ from reference.exact.straight_cut import StraightCutSolution, axes, side
 from verify.errors import InputError
 from verify.scene import Material
 
-__all__ = ["Layers"]
-
 _FITS = 1e-9  # of the strains: how well they must agree along the interface
 _BESIDE = 1e-4, 1e-7  # m: how far along the interface and beside it materials are looked at
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])

@@ -6,8 +6,6 @@ from reference.exact.hooke import Hooke
 from reference.exact.parameters import Parameters
 from reference.exact.solution import Array, ExactSolution
 
-__all__ = ["Linear"]
-
 
 class Linear(ExactSolution):
     """u = G x + shift, with ``matrix`` G (d rows) and ``shift``; in the plane or in space."""

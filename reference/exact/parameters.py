@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.scene.nearest import nearest
 
-__all__ = ["Parameters"]
-
 _SHAPES = {
     (): "a number",
     (2,): "two numbers",

@@ -8,8 +8,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
 from reference.exact.straight_cut import StraightCutSolution, side
 
-__all__ = ["Patch"]
-
 
 class Patch(StraightCutSolution):
     """u_s = ε s, u_t = −η ε t + shift, with ``strain`` ε and ``shift`` per side."""

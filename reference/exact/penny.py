@@ -12,8 +12,6 @@ from reference.exact.solution import Array, ExactSolution
 from verify.errors import InputError
 from verify.scene import Scene
 
-__all__ = ["Penny"]
-
 _AXIS = 1e-9  # of the radius: closer to the axis a point is on it
 
 

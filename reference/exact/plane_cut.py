@@ -10,8 +10,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import Array, ExactSolution, Plane
 from verify.errors import InputError
 
-__all__ = ["PlaneCutSolution", "axes_of"]
-
 Above = NDArray[np.bool_]
 
 

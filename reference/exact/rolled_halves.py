@@ -11,8 +11,6 @@ from reference.exact.straight_cut import StraightCutSolution, side
 from verify.errors import InputError
 from verify.scene import Scene
 
-__all__ = ["RolledHalves"]
-
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 

@@ -8,8 +8,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import Array
 from reference.exact.straight_cut import StraightCutSolution, side
 
-__all__ = ["Sinusoidal"]
-
 
 class Sinusoidal(StraightCutSolution):
     """u_s = U − t V', u_t = V − η t U' with U = A sin(k s + φ), V likewise, per side.

@@ -8,8 +8,6 @@ from reference.exact.field import Array, ExactField
 from verify.errors import InputError
 from verify.scene import Box, Scene
 
-__all__ = ["box_energy", "box_of", "surface_work"]
-
 _ORDERS = (12, 20, 32, 48, 80)
 _TOLERANCE = 1e-11
 

@@ -7,8 +7,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.plane_cut import Above, PlaneCutSolution
 from reference.exact.solution import Array
 
-__all__ = ["SolidPatch"]
-
 
 class SolidPatch(PlaneCutSolution):
     """u = (ε1 s1, ε2 s2, −η (ε1 + ε2) t) + shift, with ``strain`` rows (ε1, ε2) per side."""

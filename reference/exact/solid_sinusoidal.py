@@ -7,8 +7,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.plane_cut import Above, PlaneCutSolution
 from reference.exact.solution import Array
 
-__all__ = ["SolidSinusoidal"]
-
 
 class SolidSinusoidal(PlaneCutSolution):
     """u_α = U_α − t ∂_α V, u_t = V − η t div U with U_1, U_2, V = A sin(k1 s1 + k2 s2 + φ).

@@ -10,8 +10,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import Array, ExactSolution
 from verify.errors import InputError
 
-__all__ = ["StraightCutSolution", "axes"]
-
 
 def axes(parameters: Parameters, of: str = "") -> Array:
     """Take the direction of the cut: rows along (s) and normal (t), from `slope` or `angle`.

@@ -10,8 +10,6 @@ from reference.exact.solution import Array, ExactSolution, Plane
 from verify.errors import InputError
 from verify.scene import Scene
 
-__all__ = ["StraightFrontField"]
-
 
 class StraightFrontField(ExactSolution):
     """Plane strain of modes I and II across a straight front, antiplane shear along it.

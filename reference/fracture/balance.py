@@ -10,8 +10,6 @@ from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution
 
-__all__ = ["Force", "NetForce", "net_force"]
-
 Array = NDArray[np.float64]
 Force = Array | Callable[[Array], Array] | None
 NetForce = Callable[[NDArray[np.int64], CellGradients], Array]

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from verify.solution import Solution
 
-__all__ = ["CellGradients", "cell_gradients"]
-
 Array = NDArray[np.float64]
 # Gauss points per direction of the collapsed square or cube: exact to degree 10 in the plane and
 # 4 in space, where a tube has a hundred times the cells of a ring

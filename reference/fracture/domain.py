@@ -9,8 +9,6 @@ from reference.fracture.cells import CellGradients, cell_gradients
 from verify.errors import InputError
 from verify.solution import Solution
 
-__all__ = ["Ring", "ring"]
-
 Array = NDArray[np.float64]
 
 

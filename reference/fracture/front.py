@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.errors import InputError
 
-__all__ = ["CircularFront", "Front", "FrontCoordinates", "StraightFront"]
-
 Array = NDArray[np.float64]
 
 

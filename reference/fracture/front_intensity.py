@@ -15,8 +15,6 @@ from verify.errors import InputError
 from verify.scene import Material
 from verify.solution import Solution
 
-__all__ = ["FrontIntensity", "front_intensity"]
-
 Array = NDArray[np.float64]
 _CHUNK = 20_000  # cells at a time
 

@@ -9,8 +9,6 @@ from reference.exact import exact_solution
 from reference.exact.hooke import hooke
 from verify.scene import Material
 
-__all__ = ["ModeField", "mode_field"]
-
 Array = NDArray[np.float64]
 
 

@@ -14,8 +14,6 @@ from reference.fracture.tip_fields import ahead_of, tip_fields
 from verify.scene import ArcCut, Material
 from verify.solution import Solution
 
-__all__ = ["StressIntensity", "stress_intensity"]
-
 Array = NDArray[np.float64]
 
 

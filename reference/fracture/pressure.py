@@ -12,8 +12,6 @@ from reference.exact.hooke import Hooke
 from reference.fracture.cells import CellGradients, cell_gradients
 from verify.solution import Solution
 
-__all__ = ["MIXED", "NodalPressure", "stress_of"]
-
 Array = NDArray[np.float64]
 MIXED = "displacement and pressure"  # what a solution's note on its unknowns says
 _CHUNK = 20_000  # cells

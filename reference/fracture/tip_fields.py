@@ -10,8 +10,6 @@ from reference.exact.parameters import Parameters
 from reference.exact.solution import ExactSolution
 from verify.scene import ArcCut, Material
 
-__all__ = ["ahead_of", "tip_fields"]
-
 Array = NDArray[np.float64]
 _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # turns by 90° to the left
 

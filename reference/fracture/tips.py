@@ -12,8 +12,6 @@ from reference.meshing.interfaces import plane_interfaces
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["Tip", "no_tip", "tips"]
-
 Array = NDArray[np.float64]
 End = Literal["start", "end"]
 _ENDS: tuple[End, End] = ("start", "end")

@@ -5,8 +5,6 @@ from numpy.typing import NDArray
 
 from reference.meshing.session import gmsh_session, simplices
 
-__all__ = ["background_mesh"]
-
 
 def background_mesh(
     outline: NDArray[np.float64], size: float

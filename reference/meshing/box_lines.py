@@ -10,8 +10,6 @@ from verify.scene import Box, Scene, Traction
 from verify.scene.parts import lie_on_part
 from verify.scene.regions import Region, parse_region
 
-__all__ = ["clamped_edges", "part_lines"]
-
 Array = NDArray[np.float64]
 _SAMPLES = 129  # per direction of a face: a part narrower than 1/128 of it may be missed
 _SAME = 1e-6  # of the box's size: an end closer than that to an edge counts as the edge

@@ -18,8 +18,6 @@ from reference.meshing.tip_rings import shrink_to_points
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import ArcCut, Box, Polygon, PolylineCut, Rectangle, Scene, ToolPathCut
 
-__all__ = ["conforming_mesh"]
-
 Array = NDArray[np.float64]
 
 

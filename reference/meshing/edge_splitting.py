@@ -8,8 +8,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["mesh_edges", "split_edges"]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from reference.meshing.outline import divided_outline
 from verify.scene import ArcCut, Polygon, PolylineCut, Rectangle, Scene
 
-__all__ = ["Feature", "close_pairs", "crossing_points", "plane_features"]
-
 Array = NDArray[np.float64]
 _SAMPLES = 721  # of an arc, where its distance to another feature is measured
 

@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from reference.meshing.edge_splitting import mesh_edges, split_edges
 from reference.meshing.opening import doubled_nodes
 
-__all__ = ["loosen_front"]
-
 Array = NDArray[np.float64]
 
 

@@ -15,8 +15,6 @@ from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.cuts import Cut
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["Grading", "clear_radii", "singular_points"]
-
 Array = NDArray[np.float64]
 _MESHED = 3e-9  # of the grading radius: nearer to a point, gmsh runs out of digits
 _SMALLEST = 1e-12  # of the grading radius: nearer, coordinates do

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["imprint", "structured_triangles"]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 _ON = 1e-10  # of an edge: closer points are the same point

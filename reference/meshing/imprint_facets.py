@@ -20,8 +20,6 @@ from reference.meshing.imprint_solid import ON, imprint_polygons
 from reference.meshing.opening import cell_facets
 from verify.errors import InputError
 
-__all__ = ["Realised", "imprint_facets"]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 Mesh = tuple[Array, Cells, Cells]  # points, cells, facets of the cut

@@ -16,17 +16,6 @@ from reference.meshing.session import oriented
 from verify.errors import InputError
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = [
-    "ON",
-    "Mesh",
-    "imprint_polygons",
-    "plane_facets",
-    "plane_frame",
-    "split_by_line",
-    "split_by_plane",
-    "structured_tetrahedra",
-]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 Mesh = tuple[Array, Cells, Cells]  # points, cells, facets of the cuts so far

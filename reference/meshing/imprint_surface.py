@@ -8,8 +8,6 @@ from reference.meshing.imprint_solid import Mesh, interior_facets, trace_polygon
 from reference.meshing.opening import doubled_nodes
 from verify.errors import InputError
 
-__all__ = ["imprint_surface"]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 

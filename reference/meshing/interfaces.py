@@ -16,8 +16,6 @@ from verify.scene import Box, Polygon, Rectangle, Scene
 from verify.scene.planar import distance_to_outline, inside_polygon
 from verify.scene.regions import Side, comparisons
 
-__all__ = ["plane_interfaces", "solid_interfaces"]
-
 Array = NDArray[np.float64]
 
 _SAMPLES = 4097  # along a line or a circle: a part shorter than 1/4096 of it may be missed

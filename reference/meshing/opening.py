@@ -10,8 +10,6 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.errors import InputError
 
-__all__ = ["ConformingMesh", "cell_facets", "doubled_nodes", "interior_facets", "open_cut"]
-
 _SPECK = 1e-4  # size across over that of the body, below which an inner part is a speck
 
 

@@ -7,8 +7,6 @@ from verify.scene import Polygon, Rectangle, Scene, Traction
 from verify.scene.parts import on_edges
 from verify.scene.regions import parse_region
 
-__all__ = ["divided_outline", "load_jumps", "supported_edges"]
-
 Array = NDArray[np.float64]
 _SAMPLES = 257  # per edge: an interval of the inequality shorter than 1/256 of it may be missed
 _SAME = 1e-6  # of the body's size: an end closer than that to a corner counts as the corner

@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from reference.meshing.edge_splitting import mesh_edges
 from reference.meshing.session import oriented
 
-__all__ = ["refine_uniformly"]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from reference.meshing.features import Feature, close_pairs, crossing_points
 from verify.errors import InputError
 
-__all__ = ["APART", "check_separation", "check_strips"]
-
 _TOUCHING = 1e-9  # of the body's size: closer features touch (the scene judges so too)
 _RESOLVED = 1e-6  # of the body's size: OpenCASCADE merges at 1e-7, silently
 APART = 1e-7  # between the two: what neither touches nor was refused is farther apart

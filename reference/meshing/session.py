@@ -7,8 +7,6 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["gmsh_session", "oriented", "simplices"]
-
 
 @contextmanager
 def gmsh_session() -> Iterator[ModuleType]:

@@ -15,8 +15,6 @@ from reference.meshing.solid_cuts import CutFaces, add_polygon, add_surface, imp
 from verify.errors import InputError
 from verify.scene import Box, Scene
 
-__all__ = ["solid_mesh"]
-
 Array = NDArray[np.float64]
 _HXT = 10  # ten times quicker than gmsh's Delaunay, and keeps embedded faces
 _MOST_SAMPLES = 20000

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["CutFaces", "add_polygon", "add_surface", "imprint_surfaces"]
-
 Array = NDArray[np.float64]
 _MERGED = 1e-6  # of the body's size
 _KINK = np.deg2rad(15.0)  # a smaller turn leaves a singularity too weak to matter

@@ -5,8 +5,6 @@ from numpy.typing import NDArray
 
 from reference.meshing.edge_splitting import mesh_edges, split_edges
 
-__all__ = ["shrink_to_points"]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 _SHRINK = 0.25  # of one ring to the next

@@ -10,8 +10,6 @@ import pytest
 from verify.errors import InputError
 from verify.runner.ranks import mpiexec
 
-__all__ = ["on_ranks"]
-
 _BEFORE = """
 import pickle, sys
 sys.path.insert(0, {tests!r})

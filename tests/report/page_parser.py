@@ -2,8 +2,6 @@
 
 from html.parser import HTMLParser
 
-__all__ = ["Page", "parsed"]
-
 _VOID = {"br", "hr", "img", "meta", "link", "wbr", "col", "input"}
 
 

@@ -25,8 +25,6 @@ from verify.result import (
 from verify.result_files import write_result
 from verify.solution import Solution, write_solution
 
-__all__ = ["HOSTILE", "cut_square", "make_run", "write_error_field"]
-
 HOSTILE = "<script>alert('x')</script> & \"quotes\" \u202e\x00 url(http://evil.example) €"
 
 PROVENANCE = {

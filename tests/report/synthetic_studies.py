@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-__all__ = ["HOSTILE", "STUDIES", "make_studies"]
-
 HOSTILE = "a|b <script>alert(1)</script> `x` *y*"
 FINDING = {"topic": HOSTILE, "sentence": "Seen: 2 of 3.", "expected": "all", "verdict": "FAIL"}
 POINT = {"level": 0, "unknowns": 1200, "error": 0.125, "seconds": 0.25, "memory": 2e8,

@@ -8,8 +8,6 @@ from verify.simulator import Hook, Session, Stage, quality_of
 from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
 
-__all__ = ["play_random_strokes"]
-
 _STEPS = 24  # a third each: cutting, pulling, at rest
 _ROUND_OFF = 1e-12
 

@@ -6,8 +6,6 @@ from pathlib import Path
 from verify.scene import load_scene
 from verify.simulator import Stage, stage_of
 
-__all__ = ["CASES", "stage"]
-
 CASES = Path(__file__).resolve().parents[2] / "cases" / "thesis"
 
 

@@ -2,11 +2,6 @@
 
 from case_texts import body_text, cut_text
 
-__all__ = [
-    "BLADE", "BODIES", "CROSSING", "INCLINED", "KINKED", "MOTION", "PLANE", "SOLID", "SPUN",
-    "UNSTRUCTURED", "path_text",
-]  # fmt: skip
-
 PLANE = body_text(
     "A plate under a blade", "It shall move.", [1.0, 0.7], [[9, 6]], "1e4", density="1e3"
 )

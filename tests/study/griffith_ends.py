@@ -17,8 +17,6 @@ from verify.solvers import find_solver
 from verify.solvers.body_of_scene import background_mesh
 from verify.study.budget import CutEnd, cut_ends
 
-__all__ = ["Crack", "Off", "crack_scene"]
-
 
 def crack_scene(ends, angle, mesh):
     """`statics/griffith_inside` with a crack of `angle` degrees from ends[0] to ends[1], m."""

@@ -15,8 +15,6 @@ from numpy.polynomial import polynomial
 
 from reference.exact.complex_crack import ComplexCrack, Potentials
 
-__all__ = ["tip_advances"]
-
 _ORDER, _POINTS = 24, 120  # terms of each polynomial; collocation points on a side
 
 

@@ -4,8 +4,6 @@ import numpy as np
 
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["assert_same_cut"]
-
 
 def _parts(phantom: PhantomMesh):
     """Cell, sides, volume fraction and unknowns of parts: pieces that no cut keeps apart are one.

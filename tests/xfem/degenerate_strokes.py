@@ -8,8 +8,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
-__all__ = ["NEARNESS", "body", "strokes"]
-
 _Floats = NDArray[np.float64]
 
 NEARNESS = (0.0, *(10.0 ** -np.arange(1, 15)))  # how far from degenerate, in units of the body

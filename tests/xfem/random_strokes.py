@@ -7,8 +7,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
-__all__ = ["meshes", "strokes"]
-
 _ANYWHERE = st.floats(-0.4, 1.4, allow_subnormal=False)
 # on nodes, edges and faces of the meshes below, and next to them
 _ON_GRID = st.builds(

@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["enclosed_by_body", "loose_edges", "pinched_edges", "volume_by_body"]
-
 
 def loose_edges(facets: NDArray[np.int64]) -> int:
     """Edges (2D: vertices) that are not used as often in one direction as in the other."""

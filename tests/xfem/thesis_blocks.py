@@ -11,8 +11,6 @@ from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["shifted_stiffness"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -7,6 +7,4 @@ from verify.accelerated.one_pass import OnePassTetrahedra
 from verify.accelerated.solver_by_cost import SolverByCost
 from verify.xfem.kernels import Kernels
 
-__all__ = ["FAST"]
-
 FAST = Kernels(DirectBySize, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra)

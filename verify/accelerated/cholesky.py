@@ -20,8 +20,6 @@ from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.given_arrays import check_floats
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
-__all__ = ["Cholesky"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

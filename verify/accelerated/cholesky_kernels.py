@@ -9,8 +9,6 @@ a front waits on a stack until the parent front adds it. Products of many column
 import numpy as np
 from numba import njit
 
-__all__ = ["BAND", "factorise_fronts", "solve_fronts"]
-
 # a pivot below this share of the diagonal entry that it came from is round-off
 _TINY = 1e-14
 BAND = 32  #: columns that are eliminated one by one before the others take their product

@@ -6,9 +6,6 @@ from numba import njit
 from verify.accelerated.symmetric_sweep_kernels import add_lower_product, solve_lower, solve_upper
 from verify.xfem.block_pattern import symmetric_product
 
-__all__ = ["conjugate_gradients", "invert_blocks"]
-
-
 # sums in any order, over long flat vectors, where it lets the compiler use the vector unit
 _SUMS = {"reassoc", "contract", "nsz"}
 

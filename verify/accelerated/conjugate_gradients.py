@@ -15,8 +15,6 @@ from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemEr
 from verify.xfem.given_arrays import check_floats
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
-__all__ = ["ConjugateGradients"]
-
 _Floats = NDArray[np.float64]
 
 _SMALLEST, _LARGEST = 1e-200, 1e200  # squares of loads that are solved for as they are

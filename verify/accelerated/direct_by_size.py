@@ -12,8 +12,6 @@ from verify.accelerated.cholesky import Cholesky
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.linear_solvers import LinearSolver, SparseLU
 
-__all__ = ["DirectBySize"]
-
 _Floats = NDArray[np.float64]
 
 # where SuperLU takes about 30 ms more than `Cholesky` (benchmarks/test_xfem_static compares them)

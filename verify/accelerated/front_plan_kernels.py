@@ -5,8 +5,6 @@ from numba import njit
 
 from verify.accelerated.short_sort import sort_short
 
-__all__ = ["assembly_lists", "front_rows"]
-
 
 @njit(cache=True)
 def front_rows(starts, columns, order, bounds):

@@ -4,8 +4,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["levels", "merge_and_order"]
-
 _Ints = NDArray[np.int64]
 
 # Merge while the merged front has at most that many columns, or that share of added zeros:

@@ -9,8 +9,6 @@ from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.given_arrays import check_floats
 from verify.xfem.linear_solvers import LinearSolver, SparseLU, nodal_vector
 
-__all__ = ["NearlySymmetric"]
-
 _Floats = NDArray[np.float64]
 
 _REFINED = 1e-9  # residual over load: the rounding of a Newton correction, not of a solution

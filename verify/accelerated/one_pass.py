@@ -31,8 +31,6 @@ from verify.xfem.element import deform as deform_cells
 from verify.xfem.energy_momentum import StepEnds, averaged_stress
 from verify.xfem.polar import rotation_matrices
 
-__all__ = ["OnePassTetrahedra"]
-
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 

@@ -2,8 +2,6 @@
 
 from numba import njit
 
-__all__ = ["sort_short"]
-
 
 @njit(cache=True)
 def sort_short(values):

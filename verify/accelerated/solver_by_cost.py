@@ -14,8 +14,6 @@ from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import NotConvergedError
 from verify.xfem.linear_solvers import LinearSolver
 
-__all__ = ["SolverByCost"]
-
 _Floats = NDArray[np.float64]
 
 # measured on one core (AVX-512): in ns, per operation and entry of the factor of a

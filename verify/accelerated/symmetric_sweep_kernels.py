@@ -8,8 +8,6 @@ written out, so that sums stay in registers.
 import numpy as np
 from numba import njit
 
-__all__ = ["add_lower_product", "solve_lower", "solve_upper", "take_upper", "upper_pattern"]
-
 _FUSED = {"contract"}  # multiply and add in one, rounded once
 
 

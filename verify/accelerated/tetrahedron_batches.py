@@ -16,23 +16,6 @@ from numba import njit
 
 from verify.xfem.polar import largest_eigenvector
 
-__all__ = [
-    "BATCH",
-    "BLOCKS",
-    "CORNERS",
-    "ENTRIES",
-    "FIRST",
-    "FORCE",
-    "GRADIENTS",
-    "IRREGULAR",
-    "QUATERNION",
-    "average",
-    "deform",
-    "resist",
-    "resist_rotation",
-    "rotate",
-]
-
 BATCH = 8  #: cells that are computed with at once
 
 # entries: the deformation gradient by rows is at 0

@@ -40,8 +40,6 @@ from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 from verify.scene import Scene, scene_hash
 from verify.solution import Solution
 
-__all__ = ["assess_accuracy"]
-
 REFERENCE = "reference"
 
 # A solver may drop slivers; a mesh that misses more of the body than this is another body.

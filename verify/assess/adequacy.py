@@ -13,8 +13,6 @@ from verify.result import CaseResult, Notice, NoticeKind
 from verify.scene import Box, Polygon, Rectangle, Scene
 from verify.solution import Solution
 
-__all__ = ["adequacy_notice", "other_scene"]
-
 _DIVISIONS = {2: 12, 3: 4}  # of the body's extent: elements of a reference that names no size
 _COARSER = {2: 3.0, 3: 1.5}
 _OTHER = {"linear": "corotational", "corotational": "linear"}

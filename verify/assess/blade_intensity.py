@@ -10,8 +10,6 @@ from verify.errors import UnsupportedSceneError
 from verify.scene import Scene, ToolPathCut
 from verify.scene.acceptance import StressIntensityQuantity
 
-__all__ = ["blade_front", "blade_intensity"]
-
 _SAMPLES = 401  # points of the blade, of which those in the body count
 
 

@@ -11,15 +11,6 @@ from verify.assess.realised_cut import polylines_of, triangles_of
 from verify.errors import UnsupportedSceneError
 from verify.scene import Scene, ToolPathCut
 
-__all__ = [
-    "at_rest",
-    "coarsest",
-    "on_one_level",
-    "on_realised_cut",
-    "with_kinematics",
-    "with_time_step",
-]
-
 Array = NDArray[np.float64]
 
 

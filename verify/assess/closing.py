@@ -34,8 +34,6 @@ from verify.result import (
 from verify.scene import Scene
 from verify.solution import Solution
 
-__all__ = ["with_openings"]
-
 REFERENCE = "reference"
 
 _TIMES = 3.0  # the uncertainty of the opening: a penetration beyond is one

@@ -8,8 +8,6 @@ from verify.compare.ledger import balance, energy_scale, total_energy
 from verify.result import Metric
 from verify.scene import Scene
 
-__all__ = ["ACCOUNT", "account_metrics"]
-
 _ENERGIES = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
 )  # fmt: skip

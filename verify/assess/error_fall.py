@@ -8,8 +8,6 @@ from verify.compare.realised import cut_deviation
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
 
-__all__ = ["counted_order", "error_fall"]
-
 _ON_THE_CUT = 1e-10  # of the body's size
 
 

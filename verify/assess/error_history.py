@@ -13,10 +13,6 @@ from verify.compare.motion import Motion
 from verify.scene import Scene
 from verify.solution import Solution
 
-__all__ = [
-    "ERROR_NAMES", "History", "base_of", "compared_times", "error_history", "mean_over",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 ERROR_NAMES = (*ERRORS, *(f"{name}_{how}" for name in OVER_TIME for how in ("max", "mean")))

@@ -14,8 +14,6 @@ from verify.solution import Solution
 if TYPE_CHECKING:
     from reference.fracture import Front
 
-__all__ = ["front_defect", "front_factors", "front_reach"]
-
 Array = NDArray[np.float64]
 
 _STATIONS = 12  # hats of 30 degrees along a round front

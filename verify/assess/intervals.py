@@ -6,8 +6,6 @@ from verify.assess.energy_account import ACCOUNT
 from verify.assess.error_history import ERROR_NAMES
 from verify.result import Metric
 
-__all__ = ["ERROR_METRICS", "Interval", "NotMeasuredError", "error_interval"]
-
 # metrics that are relative errors themselves; all others are quantities with a reference
 ERROR_METRICS = (*ERROR_NAMES, *ACCOUNT)
 

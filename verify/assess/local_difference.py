@@ -15,8 +15,6 @@ from verify.compare.opening import cut_place
 from verify.compare.simplex_rule import points_in
 from verify.scene.acceptance import DisplacementQuantity, OpeningQuantity
 
-__all__ = ["local_difference"]
-
 Array = NDArray[np.float64]
 
 

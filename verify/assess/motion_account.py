@@ -18,8 +18,6 @@ from verify.compare.strain_energy import cell_strain_energies
 from verify.scene import BodyForce, Gravity, Scene, Traction, is_uniform
 from verify.solution import Solution
 
-__all__ = ["NO_VELOCITIES", "MotionAccount", "motion_account", "uniform_force"]
-
 Array = NDArray[np.float64]
 
 OWN = "ledger of the solution"

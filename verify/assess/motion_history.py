@@ -4,8 +4,6 @@ from verify.assess.motion_account import MotionAccount
 from verify.assess.part_account import momentum_components
 from verify.compare.ledger import total_energy
 
-__all__ = ["motion_history"]
-
 
 def motion_history(account: MotionAccount) -> dict[str, list[float]]:
     """Return what moves, by name, with ``time`` (s).

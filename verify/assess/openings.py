@@ -14,8 +14,6 @@ from verify.compare.motion import Motion
 from verify.errors import InputError
 from verify.result import OpeningCurve, OpeningProfile
 
-__all__ = ["Contestant", "largest_opening_time", "opening_profiles"]
-
 Array = NDArray[np.float64]
 
 _AROUND = 3  # points on either side of one, over which differences of levels are averaged

@@ -11,8 +11,6 @@ from verify.scene import BodyForce, Gravity, Scene, Traction
 from verify.scene.parts import lie_on_part
 from verify.solution import Solution
 
-__all__ = ["PART_METRICS", "momentum_components", "part_metrics", "part_records"]
-
 Array = NDArray[np.float64]
 
 PART_METRICS = ("part_linear_momentum_drift", "part_angular_momentum_drift")

@@ -16,8 +16,6 @@ from verify.errors import UnsupportedSceneError
 from verify.scene import PartQuantity, Scene
 from verify.solution import Solution
 
-__all__ = ["part_quantity", "part_unit"]
-
 _SAME_TIME = 1e-9  # of the duration
 _UNITS = {
     "mass": "kg", "inertia": "kg m²", "linear_momentum": "N s", "angular_momentum": "N m s",

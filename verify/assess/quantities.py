@@ -26,8 +26,6 @@ from verify.scene.acceptance import (
 )
 from verify.solution import Solution
 
-__all__ = ["Measured", "field_quantity", "unit_of"]
-
 _LOOKED_AT = 20_000  # cells
 
 

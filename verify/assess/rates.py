@@ -7,8 +7,6 @@ from math import log
 
 from verify.result import Rate
 
-__all__ = ["ROUND_OFF", "observed_rate"]
-
 # Relative errors below this are round-off of a direct solver on 1e5 unknowns.
 ROUND_OFF = 1e-11
 # The slope may still change by a little more than it last did.

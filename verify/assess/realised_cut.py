@@ -8,8 +8,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-__all__ = ["polylines_of", "triangles_of"]
-
 Array = NDArray[np.float64]
 
 _SAME = 1e-10  # of the size of the cut: corners of segments this close are one

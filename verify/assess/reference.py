@@ -44,16 +44,6 @@ from verify.scene.acceptance import (
 )
 from verify.solution import Solution
 
-__all__ = [
-    "ExactField",
-    "Reference",
-    "compared_size",
-    "conforming_reference",
-    "exact_reference",
-    "known_quantity",
-    "size_of",
-]
-
 _CLOSED_FORM = 1e-11  # relative accuracy of an exact solution's own strain energy
 OTHER = "conforming"  # solver whose levels give a second estimate of quantities, if it was run
 

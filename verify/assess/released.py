@@ -22,8 +22,6 @@ from verify.result import Metric
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
 
-__all__ = ["RELEASED", "advance", "released_metrics"]
-
 RELEASED = (
     "released", "released_to_scheme", "released_to_damping", "released_to_kinetic",
     "released_to_strain", "released_to_short_waves", "released_mismatch",

@@ -12,14 +12,6 @@ from math import inf, isfinite, log
 
 from verify.errors import InputError
 
-__all__ = [
-    "Extrapolation",
-    "extrapolate",
-    "field_uncertainty",
-    "observed_order",
-    "place_uncertainty",
-]
-
 _ROUND_OFF = 1e-13  # relative: below this, differences of levels say nothing
 _DEVIATIONS = 2.0  # of the error around a place: 95 % of a normal distribution
 

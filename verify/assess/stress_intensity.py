@@ -25,8 +25,6 @@ from verify.scene.acceptance import StressIntensityQuantity
 from verify.scene.history import factor_at, jumps
 from verify.solution import Solution
 
-__all__ = ["exact_intensity", "intensity_defect", "solution_intensity"]
-
 Array = NDArray[np.float64]
 _SAME_TIME = 1e-9  # of the duration
 _AROUND = 65  # directions, and distances, in which the material around a tip is looked at

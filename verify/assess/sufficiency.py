@@ -7,8 +7,6 @@ from typing import Any
 from verify.result import Metric, SolveRecord, Status
 from verify.scene import Scene
 
-__all__ = ["SHARE", "sufficiency"]
-
 SHARE = 0.1  # of the error that is judged, below which the reference's uncertainty shall be
 _ROUND_OFF = 1e-10  # relative: an error that small is none, and needs no reference to say so
 

@@ -14,11 +14,6 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 from verify.errors import InputError
 from verify.system import System
 
-__all__ = [
-    "CONDITION", "FREQUENCY", "SCALED", "STEP", "condition_numbers", "critical_step",
-    "lowest_frequency",
-]  # fmt: skip
-
 CONDITION, SCALED = "condition number", "condition number scaled by the diagonal"
 STEP = "critical explicit step"
 FREQUENCY = "lowest natural frequency"

@@ -6,8 +6,6 @@ from typing import Any
 
 from verify.solution import Solution
 
-__all__ = ["time_to_accuracy"]
-
 
 def time_to_accuracy(
     levels: Mapping[int, Solution], metrics: Mapping[str, Mapping[str, Any]]

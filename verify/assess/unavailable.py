@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from verify.result import Notice, NoticeKind, SolveRecord, Status
 from verify.scene import Scene
 
-__all__ = ["unavailable_quantities"]
-
 
 def unavailable_quantities(scene: Scene, records: Sequence[SolveRecord]) -> list[Notice]:
     """Make a notice of each quantity that a solver's answer, on some level, does not have.

@@ -10,8 +10,6 @@ from verify.calibration import KERNEL
 from verify.result import CaseResult, Metric, Verdict
 from verify.runner.ending import ALL_PASS, ONLY_WARNINGS, SOLVER_FAILED, VERDICT_FAILED
 
-__all__ = ["Row", "check_run", "exit_code_of", "independent_row", "own_row"]
-
 # below this an exact reference that is computed anew may differ by its own quadrature
 _SAME_REFERENCE = 1e-9
 

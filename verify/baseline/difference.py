@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from verify.baseline.finished_run import FinishedRun
 from verify.result import CaseResult, Verdict, VerdictRecord, worst
 
-__all__ = ["VerdictChange", "any_worse", "verdict_changes"]
-
 
 @dataclass(frozen=True)
 class VerdictChange:

@@ -13,8 +13,6 @@ from verify.result_files import read_result
 from verify.runner.fingerprint import digest_of
 from verify.scene import Scene
 
-__all__ = ["FinishedRun", "physics_of", "read_run"]
-
 _WORDS = {"title", "requirement", "tags", "acceptance", "known_findings", "contact"}
 
 

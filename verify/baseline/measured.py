@@ -10,8 +10,6 @@ from verify.baseline.record import Independent, Own, Quantity, Speed
 from verify.calibration import KERNEL, seconds_of_note
 from verify.result import CaseResult, Metric, SolveRecord, Status
 
-__all__ = ["MeasuredSpeed", "finest", "metric_of", "quantities_of", "speed_entry", "speed_of"]
-
 # errors below this are round-off; how large round-off is says nothing
 _ROUND_OFF = 1e-10
 

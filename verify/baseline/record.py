@@ -10,17 +10,6 @@ from verify.json_files import read_json, write_json
 from verify.scene.messages import first_fault
 from verify.scene.strict import Finite, NonNegative, Positive, Strict
 
-__all__ = [
-    "Baseline",
-    "CaseBaseline",
-    "Independent",
-    "Own",
-    "Quantity",
-    "Speed",
-    "read_baseline",
-    "write_baseline",
-]
-
 
 class _From(Strict):
     """Where a number comes from."""

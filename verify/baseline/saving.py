@@ -6,8 +6,6 @@ from verify.baseline.record import Baseline, CaseBaseline
 from verify.errors import InputError
 from verify.result import Status
 
-__all__ = ["save_run"]
-
 
 def save_run(baseline: Baseline, run: FinishedRun) -> tuple[Baseline, list[str]]:
     """Add the cases, quantities and speeds of `run` that `baseline` does not have.

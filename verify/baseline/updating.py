@@ -11,8 +11,6 @@ from verify.errors import InputError
 from verify.result import CaseResult, Verdict
 from verify.scene.nearest import nearest
 
-__all__ = ["Move", "update_from"]
-
 SPEED = "speed"
 
 

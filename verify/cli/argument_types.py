@@ -2,8 +2,6 @@
 
 import argparse
 
-__all__ = ["count", "positive"]
-
 
 def count(text: str) -> int:
     """Read a whole number from 1 on."""

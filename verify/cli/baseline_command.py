@@ -21,8 +21,6 @@ from verify.baseline import (
 from verify.baseline.difference import any_worse
 from verify.result import Verdict
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Do what the action says."""

@@ -10,8 +10,6 @@ from verify.runner import select_cases
 from verify.runner.reference_bundle import write_bundle
 from verify.runner.reference_cache import Entry, ReferenceCache, cache_folder
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """List, clear or export."""

@@ -4,8 +4,6 @@ from pathlib import Path
 
 from verify.cli.shared_arguments import Add, add_action, add_json
 
-__all__ = ["add_cache_command"]
-
 
 def add_cache_command(add: Add) -> None:
     """Add ``cache`` to the command line."""

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from verify.study.iterations import IterationsStudy
     from verify.study.thesis import ThesisStudy
 
-__all__ = ["budget", "cost", "iterations", "thesis"]
-
 Announce = Callable[[str], None]
 
 

@@ -15,8 +15,6 @@ from verify.runner.options import Options
 from verify.runner.reference_cache import cache_folder
 from verify.scene import load_scenes
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Validate the files; 2 if one is bad."""

@@ -8,8 +8,6 @@ import shtab
 from verify.cli.parser import build_parser
 from verify.scene import list_cases
 
-__all__ = ["execute"]
-
 _CASES = "_verify_cases"
 
 

@@ -6,8 +6,6 @@ from importlib import import_module
 
 from verify.warm import warm_parent
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the suite on one solver and print a line per check."""

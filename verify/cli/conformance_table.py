@@ -10,8 +10,6 @@ from verify.cli.waiting import said_to_wait
 from verify.conformance import CheckResult, conform, exit_code_of
 from verify.solvers.named import one_name, parameters_of, solver_in
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run the suite on one solver and print a line per check."""

@@ -9,8 +9,6 @@ from verify.runner.options import Options
 from verify.runner.plan import solvers_of
 from verify.scene import Scene
 
-__all__ = ["case_lines", "costs_of", "duration_text", "run_line", "suites_line"]
-
 _START = 0.8  # s: half of what a run takes before and after its cases; comparing a small case
 
 

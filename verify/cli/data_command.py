@@ -6,8 +6,6 @@ import json
 from verify.simulator.anatomy.fetching import fetch_anatomy
 from verify.simulator.anatomy.store import store_folder
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Fetch the anatomy."""

@@ -7,8 +7,6 @@ from typing import Any
 
 from verify.scene import Scene, load_scene, scene_hash
 
-__all__ = ["description", "execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Print what a case asks."""

@@ -6,8 +6,6 @@ import sys
 from collections import Counter
 from dataclasses import asdict
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Examine the installation; exit code 3 if something that a full run needs is missing."""

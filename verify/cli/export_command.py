@@ -7,8 +7,6 @@ from verify.exchange import export_case
 from verify.foreign.template import write_template
 from verify.scene import load_scene
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Write mesh, cuts, supports and loads of a case."""

@@ -14,8 +14,6 @@ from verify.cli.shared_arguments import (
     add_timeout,
 )
 
-__all__ = ["add_extension_commands"]
-
 
 def add_extension_commands(add: Add) -> None:
     """Add ``export``, ``paraview``, ``import``, ``solvers``, ``conform`` and ``baseline``."""

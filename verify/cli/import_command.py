@@ -14,8 +14,6 @@ from verify.runner import Options, RunStoppedError, exit_code
 from verify.runner.checking import check_solver_name
 from verify.scene import load_scene
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Read, compare, judge, report."""

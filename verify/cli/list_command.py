@@ -8,8 +8,6 @@ from verify.errors import InputError
 from verify.runner.selection import parse_expression
 from verify.scene import list_cases, load_scenes
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Print one line per case; a case file that is broken is listed with its fault."""

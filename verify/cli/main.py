@@ -11,8 +11,6 @@ from verify.printable import one_line
 from verify.threads import pin_to_one_thread
 from verify.whole_files import DISK_FAILURES
 
-__all__ = ["main"]
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line `argv` (default: that of the process) and return its exit code."""

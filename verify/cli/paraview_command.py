@@ -5,8 +5,6 @@ import json
 
 from verify.exchange import export_fields
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Write a ``.pvd`` per case and solver, with its fields at each output time."""

@@ -24,8 +24,6 @@ from verify.cli.shared_arguments import (
 )
 from verify.cli.study_parser import add_study_command
 
-__all__ = ["build_parser"]
-
 _EXIT_CODES = """\
 exit codes:
   0  every verdict is PASS (or UNDECIDED, without --strict; or a known finding of its case)

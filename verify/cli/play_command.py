@@ -16,8 +16,6 @@ from verify.whole_files import asked_place, write_whole
 if TYPE_CHECKING:
     from verify.simulator import Stage, StepRecord
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Play a case."""

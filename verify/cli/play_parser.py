@@ -5,8 +5,6 @@ from pathlib import Path
 from verify.cli.argument_types import positive
 from verify.cli.shared_arguments import Add, add_case, add_json
 
-__all__ = ["add_play_commands"]
-
 
 def add_play_commands(add: Add) -> None:
     """Add ``play`` and ``data`` to the command line."""

@@ -12,8 +12,6 @@ from verify.result import COMPILING, LOG, CaseResult, SolveRecord, Status
 from verify.runner import Progress
 from verify.runner.run import comparison_label
 
-__all__ = ["ClosableProgress", "progress_on"]
-
 
 class ClosableProgress(Progress, Protocol):
     """A progress display that is told of what is no solve too, and can leave the screen."""

@@ -6,8 +6,6 @@ import sys
 from verify.cli.waiting import said_to_wait
 from verify.errors import InputError
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Render the report of a run, or the pages of the studies in a directory."""

@@ -20,8 +20,6 @@ from verify.runner.fingerprint import code_of_solver, digest_of, file_digest
 from verify.solvers import solver_names
 from verify.solvers.named import solver_in
 
-__all__ = ["RANKING_FILE", "rank_run"]
-
 RANKING_FILE = "ranking.json"
 _SECONDS = 120.0  # for each small solve of the suite
 _UNASKED = 2  # so many solvers are ranked without being checked unasked

@@ -26,8 +26,6 @@ from verify.runner.ending import NOTHING_RAN
 from verify.runner.reference_cache import cache_folder
 from verify.solvers.named import one_name, parameters_of
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Select, run, render, and say what came out."""

@@ -5,8 +5,6 @@ import json
 
 from verify.scene import scene_schema
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Print the JSON Schema of a case file."""

@@ -6,19 +6,6 @@ from pathlib import Path
 
 from verify.cli.argument_types import count, positive
 
-__all__ = [
-    "Add",
-    "add_action",
-    "add_case",
-    "add_json",
-    "add_out",
-    "add_repetitions",
-    "add_run",
-    "add_strict",
-    "add_timeout",
-    "sentence",
-]
-
 # of a command: its name, what it does, and its examples
 Add = Callable[[str, str, str], argparse.ArgumentParser]
 

@@ -6,8 +6,6 @@ from typing import Any
 from verify.errors import InputError
 from verify.solvers.named import plain_value
 
-__all__ = ["of_one_solver", "of_solvers"]
-
 
 def of_one_solver(given: Iterable[str]) -> dict[str, Any]:
     """Read ``basis=shifted`` … as the parameters of one solver.

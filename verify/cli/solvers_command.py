@@ -6,8 +6,6 @@ from typing import Any
 
 from verify.foreign import foreign_solvers, install, remove, state_of
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """List, install or remove."""

@@ -9,8 +9,6 @@ from typing import Any
 
 from verify.printable import visible
 
-__all__ = ["in_colour", "print_line", "printable_streams", "unfiltered"]
-
 _COLOURS = {"PASS": 32, "FAIL": 31, "ERROR": 31, "WARNING": 33, "UNDECIDED": 33, "NOT JUDGED": 33}
 _VERDICT = re.compile(rf"\b({'|'.join(_COLOURS)})\b")
 

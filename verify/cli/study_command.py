@@ -9,8 +9,6 @@ from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
-__all__ = ["execute"]
-
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run a study, write its record and table, render its page."""

@@ -14,8 +14,6 @@ from verify.cli.shared_arguments import (
     add_repetitions,
 )
 
-__all__ = ["add_study_command"]
-
 
 def add_study_command(add: Add) -> None:
     """Add ``study`` to the command line."""

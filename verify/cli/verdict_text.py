@@ -6,8 +6,6 @@ from collections.abc import Iterator, Sequence
 from verify.printable import one_line
 from verify.result import LOG, CaseResult, Notice, Status, Verdict, VerdictRecord
 
-__all__ = ["notice_text", "verdict_lines"]
-
 
 def verdict_lines(results: Sequence[CaseResult]) -> Iterator[str]:
     """Yield a line per case, one per notice, per check that is not a PASS, per bad end."""

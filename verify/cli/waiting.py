@@ -6,8 +6,6 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import TextIO
 
-__all__ = ["Waiting", "said_to_wait"]
-
 _FIRST, _LONGEST = 2.0, 60.0  # s of silence before the first line, and before any other
 
 

@@ -13,8 +13,6 @@ from verify.errors import UnsupportedSceneError
 from verify.scene import ArcCut, MeshFile, Polygon, PolylineCut, Rectangle, Scene, read_mesh
 from verify.scene.planar import distance_to_outline, inside_polygon
 
-__all__ = ["AnyBody", "Body", "CutPart", "body_of"]
-
 Array = NDArray[np.float64]
 
 # A turn of less than 15° makes a singularity too weak to matter: r^-0.08 in the strain. Else each

@@ -17,8 +17,6 @@ from verify.compare.simplex_rule import points_in
 from verify.compare.slabs import ROUND_OFF, Rule
 from verify.compare.splitting import bisect, heights, split_at_level
 
-__all__ = ["body_rule"]
-
 Array = NDArray[np.float64]
 
 # Kuhn's tetrahedra keep their orientation as long as no node moves by a sixth of the spacing.

@@ -16,8 +16,6 @@ from verify.compare.sides import AskedCut, distance_to_cut
 from verify.compare.simplices import Simplices
 from verify.solution import Solution
 
-__all__ = ["sides_of_cells"]
-
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bits = NDArray[np.int8]

@@ -11,8 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CellTree", "SearchedCells", "build_cell_tree", "morton_order"]
-
 LEAF = 4  # cells per leaf
 
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from verify.scene import ArcCut, PolylineCut
 
-__all__ = ["Arc", "Piece", "Segment", "closed_pieces", "cut_pieces", "meeting_parameters"]
-
 Array = NDArray[np.float64]
 
 # parameters this far outside [0, 1] still count as an end: round-off of an intersection

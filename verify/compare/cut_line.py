@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from verify.compare.body import Body
 from verify.compare.slabs import graded_breaks
 
-__all__ = ["AWAY", "CutRule", "along_cut", "cut_rule", "place_on_cut"]
-
 Array = NDArray[np.float64]
 
 # Distance of `near` from the cut over the body's size. The direction to it is good to

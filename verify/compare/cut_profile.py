@@ -24,8 +24,6 @@ from verify.compare.patches import (
 )
 from verify.compare.solid import SolidBody
 
-__all__ = ["ProfileLine", "profile_lines"]
-
 Array = NDArray[np.float64]
 
 _POINTS = 48  # per straight or curved piece, denser to its ends, where an opening ends in a root

@@ -14,15 +14,6 @@ from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.simplices import EDGES, Simplices, simplices
 from verify.solution import Solution
 
-__all__ = [
-    "DeformedCells",
-    "Faces",
-    "deformed_cells",
-    "faces_of",
-    "facet_normals",
-    "is_glued",
-]
-
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

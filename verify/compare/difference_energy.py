@@ -11,8 +11,6 @@ from verify.compare.simplex_rule import simplex_rule
 from verify.errors import InputError
 from verify.solution import Solution
 
-__all__ = ["difference_energy", "short_wave_energy"]
-
 Array = NDArray[np.float64]
 Density = float | Array
 _ORDER = 3  # points per direction: the exact field may be singular in a cell

@@ -6,8 +6,6 @@ from verify.compare.error_norm import ErrorNorm, Squares
 from verify.compare.locate import Field
 from verify.compare.slabs import Rule
 
-__all__ = ["displacement_error", "displacement_squares"]
-
 
 def displacement_error(field: Field, reference: Field, rule: Rule) -> ErrorNorm:
     """‖u − u_ref‖ and ‖u_ref‖ in L2 of the body; units m·m (2D), m·m^1.5 (3D)."""

@@ -7,8 +7,6 @@ from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.slabs import Rule
 
-__all__ = ["energy_error", "energy_squares"]
-
 # Strain over gradient below which a reference is a rigid motion, solved to round-off.
 _NO_STRAIN = 1e-10
 

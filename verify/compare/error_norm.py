@@ -6,8 +6,6 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ErrorNorm", "Squares"]
-
 Array = NDArray[np.float64]
 
 

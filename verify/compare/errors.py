@@ -19,8 +19,6 @@ from verify.compare.near_tip import near_radius, near_tip
 from verify.compare.opening_error import opening_error, opening_maximum_error
 from verify.compare.slabs import Rule
 
-__all__ = ["ERRORS", "OVER_TIME", "ErrorMetric", "Rules"]
-
 Measure = Callable[[Field, Field, Any, Law], ErrorNorm | Squares]
 Where = Literal["body", "near", "far", "cut"]
 

@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["distance_to_segments"]
-
 
 @njit(cache=True)
 def distance_to_segments(points, starts, ends):

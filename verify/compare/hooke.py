@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from verify.scene import Material, Scene
 
-__all__ = ["Corotated", "Hooke", "Law", "MembraneLaw", "corotated", "hooke", "law_of"]
-
 Array = NDArray[np.float64]
 
 

@@ -18,8 +18,6 @@ from verify.compare.membrane_cut_rule import membrane_cut_rule
 from verify.compare.slabs import Rule, area_rule, slab_angles
 from verify.compare.surface_rule import surface_rule
 
-__all__ = ["MeasuredNorm", "cut_rules", "integrate_norm", "rules", "spread_of"]
-
 # spacings over the wanted one, without small common multiples
 _FAMILY = (1.0, 1.31, 1.73)
 # The few elements at a tip hold most of the error; finer cells around it make the integration

@@ -7,8 +7,6 @@ from verify.compare.cut_line import CutRule
 from verify.compare.error_norm import ErrorNorm
 from verify.compare.locate import Field
 
-__all__ = ["displacement_jump", "jump_error"]
-
 
 def displacement_jump(field: Field, rule: CutRule) -> NDArray[np.float64]:
     """Displacement (n, d) of the positive side minus that of the negative side, m."""

@@ -11,8 +11,6 @@ from verify.errors import InputError
 from verify.scene import Scene
 from verify.solution import Solution
 
-__all__ = ["Kinetic", "density_of", "kinetic"]
-
 Array = NDArray[np.float64]
 
 

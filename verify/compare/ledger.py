@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Balance", "balance", "energy_scale", "total_energy"]
-
 Array = NDArray[np.float64]
 
 # Parts of a ledger and the sign with which they enter what stays constant: what is stored and

@@ -18,8 +18,6 @@ from verify.compare.simplices import simplices, straight_or_raise, triangle_fram
 from verify.errors import InputError
 from verify.solution import Solution
 
-__all__ = ["ROUND_OFF", "Field", "SolutionField"]
-
 Array = NDArray[np.float64]
 
 # Relative to the body's size: mesh generators and files move points by up to this much.

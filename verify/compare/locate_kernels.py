@@ -4,11 +4,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = [
-    "allowed", "box_distance2", "evaluate_linear", "evaluate_quadratic", "find_cells",
-    "holding_cells", "segment_distance2",
-]  # fmt: skip
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

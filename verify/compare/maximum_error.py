@@ -6,8 +6,6 @@ from verify.compare.error_norm import ErrorNorm
 from verify.compare.locate import Field
 from verify.compare.slabs import Rule
 
-__all__ = ["maximum_error"]
-
 
 def maximum_error(field: Field, reference: Field, rule: Rule) -> ErrorNorm:
     """Largest |u − u_ref| and |u_ref| over the points of a rule, m.

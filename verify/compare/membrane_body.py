@@ -19,8 +19,6 @@ from verify.scene.mesh_file import read_mesh
 from verify.scene.spatial import rim_edges
 from verify.scene.spatial_cuts import PolygonCut, SweptCut
 
-__all__ = ["MembraneBody", "cut_membrane", "membrane_of"]
-
 Array = NDArray[np.float64]
 
 _SAME = 2 * SHORT  # of the body's size: ends of lines that are closer are one point

@@ -7,8 +7,6 @@ from verify.compare.cut_line import AWAY, CutRule, along_cut
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_cuts import SurfaceLines, nearest_on_lines
 
-__all__ = ["membrane_cut_rule", "nearest_on_membrane_cut"]
-
 Array = NDArray[np.float64]
 _WHOLE = np.array([0.0, 1.0])
 

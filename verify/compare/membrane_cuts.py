@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from verify.compare.patches import PlanePatch
 from verify.errors import UnsupportedSceneError
 
-__all__ = ["SHORT", "SurfaceLines", "nearest_on_lines", "surface_lines"]
-
 Array = NDArray[np.float64]
 Cells = NDArray[np.int64]
 

@@ -13,8 +13,6 @@ from verify.compare.locate import ROUND_OFF, SolutionField
 from verify.compare.membrane_body import MembraneBody
 from verify.solution import Solution
 
-__all__ = ["MembraneField"]
-
 Array = NDArray[np.float64]
 Sides = NDArray[np.int8]
 

@@ -5,8 +5,6 @@ from numba import njit
 
 from verify.compare.locate_kernels import allowed, box_distance2, segment_distance2
 
-__all__ = ["nearest_triangles"]
-
 
 @njit(cache=True)
 def nearest_triangles(points, directions, wanted, searched, across, sides, tolerance):

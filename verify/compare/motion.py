@@ -15,8 +15,6 @@ from verify.compare.sampled import Sampled
 from verify.errors import InputError
 from verify.solution import Solution
 
-__all__ = ["ExactMotion", "Motion", "SolutionMotion", "field_at"]
-
 Array = NDArray[np.float64]
 
 _SAME_TIME = 1e-9  # of the duration: two output times this close are one

@@ -7,8 +7,6 @@ from verify.compare.body import AnyBody, Body
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.surface_rule import surface_rule
 
-__all__ = ["NEAR", "near_radius", "near_tip"]
-
 # Radius of what is near over the length of the cuts, in space the root of their area.
 NEAR = 0.1
 

@@ -12,8 +12,6 @@ from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_cut_rule import nearest_on_membrane_cut
 from verify.compare.surface_rule import nearest_on_cut
 
-__all__ = ["cut_place", "opening"]
-
 
 def opening(
     field: Field, body: AnyBody, cut: str, place: float | Sequence[float], component: str

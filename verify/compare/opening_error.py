@@ -7,8 +7,6 @@ from verify.compare.error_norm import ErrorNorm
 from verify.compare.jump_error import displacement_jump
 from verify.compare.locate import Field
 
-__all__ = ["opening_error", "opening_maximum_error"]
-
 
 def opening_error(field: Field, reference: Field, rule: CutRule) -> ErrorNorm:
     """‖[u_n] − [u_ref,n]‖ and ‖[u_ref,n]‖ in L2 of the cuts as asked."""

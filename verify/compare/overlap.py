@@ -31,8 +31,6 @@ from verify.compare.overlap_kernels import (
 from verify.errors import UnsupportedSceneError
 from verify.solution import Solution
 
-__all__ = ["Overlap", "OverlapSearch"]
-
 Array = NDArray[np.float64]
 
 # A point of a face is looked for so far outside of its own material, over the smallest height of

@@ -9,8 +9,6 @@ from numba import njit
 
 from verify.compare.locate_kernels import box_distance2, segment_distance2
 
-__all__ = ["facet_distances", "first_exits", "nearest_before", "overlapping"]
-
 # A ray through an edge must not slip between two facets.
 _EDGE = 1e-9
 _MOST = 128  # parts that a tetrahedron has at most when four planes have cut it: 3⁴

@@ -14,8 +14,6 @@ from verify.compare.curves import Arc
 from verify.scene.spatial import ear_clipping, frame
 from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SpatialCut, SphereCut
 
-__all__ = ["CylinderPatch", "DiscPatch", "Patch", "PlanePatch", "SpherePatch", "patches_of"]
-
 Array = NDArray[np.float64]
 
 

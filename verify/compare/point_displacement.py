@@ -6,8 +6,6 @@ import numpy as np
 
 from verify.compare.locate import Field
 
-__all__ = ["point_displacement"]
-
 
 def point_displacement(field: Field, point: Sequence[float], component: str) -> float:
     """Displacement in m of `point` in direction ``x``, ``y`` or ``z``."""

@@ -18,8 +18,6 @@ from verify.compare.membrane_field import MembraneField
 from verify.compare.sides import asked_cuts, asked_sides
 from verify.solution import Solution
 
-__all__ = ["SidedField", "cut_deviation", "field_of"]
-
 Array = NDArray[np.float64]
 
 

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from verify.compare.locate import Field
 
-__all__ = ["Sampled"]
-
 Array = NDArray[np.float64]
 
 

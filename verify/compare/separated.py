@@ -12,8 +12,6 @@ from verify.compare.locate import ROUND_OFF
 from verify.compare.simplices import simplices
 from verify.solution import Solution
 
-__all__ = ["Part", "boundary_nodes", "part_of", "separated_parts"]
-
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

@@ -9,8 +9,6 @@ from verify.compare.body import AnyBody
 from verify.compare.curves import Piece
 from verify.compare.patches import Patch
 
-__all__ = ["asked_cuts", "asked_sides", "distance_to_cut"]
-
 Array = NDArray[np.float64]
 Sides = NDArray[np.int8]
 AskedCut = Sequence[Piece | Patch]

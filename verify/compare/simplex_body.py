@@ -10,8 +10,6 @@ from verify.compare.facet_kernels import distance_to_segments
 from verify.compare.patches import Patch
 from verify.compare.splitting import measures
 
-__all__ = ["SimplexBody"]
-
 Array = NDArray[np.float64]
 
 

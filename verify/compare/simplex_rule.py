@@ -8,8 +8,6 @@ from scipy.special import roots_jacobi
 
 from verify.compare.splitting import measures
 
-__all__ = ["points_in", "simplex_rule"]
-
 Array = NDArray[np.float64]
 
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["EDGES", "Simplices", "in_frames", "simplices", "straight_or_raise", "triangle_frames"]
-
 Array = NDArray[np.float64]
 
 _CORNERS = {3: 3, 6: 3, 4: 4, 10: 4}  # by the nodes of a cell

@@ -21,8 +21,6 @@ from verify.compare.curves import Arc, Piece, Segment
 from verify.compare.locate import Field
 from verify.compare.simplices import in_frames
 
-__all__ = ["ROUND_OFF", "Rule", "area_rule", "graded_breaks", "slab_angles"]
-
 Array = NDArray[np.float64]
 
 # Of the body's size: a piece of the body that is thinner has no place that is surely inside.

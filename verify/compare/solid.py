@@ -18,8 +18,6 @@ from verify.scene.mesh_file import read_mesh
 from verify.scene.spatial import rim_edges
 from verify.scene.spatial_cuts import CylinderCut, DiscCut, PolygonCut, SphereCut, SweptCut
 
-__all__ = ["SolidBody", "solid_of"]
-
 Array = NDArray[np.float64]
 Inside = Callable[[Array], NDArray[np.bool_]]
 

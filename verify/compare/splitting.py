@@ -11,8 +11,6 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bisect", "divide", "heights", "measures", "split_at_level"]
-
 Array = NDArray[np.float64]
 
 # A corner whose level is below this share of the largest is on the surface: round-off.

@@ -10,8 +10,6 @@ from verify.compare.simplices import in_frames, triangle_frames
 from verify.compare.slabs import Rule
 from verify.solution import Solution
 
-__all__ = ["cell_strain_energies", "field_strain_energy", "nodal_strain_energy", "strain_energy"]
-
 # points per direction where the density is no polynomial of the gradient
 _FINE = 4
 

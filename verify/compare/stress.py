@@ -13,8 +13,6 @@ from verify.compare.locate import SolutionField
 from verify.compare.simplices import in_frames, triangle_frames
 from verify.scene import Scene
 
-__all__ = ["strain_and_stress"]
-
 Array = NDArray[np.float64]
 
 

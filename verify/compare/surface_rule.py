@@ -12,8 +12,6 @@ from verify.compare.simplex_rule import points_in
 from verify.compare.solid import SolidBody
 from verify.compare.splitting import divide, measures, split_at_level
 
-__all__ = ["nearest_on_cut", "surface_rule"]
-
 Array = NDArray[np.float64]
 
 # Where the border of the body is not straight in a patch's parameters, cells on it are halved

@@ -12,8 +12,6 @@ from verify.compare.locate import Field
 from verify.compare.opening import cut_place
 from verify.scene import Material
 
-__all__ = ["BladeFront", "tearing_intensity"]
-
 Array = NDArray[np.float64]
 _NEAREST, _PLACES = 0.25, 12  # first place over the radius, number of places
 

@@ -8,8 +8,6 @@ from verify.conformance.trials import Outcome, Trial
 from verify.result import Status
 from verify.solution import Solution
 
-__all__ = ["Check", "CheckResult", "Finding", "State", "evaluate"]
-
 
 class State(StrEnum):
     """What became of a check."""

@@ -24,8 +24,6 @@ from verify.result import Status
 from verify.scene import Scene
 from verify.solution import Solution
 
-__all__ = ["EXACT", "checks"]
-
 EXACT = 1e-7
 _RIGID = 1e-6  # of the height of the fall: what 40 steps of an iterative solver may add up to
 Solutions = Mapping[str, Solution]

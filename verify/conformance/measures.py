@@ -11,8 +11,6 @@ from verify.conformance.scenes import Field
 from verify.scene import PolylineCut, Scene
 from verify.solution import Solution
 
-__all__ = ["covered", "distance", "nodal_deviation", "weight_imbalance"]
-
 Array = NDArray[np.float64]
 
 

@@ -15,26 +15,6 @@ from numpy.typing import NDArray
 
 from verify.scene import Rotation, Scene, restore_scene
 
-__all__ = [
-    "DENSITY",
-    "POISSON",
-    "YOUNG",
-    "Field",
-    "closed_cut",
-    "free_piece",
-    "freed_half",
-    "given_mesh",
-    "hanging_halves",
-    "parted_halves",
-    "pulled_halves",
-    "rigid",
-    "sheared_halves",
-    "strained_sides",
-    "turned",
-    "uncut_linear",
-    "unusual",
-]
-
 Array = NDArray[np.float64]
 # displacement (n, d) at points (n, d), on the side of the points `near` (n, d)
 Field = Callable[[Array, Array], Array]

@@ -12,8 +12,6 @@ from verify.conformance.trials import Outcome, Trial, solve_trials
 from verify.errors import InputError
 from verify.scene.nearest import nearest
 
-__all__ = ["conform", "exit_code_of"]
-
 
 def conform(
     solver: str,

@@ -16,8 +16,6 @@ from verify.scene import Scene, scene_content
 from verify.solution import Solution, read_solution
 from verify.solvers.interface import is_built_in
 
-__all__ = ["Outcome", "Trial", "solve_trials"]
-
 _START_SECONDS = 120.0  # importing a solver may start MPI or compile
 
 

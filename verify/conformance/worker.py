@@ -14,8 +14,6 @@ from verify.runner.childhood import die_with_parent
 from verify.runner.solve import solve_job
 from verify.solvers import check_parameters, find_solver
 
-__all__ = ["main"]
-
 
 def main(batch_file: Path) -> None:
     """Solve the trials of a batch, in order."""

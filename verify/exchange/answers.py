@@ -11,8 +11,6 @@ from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene
 from verify.solution import Solution, read_solution
 
-__all__ = ["Answers", "read_answers"]
-
 
 @dataclass(frozen=True)
 class Answers:

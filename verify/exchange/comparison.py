@@ -27,8 +27,6 @@ from verify.scene import Scene, scene_content
 from verify.solution import Solution, write_solution
 from verify.solvers import solver_names
 
-__all__ = ["compare_answers"]
-
 _NAME = re.compile(r"[A-Za-z][\w.+-]*")
 
 

@@ -30,8 +30,6 @@ from verify.runner.fingerprint import physics_digest
 from verify.scene import Scene, SpatialCut
 from verify.whole_files import asked_place, whole_file
 
-__all__ = ["EXPORT_SCHEMA", "export_case", "level_folder"]
-
 EXPORT_SCHEMA = 1
 
 

@@ -27,8 +27,6 @@ from verify.solvers.boundary_of_scene import Boundary
 from verify.solvers.loads_of_scene import ForceDensity, is_moving
 from verify.xfem.quadrature import simplex_rule
 
-__all__ = ["problem_of"]
-
 Array = NDArray[np.float64]
 _DEGREE = 7  # of the rule for loads that vary: an exact field's traction is smooth on a facet
 

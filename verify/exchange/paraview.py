@@ -31,8 +31,6 @@ from verify.scene import Scene, restore_scene
 from verify.solution import Solution
 from verify.whole_files import asked_place, whole_file, write_whole
 
-__all__ = ["export_fields"]
-
 Array = NDArray[np.float64]
 
 REFERENCE = "reference"

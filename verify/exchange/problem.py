@@ -16,8 +16,6 @@ from scipy.sparse.csgraph import connected_components
 from verify.compare.hooke import hooke
 from verify.scene import Material, Scene, Support
 
-__all__ = ["HeldNodes", "Load", "Problem"]
-
 Array = NDArray[np.float64]
 
 

@@ -19,8 +19,6 @@ from verify.scene import Scene
 from verify.solution import Solution
 from verify.solvers import check_parameters
 
-__all__ = ["ProgramSolver"]
-
 _TAIL = 300
 _FRAME = re.compile(r'File "([^"]+)", line (\d+), in (.+)')
 

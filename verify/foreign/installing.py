@@ -18,8 +18,6 @@ from verify.json_files import read_json, write_json
 from verify.printable import one_line
 from verify.runner.fingerprint import file_digest
 
-__all__ = ["State", "install", "remove", "solvers_folder", "state_of"]
-
 _ASKED = """
 import importlib, importlib.metadata, json, platform, sys
 module, of = sys.argv[1:]

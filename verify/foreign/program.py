@@ -8,8 +8,6 @@ from verify.foreign.installing import mark_of, state_of
 from verify.foreign.records import PROGRAMS, foreign_solver
 from verify.scene import Scene
 
-__all__ = ["ForeignProgram"]
-
 
 class ForeignProgram(ProgramSolver):
     """The foreign solver `name`.

@@ -19,8 +19,6 @@ from verify.printable import shown
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 
-__all__ = ["PROGRAMS", "ForeignSolver", "Install", "Takes", "foreign_solver", "foreign_solvers"]
-
 PROGRAMS = Path(__file__).resolve().parent / "programs"
 _STRICT = ConfigDict(extra="forbid")
 

@@ -6,8 +6,6 @@ from pathlib import Path
 from verify.foreign.records import PROGRAMS
 from verify.whole_files import asked_place
 
-__all__ = ["write_template"]
-
 
 def write_template(folder: Path) -> list[Path]:
     """Write the reader and writer of the exchange and the example into `folder`."""

@@ -13,8 +13,6 @@ from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["METHODS", "cut_by"]
-
 METHODS: Mapping[str, Callable[..., CutBody]] = {
     "subdivision": subdivision,
     "snapping": snapping,

@@ -10,8 +10,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.subdivision import Subdivision, subdivide
 
-__all__ = ["Change", "Counts", "CutBody", "make_body"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

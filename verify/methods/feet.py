@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["feet_on_cut", "free_directions"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

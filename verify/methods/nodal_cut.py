@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["CrossedEdges", "NodalCut", "crossed_edges"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

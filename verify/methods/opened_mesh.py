@@ -9,8 +9,6 @@ from scipy.sparse import csr_array, eye_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.subdivision import Subdivision
 
-__all__ = ["OpenedMesh", "conforming_to", "facets_without_twin"]
-
 _Ints = NDArray[np.int64]
 
 

@@ -18,8 +18,6 @@ from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 
-__all__ = ["OpenedCells", "Seams", "cut_so_far", "seams_of", "welded"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

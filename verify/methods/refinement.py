@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["bisect_cells"]
-
 _Ints = NDArray[np.int64]
 
 

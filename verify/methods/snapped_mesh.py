@@ -19,8 +19,6 @@ from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["SnappedMesh", "snap_nodes", "take_near_nodes"]
-
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 

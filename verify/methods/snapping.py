@@ -15,8 +15,6 @@ from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 
-__all__ = ["snapping"]
-
 
 def snapping(mesh: SimplexMesh, cuts: Sequence[Cut], quality: float = 0.2) -> CutBody:
     """Snap the nearer end of every crossed edge onto the cut, and open the mesh there.

@@ -23,8 +23,6 @@ from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["Fit", "cell_edges", "spring_stiffness"]
-
 Fit = Literal["fitted", "van_gelder"]
 
 _Floats = NDArray[np.float64]

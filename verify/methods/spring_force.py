@@ -13,8 +13,6 @@ from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["SpringForce"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["add_spring_stiffness", "spring_force", "spring_product"]
-
 
 @njit(cache=True)
 def spring_force(cells, edges, rest, stiffness, displacement, turning, directions, excess, force):

@@ -26,8 +26,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.subdivision import subdivide
 
-__all__ = ["snapping_subdivision", "subdivision"]
-
 # Share of an edge below which a crossing is taken as at its end. A tetrahedron with two corners
 # as near to the cut as that still has 1e-12 of its cell, above what counts as degenerate.
 _NEAR = 1e-6

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from verify.xfem.cuts import Cut, Polyline
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["add_tip_points"]
-
 _Ints = NDArray[np.int64]
 
 _NEAR = 1e-6  # barycentric: an end as near as that to an edge or node lies on it

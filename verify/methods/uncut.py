@@ -7,8 +7,6 @@ from verify.xfem.cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 
-__all__ = ["uncut"]
-
 
 def uncut(mesh: SimplexMesh, cuts: Sequence[Cut]) -> CutBody:
     """Leave the cuts out, and say so."""

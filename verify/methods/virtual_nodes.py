@@ -29,8 +29,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.subdivision import subdivide
 
-__all__ = ["CopyWeights", "virtual_node", "virtual_node_arbitrary"]
-
 CopyWeights = Literal["share", "raised", "whole"]
 
 _LEAST_SHARE = 1e-3

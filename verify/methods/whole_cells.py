@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from verify.xfem.phantom import PhantomMesh, SubCells
 
-__all__ = ["whole_cells"]
-
 
 def whole_cells(phantom: PhantomMesh, chosen: NDArray[np.bool_] | None = None) -> PhantomMesh:
     """Return the chosen pieces (p,), all by default, each with the whole volume of its cell.

@@ -9,8 +9,6 @@ from typing import Any
 
 from verify.report.notation import number
 
-__all__ = ["Cell", "Drawing", "Figure", "Table", "plain_table"]
-
 
 @dataclass(frozen=True)
 class Cell:

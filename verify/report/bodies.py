@@ -10,8 +10,6 @@ from verify.errors import InputError
 from verify.read_mesh import read_with_meshio
 from verify.solution import Solution, read_solution
 
-__all__ = ["Body", "deformed_body", "error_body", "read_stored", "zoomed"]
-
 _FEATURE_ANGLE = 30.0  # degrees between facets beyond which a 3D edge is drawn
 _SIDES = ((0, 1), (1, 2), (2, 0))  # of a triangle
 _MOST_EDGES = 4000  # of elements that are drawn; more would be too dense to be seen

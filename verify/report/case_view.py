@@ -29,15 +29,6 @@ from verify.report.tables import (
 )
 from verify.result import CaseResult, NoticeKind, Verdict, worst
 
-__all__ = [
-    "CaseView",
-    "PictureRow",
-    "case_view",
-    "floor_text",
-    "required_slope",
-    "show_pictures",
-]
-
 
 @dataclass(frozen=True)
 class PictureRow:

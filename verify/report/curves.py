@@ -9,17 +9,6 @@ from statistics import median
 from verify.report.notation import SECONDARY, solver_title
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status
 
-__all__ = [
-    "Curve",
-    "Duration",
-    "Point",
-    "duration",
-    "error_curves",
-    "floor",
-    "limits",
-    "metric_names",
-]
-
 MESHING = "meshing"
 # Beyond these a number is a symptom, and powers of ten around it overflow
 _DRAWABLE = (1e-200, 1e200)

@@ -22,8 +22,6 @@ from verify.report.pictures import case_pictures
 from verify.report.run_directory import CaseEntry, load_entry, load_record
 from verify.whole_files import write_whole
 
-__all__ = ["Drawn", "drawn_before", "drawn_case", "main", "run_palette"]
-
 
 @dataclass(frozen=True)
 class Drawn:

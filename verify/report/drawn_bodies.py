@@ -14,8 +14,6 @@ from PIL import Image
 from verify.report.bodies import Body
 from verify.report.view import View
 
-__all__ = ["draw"]
-
 _DPI = 100
 _OUTLINE, _ELEMENTS = (0.1, 0.1, 0.1, 1.0), (0.0, 0.0, 0.0, 0.25)
 _FACETS = 12_000  # up to which those of solids are split

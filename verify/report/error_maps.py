@@ -13,8 +13,6 @@ from verify.report.tips import plane_tips
 from verify.report.view import View, common_view
 from verify.result import CaseResult, error_picture
 
-__all__ = ["add_error_maps", "scale_top"]
-
 _COLOURS = "YlOrBr"
 _MOST = 8  # maps of a case
 _PEAK = 0.995  # of the nodes: what single nodes have is no measure of a map

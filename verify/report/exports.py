@@ -14,8 +14,6 @@ from verify.report.notation import printable
 from verify.report.run_directory import CaseEntry, Run
 from verify.result import SolveRecord, Verdict, VerdictRecord
 
-__all__ = ["COLUMNS", "EXPORT_SCHEMA", "csv_rows", "json_document", "junit_document"]
-
 EXPORT_SCHEMA = 1
 COLUMNS = (
     "case", "solver", "level", "parameters", "status", "reason", "size", "unknowns", "metric",

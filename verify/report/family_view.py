@@ -11,8 +11,6 @@ from verify.report.notation import error_title, number
 from verify.report.run_directory import Run
 from verify.result import CaseResult
 
-__all__ = ["FamilyView", "family_views"]
-
 
 @dataclass
 class FamilyView:

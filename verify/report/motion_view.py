@@ -12,8 +12,6 @@ from verify.report.notation import error_text, metric_title, number, solver_titl
 from verify.report.released_table import released_table
 from verify.result import CaseResult, SolveRecord, Status
 
-__all__ = ["BALANCE_METRICS", "MotionView", "motion_view"]
-
 BALANCE_METRICS = (
     "energy_drift", "energy_slope", "energy_oscillation", "energy_jump", "ledger_mismatch",
     "linear_momentum_drift", "angular_momentum_drift",

@@ -6,24 +6,6 @@ from typing import Any
 
 from verify.printable import memory_text
 
-__all__ = [
-    "ROUND_OFF",
-    "SECONDARY",
-    "bytes_text",
-    "error_text",
-    "error_title",
-    "is_error",
-    "metric_title",
-    "number",
-    "number_text",
-    "printable",
-    "seconds_text",
-    "signed",
-    "solver_title",
-    "spread_text",
-    "with_interval",
-]
-
 _METRICS = {
     "displacement_l2": "relative L² error of the displacement",
     "energy_norm": "relative energy-norm error",

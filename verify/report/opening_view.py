@@ -9,8 +9,6 @@ from verify.report.figures.style import Palette
 from verify.report.notation import solver_title
 from verify.result import CaseResult, OpeningCurve, OpeningProfile
 
-__all__ = ["opening_figures"]
-
 _REFERENCE = "reference"
 _FAR = 20.0  # times the reference's largest jump, and longer than the cut: it would hide the others
 _NOTHING = 1e-12  # of the length of the line: jumps below are round-off

@@ -13,8 +13,6 @@ from verify.report.run_directory import CaseEntry, Run
 from verify.report.tables import MANY, check_text
 from verify.result import NoticeKind, Status, Verdict, VerdictRecord
 
-__all__ = ["Overview", "origin_facts", "overview"]
-
 _NAMED = 6  # entries of a list in the paragraph
 _PLACES = 2  # of what one solver fails
 _ORDER = ["FAIL", "ERROR", "UNDECIDED", "PASS"]

@@ -18,8 +18,6 @@ from verify.report.ranking_tables import (
 from verify.report.run_directory import Run
 from verify.report.strength_view import strengths_table
 
-__all__ = ["page_view"]
-
 _QUESTIONS = (("accuracy", "Accuracy"), ("energy", "Energy"), ("cost", "Cost"))
 
 

@@ -9,8 +9,6 @@ from verify.report.notation import solver_title
 from verify.report.turntable import packed
 from verify.report.view import View
 
-__all__ = ["CasePictures", "Picture"]
-
 
 @dataclass
 class Picture:

@@ -8,8 +8,6 @@ from pathlib import Path
 from verify.errors import InputError
 from verify.whole_files import whole_file
 
-__all__ = ["BROWSERS", "print_page"]
-
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _SECONDS = 180.0
 

@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["problem_facts"]
-
 # what says nothing where it is so
 _USUAL: dict[str, Any] = {
     "opens_at": 0.0, "expected": None, "damping": [0.0, 0.0], "starts_at": 0.0, "name": "cut",

@@ -6,8 +6,6 @@ from typing import Any
 from verify.report.blocks import Cell, Table, plain_table
 from verify.report.notation import metric_title, number, solver_title, with_interval
 
-__all__ = ["compared", "conformance_table", "left_out_table", "stability_table"]
-
 _STATES = ("pass", "fail", "error", "refused")
 _ENDS = (
     ("failed", "failed"),

@@ -6,8 +6,6 @@ from verify.report.blocks import Cell, Table, plain_table
 from verify.report.notation import number, solver_title
 from verify.result import SolveRecord
 
-__all__ = ["released_table"]
-
 _PARTS = {
     "released_to_scheme": "dissipated by the scheme",
     "released_to_damping": "by damping",

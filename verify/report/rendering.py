@@ -16,8 +16,6 @@ from verify.report.run_directory import Run, load_run
 from verify.report.template_sets import as_html, as_markdown, load_templates
 from verify.whole_files import write_whole
 
-__all__ = ["load", "render", "render_markdown", "render_pdf", "render_summary"]
-
 # of the provenance, what says something to a reader elsewhere
 _PUBLISHED = (
     "command", "finished", "commit", "run again", "memory", "cpu", "cores", "load", "threads",

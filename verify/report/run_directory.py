@@ -16,8 +16,6 @@ from verify.ranking import Ranking
 from verify.result import CaseResult, SolveRecord
 from verify.result_files import checked, read_result
 
-__all__ = ["CaseEntry", "Run", "load_entry", "load_record", "load_run"]
-
 _RANKING = TypeAdapter(Ranking)
 
 

@@ -8,8 +8,6 @@ from verify.report.figures.studies import Series, loglog
 from verify.report.figures.style import Palette
 from verify.report.notation import error_title, is_error, number, solver_title
 
-__all__ = ["graded", "listed", "sliver_families"]
-
 Records = Sequence[Mapping[str, Any]]
 
 _GRADES = {"good": "●", "fair": "◐", "poor": "○", "bad": "✕"}

@@ -6,8 +6,6 @@ from typing import Any
 from verify.report.blocks import Table, plain_table
 from verify.report.notation import number, solver_title
 
-__all__ = ["strengths_table"]
-
 _TIME = "time at equal error"
 _WORDS = {
     "displacement_l2": "L² error",

@@ -15,8 +15,6 @@ from verify.report.study_views import study_view
 from verify.report.template_sets import as_html, as_markdown
 from verify.whole_files import write_whole
 
-__all__ = ["render_study", "studies_in"]
-
 _STUDIES = ("slivers", "energy", "cost", "budget", "thesis", "calibration", "iterations")
 _SCHEMA = 1
 _FOLDED = 30  # findings beyond which those that came out as expected fold

@@ -10,8 +10,6 @@ from verify.report.figures.style import Palette
 from verify.report.notation import metric_title, number, solver_title
 from verify.report.sliver_view import listed, sliver_families
 
-__all__ = ["study_view"]
-
 _NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 
 

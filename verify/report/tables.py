@@ -31,21 +31,6 @@ from verify.result import (
     VerdictRecord,
 )
 
-__all__ = [
-    "MANY",
-    "check_row",
-    "check_text",
-    "checks_table",
-    "failures_table",
-    "numbers_table",
-    "orders_table",
-    "reasons_table",
-    "reference_facts",
-    "reference_tables",
-    "regularisations_table",
-    "times_table",
-]
-
 MANY = 4  # solvers beyond which they stand side by side
 _CHECKS = {"rate": "order of the", "error": "", "ratio": "worst ratio of the", "value": ""}
 

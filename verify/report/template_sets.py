@@ -28,8 +28,6 @@ from verify.report.notation import (
 )
 from verify.whole_files import write_whole
 
-__all__ = ["PICTURES", "Beside", "as_html", "as_markdown", "in_markdown", "load_templates"]
-
 PICTURES = "report-pictures"
 _SPECIAL = re.compile(r"([\\`*\[\]|])")
 _START = re.compile(r"^(\s*)([#>+=-]|\d+[.)](?=\s))")

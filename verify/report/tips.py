@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from verify.report.figures.sketch import cut_lines
 
-__all__ = ["plane_tips"]
-
 Points = NDArray[np.float64]
 
 _ON = 1e-6  # of the body's size: an end that is closer to a line ends on it

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from verify.report.bodies import Body
 from verify.report.view import View
 
-__all__ = ["packed"]
-
 _TRIANGLES = 120_000  # of a surface beyond which only the still is shown
 _STEPS = 65535
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from verify.report.bodies import Body
 
-__all__ = ["View", "common_view"]
-
 _PIXELS = 560_000  # of a picture: 2 × what a page shows of it, for sharp displays
 _MARGIN = 0.03
 # A 3D body is seen from the front, right and above (elevation 24°, azimuth −58°)

@@ -19,8 +19,6 @@ from verify.runner.log import telling_line
 from verify.scene import Scene, scene_content
 from verify.solvers.interface import is_built_in
 
-__all__ = ["Asking"]
-
 _LOADING_SECONDS = (60.0, 300.0)  # for importing a solver: at least, at most
 
 

@@ -33,8 +33,6 @@ from verify.solvers.interface import is_built_in
 from verify.verdict import with_verdicts
 from verify.whole_files import write_whole
 
-__all__ = ["main"]
-
 REFERENCE = "reference"
 _WILD = 1e3  # sizes of its body: a solution that moves farther has no openings to look at
 

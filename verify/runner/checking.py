@@ -9,8 +9,6 @@ from verify.scene.nearest import nearest
 from verify.solvers import solver_names
 from verify.solvers.named import parameters_in, solver_in
 
-__all__ = ["check_scene", "check_solver_name"]
-
 
 def check_scene(scene: Scene) -> None:
     """Raise `InputError` if something that `scene` names is not there or is bad."""

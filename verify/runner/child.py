@@ -22,8 +22,6 @@ from uuid import uuid4
 from verify.threads import ONE_THREAD
 from verify.warm import PARENT_VARIABLE, Forked, fork
 
-__all__ = ["POLL_SECONDS", "Child", "Ending", "descendants"]
-
 POLL_SECONDS = 0.02
 _MARK_VARIABLE = "VERIFY_CHILD"
 _LONGEST_LOG = 64 * 2**20  # bytes; beyond, only its beginning and what comes next are kept

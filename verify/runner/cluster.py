@@ -17,8 +17,6 @@ from verify.runner.remote import solve_remotely
 from verify.scene import MeshFile, mesh_path, restore_scene
 from verify.whole_files import write_whole
 
-__all__ = ["ClusterEngine"]
-
 _CONNECT_SECONDS = 15.0
 
 

@@ -19,8 +19,6 @@ from verify.runner.outcome import death
 from verify.runner.unjudged import unjudged_result
 from verify.scene import Scene
 
-__all__ = ["LEAST_SECONDS", "Comparison", "stored_result"]
-
 LEAST_SECONDS = 60.0
 
 

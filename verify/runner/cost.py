@@ -17,8 +17,6 @@ from verify.scene import Box, MeshFile, Polygon, Rectangle, Scene, read_mesh
 from verify.solvers.interface import is_built_in
 from verify.solvers.named import solver_in
 
-__all__ = ["LevelCost", "case_cost", "solver_costs"]
-
 REFERENCE = "reference"
 _FENICSX = ("conforming", REFERENCE)
 _BESIDE = {True: 0.8, False: 0.25}  # s of a process that is no solve, with FEniCSx and without

@@ -7,8 +7,6 @@ from verify.runner.job import Job, stored_record
 from verify.runner.plan import CasePlan
 from verify.runner.reference_cache import REFERENCE
 
-__all__ = ["further_level", "levels_in_vain", "take_up_known_levels"]
-
 _FEWEST = 3  # levels from which a reference has an error bar
 
 

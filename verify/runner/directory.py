@@ -23,8 +23,6 @@ from verify.errors import InputError
 from verify.json_files import read_json, write_json
 from verify.whole_files import asked_place
 
-__all__ = ["RUN_SCHEMA", "RunDirectory", "claimed", "emptied", "write_run"]
-
 RUN_SCHEMA = 1
 _IDENTITY = ("cases", "options_of_result")
 

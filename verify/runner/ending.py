@@ -10,16 +10,6 @@ from collections.abc import Sequence
 
 from verify.result import CaseResult, Status, Verdict
 
-__all__ = [
-    "ALL_PASS",
-    "BAD_INPUT",
-    "NOTHING_RAN",
-    "ONLY_WARNINGS",
-    "SOLVER_FAILED",
-    "VERDICT_FAILED",
-    "exit_code",
-]
-
 ALL_PASS = 0
 VERDICT_FAILED = 1
 BAD_INPUT = 2

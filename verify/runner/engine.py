@@ -6,8 +6,6 @@ from typing import Any, Protocol
 from verify.runner.child import Child, Ending
 from verify.solvers.interface import is_built_in
 
-__all__ = ["Engine", "LocalEngine", "Running"]
-
 
 class Running(Protocol):
     """A solve that was started; it writes its files into the folder of its job."""

@@ -17,8 +17,6 @@ from verify.scene import Scene
 from verify.solution import Solution
 from verify.whole_files import whole_file
 
-__all__ = ["Truth", "nodal_differences", "nodal_error", "truth_of", "write_error_field"]
-
 Array = NDArray[np.float64]
 Truth = Callable[[float], Field]  # the reference or exact field at an output time, s
 

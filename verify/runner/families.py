@@ -5,8 +5,6 @@ from collections.abc import Iterable, Sequence
 from verify.result import CaseResult
 from verify.scene import RatioCheck, Scene
 
-__all__ = ["Families"]
-
 
 class Families:
     """The scenes of a run, and which of them wait for which.

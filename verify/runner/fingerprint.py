@@ -15,15 +15,6 @@ from verify.scene import MeshFile, Scene, mesh_path
 from verify.solvers.interface import is_built_in
 from verify.solvers.named import solver_in
 
-__all__ = [
-    "bytes_digest",
-    "code_of_comparison",
-    "code_of_solver",
-    "digest_of",
-    "file_digest",
-    "physics_digest",
-]
-
 _PACKAGE = Path(verify.__file__).resolve().parent
 # what can change any solution, and those of solvers that are built on our own methods
 _SOLVING = (

@@ -11,16 +11,6 @@ from verify.result import SolveRecord, Status
 from verify.result_files import checked
 from verify.runner.fingerprint import file_digest
 
-__all__ = [
-    "Job",
-    "check_files",
-    "load_record",
-    "record_of",
-    "solution_files",
-    "store_record",
-    "stored_record",
-]
-
 
 @dataclass(frozen=True)
 class Job:

@@ -5,8 +5,6 @@ from pathlib import Path
 
 from verify.printable import one_line
 
-__all__ = ["telling_line"]
-
 _FATAL = re.compile(r"^Fatal Python error: (.+)")  # faulthandler's headline of a crash
 _TELLING = re.compile(r"error|exception|abort|killed|fail|cannot|not found", re.IGNORECASE)
 _LONGEST = 300

@@ -9,8 +9,6 @@ from verify.runner.job import Job
 from verify.runner.reference_cache import REFERENCE
 from verify.scene import Scene
 
-__all__ = ["model_jobs"]
-
 
 def model_jobs(scene: Scene, folder: Path) -> tuple[list[Job], dict[str, Scene]]:
     """Lay out the reference's solves of the other models of a scene.

@@ -8,8 +8,6 @@ from verify.runner.options import Options
 from verify.runner.plan import CasePlan
 from verify.runner.reference_cache import REFERENCE
 
-__all__ = ["order_of_solves"]
-
 
 def order_of_solves(plans: Sequence[CasePlan], options: Options) -> list[Job]:
     """Return the solves of a run in the order in which they are begun.

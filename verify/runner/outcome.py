@@ -11,8 +11,6 @@ from verify.result_files import checked
 from verify.runner.child import Ending
 from verify.runner.log import telling_line
 
-__all__ = ["death", "outcome_in"]
-
 
 def outcome_in(folder: Path) -> dict[str, Any] | None:
     """Return what a solve left in `folder` as fields of a record, with ``peak_memory``.

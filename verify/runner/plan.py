@@ -22,8 +22,6 @@ from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solvers.named import parameters_of
 
-__all__ = ["CasePlan", "Survey", "check_judged", "plan_case", "solvers_of", "survey_solvers"]
-
 Survey = dict[str, dict[str, Any]]
 
 

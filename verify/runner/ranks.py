@@ -15,8 +15,6 @@ from verify.errors import InputError
 from verify.json_files import write_json
 from verify.runner.childhood import die_with_parent, under_a_launcher
 
-__all__ = ["RANKS_VARIABLE", "give_up", "main", "mpiexec", "world"]
-
 RANKS_VARIABLE = "VERIFY_RANKS"
 _WAIT_SECONDS = 2.0
 

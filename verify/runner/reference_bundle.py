@@ -23,8 +23,6 @@ from verify.runner.reference_cache import Entry, ReferenceCache, read_entry
 from verify.scene import Scene
 from verify.whole_files import asked_place, whole_file, write_whole
 
-__all__ = ["ReferenceBundle", "write_bundle"]
-
 BUNDLE_SCHEMA = 1
 _CONTENTS = "bundle.json"
 # what is read of others: a bundle of ours unpacks to some ten times its size

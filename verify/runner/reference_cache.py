@@ -34,8 +34,6 @@ from verify.runner.job import Job, is_file_name, solution_files
 from verify.scene import Scene
 from verify.whole_files import whole_file
 
-__all__ = ["REFERENCE", "Entry", "ReferenceCache", "cache_folder", "current_key", "read_entry"]
-
 REFERENCE = "reference"
 ENTRY_SCHEMA = 1
 _ENTRY = "entry.json"

@@ -14,8 +14,6 @@ from verify.provenance import provenance
 from verify.runner.child import POLL_SECONDS, Child
 from verify.runner.fingerprint import code_of_solver
 
-__all__ = ["solve_remotely"]
-
 _LOOK_SECONDS = 1.0
 
 

@@ -38,8 +38,6 @@ from verify.solvers.interface import is_built_in
 from verify.warm import DRAWING, prepare_fork, warm_parent
 from verify.whole_files import write_whole
 
-__all__ = ["Progress", "RunSummary", "comparison_label", "run_cases"]
-
 
 class Progress(Protocol):
     """Who is told how the run goes."""

@@ -8,8 +8,6 @@ from verify.errors import InputError
 from verify.scene import RatioCheck, Scene, list_cases, load_scenes
 from verify.scene.family import row_asked
 
-__all__ = ["parse_expression", "select_cases"]
-
 Predicate = Callable[[Scene], bool]
 _TOKEN = re.compile(r"\(|\)|[^\s()]+")
 

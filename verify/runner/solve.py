@@ -20,8 +20,6 @@ from verify.result import COMPILING, CRITICAL_STEP, Status
 from verify.runner.childhood import die_with_parent, peak_memory
 from verify.runner.ranks import give_up, world
 
-__all__ = ["main", "solve_job"]
-
 _WORTH_SAYING = 0.5  # seconds of compilation
 _LONGEST = 400  # characters of a reason
 _LARGE = 30_000  # unknowns from which an eigenvalue takes longer than many a motion

@@ -19,8 +19,6 @@ from verify.runner.childhood import ANSWER, ASKING, die_with_parent
 from verify.runner.fingerprint import digest_of, file_digest
 from verify.whole_files import write_whole
 
-__all__ = ["main", "survey"]
-
 _NONE: Mapping[str, Any] = MappingProxyType({})
 
 

@@ -11,8 +11,6 @@ from verify.result import CaseResult, SolveRecord, Verdict
 from verify.runner.job import load_record
 from verify.scene import Scene, scene_hash
 
-__all__ = ["unjudged_result"]
-
 
 def unjudged_result(
     scene: Scene,

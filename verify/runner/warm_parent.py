@@ -30,8 +30,6 @@ from verify.runner.child import descendants
 from verify.runner.childhood import die_with_parent
 from verify.warm import DRAWING, LONGEST_REQUEST, PARENT_VARIABLE
 
-__all__ = ["main"]
-
 # by what is asked for, in the order in which a run asks; each needs the modules before it too
 _NEEDED = {
     "verify.runner.survey": ("verify.runner.survey", "verify.solvers.xfem"),

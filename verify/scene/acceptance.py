@@ -6,22 +6,6 @@ from pydantic import Field, field_validator, model_validator
 
 from verify.scene.strict import Finite, Line, NonNegative, Point3, Positive, Strict, Vector
 
-__all__ = [
-    "Acceptance",
-    "BoundCheck",
-    "DisplacementQuantity",
-    "KnownFinding",
-    "MaximumDisplacementQuantity",
-    "OpeningQuantity",
-    "PartQuantity",
-    "Quantity",
-    "RateCheck",
-    "RatioCheck",
-    "StrainEnergyQuantity",
-    "StressIntensityQuantity",
-    "ValueCheck",
-]
-
 # of a cut; near and far: closer to a tip or front than a tenth of its cut, and the rest
 OF_CUTS = ("jump_l2", "opening_l2", "opening_max", "jump_l2_max", "jump_l2_mean")
 # max and mean: over time; the last nine need no reference

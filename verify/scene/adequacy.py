@@ -4,8 +4,6 @@ from pydantic import Field
 
 from verify.scene.strict import Strict
 
-__all__ = ["Adequacy"]
-
 
 class Adequacy(Strict):
     """Cheaper or richer models that are measured beside the verdict, which they do not move."""

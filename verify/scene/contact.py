@@ -6,8 +6,6 @@ from pydantic import Field
 
 from verify.scene.strict import Strict
 
-__all__ = ["Contact"]
-
 
 class Contact(Strict):
     """Contact of faces. No solver here has a contact model: faces that close overlap."""

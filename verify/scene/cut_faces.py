@@ -11,8 +11,6 @@ from verify.scene.spatial_cuts import SpatialCut
 if TYPE_CHECKING:
     from verify.scene.scene import Scene
 
-__all__ = ["Faces", "distance_to_cuts", "faces_of"]
-
 Array = NDArray[np.float64]
 
 _CHUNK = 2**20  # pairs of points and parts of a cut at a time

@@ -28,8 +28,6 @@ from verify.scene.spatial import (
 from verify.scene.spatial_cuts import SpatialCut
 from verify.scene.tables import SceneTables
 
-__all__ = ["check_cuts", "check_points"]
-
 Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-9  # of the size of what is compared

@@ -15,8 +15,6 @@ from verify.scene.physics import Traction
 from verify.scene.regions import parse_region
 from verify.scene.tables import SceneTables
 
-__all__ = ["check_parts_act", "check_parts_of_mesh"]
-
 Array = NDArray[np.float64]
 
 _PER_EDGE = 4096  # samples of an edge of the boundary of an unstructured mesh

@@ -17,8 +17,6 @@ from verify.errors import InputError
 from verify.printable import shown
 from verify.scene.regions import RESERVED_NAMES, parse_expression, parse_region
 
-__all__ = ["Row", "expand_rows", "row_asked", "rows_schema"]
-
 _MOST = 64  # values of a parameter
 _KEY, _WHEN = "parameters", "when"
 _PROSE = {"title", "requirement", "tags", "name", "reason", "source"}

@@ -11,8 +11,6 @@ from verify.scene.planar import polygon_defect
 from verify.scene.skin import Skin
 from verify.scene.strict import Point2, Point3, Strict
 
-__all__ = ["Box", "Geometry", "MeshFile", "Polygon", "Rectangle"]
-
 _SIDES = ("left", "right", "bottom", "top", "front", "back")
 
 

@@ -9,8 +9,6 @@ from pydantic import AfterValidator, Field
 
 from verify.scene.strict import Finite, NonNegative
 
-__all__ = ["History", "factor_at", "first_factor", "jumps", "slope_at"]
-
 
 def _ordered(history: list[tuple[float, float]]) -> list[tuple[float, float]]:
     times = [time for time, _ in history]

@@ -10,8 +10,6 @@ from verify.errors import InputError
 from verify.scene.physics import field_values
 from verify.scene.strict import Components, Finite, Point3, Strict, Vector
 
-__all__ = ["AtRest", "Equilibrium", "Initial", "InitialField", "Moving", "starts_open"]
-
 _LARGEST = 30.0  # of a velocity like r^-½: a tip less than 1/1000 of a cell away
 
 

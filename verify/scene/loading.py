@@ -24,18 +24,6 @@ from verify.scene.nearest import nearest
 from verify.scene.scene import Scene
 from verify.whole_files import read_bounded
 
-__all__ = [
-    "case_folder",
-    "list_cases",
-    "load_scene",
-    "load_scenes",
-    "mesh_path",
-    "restore_scene",
-    "scene_content",
-    "scene_hash",
-    "scene_schema",
-]
-
 _LARGEST = 2**23  # bytes; the longest case that comes with the project has 6 kB
 _DEEPEST, _PARTS = 20, 20
 # a dotted key takes tomllib the square of the number of its parts

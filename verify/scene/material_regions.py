@@ -8,8 +8,6 @@ from verify.scene.planar import inside_polygon
 from verify.scene.regions import parse_region
 from verify.scene.tables import SceneTables
 
-__all__ = ["check_material_regions", "check_regions_of_mesh"]
-
 Array = NDArray[np.float64]
 
 _SAMPLES = 2**16  # of the body: a region of less than about 1e-4 of it may be missed

@@ -9,8 +9,6 @@ from pydantic import Field, model_validator
 from verify.scene.regions import parse_region
 from verify.scene.strict import Positive, Strict
 
-__all__ = ["Material", "MaterialRegion", "Moduli", "crossed_by_interfaces"]
-
 Array = NDArray[np.float64]
 
 _INWARDS = 1e-6  # of the way from a corner of a cell to its centroid

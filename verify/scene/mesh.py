@@ -7,8 +7,6 @@ from pydantic import Field, model_validator
 
 from verify.scene.strict import Count, Positive, Strict
 
-__all__ = ["MeshLevels", "ReferenceLevels"]
-
 CellCounts = tuple[Count, ...]
 
 

@@ -9,8 +9,6 @@ from verify.scene.geometry import MeshFile
 from verify.scene.loading import mesh_path
 from verify.scene.scene import Scene
 
-__all__ = ["read_mesh"]
-
 _SIMPLEX = {2: "triangle", 3: "tetra"}
 _BELOW = {2: {"vertex", "line"}, 3: {"vertex", "line", "triangle"}}  # parts, which are not used
 

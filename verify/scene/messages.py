@@ -8,8 +8,6 @@ from pydantic import ValidationError
 from verify.printable import shown
 from verify.scene.nearest import nearest
 
-__all__ = ["first_fault"]
-
 
 def first_fault(error: ValidationError, content: dict[str, Any], schema: dict[str, Any]) -> str:
     """Say the most telling of pydantic's errors in one line.

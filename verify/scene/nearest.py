@@ -3,8 +3,6 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-__all__ = ["nearest"]
-
 
 def nearest(word: str, words: Iterable[str]) -> str:
     """Give a phrase to put behind "no such …": the nearest of `words`, or all of them."""

@@ -8,8 +8,6 @@ from verify.scene.geometry import Box, Geometry, Polygon, Rectangle
 from verify.scene.regions import parse_region
 from verify.scene.scene import Scene
 
-__all__ = ["copies_on_part", "lie_on_part", "on_edges", "on_part"]
-
 _TOLERANCE = 1e-9  # of the body's size: a point closer than that to a part is on it
 
 

@@ -21,22 +21,6 @@ from verify.scene.strict import (
     Vector,
 )
 
-__all__ = [
-    "Analysis",
-    "BodyForce",
-    "CutFaces",
-    "Exact",
-    "Gravity",
-    "Load",
-    "Rotation",
-    "Support",
-    "Traction",
-    "field_rates",
-    "field_values",
-    "is_timed",
-    "is_uniform",
-]
-
 _OUTPUTS = 11
 
 

@@ -26,8 +26,6 @@ from verify.scene.spatial_cuts import DiscCut, PolygonCut
 from verify.scene.tables import SceneTables
 from verify.scene.tool_path import ToolPathCut
 
-__all__ = ["boundary_condition_names", "check_placement"]
-
 _ON_FRONT = 1e-3  # of the radius or the edge: what is given in a few digits is on the front
 # quantities that need no name of their own
 _QUANTITIES = ("strain_energy", "maximum_displacement")

@@ -5,17 +5,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "distance_to_outline",
-    "distance_to_polyline",
-    "inner_parts",
-    "inside_polygon",
-    "overlap_length",
-    "point_along",
-    "polygon_defect",
-    "polyline_defect",
-]
-
 Array = NDArray[np.float64]
 
 

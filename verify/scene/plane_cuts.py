@@ -9,8 +9,6 @@ from pydantic import Field, model_validator
 from verify.scene.planar import polyline_defect
 from verify.scene.strict import Finite, Line, NonNegative, Point2, Positive, Strict
 
-__all__ = ["ArcCut", "PlaneCut", "PolylineCut"]
-
 
 class PolylineCut(Strict):
     """A polyline in the plane; what lies left of its direction is its positive side."""

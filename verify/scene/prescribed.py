@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from verify.scene.history import factor_at, slope_at
 from verify.scene.physics import Support
 
-__all__ = ["PrescribedMotion"]
-
 Array = NDArray[np.float64]
 
 

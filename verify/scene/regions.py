@@ -16,16 +16,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = [
-    "RESERVED_NAMES",
-    "Expression",
-    "Region",
-    "Side",
-    "comparisons",
-    "parse_expression",
-    "parse_region",
-]
-
 Array = NDArray[np.float64]
 Region = Callable[[Array], NDArray[np.bool_]]
 Side = Callable[[Array], Array]

@@ -9,8 +9,6 @@ from pydantic import Field, model_validator
 
 from verify.scene.strict import Count, NonNegative, Positive, Strict, Vector
 
-__all__ = ["Pull", "Replay"]
-
 
 class Pull(Strict):
     """A hook in the material beside a cut, moved or loaded from some time on."""

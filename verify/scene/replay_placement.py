@@ -4,8 +4,6 @@ from verify.scene.nearest import nearest
 from verify.scene.tables import SceneTables
 from verify.scene.tool_path import ToolPathCut
 
-__all__ = ["check_replay"]
-
 
 def check_replay(scene: SceneTables) -> None:
     """Raise ValueError if tool paths, pulls or surfaces do not fit the rest of the scene."""

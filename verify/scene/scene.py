@@ -9,8 +9,6 @@ from verify.scene.placement import check_placement
 from verify.scene.replay_placement import check_replay
 from verify.scene.tables import SceneTables
 
-__all__ = ["Scene"]
-
 
 class Scene(SceneTables):
     """One case. Solver-neutral: it says what is asked, never how a solver shall do it."""

@@ -7,8 +7,6 @@ from pydantic import Field, model_validator
 
 from verify.scene.strict import Count, Positive, Strict
 
-__all__ = ["Skin"]
-
 
 class Skin(Strict):
     """A face or the back of a hand, or a surface file; its part ``rim`` is its outer border.

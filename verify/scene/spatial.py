@@ -3,16 +3,6 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "area_inside",
-    "distance_to_triangles",
-    "ear_clipping",
-    "frame",
-    "length_inside",
-    "overlap_area",
-    "rim_edges",
-]
-
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 

@@ -10,8 +10,6 @@ from verify.scene.planar import polygon_defect, polyline_defect
 from verify.scene.spatial import ear_clipping, frame
 from verify.scene.strict import Finite, Line, NonNegative, Point3, Positive, Strict
 
-__all__ = ["CylinderCut", "DiscCut", "PolygonCut", "SpatialCut", "SphereCut", "SweptCut"]
-
 Array = NDArray[np.float64]
 Surface = tuple[Array, NDArray[np.int64]]
 

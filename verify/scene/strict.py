@@ -4,20 +4,6 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = [
-    "Components",
-    "Count",
-    "Finite",
-    "Formula",
-    "Line",
-    "NonNegative",
-    "Point2",
-    "Point3",
-    "Positive",
-    "Strict",
-    "Vector",
-]
-
 # `strict`: a number is a number; "1e4" and true are not
 # and none is so large that its powers are not
 _LARGEST = 1e60

@@ -18,8 +18,6 @@ from verify.scene.skin import Skin
 from verify.scene.strict import Line, Strict
 from verify.scene.tool_path import ToolPathCut
 
-__all__ = ["SceneTables"]
-
 
 def _strain_energy_only() -> list[Quantity]:
     return [StrainEnergyQuantity(kind="strain_energy")]

@@ -18,8 +18,6 @@ from verify.scene.plane_cuts import PolylineCut
 from verify.scene.spatial_cuts import PolygonCut, SweptCut
 from verify.scene.strict import Finite, Line, Point3, Positive, Strict, Vector
 
-__all__ = ["ToolPathCut"]
-
 Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 _SAME = 1e-9  # of a length: two this close are one

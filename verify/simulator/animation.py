@@ -22,17 +22,6 @@ from verify.errors import InputError
 from verify.simulator.surfaces import Picture
 from verify.whole_files import whole_file, write_whole
 
-__all__ = [
-    "Frame",
-    "Underlay",
-    "View",
-    "scale_length",
-    "view_of",
-    "write_animation",
-    "write_film",
-    "write_picture",
-]
-
 _Floats = NDArray[np.float64]
 
 _SKIN, _FLESH, _FAT, _STEEL = "#e8b79b", "#a8322a", "#e8bf62", "#8b98a5"

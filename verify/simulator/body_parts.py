@@ -14,8 +14,6 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["BodyParts"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -10,8 +10,6 @@ from verify.xfem.body import MovingSupports
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Grips", "gripped", "held_facets", "held_unknowns"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

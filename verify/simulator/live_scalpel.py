@@ -7,8 +7,6 @@ from verify.simulator.session import Session
 from verify.xfem.cuts import ToolPath
 from verify.xfem.errors import XfemError
 
-__all__ = ["LiveScalpel"]
-
 _Floats = NDArray[np.float64]
 
 _STEP = 0.2  # of the mean edge: nearer points of the hand add nothing to the path

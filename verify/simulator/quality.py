@@ -12,8 +12,6 @@ from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.session import Session
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["Quality", "deformation_gradients", "quality_of"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -21,8 +21,6 @@ from verify.xfem.energy_balance import BalanceRecorder
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.real_time import RealTimeEuler
 
-__all__ = ["Session"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -5,8 +5,6 @@ from numpy.typing import NDArray
 
 from verify.simulator.surfaces import Picture
 
-__all__ = ["place_in_sight"]
-
 _Floats = NDArray[np.float64]
 
 

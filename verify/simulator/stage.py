@@ -10,8 +10,6 @@ from verify.xfem.cuts import ToolPath
 from verify.xfem.elasticity import Material
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["Hold", "Hook", "Stage"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

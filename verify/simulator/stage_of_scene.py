@@ -20,8 +20,6 @@ from verify.xfem.elasticity import Material, isotropic
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["stage_of"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

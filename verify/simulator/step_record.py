@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PHASES", "StepRecord"]
-
 # in the order in which a step goes through them
 PHASES = ("cutting", "assembly", "motion", "mapping", "collision")
 

@@ -5,8 +5,6 @@ from pathlib import Path
 from verify.whole_files import write_whole
 from verify.xfem.cuts import ToolPath
 
-__all__ = ["stroke_text", "write_stroke"]
-
 
 def stroke_text(path: ToolPath, name: str = "stroke") -> str:
     """Say a path of a straight blade as a ``[[cuts]]`` of kind ``tool_path``, in TOML."""

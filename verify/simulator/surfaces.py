@@ -14,8 +14,6 @@ from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.simulator.stage import Stage
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Picture", "Surfaces"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

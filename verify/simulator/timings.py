@@ -12,8 +12,6 @@ import numpy as np
 
 from verify.simulator.step_record import PHASES, StepRecord
 
-__all__ = ["LIMITS", "Spread", "Timings", "timings_of"]
-
 LIMITS = {"1 ms": 1e-3, "2 ms": 2e-3, "1/60 s": 1.0 / 60.0}  # touch, and sight
 
 

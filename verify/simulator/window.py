@@ -13,8 +13,6 @@ from verify.simulator.sight import place_in_sight
 from verify.simulator.stage import Stage
 from verify.simulator.stroke_file import write_stroke
 
-__all__ = ["PlayWindow", "play_in_window"]
-
 _DEPTH = 0.05  # of the body's size: how far the blade reaches from where it touches
 
 

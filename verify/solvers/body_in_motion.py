@@ -15,8 +15,6 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.supports import check_bodies
 
-__all__ = ["body_in_motion", "initial_state"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -20,14 +20,6 @@ from verify.xfem.elasticity import Material, State, isotropic
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
-__all__ = [
-    "across_interfaces",
-    "background_mesh",
-    "density_of",
-    "material_of",
-    "volumetric_mass",
-]
-
 
 def background_mesh(scene: Scene, level: int) -> tuple[SimplexMesh, float]:
     """Make the uncut mesh of a level.

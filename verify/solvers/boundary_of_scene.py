@@ -10,8 +10,6 @@ from verify.errors import InputError
 from verify.scene import Scene
 from verify.scene.parts import on_part
 
-__all__ = ["Boundary"]
-
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]
 

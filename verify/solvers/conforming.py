@@ -26,8 +26,6 @@ from verify.solvers.conforming_motion import SCHEMES, Marching, move, natural_st
 from verify.solvers.interface import check_choices
 from verify.system import System
 
-__all__ = ["ConformingSolver", "ReferenceSolver"]
-
 _RADIUS = 0.0  # of the reference behind a blade: what it leaves to the mesh is damped at once
 
 import_dolfinx()  # fail here, by name, and not in the middle of a solve

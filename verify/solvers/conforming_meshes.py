@@ -39,8 +39,6 @@ from verify.scene import (
 )
 from verify.scene.cuts import Cut
 
-__all__ = ["Structure", "not_imprinted", "peer_mesh", "reference_mesh", "structure"]
-
 Array = NDArray[np.float64]
 _WAY = {2: 1 / 16, 3: 1 / 2}  # size of elements along the way of a blade, over that far away
 Cells = NDArray[np.int64]

@@ -23,8 +23,6 @@ from verify.scene import Equilibrium, InitialField, Moving, Scene, ToolPathCut
 from verify.scene.cuts import Cut
 from verify.scene.initial import starts_open
 
-__all__ = ["SCHEMES", "ConformingMotion", "Marching", "move", "natural_step"]
-
 Array = NDArray[np.float64]
 _SAME = 1e-12  # of the duration: times that close are one
 _PASSED = 1e-9  # of the duration: what is passed so little later counts as passed

@@ -9,8 +9,6 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.quadrature import simplex_rule
 from verify.xfem.subdivision import Subdivision, subdivide
 
-__all__ = ["face_forces"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -23,8 +23,6 @@ from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath,
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tips import with_tip_nodes
 
-__all__ = ["EndNodes", "ToCut", "cuts_of", "to_cut"]
-
 Array = NDArray[np.float64]
 
 _ARC_SEGMENTS_PER_CELL = 8

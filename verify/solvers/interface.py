@@ -19,11 +19,6 @@ from verify.scene.nearest import nearest
 from verify.solution import Solution
 from verify.solvers.named import parameters_in, solver_in
 
-__all__ = [
-    "Solver", "check_choices", "check_parameters", "checked_levels", "checked_refusal",
-    "find_solver", "is_built_in", "solver_names",
-]  # fmt: skip
-
 # module:class, imported only when asked for, so that one solver's missing dependency
 # (FEniCSx, say) does not hinder the others
 _BUILT_IN = {

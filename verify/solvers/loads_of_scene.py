@@ -14,8 +14,6 @@ from verify.solvers.cut_face_loads import face_forces
 from verify.xfem.loads import body_force, traction
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["ForceDensity", "NodalForces", "forces_of", "is_moving", "loads_of", "nodal_forces"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -52,8 +52,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.statics import solve_static
 from verify.xfem.supports import check_bodies
 
-__all__ = ["MassSpringSolver", "MethodSolver"]
-
 _Floats = NDArray[np.float64]
 
 _SHEETS = ("subdivision", "removal", "virtual_node", "virtual_node_arbitrary", "uncut")

@@ -19,8 +19,6 @@ from verify.xfem.mass import Mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["MethodOpening"]
-
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 

@@ -27,8 +27,6 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import Mass
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Marching", "Motion", "OpeningBody"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -9,8 +9,6 @@ from typing import Any
 
 from verify.errors import InputError
 
-__all__ = ["one_name", "parameters_in", "parameters_of", "plain_value", "solver_in"]
-
 
 def one_name(asked: str) -> str:
     """Return `asked` with single spaces: how records and reports name this solver."""

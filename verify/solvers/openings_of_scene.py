@@ -13,8 +13,6 @@ from verify.solvers.cuts_of_scene import cuts_of
 from verify.xfem.cuts import Cut
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Openings", "opening_times", "openings_of", "seam_times", "stops_of"]
-
 _Floats = NDArray[np.float64]
 _DUE = 1e-9  # of the duration: times that close are one, steps added up are off by less
 

@@ -19,8 +19,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.subdivision import Subdivision
 
-__all__ = ["Answer", "Repeated", "check_steps", "errors_of_scene", "repeated", "solution_on"]
-
 _Floats = NDArray[np.float64]
 
 

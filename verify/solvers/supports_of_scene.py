@@ -16,8 +16,6 @@ from verify.xfem.body import MovingSupports
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports
 
-__all__ = ["initial_path", "motion_of_supports", "path_of_supports", "supports_of"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

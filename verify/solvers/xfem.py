@@ -30,8 +30,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import join_specks, treat_slivers
 
-__all__ = ["XfemSolver"]
-
 _BASES = ("sidewise", "shifted", "heaviside")
 _TIPS = ("inside", "through", "nearest", "partial")
 _KERNELS = {"fast": FAST, "plain": PLAIN}

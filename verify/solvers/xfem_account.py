@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.energy_balance import BalanceRecorder, EnergyBalance
 
-__all__ = ["Account"]
-
 _STATE = ("kinetic", "strain", "gravity")
 _DONE = {
     "load_work": "work_of_loads",

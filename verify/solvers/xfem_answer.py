@@ -14,8 +14,6 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.slivers import SliverReport, Specks
 from verify.xfem.subdivision import Subdivision, subdivide
 
-__all__ = ["joined", "penalised", "solution_of", "treated"]
-
 
 def solution_of(scene: Scene, done: Repeated[Answer], notes: dict[str, str]) -> Solution:
     """Put an answer on the conforming mesh of its cut body.

@@ -26,8 +26,6 @@ from verify.xfem.internal_force import InternalForce
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
 
-__all__ = ["held_in_basis", "solve_in_basis"]
-
 
 def solve_in_basis(
     phantom: PhantomMesh,

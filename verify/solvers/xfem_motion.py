@@ -26,8 +26,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import treat_slivers
 
-__all__ = ["Cutting", "XfemOpening"]
-
 _Floats = NDArray[np.float64]
 
 

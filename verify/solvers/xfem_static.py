@@ -23,8 +23,6 @@ from verify.xfem.phantom import PhantomMesh
 from verify.xfem.statics import solve_static
 from verify.xfem.supports import Supports, check_bodies
 
-__all__ = ["Equilibrium", "dismissed_equilibria", "path_notes", "solve_equilibrium"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -23,8 +23,6 @@ from verify.xfem.mass_variants import (
 )
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["MASSES", "SCHEMES", "integrator_of", "largest_step"]
-
 SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {
     "newmark": Trapezoidal,
     "implicit_euler": ImplicitEuler,

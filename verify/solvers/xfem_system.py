@@ -18,8 +18,6 @@ from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["system_of"]
-
 
 def system_of(
     scene: Scene,

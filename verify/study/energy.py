@@ -17,8 +17,6 @@ from verify.study.measured_scenes import (
 )
 from verify.study.variants import Variant
 
-__all__ = ["account_findings", "energy_study"]
-
 _DRIFT = 1e-2  # of the energy in play: what a spectator would not see
 _KEPT = 1e-8
 # momenta are in the table: the supports of most scenes change them

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from verify.result import Verdict
 
-__all__ = ["Finding"]
-
 
 @dataclass(frozen=True)
 class Finding:

@@ -10,8 +10,6 @@ from multiprocessing import get_context
 from verify.runner.childhood import die_with_parent
 from verify.warm import PARENT_VARIABLE
 
-__all__ = ["in_processes"]
-
 
 def in_processes[T](
     function: Callable[..., T], arguments: Sequence[tuple[object, ...]], processes: int

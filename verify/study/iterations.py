@@ -22,8 +22,6 @@ from verify.study.finding import Finding
 from verify.study.record import Study
 from verify.study.variants import Variant
 
-__all__ = ["Grid", "IterationsStudy", "Setting", "iterations_study"]
-
 Array = NDArray[np.float64]
 
 

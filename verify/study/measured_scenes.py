@@ -20,14 +20,6 @@ from verify.study.in_processes import in_processes
 from verify.study.record import Study
 from verify.study.variants import Variant
 
-__all__ = [
-    "MeasuredStudy",
-    "Measurement",
-    "measured_families",
-    "measured_scenes",
-    "missing_solutions",
-]
-
 # quantity, unit, value, reason and, if the case states one, limit
 Row = tuple[str, str, float | None, str] | tuple[str, str, float | None, str, float]
 Further = Callable[[Solver, Variant, Scene, int], Iterator[Row]]

@@ -12,8 +12,6 @@ from verify.provenance import provenance
 from verify.study.finding import Finding
 from verify.whole_files import write_whole
 
-__all__ = ["SCHEMA", "Study", "make_directory", "write_study"]
-
 SCHEMA = 1
 
 

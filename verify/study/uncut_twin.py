@@ -6,8 +6,6 @@ from typing import Any
 from verify.scene import Scene
 from verify.system import System, checked_system
 
-__all__ = ["with_uncut_twin"]
-
 
 def with_uncut_twin(
     system: Any, scene: Scene, level: int, parameters: Mapping[str, Any]

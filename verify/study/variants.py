@@ -8,8 +8,6 @@ from typing import Any
 from verify.solvers import Solver, check_parameters, find_solver
 from verify.solvers.named import one_name, parameters_in, solver_in
 
-__all__ = ["Variant", "variant_of"]
-
 
 @dataclass(frozen=True)
 class Variant:

@@ -12,8 +12,6 @@ from scipy.sparse import csr_array
 
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["absorb", "renumber"]
-
 _Ints = NDArray[np.int64]
 
 

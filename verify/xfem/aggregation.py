@@ -20,8 +20,6 @@ from verify.xfem.absorption import renumber
 from verify.xfem.contacts import face_contacts
 from verify.xfem.phantom import Aggregation, PhantomMesh
 
-__all__ = ["Roots", "aggregate"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]

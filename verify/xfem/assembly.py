@@ -13,15 +13,6 @@ from verify.xfem.block_pattern import BlockPattern, block_pattern
 from verify.xfem.errors import XfemError
 from verify.xfem.phantom import Aggregation, PhantomMesh
 
-__all__ = [
-    "add_mass",
-    "body_pattern",
-    "constrain",
-    "find_places",
-    "held_entries",
-    "pattern_places",
-]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

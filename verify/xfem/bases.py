@@ -16,8 +16,6 @@ from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.given_arrays import check_choice
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Basis", "from_sidewise", "sidewise_from", "transformation", "transformed_matrix"]
-
 Basis = Literal["shifted", "heaviside"]
 
 _Floats = NDArray[np.float64]

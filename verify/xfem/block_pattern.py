@@ -10,8 +10,6 @@ from scipy.sparse import bsr_array, csr_array
 
 from verify.xfem.errors import XfemError
 
-__all__ = ["BlockPattern", "block_pattern", "symmetric_product"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int32]
 

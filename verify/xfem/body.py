@@ -22,20 +22,6 @@ from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
 from verify.xfem.supports import Supports, check_fixed
 
-__all__ = [
-    "DynamicBody",
-    "FreeMass",
-    "Integrator",
-    "MotionState",
-    "MovingSupports",
-    "RayleighDamping",
-    "StepFailedError",
-    "StepForces",
-    "check_state",
-    "check_step",
-    "couples_supports",
-]
-
 _Floats = NDArray[np.float64]
 
 

@@ -23,16 +23,6 @@ from numpy.typing import NDArray
 
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = [
-    "Partition",
-    "Simplices",
-    "Staircase",
-    "bisected",
-    "divided",
-    "staircase",
-    "staircase_entries",
-]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]

@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["face_contacts", "sibling_contacts"]
-
 _Ints = NDArray[np.int64]
 _Floats = NDArray[np.float64]
 

@@ -16,8 +16,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["RESONANCE_FREE", "critical_step", "element_critical_steps"]
-
 RESONANCE_FREE = float(np.sqrt(0.5))
 _DENSE = 400  # unknowns up to which all eigenvalues are cheaper than a Lanczos iteration
 

@@ -9,16 +9,6 @@ from numpy.typing import NDArray
 from verify.xfem.errors import XfemError
 from verify.xfem.flat_cuts import Cut
 
-__all__ = [
-    "AT_END",
-    "REACH",
-    "Crossing",
-    "Reached",
-    "TipRule",
-    "crossed_through",
-    "level_and_depth",
-]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

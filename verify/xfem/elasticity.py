@@ -9,8 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import check_choice, finite_array, real_array
 
-__all__ = ["Material", "State", "isotropic"]
-
 State = Literal["plane strain", "plane stress", "solid"]
 
 

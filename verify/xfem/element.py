@@ -24,20 +24,6 @@ from verify.xfem.elasticity import Material
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import adjugate
 
-__all__ = [
-    "Elements",
-    "add_blocks",
-    "add_force",
-    "add_moduli",
-    "add_rotation_fixed",
-    "consistent_moduli",
-    "deform",
-    "elements_of",
-    "geometric_stiffness",
-    "polar_slope",
-    "restricted",
-]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

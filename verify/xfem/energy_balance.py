@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from verify.xfem.body import DynamicBody, Integrator, MotionState, StepForces
 from verify.xfem.errors import XfemError
 
-__all__ = ["BalanceRecorder", "EnergyBalance", "run"]
-
 _Floats = NDArray[np.float64]
 
 

@@ -33,8 +33,6 @@ from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.polar import adjugate, nearest_rotations
 
-__all__ = ["EnergyMomentum", "StepEnds", "averaged_moduli", "averaged_stress"]
-
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 

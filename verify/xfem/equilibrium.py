@@ -13,8 +13,6 @@ from verify.xfem.rigid_motion import RigidMotions
 from verify.xfem.static_newton import Descent, Newton, NotInEquilibriumError
 from verify.xfem.supports import check_fixed
 
-__all__ = ["LoadPath", "PathCheck", "StaticEquilibrium", "static_equilibrium"]
-
 _Floats = NDArray[np.float64]
 
 _HALVINGS = 6  # of a load step

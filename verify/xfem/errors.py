@@ -1,7 +1,5 @@
 """Errors of the compact solver: wrong input, and systems that have no solution."""
 
-__all__ = ["BasisError", "NotConvergedError", "SingularStiffnessError", "XfemError"]
-
 
 class XfemError(ValueError):
     """Bad input to the compact solver: what it was, where, and what was expected."""

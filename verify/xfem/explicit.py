@@ -20,8 +20,6 @@ from verify.xfem.body import (
 )
 from verify.xfem.errors import XfemError
 
-__all__ = ["CentralDifferences", "ForwardEuler", "SymplecticEuler", "acceleration_of"]
-
 _Floats = NDArray[np.float64]
 
 

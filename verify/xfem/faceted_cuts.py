@@ -18,15 +18,6 @@ from verify.xfem.given_arrays import finite_array, index_array, places
 from verify.xfem.mesh import facets_of, neighbours_across
 from verify.xfem.nearest_points import foot_on_facet, nearest_on_facet, squared_distance
 
-__all__ = [
-    "FacetArrays",
-    "FacetCut",
-    "Polyline",
-    "TriangulatedSurface",
-    "facet_arrays",
-    "probe",
-]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -24,8 +24,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.faceted_cuts import Polyline
 from verify.xfem.given_arrays import finite_array, places
 
-__all__ = ["Cut", "ImplicitCut", "Plane", "PolygonPatch"]
-
 _Floats = NDArray[np.float64]
 
 

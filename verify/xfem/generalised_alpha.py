@@ -14,8 +14,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.linear_solvers import LinearSolver
 
-__all__ = ["GeneralisedAlpha"]
-
 _Floats = NDArray[np.float64]
 
 _JUMP = 1e-6  # of a load: it jumps if it changes by more within 1e-9 of a step

@@ -20,8 +20,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["DEFAULT_FACTOR", "GhostPenalty"]
-
 DEFAULT_FACTOR = 0.01  # least accuracy lost for a bounded condition number: see the docs on slivers
 
 _Floats = NDArray[np.float64]

@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.xfem.errors import XfemError
 
-__all__ = ["check_choice", "check_floats", "finite_array", "index_array", "places", "real_array"]
-
 
 def check_choice(given: str, choices: Any, what: str) -> None:
     """Check that a word is one of those that a Literal type lists.

@@ -19,8 +19,6 @@ from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.internal_force import TangentKind, inverted_cells
 from verify.xfem.linear_solvers import LinearSolver
 
-__all__ = ["ImplicitEuler", "NewtonIntegrator", "Trapezoidal"]
-
 _Floats = NDArray[np.float64]
 
 _HALVINGS = 10

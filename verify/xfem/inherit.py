@@ -18,8 +18,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.mass import AggregatedMass
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["ancestors", "inherit_state"]
-
 
 def inherit_state(
     old: PhantomMesh, new: PhantomMesh, state: MotionState, body: DynamicBody | None = None

@@ -28,8 +28,6 @@ from verify.xfem.kernels import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
 
-__all__ = ["InternalForce", "Kinematics", "TangentKind", "inverted_cells"]
-
 _Floats = NDArray[np.float64]
 Kinematics = Literal["corotational", "linear"]
 TangentKind = Literal["rotation-fixed", "geometric", "consistent", "tension"]

@@ -20,8 +20,6 @@ from verify.xfem.clip import Partition, staircase, staircase_entries
 from verify.xfem.mesh import SimplexMesh, facets_of
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["PatchNodes", "PieceSides", "join_parts", "node_sides", "number_nodes", "piece_sides"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]

@@ -21,8 +21,6 @@ from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["joint_cuts", "meeting_cells", "reached", "tied_pieces", "without_specks"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]

@@ -15,8 +15,6 @@ from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import Elements
 from verify.xfem.linear_solvers import BlockJacobiCG, LinearSolver, SparseLU
 
-__all__ = ["PLAIN", "Kernels", "OnePass"]
-
 _Floats = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
 

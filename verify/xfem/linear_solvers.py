@@ -11,8 +11,6 @@ from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
 from verify.xfem.given_arrays import check_floats
 
-__all__ = ["BlockJacobiCG", "LinearSolver", "SparseLU", "nodal_vector"]
-
 _Floats = NDArray[np.float64]
 
 _ROUND_OFF = 1e-14  # of the diagonal entry from which a pivot comes

@@ -15,8 +15,6 @@ from verify.xfem.given_arrays import finite_array, index_array
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.quadrature import simplex_rule
 
-__all__ = ["body_force", "traction"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

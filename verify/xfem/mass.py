@@ -21,16 +21,6 @@ from verify.xfem.given_arrays import finite_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import Aggregation, PhantomMesh
 
-__all__ = [
-    "AggregatedMass",
-    "Mass",
-    "assembled_mass",
-    "cell_densities",
-    "consistent_mass",
-    "second_moments",
-    "side_wise_mass",
-]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

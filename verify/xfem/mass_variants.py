@@ -38,13 +38,6 @@ from verify.xfem.mass import (
 )
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = [
-    "ShiftedLumping",
-    "eigenvalue_stabilised_mass",
-    "generalised_eigenvalue_stabilised_mass",
-    "shifted_mass",
-]
-
 _NEARLY_ZERO = 1e-3  # ε_λ: of the largest eigenvalue of the part's mass
 _ADDED = 1e-3  # ε_S: likewise
 _Floats = NDArray[np.float64]

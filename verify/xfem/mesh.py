@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import finite_array, index_array
 
-__all__ = ["SimplexMesh", "equal_rows", "facets_of", "neighbours_across"]
-
 # A cell whose volume is below this fraction of (longest edge)^dim is called degenerate: its
 # gradients would lose all digits.
 _DEGENERATE = 1e-14

@@ -8,12 +8,6 @@ do not take part, so that a caller can tell face, edge and vertex apart without 
 
 from numba import njit
 
-__all__ = [
-    "foot_on_facet",
-    "nearest_on_facet",
-    "squared_distance",
-]
-
 
 @njit(cache=True)
 def squared_distance(a, b):

@@ -22,8 +22,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import split_cells
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["Aggregation", "PhantomMesh", "SubCells", "cut_mesh"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -30,8 +30,6 @@ from verify.xfem.junctions import (
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["ROUND_OFF", "Held", "nodal_values", "split_cells"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]

@@ -12,15 +12,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = [
-    "adjugate",
-    "largest_eigenvector",
-    "nearest_rotations",
-    "rotation_matrices",
-    "rotations_in_plane",
-    "rotations_in_space",
-]
-
 _Floats = NDArray[np.float64]
 
 _NEWTON_STEPS = 12

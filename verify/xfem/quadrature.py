@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
-__all__ = ["simplex_rule"]
-
 
 @cache
 def simplex_rule(dim: int, degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -21,8 +21,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.supports import Supports
 
-__all__ = ["RealTimeEuler"]
-
 _Floats = NDArray[np.float64]
 
 _EXACT = 1e-10  # residual that conjugate gradients leave of the right-hand side of a step

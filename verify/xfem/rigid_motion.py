@@ -13,8 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["RigidMotions", "nearest_rotation", "part_of_rotation"]
-
 _Floats = NDArray[np.float64]
 
 _UNDETERMINED = 1e-9  # of the spread of the points: turns that they do not determine stay near 1

@@ -38,16 +38,6 @@ from verify.xfem.given_arrays import check_choice
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, loose_bodies
 
-__all__ = [
-    "DEFAULT_POLICY",
-    "DEFAULT_THRESHOLD",
-    "SliverPolicy",
-    "SliverReport",
-    "Specks",
-    "join_specks",
-    "treat_slivers",
-]
-
 SliverPolicy = Literal["keep", "drop", "merge"]
 
 DEFAULT_POLICY: SliverPolicy = "merge"

@@ -10,8 +10,6 @@ from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.statics import StaticSolver, is_large
 
-__all__ = ["Descent", "Newton", "NotInEquilibriumError", "Place", "collapsed_cells"]
-
 _Floats = NDArray[np.float64]
 
 _HALVINGS = 12

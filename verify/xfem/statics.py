@@ -18,8 +18,6 @@ from verify.xfem.kernels import PLAIN, Kernels
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
 
-__all__ = ["StaticSolution", "StaticSolver", "is_large", "solve_static"]
-
 _Floats = NDArray[np.float64]
 Method = Literal["auto", "direct", "iterative"]
 

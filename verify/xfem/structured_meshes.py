@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["Diagonal", "box_mesh", "rectangle_mesh"]
-
 Diagonal = Literal["right", "left", "alternating", "crossed"]
 
 

@@ -16,8 +16,6 @@ from verify.xfem.clip import Simplices, bisected
 from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Subdivision", "subdivide"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -10,8 +10,6 @@ from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import finite_array, index_array
 from verify.xfem.phantom import PhantomMesh
 
-__all__ = ["Supports", "UnsupportedBodyError", "check_bodies", "check_fixed", "loose_bodies"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

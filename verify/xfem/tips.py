@@ -21,8 +21,6 @@ from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import nodal_values
 
-__all__ = ["EndingCut", "TipNodes", "with_tip_nodes"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]

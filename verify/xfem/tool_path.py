@@ -18,8 +18,6 @@ from verify.xfem.faceted_cuts import FacetArrays, FacetCut, Polyline, facet_arra
 from verify.xfem.given_arrays import finite_array, places
 from verify.xfem.mesh import neighbours_across
 
-__all__ = ["PartOfSweep", "Sweep", "SweepSurface", "ToolPath"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

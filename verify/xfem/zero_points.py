@@ -8,8 +8,6 @@ position, and on the sign of every other cut there, to the last bit.
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ZeroPoints"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

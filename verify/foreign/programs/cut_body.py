@@ -10,8 +10,6 @@ import numpy as np
 from exchange_files import RefusedError, factor_at, loose_parts, parts
 from split_cells import SplitMesh, place, split_cells
 
-__all__ = ["Cut", "CutBody", "divided", "forces", "held_at_rest", "prescribed", "uniform_weight"]
-
 
 class Cut:
     """A cut as a level set, and where on its extension it really is."""

@@ -14,8 +14,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-__all__ = ["Case", "RefusedError", "loose_parts", "run"]
-
 _NUMPY = {
     "Float64": "<f8", "Float32": "<f4", "Int64": "<i8", "Int32": "<i4", "UInt8": "u1",
     "UInt32": "<u4", "UInt64": "<u8",

@@ -16,8 +16,6 @@ import time
 import numpy as np
 from exchange_files import RefusedError, factor_at, loose_parts
 
-__all__ = ["Stage", "run_engine"]
-
 _SAME = 1e-9  # of the duration: times that close are one
 _BEFORE = 1e-7  # of the duration: so much earlier a history has not jumped yet
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["SplitMesh", "place", "split_cells"]
-
 
 def split_cells(cells, phi):
     """Divide simplices in which the level set has both signs.

@@ -13,8 +13,6 @@ from verify.report.figures.style import drawing
 from verify.report.notation import RAISED
 from verify.report.view import View
 
-__all__ = ["colour_bar"]
-
 _LEAST = 1e-300  # below, numbers lose their digits
 
 

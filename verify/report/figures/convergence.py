@@ -9,8 +9,6 @@ from verify.report.curves import Curve, Point, floor, limits
 from verify.report.figures.style import Palette, Style, drawing, legend, log_axis, log_range, panel
 from verify.report.notation import number_text
 
-__all__ = ["error_panel", "error_range", "slope_triangle"]
-
 _BAND, _BAND_EDGE = "#e2e2e2", "#8f8f8f"
 
 Abscissa = Callable[[Point], float | None]

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from verify.report.blocks import Drawing
 from verify.report.figures.style import Palette, Style, drawing, legend, panel, plain_axis
 
-__all__ = ["profile_panel"]
-
 _DRAWABLE = 1e200  # what is larger, or no number, leaves a gap
 _PARTS = tuple(
     Style(colour, "", dashes=dashes)

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from verify.report.blocks import Drawing
 from verify.report.figures.style import drawing
 
-__all__ = ["cut_lines", "sketch"]
-
 _CUT, _HELD, _LOAD, _BODY = "#b3261e", "#0067a5", "#00785a", "#f1efe9"
 _DEPTH = np.array([0.42, 0.3])  # of the third axis in a cabinet projection
 # sides of a rectangle as corner numbers, and of a box as corner numbers of its faces

@@ -7,8 +7,6 @@ from verify.report.blocks import Figure
 from verify.report.figures.style import Palette, drawing, legend, log_axis, log_range, panel
 from verify.report.notation import solver_title
 
-__all__ = ["profiles_figure"]
-
 
 def profiles_figure(profiles: Sequence[Mapping[str, Any]]) -> Figure | None:
     """Return a panel for each profile of a ranking; None if no item was compared."""

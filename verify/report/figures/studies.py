@@ -11,8 +11,6 @@ from matplotlib.axes import Axes
 from verify.report.blocks import Drawing
 from verify.report.figures.style import Palette, drawing, legend, log_axis, log_range, panel
 
-__all__ = ["Bar", "Series", "bars", "loglog", "scatter"]
-
 _TOTAL, _PART = "#4d4d4d", "#0067a5"
 
 

@@ -17,8 +17,6 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 from verify.report.blocks import Drawing
 from verify.report.notation import RAISED, printable
 
-__all__ = ["Palette", "Style", "drawing", "legend", "log_axis", "log_range", "panel", "plain_axis"]
-
 _MOST = 300.0  # powers of ten that a number holds, with room for a tick beyond
 _GRID = "#e4e4e4"
 _RC = {

@@ -1,3 +1,1 @@
 """Skin to cut: made by formulas, cropped from a real body, or from a file of one's own."""
-
-__all__: list[str] = []

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["BaseMesh", "parse_base_mesh"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -12,8 +12,6 @@ from verify.errors import InputError
 from verify.simulator.anatomy.base_mesh import BaseMesh
 from verify.simulator.anatomy.surface_file import border_loops
 
-__all__ = ["Crop", "crop_face", "crop_hand"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

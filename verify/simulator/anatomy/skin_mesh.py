@@ -13,8 +13,6 @@ from verify.simulator.anatomy.store import stored_patch
 from verify.simulator.anatomy.surface_file import outer_border, read_surface
 from verify.simulator.anatomy.thicken import closed_shell, thicken
 
-__all__ = ["SkinMesh", "patch_of", "quartered", "skin_mesh", "skin_surface"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -13,8 +13,6 @@ from verify.errors import InputError
 from verify.simulator.anatomy.patch import Patch
 from verify.whole_files import write_whole
 
-__all__ = ["patch_file", "store_folder", "stored_patch", "write_patch"]
-
 _Floats = NDArray[np.float64]
 
 

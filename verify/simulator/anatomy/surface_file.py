@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.read_mesh import read_with_meshio
 
-__all__ = ["border_loops", "outer_border", "read_surface"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

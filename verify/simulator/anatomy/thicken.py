@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError
 
-__all__ = ["closed_shell", "thicken", "vertex_normals"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["distinct", "of_lists", "ranges"]
-
 _Ints = NDArray[np.int64]
 
 

@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 
 from verify.simulator.arrays.growing_array import GrowingArray
 
-__all__ = ["RowNumbers", "find_row", "first_of_new", "number_of_row"]
-
 _Ints = NDArray[np.int64]
 
 

@@ -12,8 +12,6 @@ from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.errors import XfemError
 from verify.xfem.nearest_points import nearest_on_facet
 
-__all__ = ["Contacts", "SurfaceCollider"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from verify.xfem.crossing import AT_END, REACH
 from verify.xfem.faceted_cuts import probe
 
-__all__ = ["WalkState", "WalkedMesh", "walk"]
-
 
 class WalkedMesh(NamedTuple):
     """Mesh, the longest edge (m,) of each cell, and below what a level set is zero, in metres."""

@@ -8,8 +8,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["BoundingTree"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -10,8 +10,6 @@ from verify.simulator.arrays.distinct import distinct
 from verify.simulator.cutting.patch import MeshPatch
 from verify.xfem.clip import Partition
 
-__all__ = ["Division"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -26,8 +26,6 @@ from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import ROUND_OFF, Held, split_cells
 
-__all__ = ["CutsNear", "GrowingBody", "Increment"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from verify.simulator.arrays.distinct import distinct, of_lists
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["MeshPatch", "PatchCutter"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

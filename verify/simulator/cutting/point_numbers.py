@@ -15,8 +15,6 @@ from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.arrays.row_numbers import RowNumbers, first_of_new, number_of_row
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["CUTS", "NODES", "FoundPoints", "PointNumbers"]
-
 _Ints = NDArray[np.int64]
 
 NODES, CUTS = 4, 3  # a point of a tetrahedron has at most that many

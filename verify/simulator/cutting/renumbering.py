@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from verify.simulator.cutting.division import Division
 
-__all__ = ["Renumbered", "Slots", "number_groups", "slots_before"]
-
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]
 

@@ -25,8 +25,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.tool_path import ToolPath
 
-__all__ = ["Crossings", "SemiProgressiveCutter"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -6,8 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["StoredPieces"]
-
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]
 _Labels = NDArray[np.int8]

@@ -14,8 +14,6 @@ from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import Sweep, ToolPath
 
-__all__ = ["SeenCut", "Stroke"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -7,8 +7,6 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.simulator.arrays.growing_array import GrowingArray
 
-__all__ = ["TiedParts"]
-
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]
 

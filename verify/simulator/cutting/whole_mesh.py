@@ -10,8 +10,6 @@ from verify.xfem.join import node_sides, piece_sides
 from verify.xfem.phantom import PhantomMesh, SubCells
 from verify.xfem.zero_points import ZeroPoints
 
-__all__ = ["whole_mesh"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

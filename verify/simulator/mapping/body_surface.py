@@ -17,8 +17,6 @@ from verify.simulator.mapping.exposed_kernels import exposed_facets
 from verify.simulator.mapping.membrane_facets import membrane_facets, rim_edges
 from verify.simulator.mapping.moving_surface import MovingSurface
 
-__all__ = ["BodySurface"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

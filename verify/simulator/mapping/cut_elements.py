@@ -7,13 +7,6 @@ from numpy.typing import NDArray
 
 from verify.simulator.cutting.growing_body import GrowingBody
 
-__all__ = [
-    "CutElements",
-    "SubSimplices",
-    "cut_elements",
-    "sub_simplices",
-]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

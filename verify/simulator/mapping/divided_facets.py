@@ -10,8 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["DividedFacets", "divide_facets"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from verify.simulator.arrays.row_numbers import find_row, number_of_row
 from verify.simulator.cutting.point_numbers import CUTS, NODES
 
-__all__ = ["LINE", "EdgeRecord", "bisect_facets", "record_points"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

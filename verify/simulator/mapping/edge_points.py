@@ -16,8 +16,6 @@ from verify.simulator.cutting.point_numbers import CUTS, PointNumbers
 from verify.simulator.mapping.edge_kernels import LINE, EdgeRecord, bisect_facets, record_points
 from verify.xfem.errors import XfemError
 
-__all__ = ["EdgePoints"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

@@ -23,8 +23,6 @@ from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.errors import XfemError
 from verify.xfem.pieces import ROUND_OFF, split_cells
 
-__all__ = ["EmbeddedSurface"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 _Bools = NDArray[np.bool_]

@@ -3,8 +3,6 @@
 import numpy as np
 from numba import njit
 
-__all__ = ["exposed_facets"]
-
 
 @njit(cache=True)
 def _same_facet(s, skip, t, other, sub_points):

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.xfem.mesh import SimplexMesh
 
-__all__ = ["MaterialPlaces"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

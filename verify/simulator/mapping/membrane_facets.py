@@ -7,8 +7,6 @@ from verify.simulator.arrays.distinct import ranges
 from verify.simulator.cutting.growing_body import GrowingBody
 from verify.simulator.mapping.moving_surface import MovingSurface
 
-__all__ = ["membrane_facets", "rim_edges"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

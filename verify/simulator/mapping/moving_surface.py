@@ -16,8 +16,6 @@ from verify.simulator.arrays.row_numbers import RowNumbers, first_of_new, number
 from verify.xfem.errors import XfemError
 from verify.xfem.given_arrays import check_floats
 
-__all__ = ["MovingSurface"]
-
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
 

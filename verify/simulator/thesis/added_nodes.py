@@ -23,8 +23,6 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import rectangle_mesh
 
-__all__ = ["THRESHOLDS", "FaceCount", "StripCount", "count_face", "count_strips"]
-
 THRESHOLDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)  # of an edge: nodes as near as that are snapped
 _HEIGHT = 0.43  # of the strip: away from nodes and from the middles of edges
 

@@ -11,8 +11,6 @@ from verify.simulator.cutting.semi_progressive import Crossings, SemiProgressive
 from verify.simulator.thesis.published import published_rows
 from verify.simulator.thesis.strokes import hand, stroke_along
 
-__all__ = ["SPEEDS", "Delay", "Frames", "delays", "with_other_frames"]
-
 SPEEDS = ("slow", "normal", "fast")
 _PLACES = (-0.021, 0.003, 0.025)  # m
 _FRAME = 1.0 / 60.0  # s

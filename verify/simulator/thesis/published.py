@@ -4,8 +4,6 @@ import json
 from functools import cache
 from importlib.resources import files
 
-__all__ = ["published_rows", "published_source"]
-
 
 @cache
 def _tables() -> dict[str, dict[str, list[list[float]]]]:

@@ -10,8 +10,6 @@ from verify.simulator import Session, Stage
 from verify.simulator.thesis.published import published_rows
 from verify.simulator.thesis.strokes import CutHand, cut_hand, hand
 
-__all__ = ["CUTS", "TETRAHEDRA", "StepTime", "step_times"]
-
 TETRAHEDRA = (200, 400, 600, 800, 1000)
 CUTS = (0, 50, 100, 150, 200)
 _STEP = 0.5  # s: the thesis' own

@@ -10,8 +10,6 @@ from verify.simulator import Stage, stage_of
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.xfem.cuts import ToolPath
 
-__all__ = ["CutHand", "cut_hand", "hand", "stroke_along"]
-
 # m, across the hand: the middle first, then ever denser; none along another
 _PLACES = (
     0.003, -0.021, 0.025, -0.009, 0.013, -0.031, 0.034, -0.015, 0.019, -0.003, 0.008, -0.026,

@@ -19,8 +19,6 @@ from verify.compare.integration import rules
 from verify.compare.motion import Motion
 from verify.study.budget.distances import Distances, Times, distances, norm_names
 
-__all__ = ["Answer", "Budget", "Part", "error_budget"]
-
 _ROUND_OFF = 1e-10  # relative: a thousand steps leave some 1e-13
 
 

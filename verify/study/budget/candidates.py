@@ -22,8 +22,6 @@ from verify.study.budget.distances import Times, distances, norm_names
 from verify.study.budget.links import Chain
 from verify.study.budget.solved import JUDGED, Solve, Solved
 
-__all__ = ["find_candidates"]
-
 _NONE = float("nan")
 _STANDARD = "trapezoidal, side-wise mass"
 # in words, and the parameters of the solver; what is left out by --quick comes last

@@ -31,8 +31,6 @@ from verify.study.budget.links import Chain, Missing, is_realised_as_asked, link
 from verify.study.budget.references import OUTSIDE, References
 from verify.study.budget.solved import CONFORMING, JUDGED, Solve
 
-__all__ = ["make_chain"]
-
 _FINER = 4  # an exact solution has no time step: the own one over this
 
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from verify.result import Verdict
 from verify.study.finding import Finding
 
-__all__ = ["Candidate", "cheapest_adequate"]
-
 
 @dataclass(frozen=True)
 class Candidate:

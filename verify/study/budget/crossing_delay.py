@@ -13,8 +13,6 @@ from verify.compare.sides import distance_to_cut
 from verify.scene import Scene, ToolPathCut
 from verify.solution import Solution
 
-__all__ = ["mean_wait"]
-
 
 def mean_wait(scene: Scene, body: AnyBody, solution: Solution) -> float | None:
     """Mean over the realised cut of the time from the blade's passing to the opening, s.

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from verify.assess.realised_cut import polylines_of
 from verify.compare.body import Body
 
-__all__ = ["CutEnd", "cut_ends"]
-
 Array = NDArray[np.float64]
 
 _BEHIND, _STIFF, _SPREAD = 2 / 3, 0.355, 0.22  # of elements; holds for 95 % of 264 ends

@@ -15,8 +15,6 @@ from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.motion import Motion
 
-__all__ = ["Distances", "Times", "distances", "norm_names"]
-
 Array = NDArray[np.float64]
 Times = Sequence[float | None]
 

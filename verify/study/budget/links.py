@@ -15,8 +15,6 @@ from verify.solution import Solution
 from verify.study.budget.budget import Answer
 from verify.study.budget.solved import Solved
 
-__all__ = ["Chain", "Missing", "is_realised_as_asked", "link"]
-
 _SAME = 1e-9  # of the body's size
 
 

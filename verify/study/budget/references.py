@@ -11,8 +11,6 @@ from verify.scene import Scene
 from verify.study.budget.links import Missing
 from verify.study.budget.solved import REFERENCE, Solve, Solved
 
-__all__ = ["OUTSIDE", "References"]
-
 OUTSIDE = "not part of the total"
 
 

@@ -9,8 +9,6 @@ from verify.result import CaseResult
 from verify.scene import Scene
 from verify.solution import Solution
 
-__all__ = ["CONFORMING", "JUDGED", "REFERENCE", "Solve", "Solved"]
-
 REFERENCE, JUDGED, CONFORMING = "reference", "xfem", "conforming"
 
 

@@ -24,8 +24,6 @@ from verify.study.budget.solved import JUDGED, Solve
 from verify.study.finding import Finding
 from verify.study.record import Study
 
-__all__ = ["BudgetStudy", "budget_study"]
-
 _QUICK_LEVELS = 2
 
 

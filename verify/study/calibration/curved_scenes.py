@@ -4,8 +4,6 @@ import numpy as np
 
 from verify.study.calibration.scene_parts import Content, Random, around, intensities, plane_scene
 
-__all__ = ["arc_through", "curved_crack", "ring_and_disc"]
-
 
 def ring_and_disc(random: Random) -> Content:
     """Return a disc at rest in a ring that is drawn off it, at a corner or at an edge.

@@ -11,8 +11,6 @@ from verify.study.calibration.curved_scenes import arc_through, curved_crack, ri
 from verify.study.calibration.solid_scenes import ball_and_shell, solid_smooth
 from verify.study.calibration.straight_scenes import airy, griffith, smooth, tip
 
-__all__ = ["Family", "families"]
-
 Content = dict[str, Any]
 
 _SCENES, _QUICK_SCENES = 15, 2

@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Content", "Random", "around", "intensities", "plane_scene", "random_point"]
-
 Array = NDArray[np.float64]
 Content = dict[str, Any]
 Random = np.random.Generator

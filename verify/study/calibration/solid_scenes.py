@@ -4,8 +4,6 @@ import numpy as np
 
 from verify.study.calibration.scene_parts import Content, Random
 
-__all__ = ["ball_and_shell", "solid_smooth"]
-
 
 def solid_smooth(random: Random) -> Content:
     """Return sinusoids with a body force on both sides of a plane through the unit cube."""

@@ -4,8 +4,6 @@ import numpy as np
 
 from verify.study.calibration.scene_parts import Content, Random, around, intensities, plane_scene
 
-__all__ = ["airy", "griffith", "smooth", "tip"]
-
 _UNIT = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
 _LONG = 3.0  # of a cut that goes on beyond a unit square
 

@@ -12,8 +12,6 @@ from verify.study.calibration.trial import NORMS, Trial, trials
 from verify.study.finding import Finding
 from verify.study.record import Study
 
-__all__ = ["CalibrationStudy", "calibration_findings", "calibration_study"]
-
 COVERED, COVERED_IN_EACH, NOT_WASTED = 0.95, 0.90, 0.85  # shares that are asked for
 WASTED = 10.0  # an error bar that is so many times the error judges little
 FEWEST, FEWEST_SCENES = 60, 15  # triples and scenes of a family from which a share says something

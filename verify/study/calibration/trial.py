@@ -18,8 +18,6 @@ from verify.solution import Solution
 from verify.solvers import find_solver
 from verify.study.calibration.families import Family
 
-__all__ = ["NORMS", "Trial", "trials"]
-
 NORMS = ("displacement_l2", "energy_norm", "jump_l2")
 _LEVELS = 3  # that a reference is made of
 # Relative errors below are those of the solve and of the quadrature, not of the elements

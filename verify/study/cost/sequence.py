@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from verify.errors import InputError
 from verify.scene import PolylineCut, Scene
 
-__all__ = ["growing_scenes"]
-
 
 def growing_scenes(scene: Scene, steps: int) -> list[Scene]:
     """Return `scene` with its first cut at 1/`steps`, 2/`steps`, …, all of its length.

@@ -9,8 +9,6 @@ from verify.study.cost.work import WorkPoint, pareto_front, time_at, work_points
 from verify.study.finding import Finding
 from verify.study.record import Study
 
-__all__ = ["CostStudy", "cost_study"]
-
 REFERENCE = "reference"
 SAMPLE = 3  # repetitions from which on their range bounds a time
 

@@ -9,8 +9,6 @@ from statistics import median
 from verify.assess.intervals import error_interval
 from verify.result import SolveRecord, Status
 
-__all__ = ["ONCE", "WorkPoint", "pareto_front", "time_at", "work_points"]
-
 # Phases that a solver pays once, however often the cut grows: its mesh does not know the cut. A
 # conforming mesh is made anew, and so it is for a solver that is not known here.
 ONCE: Mapping[str, tuple[str, ...]] = dict.fromkeys(

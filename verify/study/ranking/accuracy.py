@@ -9,10 +9,6 @@ from verify.result import CaseResult
 from verify.study.ranking.finest import interval_of, item_on_finest
 from verify.study.ranking.standing import Item, compared_by_mean, compared_by_worst, is_exact
 
-__all__ = [
-    "EQUAL_SIZE", "EXACT", "FINEST", "QUANTITIES", "accuracy_comparisons", "item_at_equal_size",
-]  # fmt: skip
-
 EQUAL_SIZE, FINEST = "equal size", "finest level"
 EXACT = "where a solver is exact"
 QUANTITIES = "quantities"  # all quantities of interest of all cases together

@@ -10,8 +10,6 @@ from verify.result import CaseResult
 from verify.study.cost.work import WorkPoint, time_at, work_points
 from verify.study.ranking.standing import Item, compared_by_mean
 
-__all__ = ["common_error", "cost_comparisons", "cost_item", "why_times_are_no_sample"]
-
 _METRICS = ("displacement_l2", "energy_norm")
 _SAMPLE = 3  # repetitions: two have a range, but not one that says anything about a third
 

@@ -8,8 +8,6 @@ from verify.result import CaseResult
 from verify.study.ranking.finest import item_on_finest
 from verify.study.ranking.standing import compared_by_worst
 
-__all__ = ["energy_comparisons"]
-
 
 def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
     """Compare what is kept on the finest level of each case; the worst case counts.

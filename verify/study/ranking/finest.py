@@ -7,8 +7,6 @@ from verify.assess.intervals import Interval, NotMeasuredError, error_interval
 from verify.result import CaseResult, SolveRecord, Status
 from verify.study.ranking.standing import Item
 
-__all__ = ["interval_of", "item_on_finest"]
-
 
 def item_on_finest(result: CaseResult, name: str, solvers: Sequence[str], label: str) -> Item:
     """Take a metric of every solver on its finest level; the item is called `label`."""

@@ -10,8 +10,6 @@ from verify.study.cost.work import work_points
 from verify.study.ranking.accuracy import item_at_equal_size
 from verify.study.ranking.standing import Item
 
-__all__ = ["data_profiles", "performance_profile"]
-
 _METRIC = "displacement_l2"
 _FAR = 100.0  # times the least error: of no use, however much more it is
 _ERRORS = (0.1, 0.01)  # what a simulator needs, and what a verification does

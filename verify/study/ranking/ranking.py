@@ -15,8 +15,6 @@ from verify.study.ranking.profiles import data_profiles, performance_profile
 from verify.study.ranking.stability import stability_standings
 from verify.study.ranking.strengths import strengths
 
-__all__ = ["rank_solvers"]
-
 _REFERENCE = "reference"
 
 

@@ -6,8 +6,6 @@ from math import isfinite
 from verify.ranking import StabilityStanding
 from verify.result import CaseResult, SolveRecord, Status
 
-__all__ = ["stability_standings"]
-
 _ANSWER = ("displacement_l2", "displacement_l2_max")
 _BLOWN_UP = 1.0 - 1e-9  # relative error: as far off as a body that does not move, to round-off
 

@@ -8,8 +8,6 @@ from verify.assess.intervals import Interval
 from verify.assess.rates import ROUND_OFF
 from verify.ranking import Comparison, LeftOut, Standing
 
-__all__ = ["Item", "compared_by_mean", "compared_by_worst", "is_exact"]
-
 
 @dataclass(frozen=True)
 class Item:

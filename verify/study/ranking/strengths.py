@@ -11,8 +11,6 @@ from verify.study.ranking.accuracy import item_at_equal_size
 from verify.study.ranking.cost import cost_item, why_times_are_no_sample
 from verify.study.ranking.standing import Item
 
-__all__ = ["strengths"]
-
 _SAME = 1e-6  # relative: two programs of one method differ by their linear solvers
 _NEAR = 1.05  # of the best
 _ACCURACY = ("displacement_l2", "energy_norm", "jump_l2")

@@ -9,8 +9,6 @@ from verify.study.energy import account_findings
 from verify.study.finding import Finding
 from verify.study.measured_scenes import Measurement, missing_solutions
 
-__all__ = ["NEAR", "findings"]
-
 NEAR = 1e-2  # ε up to which an error shall be that at ε = 0
 _NEAR_LIMIT, _FAR_LIMIT = 0.05, 1.25
 _ROUND_OFF = 1e-9

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-__all__ = ["Growth", "growth"]
-
 _SMALL = 1e-3  # larger slivers are not in the asymptotic range
 _CONFIDENCE = 0.95
 _WANDERING = 0.25  # half the spread of local slopes above which there is no single exponent

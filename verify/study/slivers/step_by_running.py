@@ -9,8 +9,6 @@ from verify.scene import Analysis, Scene
 from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
 
-__all__ = ["step_by_running"]
-
 _STEPS = 300  # 1 % beyond the critical step a mode grows by e^(0.28 · 300)
 _BLOWN_UP = 1e3  # sizes of the body that something moves
 _DOUBLINGS, _BISECTIONS = 7, 7

@@ -32,8 +32,6 @@ from verify.study.slivers.step_by_running import step_by_running
 from verify.study.uncut_twin import with_uncut_twin
 from verify.study.variants import Variant
 
-__all__ = ["SliverStudy", "sliver_study"]
-
 _FITTED = (CONDITION, SCALED, STEP)
 Row = tuple[str, str, float | None, str]
 

@@ -9,8 +9,6 @@ from verify.simulator.thesis.step_times import StepTime
 from verify.study.thesis.methods_compared import MethodOnCase
 from verify.study.thesis.sliver_systems import SliverSystem
 
-__all__ = ["Measured"]
-
 
 @dataclass(frozen=True)
 class Measured:

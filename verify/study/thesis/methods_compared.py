@@ -12,8 +12,6 @@ from verify.solvers import find_solver
 from verify.study.cost.work import work_points
 from verify.study.uncut_twin import with_uncut_twin
 
-__all__ = ["MethodOnCase", "compare_methods"]
-
 
 @dataclass(frozen=True)
 class MethodOnCase:

@@ -12,8 +12,6 @@ from verify.scene import Scene
 from verify.study.uncut_twin import with_uncut_twin
 from verify.study.variants import variant_of
 
-__all__ = ["SliverSystem", "exponent", "sliver_systems"]
-
 _METHODS = (
     "xfem", "xfem mass=consistent", "virtual_node", "subdivision", "snapping_subdivision",
     "snapping",

@@ -20,8 +20,6 @@ from verify.study.thesis.sliver_systems import sliver_systems
 from verify.study.thesis.verdicts_on_cost import verdicts_on_cost
 from verify.study.thesis.verdicts_on_mechanics import verdicts_on_mechanics
 
-__all__ = ["CASES", "SOLVERS", "ThesisStudy", "thesis_study"]
-
 # exact without tips, exact with tips inside elements, and references in the plane and in space
 CASES = (
     "statics/f3_inclined", "statics/griffith_inside", "statics/tissue_strip",

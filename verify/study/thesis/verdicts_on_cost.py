@@ -10,8 +10,6 @@ from verify.simulator.thesis.step_times import StepTime
 from verify.study.finding import Finding
 from verify.study.thesis.measured import Measured
 
-__all__ = ["verdicts_on_cost"]
-
 _NEAR = 0.2  # of the thesis' increments: another face, other strokes, two nodes less for each end
 _BEATEN = 500.0
 _SAME = 1e-9

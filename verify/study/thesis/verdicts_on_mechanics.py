@@ -9,8 +9,6 @@ from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import MethodOnCase
 from verify.study.thesis.sliver_systems import SliverSystem, exponent
 
-__all__ = ["verdicts_on_mechanics"]
-
 _FLAT, _KEPT = 0.02, 0.9  # exponent of a step that slivers leave alone; share of the uncut one
 _AS_GOOD = 1.05
 _TIPS = 3.0

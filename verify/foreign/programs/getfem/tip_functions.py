@@ -7,8 +7,6 @@ hat function (Laborde, Pommier, Renard, Salaün 2005, doi:10.1002/nme.1370).
 import getfem as gf
 import numpy as np
 
-__all__ = ["RULES", "SHARE", "TipAreas"]
-
 SHARE = 0.25  # of the length of its cut: radius of the area around a tip
 RULES = (
     "IM_STRUCTURED_COMPOSITE(IM_TRIANGLE(6),3)",

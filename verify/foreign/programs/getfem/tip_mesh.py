@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["TipMesh"]
-
 _FINE, _GRADED, _LEAST = 0.3, 0.15, 1e-4  # of an element; of the distance to the tip; of an element
 _NEAR = 1e-9  # of an element
 

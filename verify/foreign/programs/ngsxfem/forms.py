@@ -16,8 +16,6 @@ from xfem import (
     pos_grad,
 )
 
-__all__ = ["EnrichedForms", "Forms", "bits", "mesh_of"]
-
 SIDES = ((NEG, -1), (POS, 1))
 
 

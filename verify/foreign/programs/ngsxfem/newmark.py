@@ -5,8 +5,6 @@ from cut_body import forces, prescribed
 from exchange_files import RefusedError
 from forms import bits
 
-__all__ = ["Body", "PartedCase"]
-
 
 class PartedCase:
     """A case whose nodes are the values of a cut body's nodes, one for each part, for `motion`.

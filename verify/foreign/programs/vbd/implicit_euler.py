@@ -8,8 +8,6 @@ import numpy as np
 from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import splu
 
-__all__ = ["ImplicitEuler"]
-
 _TOLERANCE = 1e-10  # of the forces in play
 
 
