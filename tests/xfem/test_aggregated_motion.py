@@ -7,6 +7,7 @@ from test_cell_aggregation import mesh_of, near_nodes
 from test_sliver_policies import degenerate_cuts
 from time_schemes import SCHEMES
 
+from verify.methods.mass_variants import shifted_mass
 from verify.xfem.assembly import body_pattern
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.critical_step import critical_step, element_critical_steps
@@ -16,7 +17,6 @@ from verify.xfem.explicit import CentralDifferences, ForwardEuler
 from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mass_variants import shifted_mass
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.slivers import treat_slivers

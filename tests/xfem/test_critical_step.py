@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, material
 
+from verify.methods.mass_variants import shifted_mass
 from verify.xfem.block_pattern import block_pattern
 from verify.xfem.body import DynamicBody, StepFailedError
 from verify.xfem.critical_step import critical_step, element_critical_steps
@@ -11,7 +12,6 @@ from verify.xfem.cuts import Plane
 from verify.xfem.explicit import CentralDifferences
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mass_variants import shifted_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

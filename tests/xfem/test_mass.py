@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane
 
+from verify.methods.mass_variants import shifted_mass
 from verify.xfem.cuts import Plane
 from verify.xfem.mass import consistent_mass, second_moments, side_wise_mass
-from verify.xfem.mass_variants import shifted_mass
 
 LUMPINGS = ("enrichment", "row sum", "weighted diagonal")
 

@@ -10,11 +10,11 @@ from turned_bodies import random_mesh, turn, turned_body, turned_sheet
 
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
+from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.equilibrium import static_equilibrium
-from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce

@@ -6,9 +6,9 @@ from cut_bodies import DENSITY, material
 
 from verify.accelerated import FAST
 from verify.accelerated.cholesky import Cholesky
+from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.body import DynamicBody
 from verify.xfem.cuts import Plane
-from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass

@@ -5,11 +5,11 @@ import pytest
 from cut_bodies import DENSITY, cut_body, cut_membrane, material
 from time_schemes import SCHEMES
 
+from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.body import DynamicBody, RayleighDamping
 from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences
-from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass

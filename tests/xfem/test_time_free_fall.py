@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, GRAVITY, cut_square, material
 
+from verify.methods.mass_variants import shifted_mass
 from verify.xfem.body import DynamicBody
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import side_wise_mass
-from verify.xfem.mass_variants import shifted_mass
 from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 

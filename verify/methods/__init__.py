@@ -1,4 +1,4 @@
-"""The other ways to cut a finite element mesh, on the mechanics of `verify.xfem`.
+"""The other ways to cut a finite element mesh, and others' parts of the method of `verify.xfem`.
 
 A method takes an uncut mesh and cuts and gives a `CutBody`: what to solve on, what to show, how
 many unknowns it cost and what it moved, merged or lost. Statics and dynamics are those of
@@ -9,15 +9,15 @@ what every method gives
 nodes that move onto the cut
     `feet`, `nodal_cut`, `snapped_mesh`, `snapping`
 cells that are split
-    `tip_points`, `opened_mesh`, `subdivision`
+    `tip_nodes` (ends of cuts as nodes), `opened_mesh`, `subdivision`
 cells that go
     `refinement`, `removal`
 cells that are copied
     `virtual_nodes`
 springs instead of elements
     `spring_fit`, `spring_kernels`, `spring_force`
-what they cost
-    `counting`
+in the place of parts of `verify.xfem`, chosen by its adapter
+    `tip_nodes` before the cut, `mass_variants` for the mass, `generalised_alpha` for the steps
 
 Sources and limits of each: ``docs/theory/methods.md``.
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.errors import UnsupportedSceneError
+from verify.methods.tip_nodes import with_tip_nodes
 from verify.scene import (
     ArcCut,
     CylinderCut,
@@ -21,7 +22,6 @@ from verify.solution import Regularisation
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut, ImplicitCut, PolygonPatch, Polyline, ToolPath, TriangulatedSurface
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.tips import with_tip_nodes
 
 Array = NDArray[np.float64]
 

@@ -67,7 +67,7 @@ class XfemSolver:
         are for linear statics.
     tip : {"inside", "through", "nearest", "partial"}
         What happens to an element in which a cut ends: see `verify.xfem.pieces.split_cells`; the
-        last, for triangles, divides it so that the end is a node (`verify.xfem.tips`).
+        last, for triangles, divides it so that the end is a node (`verify.methods.tip_nodes`).
     slivers : {"keep", "merge", "drop", "penalise"}
         What happens to pieces with less than a tenth of their element; see
         `verify.xfem.slivers`; "merge" is cell aggregation. A direct static solve does not mind
@@ -83,7 +83,7 @@ class XfemSolver:
         Dynamics: that of generalised_alpha at infinite frequency, from 0 to 1.
     mass : {"sidewise", "consistent", "evs", "gevs", "row_sum", "hrz", "thesis"}
         Dynamics: the last three are the lumpings of the thesis; EVS and GEVS raise eigenvalues of
-        the consistent mass of cut cells, see `verify.xfem.mass_variants`.
+        the consistent mass of cut cells, see `verify.methods.mass_variants`.
     step_factor : float
         Dynamics: share of the critical step that an explicit scheme takes at most, and an
         implicit one if the scene states no time step.

@@ -8,19 +8,19 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from verify.errors import InputError
+from verify.methods.generalised_alpha import GeneralisedAlpha
+from verify.methods.mass_variants import (
+    eigenvalue_stabilised_mass,
+    generalised_eigenvalue_stabilised_mass,
+    shifted_mass,
+)
 from verify.xfem.body import DynamicBody, Integrator
 from verify.xfem.critical_step import RESONANCE_FREE, critical_step, element_critical_steps
 from verify.xfem.elasticity import Material
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences, ForwardEuler, SymplecticEuler
-from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.mass import Mass, consistent_mass, side_wise_mass
-from verify.xfem.mass_variants import (
-    eigenvalue_stabilised_mass,
-    generalised_eigenvalue_stabilised_mass,
-    shifted_mass,
-)
 from verify.xfem.phantom import PhantomMesh
 
 SCHEMES: dict[str, Callable[[DynamicBody, float], Integrator]] = {

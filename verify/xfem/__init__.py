@@ -6,14 +6,13 @@ reading:
 
 `mesh`, `flat_cuts`, `faceted_cuts`, `tool_path`; `cuts` names them all
     simplices; what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
-`zero_points`, `clip`, `crossing`, `junctions`, `pieces`, `tips`
-    exact division of cells at zero points of level sets; parts of the cells that cuts go through;
-    nodes at ends of cuts
+`zero_points`, `clip`, `crossing`, `junctions`, `pieces`
+    exact division of cells at zero points of level sets; parts of the cells that cuts go through
 `join`, `phantom`
     which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
     the result: standard finite elements with weights
 `mass`
-    consistent, row sum, weighted diagonal, side-wise (`mass_variants`: those of others)
+    side-wise, consistent
 `elasticity`, `loads`, `supports`
     material, load vectors, prescribed displacements; `bases`: the other bases of the same
     space; `critical_step` of explicit schemes; `subdivision`: a conforming mesh of the cut body
@@ -26,7 +25,7 @@ reading:
     SciPy behind one protocol; the operations that `verify.accelerated` replaces
 `statics`, `static_newton`, `rigid_motion`, `equilibrium`
     linear statics; Newton's method on the potential energy and load steps at finite rotation
-`body`, `energy_balance`, `explicit`, `implicit`, `generalised_alpha`, `real_time`, `inherit`
+`body`, `energy_balance`, `explicit`, `implicit`, `real_time`, `inherit`
     a body in motion and its schemes; `energy_momentum`: the conserving one
 `given_arrays`, `quadrature`, `nearest_points`, `block_pattern`, `errors`
     what several of them use

@@ -3,7 +3,7 @@
 Side-wise lumping gives each dof node its share ρ V_piece/n of the pieces around it. It is
 diagonal, conserves the mass of every piece exactly, and bounds the explicit step by that of the
 uncut elements, however small the pieces. The consistent mass integrates shape functions exactly.
-The lumpings that the thesis compares live in the shifted basis: see `verify.xfem.mass_variants`.
+`verify.methods.mass_variants` has others: the lumpings that the thesis compares, and raised ones.
 """
 
 from dataclasses import dataclass

@@ -6,6 +6,9 @@ its neighbour if the end is near an edge; if it is near a node, the cut ends the
 the cut goes through one of these parts and stops at their common node. So the jump falls linearly
 from the nodes of the edge by which the cut comes in to zero at its end: the partially cut element
 of Rabczuk, Zi, Gerstenberger & Wall (Int. J. Numer. Meth. Engng 75, 2008), whose end is a node.
+
+A split that ends at a node, as subdivision does it, needs the first of these divisions alone:
+`add_tip_points`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.crossing import AT_END, REACH, level_and_depth
+from verify.xfem.cuts import Cut, Polyline
 from verify.xfem.errors import XfemError
-from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import nodal_values
 
@@ -32,6 +35,7 @@ _BEHIND = 4.0
 _HALVINGS = 52
 _ROUND_OFF = 1e-9
 _NEAR = 0.05  # element sizes: an end farther from the cut than that is none
+_AT_EDGE = 1e-6  # barycentric: an end as near as that to an edge or node lies on it
 
 
 @dataclass(frozen=True)
@@ -250,12 +254,10 @@ class _Division:
         self._places.append(at @ corners)
         self._from.append((chord.cell, at))
         for cell in cells:
-            parts = [
-                np.where(self._cells[cell] == node, number, self._cells[cell])
-                for node in np.intersect1d(self._cells[cell], replaced)
-            ]
+            ends = np.intersect1d(self._cells[cell], replaced)
+            parts = _parts(self._cells[cell], ends, number)
             self._cells[cell] = parts[0]
-            self._more.append(np.array(parts[1:]))
+            self._more.append(parts[1:])
         return self._places[-1]
 
     def _joins(self, chord: _Chord, cells: list[int], met: _Bools) -> bool:
@@ -284,6 +286,11 @@ class _Division:
         return [cell]
 
 
+def _parts(cell: _Ints, replaced: _Ints, node: int) -> _Ints:
+    """Parts (k, 3) of a triangle, in each of which a new node takes the place of a corner (k,)."""
+    return np.where(cell == replaced[:, None], node, cell)
+
+
 def _places(chord: _Chord, corners: _Floats) -> Iterator[_Floats]:
     """Barycentric coordinates of places in an element at which a cut may end."""
     way = chord.exit - chord.entry
@@ -309,3 +316,32 @@ def _places(chord: _Chord, corners: _Floats) -> Iterator[_Floats]:
         foot = np.zeros(3)
         foot[(k + 1) % 3], foot[(k + 2) % 3] = 1.0 - share, share
         yield foot
+
+
+def add_tip_points(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[SimplexMesh, _Ints]:
+    """Divide each triangle in which an open polyline ends into three.
+
+    Ends on an edge, at a node or outside the body need nothing, as a split ends there anyway.
+
+    Returns
+    -------
+    mesh : SimplexMesh
+        The same one if there is nothing to do.
+    origin : (m,) int array
+        Cell of the given mesh in which each cell lies.
+    """
+    origin = np.arange(len(mesh.cells))
+    if mesh.dim != 2 or mesh.space != 2:
+        return mesh, origin
+    ends = [cut.vertices[[0, -1]] for cut in cuts if isinstance(cut, Polyline) and not cut.closed]
+    for point in np.concatenate(ends) if ends else []:
+        weights = np.einsum("eik,ek->ei", mesh.gradients, point - mesh.points[mesh.cells[:, 0]])
+        weights[:, 0] += 1.0
+        cell = int(weights.min(axis=1).argmax())
+        if weights[cell].min() <= _AT_EDGE:
+            continue
+        parts = _parts(mesh.cells[cell], mesh.cells[cell], len(mesh.points))
+        cells = np.concatenate([np.delete(mesh.cells, cell, axis=0), parts])
+        origin = np.concatenate([np.delete(origin, cell), np.repeat(origin[cell], 3)])
+        mesh = SimplexMesh(np.concatenate([mesh.points, point[None]]), cells)
+    return mesh, origin

@@ -7,14 +7,14 @@ from scipy.linalg import eigh
 from test_junctions import fork
 
 from verify.assess.system_numbers import critical_step, lowest_frequency
+from verify.methods.mass_variants import (
+    eigenvalue_stabilised_mass,
+    generalised_eigenvalue_stabilised_mass,
+)
 from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.xfem.cuts import ImplicitCut, Polyline
 from verify.xfem.mass import consistent_mass, second_moments
-from verify.xfem.mass_variants import (
-    eigenvalue_stabilised_mass,
-    generalised_eigenvalue_stabilised_mass,
-)
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 

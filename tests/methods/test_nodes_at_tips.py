@@ -9,6 +9,7 @@ from test_sliver_policies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import boundary_nodes, scaled_dense_stiffness, sparse_stiffness, zero_modes
 
+from verify.methods.tip_nodes import with_tip_nodes
 from verify.scene import Scene, load_scene
 from verify.solution import Regularisation
 from verify.solvers import find_solver
@@ -21,7 +22,6 @@ from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
-from verify.xfem.tips import with_tip_nodes
 
 SOFT = isotropic(1.0, 0.3, "plane strain")
 SEEDS = [*range(10), *(pytest.param(n, marks=pytest.mark.heavy) for n in range(10, 50))]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from cut_bodies import DENSITY, cut_body, cut_square, material
 
+from verify.methods.generalised_alpha import GeneralisedAlpha
 from verify.xfem.body import DynamicBody, RayleighDamping
 from verify.xfem.energy_balance import run
 from verify.xfem.explicit import acceleration_of
-from verify.xfem.generalised_alpha import GeneralisedAlpha
 from verify.xfem.implicit import Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
