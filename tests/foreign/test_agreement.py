@@ -66,7 +66,7 @@ def test_enriched_nodal_values_and_values_of_both_sides_are_one_space(case):
     """ngsxfem's XFESpace and its CutFEM without a ghost penalty: in the plane, in space, moving."""
     scene = load_scene(case)
     sides, enriched = (
-        find_solver(f"ngsxfem ghost=0 space={space}").solve(scene, 0) for space in ("copies", "xfe")
+        find_solver("ngsxfem").solve(scene, 0, ghost=0, space=space) for space in ("copies", "xfe")
     )
     scale = np.abs(sides.displacement).max()
     assert enriched.notes["method"] != sides.notes["method"]

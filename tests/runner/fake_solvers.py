@@ -69,6 +69,16 @@ class Straining(Instant):
         return super().solve(scene, level, repetitions)
 
 
+class Frozen(Straining):
+    """Allows nothing to be set on it."""
+
+    def __setattr__(self, name, value):
+        raise AttributeError(f"no {name} can be set")
+
+    def solve(self, scene, level, repetitions=1, strain=0.1):
+        return Straining().solve(scene, level, repetitions, strain)
+
+
 class Wrong(Instant):
     """Stretches twice as much as it should."""
 

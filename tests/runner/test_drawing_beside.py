@@ -73,17 +73,17 @@ def test_a_case_that_was_drawn_in_other_colours_is_drawn_again(drawn, tmp_path):
 
 def test_an_interrupted_run_leaves_no_drawing_process(tmp_path, drawn, monkeypatch):
     """The run is stopped as soon as a case is being drawn; all that it started ends with it."""
-    from verify.runner import RunStoppedError, run
+    from verify.runner import RunStoppedError, drawing
 
     started = []
-    real = run.Child
+    real = drawing.Child
 
     def child(module, *arguments, **named):
         started.append(real(module, *arguments, **named))
         os.kill(os.getpid(), signal.SIGTERM)  # SIGINT is ignored behind an `&`
         return started[-1]
 
-    monkeypatch.setattr(run, "Child", child)
+    monkeypatch.setattr(drawing, "Child", child)
     source, _ = drawn
     scenes = [load_scene(source.parent / f"{name}.toml") for name in ("one", "two")]
     options = Options(solvers=("xfem", "conforming"), repetitions=1, jobs=2)

@@ -10,7 +10,7 @@ from verify.cli.waiting import Waiting
 from verify.printable import one_line
 from verify.result import COMPILING, LOG, CaseResult, SolveRecord, Status
 from verify.runner import Progress
-from verify.runner.run import comparison_label
+from verify.runner.comparing import comparison_label
 
 
 class ClosableProgress(Progress, Protocol):

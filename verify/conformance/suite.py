@@ -11,6 +11,7 @@ from verify.conformance.checks import checks
 from verify.conformance.trials import Outcome, Trial, solve_trials
 from verify.errors import InputError
 from verify.scene.nearest import nearest
+from verify.solvers.named import parameters_in
 
 
 def conform(
@@ -24,9 +25,9 @@ def conform(
     Parameters
     ----------
     solver : str
-        Name, or ``module:Class``.
+        Name, or ``module:Class``; parameters may follow it.
     parameters : mapping, optional
-        Parameters of its `solve`.
+        Parameters of its `solve`, under those that follow its name.
     timeout : float
         Wall seconds for each of the about 30 small solves.
     only : sequence of str
@@ -41,6 +42,7 @@ def conform(
     InputError
         If there is no such solver or check, or the solver cannot be loaded.
     """
+    given = {**(parameters or {}), **parameters_in(solver)}
     with tempfile.TemporaryDirectory(prefix="verify-") as place:
         folder = Path(place)
         every = {check.name: check for check in checks(folder)}
@@ -56,7 +58,7 @@ def conform(
                 where.append(replace(trial, name=f"{number}-{trial.name}"))
         outcomes: dict[str, Outcome] = {}
         for label, trials in (("together", together), ("apart", apart)):
-            outcomes |= solve_trials(solver, parameters or {}, trials, folder, timeout, label)
+            outcomes |= solve_trials(solver, given, trials, folder, timeout, label)
     return [
         evaluate(check, {t.name: outcomes[f"{number}-{t.name}"] for t in check.trials})
         for number, check in enumerate(asked)

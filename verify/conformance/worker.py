@@ -13,6 +13,7 @@ from verify.json_files import read_json, write_json
 from verify.runner.childhood import die_with_parent
 from verify.runner.solve import solve_job
 from verify.solvers import check_parameters, find_solver
+from verify.solvers.named import solver_in
 
 
 def main(batch_file: Path) -> None:
@@ -22,7 +23,8 @@ def main(batch_file: Path) -> None:
     if ":" in batch["solver"]:
         sys.path.append(os.getcwd())
     try:
-        check_parameters(batch["solver"], find_solver(batch["solver"]), batch["parameters"])
+        name = solver_in(batch["solver"])
+        check_parameters(name, find_solver(name), batch["parameters"])
     except InputError as error:
         write_json({"error": str(error)}, batch_file.with_suffix(".refused"))
         return

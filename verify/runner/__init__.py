@@ -7,8 +7,9 @@ case (`verify.study`) runs in a process of its own too.
 from verify.runner.ending import exit_code
 from verify.runner.interruption import RunStoppedError
 from verify.runner.options import Options
-from verify.runner.run import Progress, RunSummary, run_cases
+from verify.runner.run import RunSummary, run_cases
 from verify.runner.selection import select_cases
+from verify.runner.work import Progress
 
 __all__ = [
     "Options",

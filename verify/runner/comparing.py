@@ -120,3 +120,8 @@ def stored_result(folder: Path, key: str) -> CaseResult | None:
     except InputError:
         pass
     return None
+
+
+def comparison_label(case: str) -> str:
+    """Return what `Progress` is told of the comparison of a case."""
+    return f"{case} · comparison"

@@ -121,7 +121,7 @@ def survey_solvers(
         if answer["error"] and name in options.solvers:
             raise InputError(answer["error"], "--solver")
         if bad := answer.get("bad_parameter"):
-            raise InputError(bad, "--set")
+            raise InputError(bad, "--solver" if " " in name else "--set")
         for scene in asked.get(name, []):
             bad = answer.get("cases", {}).get(scene.name, {}).get("bad_input")
             if bad:

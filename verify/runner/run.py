@@ -1,62 +1,28 @@
 """The run: solves in parallel processes, then the comparison of each finished case."""
 
-import os
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from time import sleep
-from typing import Any, Protocol
+from typing import Any
 
 from verify.errors import InputError
-from verify.json_files import read_json, write_json
-from verify.printable import one_line
 from verify.provenance import provenance
-from verify.result import LOG, CaseResult, SolveRecord, Status
-from verify.result_files import write_result
+from verify.result import CaseResult
 from verify.runner.checking import check_scene
-from verify.runner.child import POLL_SECONDS, Child, Ending
 from verify.runner.cluster import ClusterEngine
-from verify.runner.comparing import LEAST_SECONDS, Comparison, stored_result
-from verify.runner.deepening import further_level, levels_in_vain, take_up_known_levels
-from verify.runner.directory import RunDirectory, claimed, emptied, folder_name, write_run
-from verify.runner.engine import Engine, LocalEngine, Running
-from verify.runner.families import Families
-from verify.runner.fingerprint import code_of_comparison, code_of_solver, digest_of
-from verify.runner.interruption import StopRequest, listening
-from verify.runner.job import Job, load_record, store_record, stored_record
+from verify.runner.directory import claimed, folder_name, write_run
+from verify.runner.fingerprint import code_of_solver
+from verify.runner.interruption import listening
 from verify.runner.options import Options
-from verify.runner.order import order_of_solves
-from verify.runner.outcome import death, outcome_in
-from verify.runner.plan import CasePlan, check_judged, plan_case, solvers_of, survey_solvers
+from verify.runner.plan import check_judged, plan_case, solvers_of, survey_solvers
 from verify.runner.ranks import mpiexec
 from verify.runner.reference_bundle import ReferenceBundle
-from verify.runner.reference_cache import REFERENCE, ReferenceCache
-from verify.scene import Scene, scene_content
+from verify.runner.work import Progress, Work
+from verify.scene import Scene
 from verify.solvers.interface import is_built_in
-from verify.warm import DRAWING, prepare_fork, warm_parent
-from verify.whole_files import write_whole
-
-
-class Progress(Protocol):
-    """Who is told how the run goes."""
-
-    def planned(self, solves: int, cases: int) -> None:
-        """Say how much there is to do."""
-        ...
-
-    def started(self, label: str) -> None:
-        """Say that a solve or a comparison begins."""
-        ...
-
-    def solved(self, label: str, record: SolveRecord, reused: bool) -> None:
-        """Say that a solve ended."""
-        ...
-
-    def judged(self, result: CaseResult) -> None:
-        """Say that a case is compared and judged."""
-        ...
+from verify.warm import warm_parent
 
 
 @dataclass(frozen=True)
@@ -135,297 +101,10 @@ def run_cases(
             }
             write_run(directory, record)
             plans = [plan_case(scene, options, survey, directory, bundle) for scene in scenes]
-            work = _Work(plans, directory, options, origin, progress, bundle, cluster)
-            work.drawings = drawings
+            work = Work(plans, directory, options, origin, progress, bundle, cluster, drawings)
             results = work.until_done(stop)
             write_run(directory, {**record, "finished": _now()})
     return RunSummary(out, results, work.reused)
-
-
-class _Work:
-    """The state of a run: what waits, what runs, what is done."""
-
-    def __init__(
-        self,
-        plans: list[CasePlan],
-        directory: RunDirectory,
-        options: Options,
-        origin: dict[str, Any],
-        progress: Progress,
-        bundle: ReferenceBundle | None,
-        cluster: ClusterEngine | None,
-    ) -> None:
-        self.bundle, self.cache = bundle, ReferenceCache(options.cache) if options.cache else None
-        self.directory, self.options, self.origin = directory, options, origin
-        self.progress, self.reused = progress, 0
-        self.plans = {plan.scene.name: plan for plan in plans}
-        for plan in plans:
-            take_up_known_levels(plan)
-        self.waiting = order_of_solves(plans, options)
-        self.open = {n: len(plan.jobs) + len(plan.models) for n, plan in self.plans.items()}
-        self.to_judge = [name for name, count in self.open.items() if not count]
-        self.running: dict[Running, Job] = {}
-        self.comparing: list[Comparison] = []
-        self.drawings: Path | None = None
-        self.to_draw: list[str] = []
-        self.drawing: list[Child] = []
-        self.results: dict[str, CaseResult] = {}
-        self.families = Families((plan.scene for plan in plans), options.judge_only)
-        self.records: dict[Path, bytes] = {}  # as they were written
-        self.again: set[Path] = set()
-        side_by_side = max(1, min(options.jobs, len(self.waiting)))
-        self.memory = options.memory or 0.8 * origin["memory"] / side_by_side
-        self.engine: Engine = cluster or LocalEngine(options.jobs, options.timeout, self.memory)
-
-    def until_done(self, stop: StopRequest) -> list[CaseResult]:
-        """Run everything; kill what runs if that is interrupted or fails."""
-        self.progress.planned(
-            sum(self.open.values()) + sum(len(plan.refused) for plan in self.plans.values()),
-            len(self.plans),
-        )
-        try:
-            for plan in self.plans.values():
-                self._prepare(plan)
-            while self._unfinished():
-                stop.check()
-                while self._has_room():
-                    self._start()
-                for solve, job in list(self.running.items()):
-                    if (ending := solve.poll()) is not None:
-                        del self.running[solve]
-                        self._ended(job, solve, ending)
-                for comparison in list(self.comparing):
-                    if (result := comparison.poll()) is not None:
-                        self.comparing.remove(comparison)
-                        self._case_done(result)
-                # what could not be drawn is drawn, or said to be undrawable, by the report
-                self.drawing = [drawing for drawing in self.drawing if drawing.poll() is None]
-                sleep(POLL_SECONDS)
-            stop.check()  # asked while the last of it ended
-        finally:
-            for solve in self.running:
-                solve.kill()
-            for comparison in self.comparing:
-                comparison.kill()
-            for drawing in self.drawing:
-                drawing.kill()
-            self.engine.close()
-        return [self.results[name] for name in self.plans]
-
-    def _unfinished(self) -> bool:
-        todo = (self.waiting, self.to_judge, self.to_draw)
-        return any((*todo, self.running, self.comparing, self.drawing))
-
-    def _has_room(self) -> bool:
-        """Whether something can be started: solves run where the engine is, all else here."""
-        if self._has_room_here():
-            return True
-        beside = 0 if self.options.cluster else len(self.comparing) + len(self.drawing)
-        return bool(self.waiting) and len(self.running) + beside < self.engine.width
-
-    def _has_room_here(self) -> bool:
-        here = len(self.comparing) + len(self.drawing)
-        here += 0 if self.options.cluster else len(self.running)
-        return bool(self.to_judge or self.to_draw) and here < self.options.jobs
-
-    def _prepare(self, plan: CasePlan) -> None:
-        folder = self.directory.case_folder(plan.scene.name)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_json(scene_content(plan.scene), folder / "scene.json")
-        for job, record in plan.refused:
-            self._kept(job, record)
-            self.progress.solved(job.label, record, reused=False)
-
-    def _start(self) -> None:
-        if self._has_room_here():
-            if self.to_judge:
-                self._judge(self.to_judge.pop(0))
-            else:
-                self._draw(self.to_draw.pop(0))
-            return
-        job = self.waiting.pop(0)
-        if (record := stored_record(job)) is not None:
-            self.reused += 1
-            self.records[job.folder] = (job.folder / "record.json").read_bytes()
-            self._solve_done(job, record, reused=True)
-            return
-        emptied(job.folder)
-        if (record := self._known(job)) is not None:
-            self.reused += 1
-            self._solve_done(job, self._kept(job, record), reused=True)
-            return
-        content = {
-            "scene": scene_content(self.plans[job.case].scene_of(job)),
-            "solver": job.solver,
-            "level": job.level,
-            "repetitions": job.repetitions,
-            "parameters": job.parameters,
-            "ranks": self._ranks(job),
-        }
-        write_json(content, job.folder / "job.json")
-        self.running[self.engine.start(content, job.folder)] = job
-        self.progress.started(job.label)
-
-    def _ranks(self, job: Job) -> int:
-        """MPI ranks of a solve: several for references, else one."""
-        return self.options.ranks if job.solver == REFERENCE else 1
-
-    def _known(self, job: Job) -> SolveRecord | None:
-        """Take a reference from the bundle or the cache."""
-        scene = self.plans[job.case].scene_of(job)
-        if job.solver != REFERENCE:
-            return None
-        if self.bundle is not None:
-            return self.bundle.take(scene, job)
-        return self.cache.take(scene, job) if self.cache is not None else None
-
-    def _ended(self, job: Job, solve: Running, ending: Ending) -> None:
-        record = self._record(job, solve, ending)
-        if job.solver == REFERENCE and self.cache is not None:
-            trouble = self.cache.keep(self.plans[job.case].scene_of(job), job, record)
-            if trouble:
-                record.notes["cache"] = trouble
-        record = self._kept(job, record)
-        self._solve_done(job, record, reused=False)
-
-    def _kept(self, job: Job, record: SolveRecord) -> SolveRecord:
-        """Store a record; its solution may be gone, or be removed by a solver later."""
-        job.folder.mkdir(parents=True, exist_ok=True)
-        try:
-            store_record(job, record)
-        except (InputError, FileNotFoundError) as error:
-            reason = f"its solution is not there any more ({one_line(error)})"
-            record = job.blank(Status.FAILED, reason)
-            store_record(job, record)
-        self.records[job.folder] = (job.folder / "record.json").read_bytes()
-        return record
-
-    def _record(self, job: Job, child: Running, ending: Ending) -> SolveRecord:
-        outcome = outcome_in(job.folder)
-        if outcome is None:
-            blank = job.blank(*death(child.log, ending, self.options.timeout, self.memory))
-            record = replace(blank, wall=ending.wall, peak_memory=ending.peak)
-        else:
-            peak = max(ending.peak, outcome.pop("peak_memory", None) or 0.0)
-            blank = job.blank(outcome.pop("status"), outcome.pop("reason"))
-            record = replace(blank, wall=ending.wall, peak_memory=peak, **outcome)
-            if ending.killed_for:
-                record.notes["ended"] = f"had answered, and was killed for its {ending.killed_for}"
-        if note := self._contention():
-            record.notes["timing"] = note
-        if record.status in (Status.FAILED, Status.TIMEOUT, Status.MEMORY):
-            record.notes[LOG] = os.path.relpath(child.log, self.directory.root)
-        return record
-
-    def _contention(self) -> str:
-        if self.options.cluster:
-            return f"on a worker of {self.options.cluster}: other solves may have run beside it"
-        if self.options.jobs > 1:
-            return f"contended: up to {self.options.jobs} processes at the same time"
-        if self.origin["load"] > self.origin["cores"]:
-            return f"contended: load {self.origin['load']} on {self.origin['cores']} cores"
-        return ""
-
-    def _solve_done(self, job: Job, record: SolveRecord, reused: bool) -> None:
-        self.progress.solved(job.label, record, reused)
-        self.open[job.case] -= 1
-        for other, without in levels_in_vain(self.plans[job.case], job, record, self.waiting):
-            self.waiting.remove(other)
-            self.open[job.case] -= 1
-            self.progress.solved(other.label, self._kept(other, without), reused=False)
-        if not self.open[job.case]:
-            self.to_judge.append(job.case)
-
-    def _restore(self, plan: CasePlan, jobs: Sequence[Job]) -> None:
-        """Write anew what a solver may have removed or changed: the scene and the records."""
-        folder = self.directory.case_folder(plan.scene.name)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_json(scene_content(plan.scene), folder / "scene.json")
-        for job in jobs:
-            job.folder.mkdir(parents=True, exist_ok=True)
-            write_whole(job.folder / "record.json", self.records[job.folder])
-
-    def _lost(self, jobs: Sequence[Job]) -> list[Job]:
-        """Those whose solution a solver has removed or changed; to be solved again, once."""
-        lost = [
-            job
-            for job in jobs
-            if job.folder not in self.again
-            and load_record(job.folder).status is Status.SOLVED
-            and stored_record(job) is None
-        ]
-        self.again |= {job.folder for job in lost}
-        return lost
-
-    def _judge(self, case: str) -> None:
-        plan, folder = self.plans[case], self.directory.case_folder(case)
-        own = [*plan.jobs, *(job for job, _ in plan.refused)]
-        jobs = [*own, *plan.models]
-        self._restore(plan, jobs)
-        if lost := self._lost(jobs):
-            self.waiting = [*lost, *self.waiting]
-            self.open[case] += len(lost)
-            return
-        records = [digest_of(read_json(job.folder / "record.json")) for job in jobs]
-        judge_only = self.options.judge_only
-        key = digest_of([records, scene_content(plan.scene), judge_only, code_of_comparison()])
-        if (result := stored_result(folder, key)) is not None:
-            self._case_done(result)
-            return
-        if self.drawings is not None:
-            prepare_fork(DRAWING)
-        comparison = Comparison(
-            plan.scene,
-            key,
-            judge_only,
-            [job.folder for job in own],
-            {
-                model: [j.folder for j in plan.models if j.model == model]
-                for model in plan.other_scenes
-            },
-            folder,
-            self.directory.root,
-            self.origin,
-            self.options.timeout,
-            self.memory,
-        )
-        self.comparing.append(comparison)
-        self.progress.started(comparison_label(case))
-
-    def _case_done(self, result: CaseResult) -> None:
-        if (job := further_level(self.plans[result.case], result)) is not None:
-            self.waiting.insert(0, job)
-            self.open[result.case] += 1
-            return
-        for done in self.families.ready(result):
-            folder = self.directory.case_folder(done.case)
-            if done is not result:
-                write_result(done, folder / "result.json")
-            self.results[done.case] = done
-            self.progress.judged(done)
-            if self.drawings is not None:
-                self.to_draw.append(done.case)
-
-    def _draw(self, case: str) -> None:
-        assert self.drawings is not None
-        folder = self.directory.case_folder(case)
-        question = {
-            "root": str(self.directory.root.resolve()),
-            "index": list(self.plans).index(case),
-            "folder": str(folder.relative_to(self.directory.root)),
-            "target": str(self.drawings / f"{folder.name}.pickle"),
-        }
-        file = self.drawings / f"{folder.name}.json"
-        write_json(question, file)
-        limit = max(self.options.timeout, LEAST_SECONDS)
-        log = file.with_suffix(".txt")
-        drawing = Child(DRAWING, file, log, limit, self.memory, own=True)
-        self.drawing.append(drawing)
-
-
-def comparison_label(case: str) -> str:
-    """Return what `Progress` is told of the comparison of a case."""
-    return f"{case} · comparison"
 
 
 def _now() -> str:

@@ -85,11 +85,12 @@ def _solved(job: dict[str, Any], folder: Path, store: bool, timed: bool) -> dict
     from verify.solution import handed_over, write_solution
     from verify.solvers import find_solver
     from verify.solvers.interface import checked_refusal
+    from verify.solvers.named import solver_in
 
     if ":" in job["solver"]:  # a class of the user's own, found from where the run was started
         sys.path.append(os.getcwd())
     scene = restore_scene(job["scene"])
-    solver = find_solver(job["solver"])
+    solver = find_solver(solver_in(job["solver"]))
     if refusal := checked_refusal(solver.refuses(scene)):
         raise UnsupportedSceneError(refusal)
     with compile_times() as compiled:

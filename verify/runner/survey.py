@@ -65,15 +65,16 @@ def survey(
         ``refusal``, ``bad_input`` (of the case) and ``failure`` (of the solver).
     """
     from verify.solvers import check_parameters, find_solver
+    from verify.solvers.named import solver_in
 
     if ":" in name:
         sys.path.append(os.getcwd())
     try:
-        solver = find_solver(name)
+        solver = find_solver(solver_in(name))
     except InputError as error:
         return {"error": str(error)}
     try:
-        check_parameters(name, solver, parameters)
+        check_parameters(solver_in(name), solver, parameters)
     except InputError as error:
         return {"error": None, "bad_parameter": str(error)}
     cases: dict[str, Any] = {}

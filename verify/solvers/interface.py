@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import Parameter, signature
@@ -17,7 +16,7 @@ from verify.printable import shown, words_of
 from verify.scene import Scene
 from verify.scene.nearest import nearest
 from verify.solution import Solution
-from verify.solvers.named import parameters_in, solver_in
+from verify.solvers.named import solver_in
 
 # module:class, imported only when asked for, so that one solver's missing dependency
 # (FEniCSx, say) does not hinder the others
@@ -124,16 +123,14 @@ def find_solver(name: str) -> Solver:
     Parameters
     ----------
     name : str
-        One of `solver_names`, or ``module:Class`` for a class of the user's own. Parameters may
-        follow it (``xfem tip=partial``), which all that it solves then has.
+        One of `solver_names`, or ``module:Class`` for a class of the user's own; without
+        parameters, which each solve is given.
 
     Raises
     ------
     InputError
-        If there is no such solver, it cannot be loaded, what it needs is not installed, or it does
-        not take these parameters.
+        If there is no such solver, it cannot be loaded, or what it needs is not installed.
     """
-    name, own = solver_in(name), parameters_in(name)
     with _loading(name):
         found = _class_of(name)
         told = name in _METHODS or name in _foreign_names()
@@ -141,10 +138,6 @@ def find_solver(name: str) -> Solver:
     for method in _ASKED:
         if not callable(getattr(solver, method, None)):
             raise InputError(f"solver '{name}' has no {method}(); expected {', '.join(_ASKED)}")
-    check_parameters(name, solver, own)
-    for method in ("solve", "system") if own else ():
-        if hasattr(solver, method):
-            setattr(solver, method, partial(getattr(solver, method), **own))
     return solver
 
 
