@@ -95,7 +95,7 @@ def load_scenes(source: str | Path) -> list[Scene]:
     if path.suffix != ".toml":
         known = list_cases()
         if text not in known:
-            raise InputError(f"no case '{text}'{nearest(text, known)}")
+            raise InputError(f"no case '{text}'{nearest(text, known)} (`verify list` shows all)")
         name, path = text, known[text]
     content = _content(path)
     file, cases = path.resolve(), case_folder().resolve()
