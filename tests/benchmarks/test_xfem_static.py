@@ -12,8 +12,7 @@ from scipy.sparse.linalg import splu
 
 from verify.accelerated.cholesky import Cholesky
 from verify.accelerated.conjugate_gradients import ConjugateGradients
-from verify.xfem.assembly import constrain
-from verify.xfem.block_pattern import block_pattern
+from verify.xfem.block_pattern import block_pattern, constrain
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.internal_force import InternalForce

@@ -8,7 +8,7 @@ from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.kernels import PLAIN
+from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh

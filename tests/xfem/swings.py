@@ -4,7 +4,7 @@ import numpy as np
 from cut_bodies import DENSITY, material
 from test_sliver_policies import shaken
 
-from verify.xfem.assembly import body_pattern
+from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody
 from verify.xfem.critical_step import critical_step
 from verify.xfem.cuts import Plane

@@ -8,7 +8,7 @@ from test_sliver_policies import degenerate_cuts
 from time_schemes import SCHEMES
 
 from verify.methods.mass_variants import shifted_mass
-from verify.xfem.assembly import body_pattern
+from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody, MotionState
 from verify.xfem.critical_step import critical_step, element_critical_steps
 from verify.xfem.energy_balance import BalanceRecorder, run

@@ -7,15 +7,14 @@ from cut_bodies import rotation
 from test_sliver_policies import degenerate_cuts, shaken
 from xfem_bodies import boundary_nodes, relative_l2_error
 
-from verify.xfem.assembly import body_pattern
+from verify.xfem.block_pattern import body_pattern
 from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.loads import body_force
+from verify.xfem.loads import body_force, simplex_rule
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.quadrature import simplex_rule
 from verify.xfem.slivers import treat_slivers
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

@@ -7,7 +7,7 @@ from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.cuts import ToolPath
-from verify.xfem.nearest_points import nearest_on_facet
+from verify.xfem.faceted_cuts import nearest_on_facet
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 

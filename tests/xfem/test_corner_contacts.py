@@ -5,8 +5,8 @@ import pytest
 from xfem_bodies import zero_modes
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.cuts import Plane, PolygonPatch
 from verify.xfem.faceted_cuts import Polyline
-from verify.xfem.flat_cuts import Plane, PolygonPatch
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh

@@ -9,7 +9,7 @@ from verify.xfem import static_newton, statics
 from verify.xfem.cuts import Plane
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.kernels import PLAIN
+from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.structured_meshes import rectangle_mesh
 

@@ -8,8 +8,8 @@ from xfem_bodies import boundary_nodes
 
 from verify.xfem.cuts import Polyline
 from verify.xfem.elasticity import isotropic
+from verify.xfem.loads import simplex_rule
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.quadrature import simplex_rule
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import rectangle_mesh
 from verify.xfem.subdivision import subdivide

@@ -5,9 +5,8 @@ import pytest
 
 from verify.xfem.cuts import Plane, Polyline
 from verify.xfem.elasticity import isotropic
-from verify.xfem.loads import body_force, traction
+from verify.xfem.loads import body_force, simplex_rule, traction
 from verify.xfem.phantom import cut_mesh
-from verify.xfem.quadrature import simplex_rule
 from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.supports import Supports, UnsupportedBodyError

@@ -18,7 +18,7 @@ from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.kernels import PLAIN
+from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.loads import body_force
 from verify.xfem.mass import side_wise_mass
 from verify.xfem.phantom import cut_mesh

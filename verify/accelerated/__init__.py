@@ -5,6 +5,6 @@ from verify.accelerated.direct_by_size import DirectBySize
 from verify.accelerated.nearly_symmetric import NearlySymmetric
 from verify.accelerated.one_pass import OnePassTetrahedra
 from verify.accelerated.solver_by_cost import SolverByCost
-from verify.xfem.kernels import Kernels
+from verify.xfem.linear_solvers import Kernels
 
 FAST = Kernels(DirectBySize, ConjugateGradients, SolverByCost, NearlySymmetric, OnePassTetrahedra)

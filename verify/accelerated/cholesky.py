@@ -16,8 +16,7 @@ from verify.accelerated.front_plan_kernels import assembly_lists, front_rows
 from verify.accelerated.front_tree import levels, merge_and_order
 from verify.accelerated.minimum_degree import minimum_degree
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import SingularStiffnessError, XfemError
-from verify.xfem.given_arrays import check_floats
+from verify.xfem.errors import SingularStiffnessError, XfemError, check_floats
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
 _Floats = NDArray[np.float64]

@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from verify.accelerated.cholesky import Cholesky
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import SingularStiffnessError
-from verify.xfem.given_arrays import check_floats
+from verify.xfem.errors import SingularStiffnessError, check_floats
 from verify.xfem.linear_solvers import LinearSolver, SparseLU, nodal_vector
 
 _Floats = NDArray[np.float64]

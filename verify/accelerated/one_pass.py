@@ -95,7 +95,7 @@ class OnePassTetrahedra:
         whole: bool = True,
         rotational: float = 0.0,
     ) -> int:
-        """Overwrite force (N, 3) and blocks (B, 3, 3); see `verify.xfem.kernels.OnePass`."""
+        """Overwrite force (N, 3) and blocks (B, 3, 3); see `verify.xfem.linear_solvers.OnePass`."""
         moved = displacement, velocity, implicit
         return self._run(moved, scale, rotational, False, force, blocks, whole)
 

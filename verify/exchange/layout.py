@@ -25,7 +25,7 @@ from verify.scene.prescribed import PrescribedMotion
 from verify.solvers.body_of_scene import background_mesh
 from verify.solvers.boundary_of_scene import Boundary
 from verify.solvers.loads_of_scene import ForceDensity, is_moving
-from verify.xfem.quadrature import simplex_rule
+from verify.xfem.loads import simplex_rule
 
 Array = NDArray[np.float64]
 _DEGREE = 7  # of the rule for loads that vary: an exact field's traction is smooth on a facet

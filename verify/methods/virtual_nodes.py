@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from verify.methods.cut_body import Change, CutBody, make_body
 from verify.methods.opening import OpenedCells, cut_so_far
 from verify.methods.whole_cells import whole_cells
-from verify.xfem.absorption import absorb
-from verify.xfem.contacts import sibling_contacts
+from verify.xfem.contacts import absorb, sibling_contacts
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError

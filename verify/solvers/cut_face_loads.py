@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import CutFaces, Scene, faces_of
+from verify.xfem.loads import simplex_rule
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.quadrature import simplex_rule
 from verify.xfem.subdivision import Subdivision, subdivide
 
 _Floats = NDArray[np.float64]

@@ -25,7 +25,7 @@ from verify.solvers.xfem_static import solve_equilibrium
 from verify.solvers.xfem_steps import MASSES, SCHEMES
 from verify.solvers.xfem_system import system_of
 from verify.system import System
-from verify.xfem.kernels import PLAIN
+from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import join_specks, treat_slivers

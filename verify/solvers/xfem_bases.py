@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
-from verify.xfem.assembly import body_pattern
 from verify.xfem.bases import (
     Basis,
     from_sidewise,
@@ -20,6 +19,7 @@ from verify.xfem.bases import (
     transformation,
     transformed_matrix,
 )
+from verify.xfem.block_pattern import body_pattern
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import BasisError
 from verify.xfem.internal_force import InternalForce

@@ -20,7 +20,7 @@ from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.inherit import ancestors, inherit_state
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.kernels import Kernels
+from verify.xfem.linear_solvers import Kernels
 from verify.xfem.mass import Mass, side_wise_mass
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh

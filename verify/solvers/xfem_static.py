@@ -18,7 +18,7 @@ from verify.solvers.xfem_bases import solve_in_basis
 from verify.xfem.equilibrium import StaticEquilibrium, static_equilibrium
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce, inverted_cells
-from verify.xfem.kernels import Kernels
+from verify.xfem.linear_solvers import Kernels
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.statics import solve_static
 from verify.xfem.supports import Supports, check_bodies

@@ -11,8 +11,8 @@ from verify.solvers.supports_of_scene import supports_of
 from verify.solvers.xfem_bases import held_in_basis
 from verify.solvers.xfem_steps import MASSES
 from verify.system import System
-from verify.xfem.assembly import body_pattern
 from verify.xfem.bases import transformed_matrix
+from verify.xfem.block_pattern import body_pattern
 from verify.xfem.elasticity import Material
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce

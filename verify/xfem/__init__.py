@@ -4,31 +4,33 @@ It knows no scene, no file format and no other solver, and needs numpy, scipy an
 Its parts are layers (`make check` tests that none imports one above it). In an order of
 reading:
 
-`mesh`, `flat_cuts`, `faceted_cuts`, `tool_path`; `cuts` names them all
-    simplices; what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
-`zero_points`, `clip`, `crossing`, `junctions`, `pieces`
+`mesh`, `structured_meshes`
+    simplices
+`cuts`, `faceted_cuts`, `tool_path`
+    what a cut is: flat, a polyline, a triangulated surface, what a tool sweeps
+`zero_points`, `clip`, `crossing`, `pieces`
     exact division of cells at zero points of level sets; parts of the cells that cuts go through
 `join`, `phantom`
     which parts share dof nodes (by contact across faces), on which side of the cuts they lie, and
     the result: standard finite elements with weights
-`mass`
-    side-wise, consistent
-`elasticity`, `loads`, `supports`
-    material, load vectors, prescribed displacements; `bases`: the other bases of the same
-    space; `critical_step` of explicit schemes; `subdivision`: a conforming mesh of the cut body
-`polar`, `element`, `assembly`, `internal_force`
-    nearest rotations; force and tangents of an element, linear elasticity being R = I; block
-    pattern and supports; force, energy and stiffness of a body
-`contacts`, `absorption`, `aggregation`, `slivers`, `ghost_penalty`
-    policies for parts with a small share of their element; ghost penalty
-`linear_solvers`, `kernels`
-    SciPy behind one protocol; the operations that `verify.accelerated` replaces
+`elasticity`, `loads`, `supports`, `mass`
+    material, load vectors, prescribed displacements; masses, side-wise and consistent
+`polar`, `element`, `block_pattern`, `internal_force`
+    nearest rotations; force and tangents of an element, linear elasticity being R = I; sparsity
+    and supports; force, energy and stiffness of a body
+`linear_solvers`
+    SciPy behind one protocol, and the operations that `verify.accelerated` replaces
 `statics`, `static_newton`, `rigid_motion`, `equilibrium`
     linear statics; Newton's method on the potential energy and load steps at finite rotation
-`body`, `energy_balance`, `explicit`, `implicit`, `real_time`, `inherit`
-    a body in motion and its schemes; `energy_momentum`: the conserving one
-`given_arrays`, `quadrature`, `nearest_points`, `block_pattern`, `errors`
-    what several of them use
+`body`, `energy_balance`, `explicit`, `implicit`, `energy_momentum`, `real_time`, `inherit`
+    a body in motion, its energies and its schemes; the state of a body that is cut on the way
+`contacts`, `aggregation`, `slivers`, `ghost_penalty`
+    policies for parts with a small share of their element
+`bases`, `critical_step`, `subdivision`
+    other bases of the same space; largest step of explicit schemes; the cut body as a conforming
+    mesh
+`errors`
+    what is raised, and checks of what a user gives
 
 Example
 -------

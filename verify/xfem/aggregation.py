@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from verify.xfem.absorption import renumber
-from verify.xfem.contacts import face_contacts
+from verify.xfem.contacts import face_contacts, renumber
 from verify.xfem.phantom import Aggregation, PhantomMesh
 
 _Floats = NDArray[np.float64]

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, identity, kron
 from scipy.sparse.linalg import splu
 
-from verify.xfem.errors import BasisError, XfemError
-from verify.xfem.given_arrays import check_choice
+from verify.xfem.errors import BasisError, XfemError, check_choice
 from verify.xfem.phantom import PhantomMesh
 
 Basis = Literal["shifted", "heaviside"]

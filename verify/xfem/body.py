@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import check_floats, finite_array
+from verify.xfem.errors import XfemError, check_floats, finite_array
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass

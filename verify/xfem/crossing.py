@@ -1,23 +1,38 @@
-"""Crossing of a piece by a cut, from where it crosses the piece's edges."""
+"""Crossing of pieces by cuts: by one alone, and by several that end on one another.
 
-from collections.abc import Callable
+A cut alone divides a piece only if it goes through, which the points tell where it crosses the
+edges of the piece.
+
+Where several end in one point (2D) or along one line (3D) inside an element, none goes through, and
+yet together they part the material. There every cut divides whatever its plane crosses. Of the
+facets between the pieces that this leaves, those inside the extent of a cut keep apart; pieces that
+meet in another one are tied: one piece.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from verify.xfem.clip import Partition
+from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
-from verify.xfem.flat_cuts import Cut
+from verify.xfem.mesh import equal_rows, facets_of
+from verify.xfem.zero_points import ZeroPoints
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
-
+_Bools = NDArray[np.bool_]
 TipRule = Literal["inside", "through", "nearest"]
-
 Reached = Callable[[_Ints, _Floats], NDArray[np.bool_]]
-
 AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
 REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
+_ASIDE = 1e-4  # element sizes: steps in which a cut is felt for
+_SPECK = 1e-24  # of a cell: what rounding leaves between three planes with a common line
 
 
 class Crossing(NamedTuple):
@@ -119,3 +134,190 @@ def _mostly_crossed(cut: Cut, positions: _Floats, crossing: Crossing) -> NDArray
     mostly = np.zeros(crossing.pieces, dtype=bool)
     mostly[found] = inside
     return mostly
+
+
+class _Facets(NamedTuple):
+    """Facets between two pieces of one cell: points (f, d), pieces (f,) and (f,)."""
+
+    points: _Ints
+    first: _Ints
+    second: _Ints
+
+
+def meeting_cells(
+    partition: Partition, ends: Sequence[_Ints], cells: int, joint: _Bools | None
+) -> _Bools:
+    """Which cuts (m, cuts) meet cells, of those where several do and one at least ends.
+
+    Parameters
+    ----------
+    partition : Partition
+        By the rule that a cut divides what it goes through.
+    ends : sequence of int arrays
+        Cells in pieces of which each cut ends.
+    cells : int
+        Number of cells of the mesh.
+    joint : (m,) bool array, optional
+        Further cells, in which several meet.
+    """
+    meets = np.zeros((cells, len(ends)), dtype=bool)
+    for cut, some in enumerate(ends):
+        meets[some, cut] = True
+    ending = meets.any(axis=1) if joint is None else meets.any(axis=1) | joint
+    piece, cut = np.nonzero((partition.label != 0) & ending[partition.parent, None])
+    meets[partition.parent[piece], cut] = True
+    meets[meets.sum(axis=1) < 2] = False
+    return meets
+
+
+def without_specks(partition: Partition, cells: _Bools) -> Partition:
+    """Take the volume of the pieces of some cells (m,) that rounding alone has made."""
+    speck = cells[partition.parent] & (partition.fraction <= _SPECK)
+    if not speck.any():
+        return partition
+    sub = partition.simplices
+    fraction = np.where(speck[sub.piece], 0.0, sub.fraction)
+    return replace(partition, simplices=replace(sub, fraction=fraction))
+
+
+def joint_cuts(
+    trial: Partition,
+    alone: Partition,
+    cuts: Sequence[Cut],
+    sizes: _Floats,
+    joint: _Bools | None,
+) -> _Bools:
+    """Which cuts (m, cuts) part which cells together, into more pieces than each one alone.
+
+    Parameters
+    ----------
+    trial : Partition
+        Of suspicious cells: every cut that meets them divides whatever its plane crosses.
+    alone : Partition
+        By the rule that a cut divides what it goes through.
+    cuts : sequence of Cut
+    sizes : (m,) float array
+        Longest edges of the cells, in metres.
+    joint : (m,) bool array, optional
+        Cells that have been parted so before.
+    """
+    cells = len(sizes)
+    chosen = np.zeros(cells, dtype=bool)
+    chosen[trial.parent] = True
+    facets = _inner_facets(trial, chosen)
+    borne = _borne(trial, facets, cuts, sizes)
+    loose = ~borne.any(axis=1)
+    part = _components(len(trial.parent), facets.first[loose], facets.second[loose])
+    solid = trial.fraction > 0.0
+    first = np.unique(part[solid], return_index=True)[1]
+    parts = np.bincount(trial.parent[solid][first], minlength=cells)
+    more = parts > np.bincount(alone.parent[alone.fraction > 0.0], minlength=cells)
+    if joint is not None:
+        more |= joint & chosen
+    through = np.zeros((cells, len(cuts)), dtype=bool)
+    apart = part[facets.first] != part[facets.second]
+    facet, cut = np.nonzero(borne & apart[:, None])
+    through[trial.parent[facets.first[facet]], cut] = True
+    through[~more] = False
+    return through
+
+
+def tied_pieces(partition: Partition, cuts: Sequence[Cut], sizes: _Floats, cells: _Bools) -> _Ints:
+    """Pairs (t, 2) of pieces of some cells (m,) that no cut keeps apart."""
+    facets = _inner_facets(partition, cells)
+    loose = ~_borne(partition, facets, cuts, sizes).any(axis=1)
+    pairs = np.stack([facets.first[loose], facets.second[loose]], axis=1)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+def _components(count: int, first: _Ints, second: _Ints) -> _Ints:
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _inner_facets(partition: Partition, cells: _Bools) -> _Facets:
+    """Facets between sub-simplices with a volume, in different pieces of one of some cells (m,)."""
+    sub, corners = partition.simplices, partition.simplices.points.shape[1]
+    sub = sub[cells[partition.parent[sub.piece]] & (sub.fraction > 0.0)]
+    points = np.sort(facets_of(sub.points), axis=1)
+    piece = np.repeat(sub.piece, corners)
+    first, second = equal_rows(np.column_stack([partition.parent[piece], points]))
+    met = piece[first] != piece[second]
+    return _Facets(points[first][met], piece[first][met], piece[second][met])
+
+
+def _borne(partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: _Floats) -> _Bools:
+    """Which facets lie inside the extent of each cut that has their pieces on its two sides."""
+    label, positions = partition.label, partition.points.positions
+    borne = np.zeros((len(facets.points), len(cuts)), dtype=bool)
+    for index, cut in enumerate(cuts):
+        rows = np.flatnonzero(label[facets.first, index] * label[facets.second, index] < 0)
+        if len(rows) == 0:
+            continue
+        points = facets.points[rows]
+        size = sizes[partition.parent[facets.first[rows]]][:, None]
+        level, depth = (
+            x.reshape(points.shape) for x in level_and_depth(cut, positions[points.ravel()])
+        )
+        inside = depth >= -AT_END * size
+        if not inside.all():
+            past = (depth < -AT_END * size) & (depth > depth.max(axis=1, keepdims=True) - size)
+            past &= (depth > AT_END * size).any(axis=1, keepdims=True)
+            row, corner = np.nonzero(past)
+            if len(row):
+                inside[row, corner] = reached(
+                    cuts, index, partition.points, points[row, corner], size[row, 0]
+                )
+        borne[rows, index] = (inside & (np.abs(level) <= REACH * size)).all(axis=1)
+    return borne
+
+
+def reached(
+    cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: _Ints, size: _Floats
+) -> _Bools:
+    """Which points past the end of a cut it reaches all the same: it ends on another cut there.
+
+    A cut that is bent inside an element is realised beside itself, and what ends on it goes on to
+    where it is: over points that lie past the other cut as given and not past it as realised.
+
+    Parameters
+    ----------
+    cuts : sequence of Cut
+    index : int
+        Of the cut that ends.
+    zero : ZeroPoints
+    points : (q,) int array
+        Numbers of points of its plane past its end.
+    size : (q,) float array
+        Of the cells in which they lie, in metres.
+    """
+    found = np.zeros(len(points), dtype=bool)
+    at, realised = zero.positions[points], zero.values[points]
+    near = np.abs(realised) <= size[:, None]
+    near[:, index] = False
+    for other in np.flatnonzero(near.any(axis=0)).tolist():
+        cut = cuts[other]
+        given = level_and_depth(cut, at)[0]
+        between = near[:, other] & (given * realised[:, other] <= 0.0)
+        between &= np.abs(given - realised[:, other]) > AT_END * size
+        rows = np.flatnonzero(between & ~found)
+        if len(rows) == 0:
+            continue
+        end, inwards = _end(cuts[index], at[rows], size[rows])
+        off = AT_END * size[rows] + np.abs(level_and_depth(cuts[index], end)[0])
+        level, depth = level_and_depth(cut, end)
+        before = level_and_depth(cut, end + _ASIDE * size[rows, None] * inwards)[0]
+        found[rows] = (np.abs(level) <= off) & (depth >= -off) & (before * given[rows] < 0.0)
+    return found
+
+
+def _end(cut: Cut, points: _Floats, size: _Floats) -> tuple[_Floats, _Floats]:
+    """Nearest end (q, space) of a cut to points past it, and the direction from there to it."""
+    step = _ASIDE * size
+    slope = np.empty_like(points)
+    for axis, unit in enumerate(np.eye(points.shape[1])):
+        ahead, behind = (cut.depth(points + way * step[:, None] * unit) for way in (0.5, -0.5))
+        slope[:, axis] = (ahead - behind) / step
+    length = np.linalg.norm(slope, axis=1)
+    slope /= np.where(length > 0.0, length, 1.0)[:, None]
+    return points - cut.depth(points)[:, None] * slope, slope

@@ -6,8 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import check_choice, finite_array, real_array
+from verify.xfem.errors import XfemError, check_choice, finite_array, real_array
 
 State = Literal["plane strain", "plane stress", "solid"]
 

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import finite_array
+from verify.xfem.errors import XfemError, finite_array
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.rigid_motion import RigidMotions
 from verify.xfem.static_newton import Descent, Newton, NotInEquilibriumError

@@ -1,4 +1,9 @@
-"""Errors of the compact solver: wrong input, and systems that have no solution."""
+"""Errors of the compact solver, and checks of the arrays and words that a user gives."""
+
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 
 class XfemError(ValueError):
@@ -29,3 +34,110 @@ class SingularStiffnessError(XfemError):
 
 class NotConvergedError(XfemError):
     """The iterations ran out before the residual was small enough."""
+
+
+def check_choice(given: str, choices: Any, what: str) -> None:
+    """Check that a word is one of those that a Literal type lists.
+
+    Raises
+    ------
+    XfemError
+        If it is another.
+    """
+    if given not in get_args(choices):
+        raise XfemError(f"{what} '{given}'; expected one of {', '.join(get_args(choices))}")
+
+
+def real_array(given: ArrayLike, what: str) -> NDArray[np.float64]:
+    """Real numbers of any shape: a copy, so that what is made of them stays when they change.
+
+    Raises
+    ------
+    XfemError
+        If there is text, None or a complex number among them, or rows differ in length.
+    """
+    return np.array(_as_real(given, what))
+
+
+def finite_array(
+    given: ArrayLike, what: str, *shapes: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """Finite real numbers in one of some shapes, a copy; None stands for any length.
+
+    Raises
+    ------
+    XfemError
+        If they are no real numbers, one is not finite, or the shape is another.
+    """
+    found = real_array(given, what)
+    fits = (
+        len(shape) == found.ndim
+        and all(n in (None, m) for n, m in zip(shape, found.shape, strict=True))
+        for shape in shapes
+    )
+    if not any(fits):
+        expected = " or ".join(str(shape).replace("None", "n") for shape in shapes)
+        raise XfemError(f"{what} of shape {found.shape}; expected {expected}")
+    if not np.isfinite(found).all():
+        first = np.argwhere(~np.isfinite(found))[0].tolist()
+        raise XfemError(f"{what}: number {first} is not finite")
+    return found
+
+
+def index_array(given: ArrayLike, what: str) -> NDArray[np.int64]:
+    """Whole numbers of any shape, a copy; an empty list has none, and so may be of any type.
+
+    Raises
+    ------
+    XfemError
+        If they are not of an integer type: 0.7 is not taken as 0.
+    """
+    try:
+        raw = np.asarray(given)
+    except ValueError:
+        raw = np.array(None)
+    if raw.size and not np.issubdtype(raw.dtype, np.integer):
+        raise XfemError(f"{what} {_shown(given)}; expected integers, in rows of one length")
+    return raw.astype(np.int64)
+
+
+def places(given: ArrayLike, space: int, what: str) -> NDArray[np.float64]:
+    """Positions (n, space) at which something in so many dimensions is asked for, in metres.
+
+    Raises
+    ------
+    XfemError
+        If they have another shape.
+    """
+    points = _as_real(given, f"{what}: points")
+    if points.ndim != 2 or points.shape[1] != space:
+        raise XfemError(f"{what} at points of shape {points.shape}; expected (n, {space})")
+    return points
+
+
+def _as_real(given: ArrayLike, what: str) -> NDArray[np.float64]:
+    try:
+        raw = np.asarray(given)
+        if not np.iscomplexobj(raw):
+            return np.asarray(raw, dtype=np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise XfemError(f"{what} {_shown(given)}; expected real numbers, in rows of one length")
+
+
+def check_floats(name: str, values: NDArray[np.float64], shape: tuple[int, ...]) -> None:
+    """Check an array that a compiled loop reads or writes as it is: loops check no bounds.
+
+    Raises
+    ------
+    XfemError
+        If it has another shape, or is not of 64-bit floats.
+    """
+    kind = getattr(values, "dtype", type(values).__name__)
+    if kind != np.float64 or values.shape != shape:
+        raise XfemError(f"{name} of shape {np.shape(values)}, {kind}; expected {shape}, float64")
+
+
+def _shown(given: ArrayLike) -> str:
+    text = " ".join(repr(given).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from verify.xfem.assembly import body_pattern, pattern_places
-from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.block_pattern import BlockPattern, body_pattern, pattern_places
 from verify.xfem.contacts import face_contacts
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly import add_mass, constrain, held_entries
+from verify.xfem.block_pattern import add_mass, constrain, held_entries
 from verify.xfem.body import (
     DynamicBody,
     MotionState,

@@ -21,10 +21,9 @@ from verify.xfem.element import (
     elements_of,
     geometric_stiffness,
 )
-from verify.xfem.errors import XfemError
+from verify.xfem.errors import XfemError, check_choice, check_floats
 from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.given_arrays import check_choice, check_floats
-from verify.xfem.kernels import PLAIN, Kernels, OnePass
+from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
 

@@ -1,5 +1,13 @@
-"""Linear solvers of nodal blocks by SciPy: sparse LU factorisation, conjugate gradients."""
+"""Linear solvers of nodal blocks, and the operations of this package that faster ones may replace.
 
+The solvers are SciPy's: sparse LU factorisation, conjugate gradients. `Kernels` is the seam to
+`verify.accelerated`: every implementation of an operation gives the same result to round-off.
+`PLAIN` is what this package does alone, with NumPy, SciPy and plain loops; whoever builds a body
+may pass another set.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -8,12 +16,13 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, SuperLU, cg, splu
 
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
-from verify.xfem.given_arrays import check_floats
+from verify.xfem.element import Elements
+from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError, check_floats
 
 _Floats = NDArray[np.float64]
-
+_Bools = NDArray[np.bool_]
 _ROUND_OFF = 1e-14  # of the diagonal entry from which a pivot comes
+_SMALL = 1500  # nodes of a solid, up to which a factorisation is quicker than iterations
 _IN_ITS_ORDER = {"SymmetricMode": True}
 
 
@@ -207,3 +216,87 @@ def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> _Floats
         first = int(np.argmin(np.isfinite(found).all(axis=1)))
         raise XfemError(f"the {name} is not finite, first at dof node {first}")
     return found
+
+
+class OnePass(Protocol):
+    """Force and stiffness of corotational tetrahedra in one pass over the elements.
+
+    `InternalForce.linearise` and `linearise_average` of `verify.xfem.internal_force` ask for it.
+    """
+
+    pattern: BlockPattern
+
+    def __call__(
+        self,
+        displacement: _Floats,
+        velocity: _Floats,
+        implicit: float,
+        scale: float,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+        rotational: float = 0.0,
+    ) -> int:
+        """Overwrite force (N, 3) and blocks (B, 3, 3); return the cells without rotational part."""
+        ...
+
+    def average(
+        self,
+        start: _Floats,
+        end: _Floats,
+        scale: float,
+        rotational: float,
+        substituted: _Bools,
+        force: _Floats,
+        blocks: _Floats,
+        whole: bool = True,
+    ) -> int:
+        """Overwrite the force averaged over a step, and the stiffness at its end."""
+        ...
+
+    def write_rotations(self, rotations: _Floats) -> None:
+        """Write the rotations (p, 3, 3) of the last pass."""
+        ...
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """One implementation of each operation.
+
+    Attributes
+    ----------
+    direct : callable
+        (pattern, block, held) → factorisation of a symmetric positive definite matrix. `held`
+        (N,) are nodes of which every component is fixed, or None.
+    iterative : callable
+        (pattern, block, tolerance, limit) → iterations with such a matrix.
+    step : callable
+        (pattern, block, held, solid, tolerance) → whichever of the two is quicker for a step in
+        time; `solid` says whether the body fills space, where factors are large.
+    general : callable
+        (pattern, block) → solver for any regular matrix, nearly symmetric as a rule.
+    one_pass : callable, optional
+        (elements, pattern, corotational) → `OnePass`; without it force and stiffness are found one
+        after the other.
+    """
+
+    direct: Callable[[BlockPattern, int, _Bools | None], LinearSolver]
+    iterative: Callable[[BlockPattern, int, float, int], LinearSolver]
+    step: Callable[[BlockPattern, int, _Bools, bool, float], LinearSolver]
+    general: Callable[[BlockPattern, int], LinearSolver]
+    one_pass: Callable[[Elements, BlockPattern, bool], OnePass] | None = None
+
+
+def _direct(pattern: BlockPattern, block: int, held: _Bools | None) -> LinearSolver:
+    return SparseLU(pattern, block, definite=True)
+
+
+def _step(
+    pattern: BlockPattern, block: int, held: _Bools, solid: bool, tolerance: float
+) -> LinearSolver:
+    if solid and pattern.node_count > _SMALL:
+        return BlockJacobiCG(pattern, block, tolerance)
+    return _direct(pattern, block, held)
+
+
+PLAIN = Kernels(_direct, BlockJacobiCG, _step, SparseLU)

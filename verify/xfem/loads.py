@@ -6,17 +6,48 @@ statics exact (patch tests under load).
 """
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import roots_jacobi
 
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import finite_array, index_array
+from verify.xfem.errors import XfemError, finite_array, index_array
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.quadrature import simplex_rule
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
+
+
+@cache
+def simplex_rule(dim: int, degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points and weights exact for polynomials up to a degree.
+
+    Parameters
+    ----------
+    dim : int
+        Dimension of the simplex, 1 to 3.
+    degree : int
+
+    Returns
+    -------
+    barycentric : (q, dim + 1) float array
+    weights : (q,) float array
+        Their sum is 1: they multiply the volume.
+    """
+    count = degree // 2 + 1
+    barycentric = np.ones((1, 1))
+    weights = np.ones(1)
+    for axis in range(dim):
+        # the Jacobi weight (1 − t)^axis is the Jacobian of the collapse onto the new corner
+        t, w = roots_jacobi(count, axis, 0.0)
+        share, w = 0.5 * (1.0 + t), w / w.sum()
+        old = (1.0 - share)[:, None, None] * barycentric
+        new = np.broadcast_to(share[:, None, None], (count, len(weights), 1))
+        barycentric = np.concatenate([old, new], axis=2).reshape(-1, axis + 2)
+        weights = (w[:, None] * weights).ravel()
+    return barycentric, weights
+
 
 # points (q, d) and sides of every cut (q, cuts) to force densities (q, d)
 Density = Callable[[_Floats, NDArray[np.int8]], _Floats]

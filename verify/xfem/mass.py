@@ -14,10 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from verify.xfem.assembly import body_pattern, find_places, pattern_places
-from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import finite_array
+from verify.xfem.block_pattern import BlockPattern, body_pattern, find_places, pattern_places
+from verify.xfem.errors import XfemError, finite_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import Aggregation, PhantomMesh
 

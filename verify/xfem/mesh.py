@@ -12,8 +12,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import finite_array, index_array
+from verify.xfem.errors import XfemError, finite_array, index_array
 
 # A cell whose volume is below this fraction of (longest edge)^dim is called degenerate: its
 # gradients would lose all digits.

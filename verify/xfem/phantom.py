@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from verify.xfem.clip import Partition
 from verify.xfem.crossing import TipRule
-from verify.xfem.flat_cuts import Cut
+from verify.xfem.cuts import Cut
 from verify.xfem.join import PatchNodes, join_parts, node_sides, number_nodes, piece_sides
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import split_cells

@@ -16,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.xfem.clip import Partition, bisected, divided
-from verify.xfem.crossing import Crossing, TipRule, crossed_through
-from verify.xfem.errors import XfemError
-from verify.xfem.flat_cuts import Cut
-from verify.xfem.given_arrays import check_choice, finite_array
-from verify.xfem.junctions import (
+from verify.xfem.crossing import (
+    Crossing,
+    TipRule,
+    crossed_through,
     joint_cuts,
     meeting_cells,
     reached,
     tied_pieces,
     without_specks,
 )
+from verify.xfem.cuts import Cut
+from verify.xfem.errors import XfemError, check_choice, finite_array
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.zero_points import ZeroPoints
 

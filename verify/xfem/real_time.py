@@ -7,8 +7,7 @@ the geometric stiffness: symmetric positive definite, so that the step always ha
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly import add_mass, constrain, held_entries
-from verify.xfem.block_pattern import symmetric_product
+from verify.xfem.block_pattern import add_mass, constrain, held_entries, symmetric_product
 from verify.xfem.body import (
     DynamicBody,
     MotionState,

@@ -6,7 +6,7 @@ of an element (like 1/ε in space under a force on it) and that such a piece inv
 policies do:
 
 "drop"
-    Its sibling across the cut absorbs it (`verify.xfem.absorption`): the realised cut
+    Its sibling across the cut absorbs it (`verify.xfem.contacts`): the realised cut
     moves to the nearest element faces. The halves stay separate, because no unknowns are joined.
     A sliver that holds together parts of the body that nothing else does is kept.
 "merge"
@@ -30,11 +30,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, identity
 from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.absorption import absorb
 from verify.xfem.aggregation import aggregate
-from verify.xfem.contacts import face_contacts, sibling_contacts
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import check_choice
+from verify.xfem.contacts import absorb, face_contacts, sibling_contacts
+from verify.xfem.errors import XfemError, check_choice
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, loose_bodies
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly import body_pattern, constrain, held_entries
+from verify.xfem.block_pattern import body_pattern, constrain, held_entries
 from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.statics import StaticSolver, is_large

@@ -7,14 +7,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from verify.xfem.assembly import body_pattern, constrain
-from verify.xfem.block_pattern import BlockPattern
+from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain
 from verify.xfem.elasticity import Material
-from verify.xfem.errors import NotConvergedError
+from verify.xfem.errors import NotConvergedError, check_choice, finite_array
 from verify.xfem.ghost_penalty import GhostPenalty
-from verify.xfem.given_arrays import check_choice, finite_array
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.kernels import PLAIN, Kernels
+from verify.xfem.linear_solvers import PLAIN, Kernels
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
 

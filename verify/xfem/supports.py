@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.errors import XfemError
-from verify.xfem.given_arrays import finite_array, index_array
+from verify.xfem.errors import XfemError, finite_array, index_array
 from verify.xfem.phantom import PhantomMesh
 
 _Floats = NDArray[np.float64]

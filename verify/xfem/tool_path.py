@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from verify.xfem.errors import XfemError
+from verify.xfem.errors import XfemError, finite_array, places
 from verify.xfem.faceted_cuts import FacetArrays, FacetCut, Polyline, facet_arrays
-from verify.xfem.given_arrays import finite_array, places
 from verify.xfem.mesh import neighbours_across
 
 _Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from verify.simulator.mapping.moving_surface import MovingSurface
 from verify.xfem.errors import XfemError
-from verify.xfem.nearest_points import nearest_on_facet
+from verify.xfem.faceted_cuts import nearest_on_facet
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]

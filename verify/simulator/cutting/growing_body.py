@@ -20,8 +20,8 @@ from verify.simulator.cutting.renumbering import Slots, number_groups, slots_bef
 from verify.simulator.cutting.stored_pieces import StoredPieces
 from verify.simulator.cutting.tied_parts import TiedParts
 from verify.xfem.clip import Partition
+from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
-from verify.xfem.flat_cuts import Cut
 from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.pieces import ROUND_OFF, Held, split_cells

@@ -19,8 +19,8 @@ from verify.simulator.cutting.growing_body import GrowingBody, Increment
 from verify.simulator.cutting.patch import MeshPatch
 from verify.simulator.cutting.stroke import Stroke
 from verify.simulator.cutting.whole_mesh import whole_mesh
+from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
-from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.tool_path import ToolPath

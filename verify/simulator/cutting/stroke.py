@@ -9,8 +9,8 @@ from verify.simulator.cutting.blade_walk_kernels import WalkedMesh, WalkState, w
 from verify.simulator.cutting.bounding_tree import BoundingTree
 from verify.simulator.cutting.patch import MeshPatch
 from verify.xfem.crossing import REACH
+from verify.xfem.cuts import Cut
 from verify.xfem.faceted_cuts import FacetArrays
-from verify.xfem.flat_cuts import Cut
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.tool_path import Sweep, ToolPath
 

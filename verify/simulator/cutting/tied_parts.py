@@ -12,7 +12,7 @@ _Bools = NDArray[np.bool_]
 
 
 class TiedParts:
-    """Which stored pieces are tied: see `verify.xfem.junctions`.
+    """Which stored pieces are tied: see `verify.xfem.crossing`.
 
     Parameters
     ----------
