@@ -75,10 +75,7 @@ def test_every_command_on_extending_succeeds_in_order(examples):
     # the example solver keeps what it does not refuse, and its metric is round-off
     assert re.search(r"^cut-patch +pass", said["conform"], re.MULTILINE)
     strain = re.findall(r"(\S+): (\S+) ± ", said["strain_error.py"])
-    assert {name.rpartition("-")[0] for name, _ in strain} == {
-        "skfem_solver_SkfemSolver",
-        "xfem",
-    }
+    assert {name.rpartition("-")[0] for name, _ in strain} == {"skfem_solver_SkfemSolver", "xfem"}
     assert all(float(value) < 1e-12 for _, value in strain)
     assert "1 PASS" in said["import"]
 

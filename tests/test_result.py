@@ -1,15 +1,22 @@
-"""The result model: what is written is what is read; a damaged file is one clear line."""
+"""Results and their files: written whole, read back, with their provenance."""
 
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+import verify
+from verify import provenance as module
 from verify.errors import InputError
+from verify.provenance import provenance, versions
 from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, Metric, Rate, SolveRecord, Status, Verdict, VerdictRecord
 from verify.result_files import read_result, write_result
+from verify.whole_files import asked_place, whole_file, write_whole
 
 
 def judged(*verdicts):
@@ -142,3 +149,64 @@ def test_a_damaged_result_is_said_in_one_line(tmp_path, damage, fault):
         read_result(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("end", [OSError, ValueError, KeyboardInterrupt])
+def test_what_was_there_stays_if_writing_does_not_end(tmp_path, end):
+    write_whole(tmp_path / "a.txt", "old")
+
+    def begin():
+        with whole_file(tmp_path / "a.txt") as partial:
+            partial.write_text("ne")
+            raise end
+
+    with pytest.raises(end):
+        begin()
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
+
+
+def test_the_name_in_an_error_is_that_of_the_file_asked_for(tmp_path):
+    (tmp_path / "folder").mkdir()
+    for place in (tmp_path / "absent/a.txt", tmp_path / "folder"):
+        with pytest.raises(OSError, match=f"'{place}'$"):
+            write_whole(place, "a")
+        with pytest.raises(InputError, match=f"^{place}: cannot be written"), asked_place(place):
+            write_whole(place, "a")
+    # what another file is to blame for keeps that file's name
+    with pytest.raises(FileNotFoundError, match=r"other\.txt'$"), whole_file(tmp_path / "a.txt"):
+        (tmp_path / "other.txt").read_text()
+
+
+ROOT = Path(verify.__file__).parent.parent
+
+
+def git(*arguments):
+    return subprocess.run(
+        ["git", "-C", ROOT, *arguments], capture_output=True, text=True, check=True
+    )
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a checkout")
+def test_the_commit_is_that_of_the_checkout():
+    origin = provenance()
+    assert origin["commit"] == git("rev-parse", "HEAD").stdout.strip()
+    assert isinstance(origin["dirty"], bool)
+
+
+def test_a_repository_that_only_happens_to_be_around_us_is_not_ours(tmp_path, monkeypatch):
+    """A virtual environment inside somebody's repository: its commit says nothing of our code."""
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    package = tmp_path / ".venv" / "lib" / "verify" / "__init__.py"
+    monkeypatch.setattr(module.verify, "__file__", str(package))
+    assert module._commit() in [(None, None)] or module._commit()[1] is False  # pip's own record
+
+
+def test_versions_are_those_of_the_libraries_and_nothing_is_imported_for_them():
+    import numpy
+
+    assert versions()["numpy"] == numpy.__version__
+    code = "import sys; from verify.provenance import provenance; provenance(); print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert {"numpy", "dolfinx", "petsc4py", "gmsh"}.isdisjoint(loaded.stdout.split())

@@ -1,16 +1,22 @@
-"""Commands that only read: quick, complete, and honest about what they do not know."""
+"""Command lines that read: help, list, describe, completion, colours, waiting."""
 
+import io
 import json
 import os
 import re
 import statistics
 import subprocess
 import sys
+import textwrap
+import time
 
 import pytest
 
 from verify.cli import main
 from verify.cli.parser import build_parser
+from verify.cli.solver_parameters import of_one_solver, of_solvers
+from verify.cli.streams import in_colour, print_line, printable_streams
+from verify.cli.waiting import said_to_wait
 from verify.scene import list_cases, load_scene, load_scenes
 
 COMMANDS = ("list", "describe", "run", "report", "check", "schema")
@@ -97,3 +103,138 @@ def test_list_takes_little_more_than_reading_all_case_files():
     )
     ratios = [seconds("-m", "verify", "list") / seconds("-c", reading) for _ in range(5)]
     assert statistics.median(ratios) < 1.5
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        (["desc"], "describe"),
+        (["run", "--qu"], "--quick"),
+        (["run", "statics/f1_p"], "statics/f1_patch"),
+        (["describe", "meeting/three"], "meeting/three_through_a_point"),
+    ],
+)
+def test_bash_completes(capsys, tmp_path, words, completed):
+    assert main(["completion", "bash"]) == 0
+    script = tmp_path / "verify.bash"
+    script.write_text(capsys.readouterr().out, encoding="utf-8")
+    typed = f"COMP_WORDS=(verify {' '.join(words)}); COMP_CWORD={len(words)}"
+    asked = f'source {script}; {typed}; _shtab_verify; echo "${{COMPREPLY[@]}}"'
+    done = subprocess.run(
+        ["bash", "-c", asked], cwd=tmp_path, capture_output=True, text=True, timeout=30, check=True
+    )
+    assert done.stdout.split() == [completed]
+
+
+def test_zsh_gets_a_script_with_the_cases(capsys):
+    assert main(["completion", "zsh"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("#compdef verify")
+    assert "statics/f1_patch" in said
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def printed(monkeypatch, stream, line):
+    monkeypatch.setattr(sys, "stdout", stream)
+    with printable_streams():
+        print_line(line)
+    return stream.getvalue()
+
+
+@pytest.fixture(autouse=True)
+def environment(monkeypatch):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+
+
+def test_the_first_verdict_of_a_line_has_a_colour_of_its_own():
+    assert in_colour("a  FAIL       1 PASS") == "a  \x1b[31mFAIL\x1b[0m       1 PASS"
+    assert in_colour("a  PASS") == "a  \x1b[32mPASS\x1b[0m"
+    assert in_colour("PASSED") == "PASSED"
+
+
+def test_only_a_terminal_gets_colours_and_no_escapes_of_others(monkeypatch):
+    assert "\x1b[32m" in printed(monkeypatch, Terminal(), "a  PASS")
+    assert printed(monkeypatch, io.StringIO(), "a  PASS") == "a  PASS\n"
+    assert "\x1b[2J" not in printed(monkeypatch, Terminal(), "a \x1b[2J PASS")
+
+
+@pytest.mark.parametrize("name, value", [("NO_COLOR", "1"), ("TERM", "dumb")])
+def test_colours_can_be_refused(monkeypatch, name, value):
+    monkeypatch.setenv(name, value)
+    assert printed(monkeypatch, Terminal(), "a  PASS") == "a  PASS\n"
+
+
+@pytest.mark.parametrize(
+    "words, meant", [(["rnu"], "run"), (["list", "--jsno"], "--json"), (["solvers", "lst"], "list")]
+)
+def test_misspelt_commands_and_options_get_the_nearest(capsys, words, meant):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    assert f"'{meant}'" in capsys.readouterr().err
+
+
+def test_values_are_numbers_where_they_are_json_and_text_elsewhere():
+    assert of_one_solver(["a=1", "b=0.5", "c=true", "d=shifted"]) == {
+        "a": 1, "b": 0.5, "c": True, "d": "shifted",
+    }  # fmt: skip
+
+
+def test_each_solver_gets_its_own():
+    given = ["xfem.basis=shifted", "xfem.tip=inside", "my.module:Solver.order=2"]
+    wanted = {"xfem": {"basis": "shifted", "tip": "inside"}, "my.module:Solver": {"order": 2}}
+    assert of_solvers(given) == wanted
+
+
+@pytest.mark.usefixtures("warm")
+def test_a_run_solves_with_the_parameters_that_it_was_given(tmp_path, capsys):
+    # one level and scheme: first order in time, which the case does not accept
+    run = ["run", "dynamics/freed_half", "--solver", "xfem", "--repetitions", "1", "--no-report"]
+    out = ["--out", str(tmp_path / "run"), "--json"]
+    assert main([*run, *out, "--set", "xfem.scheme=implicit_euler"]) != 0
+    (case,) = json.loads(capsys.readouterr().out)["cases"]
+    assert case["verdict"] == "FAIL"
+    assert main(["run", "dynamics/freed_half", "--set", "xfme.scheme=newmark"]) == 2
+    assert "no solver 'xfme'" in capsys.readouterr().err
+    assert main(["run", "statics/f1_patch", "--set", "xfem.tip=middle", *out[:2]]) == 2
+    assert "xfem.tip" in capsys.readouterr().err
+
+
+SLOW = """
+    import time
+    class Slow:
+        name = "slow"
+        def refuses(self, scene):
+            return None
+        def levels(self, scene): return 1
+        def solve(self, scene, level, repetitions=1):
+            time.sleep(9)
+            raise ValueError("nothing")
+"""
+
+
+def test_a_long_solve_says_through_a_pipe_what_is_waited_for(tmp_path):
+    (tmp_path / "slow.py").write_text(textwrap.dedent(SLOW))
+    command = ["run", "statics/f1_patch", "--solver", "slow:Slow", "--out", "out", "--no-report"]
+    done = subprocess.run(
+        [sys.executable, "-m", "verify", *command, "--quick", "--judge", "slow:Slow"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=120,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(tmp_path)])},
+    )  # fmt: skip
+    waits = [line for line in done.stderr.splitlines() if line.startswith("…")]
+    of_solve = [line for line in waits if "statics/f1_patch · slow:Slow · level 0" in line]
+    assert len(of_solve) >= 2  # after 2 s and after 6 s
+    assert len(of_solve) < 5
+    assert "\r" not in done.stderr
+    assert "\x1b" not in done.stderr
+
+
+def test_nothing_is_said_of_what_is_soon_done(capsys):
+    with said_to_wait(sys.stderr, "a little thing"):
+        time.sleep(0.1)
+    assert capsys.readouterr().err == ""

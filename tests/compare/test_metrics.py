@@ -38,11 +38,7 @@ def test_a_jump_across_a_sliver_is_measured_on_its_own_cut(gap):
     points, cells, layer = layered(6, [line, upper])
     moved = np.array([[0.0, 0.0], [3.0, 4.0], [6.0, 0.0]])[layer]
     field = SolutionField(solution(points, cells, moved))
-    other = {
-        "kind": "polyline",
-        "name": "b",
-        "points": [[-0.1, 0.3 + gap], [1.1, 0.7 + gap]],
-    }
+    other = {"kind": "polyline", "name": "b", "points": [[-0.1, 0.3 + gap], [1.1, 0.7 + gap]]}
     body = body_of(scene([STRAIGHT, other]))
     rule = cut_rule(body, 0.1)
     still = SolutionField(solution(points, cells, np.zeros_like(points)))

@@ -1,14 +1,22 @@
+"""Cuts as realised: profiles, tubes and arcs on the sides of what was asked."""
+
 import numpy as np
 import pytest
 from cut_meshes import scene, solution
+from solid_meshes import solid_scene
 
 from verify.compare.body import body_of
+from verify.compare.body_rule import body_rule
+from verify.compare.curves import Arc
 from verify.compare.cut_line import cut_rule
+from verify.compare.cut_profile import profile_lines
 from verify.compare.displacement_error import displacement_error
-from verify.compare.jump_error import displacement_jump
+from verify.compare.jump_error import displacement_jump, jump_error
 from verify.compare.locate import SolutionField
 from verify.compare.realised import SidedField, cut_deviation, field_of
 from verify.compare.slabs import area_rule
+from verify.compare.surface_rule import surface_rule
+from verify.solution import Solution
 
 CIRCLE = {"kind": "arc", "centre": [0.5, 0.5], "radius": 0.3}
 
@@ -72,3 +80,97 @@ def test_a_cut_that_runs_beyond_its_tip_is_not_taken_for_one_beside_it():
     assert cut_deviation(too_long, body) < 1e-15
     bent = solution(points, cells, points, cut_facets=facets + np.array([0.0, 0.01]))
     assert cut_deviation(bent, body) == pytest.approx(0.01)
+
+
+TILT = [0.1, -0.2, 0.9]
+DISC = {"kind": "disc", "centre": [0.5, 0.48, 0.52], "normal": TILT,
+        "radii": [0.1, 0.3], "axis": [1.0, 0.0, 0.0]}  # fmt: skip
+CYLINDER = {"kind": "cylinder", "base": [0.5, 0.5, 0.2], "axis": [0.0, 0.1, 1.0], "radius": 0.2,
+            "height": 0.4, "towards": [1.0, 0.0, 0.0], "start": 20.0, "sweep": 130.0}  # fmt: skip
+SPHERE = {"kind": "sphere", "centre": [0.5, 0.5, 0.5], "radius": 0.3, "opening": 60.0}
+SWEPT = {"kind": "swept", "points": [[0.2, 0.3, 0.3], [0.5, 0.45, 0.3], [0.8, 0.3, 0.3]],
+         "along": [0.05, 0.1, 0.4]}  # fmt: skip
+POLYGON = {"kind": "polygon", "points": [[0.2, 0.4, 0.45], [0.8, 0.4, 0.5], [0.8, 0.6, 0.5],
+                                         [0.2, 0.6, 0.45]]}  # fmt: skip
+
+
+# the end points are half a step from the ends: a share of sin²(π/4/48) of a piece at either end
+@pytest.mark.parametrize(
+    ("cut", "length"),
+    [(DISC, 0.6), (CYLINDER, 0.2 * np.deg2rad(130.0)), (SPHERE, 0.3 * np.deg2rad(120.0)),
+     (SWEPT, 2 * np.hypot(0.3, 0.15)), (POLYGON, np.hypot(0.6, 0.05))],
+    ids=["disc", "cylinder", "sphere", "swept", "polygon"],
+)  # fmt: skip
+def test_a_line_lies_on_its_cut_and_is_as_long_as_it_should(cut, length):
+    body = body_of(solid_scene([cut]))
+    (line,) = profile_lines(body)
+    foot, _ = body.nearest_on_cuts(line.rule.points)
+    assert np.abs(foot - line.rule.points).max() < 1e-12
+    assert line.arc[-1] == pytest.approx(length, rel=2e-3)
+    assert (np.diff(line.arc) > 0).all()
+    across = line.rule.positive - line.rule.negative
+    assert np.allclose(np.sum(across * line.rule.normals, axis=1), np.linalg.norm(across, axis=1))
+
+
+def test_a_line_ends_where_the_body_does():
+    wide = {**POLYGON, "points": [[-0.5, 0.4, 0.45], [1.5, 0.4, 0.45], [1.5, 0.6, 0.45],
+                                  [-0.5, 0.6, 0.45]]}  # fmt: skip
+    (line,) = profile_lines(body_of(solid_scene([wide])))
+    assert line.rule.points[:, 0].min() >= 0.0
+    assert line.rule.points[:, 0].max() <= 1.0
+    assert line.arc[-1] > 0.9
+
+
+def solid_solution(points, cells, u, **more):
+    return Solution(points=points, cells=cells.astype(np.int64), displacement=u[None], **more)
+
+
+def tube(facets, radius=0.3):
+    """A prism with a regular polygon inscribed in a circle, in a cube: cut along its mantle."""
+    angle = 2 * np.pi * np.arange(facets) / facets
+    ring = 0.5 + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    scale = 0.5 / np.abs(ring - 0.5).max(axis=1)[:, None]
+    hull = 0.5 + (ring - 0.5) * scale  # on the square
+    points, cells, inner, mantle = [], [], [], []
+
+    def prism(a, b, c, moved):
+        first = 6 * (len(points) // 6)
+        points.extend([[*p, z] for z in (0.0, 1.0) for p in (a, b, c)])
+        inner.extend([moved] * 6)
+        cells.extend(
+            (first + np.array(t)).tolist() for t in ([0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5])
+        )
+
+    centre = np.array([0.5, 0.5])
+    for k in range(facets):
+        a, b, c, d = ring[k], ring[(k + 1) % facets], hull[k], hull[(k + 1) % facets]
+        prism(centre, a, b, True)
+        prism(a, c, d, False)
+        prism(a, d, b, False)
+        low, high = [[*p, 0.0] for p in (a, b)], [[*p, 1.0] for p in (a, b)]
+        mantle += [[low[0], low[1], high[1]], [low[0], high[1], high[0]]]
+    return np.array(points), np.array(cells), np.array(inner), np.array(mantle)
+
+
+def test_the_sides_of_a_tube_are_those_of_the_cylinder_and_not_of_its_facets():
+    cut = {"kind": "cylinder", "base": [0.5, 0.5, -0.1], "axis": [0.0, 0.0, 1.0],
+           "radius": 0.3, "height": 1.2}  # fmt: skip
+    body = body_of(solid_scene([cut]))
+    points, cells, inner, mantle = tube(16)
+    u = np.where(inner[:, None], [0.0, 0.0, 1.0], 0.0)
+    one = solid_solution(points, cells, u, cut_facets=mantle)
+    # sagitta of 16 chords; probes are corners and centroids, those lie two thirds along it
+    sagitta = 0.3 * (1 - np.cos(np.pi / 16))
+    assert 0.8 * sagitta < cut_deviation(one, body) <= sagitta * (1 + 1e-12)
+    field = field_of(one, body)
+    assert isinstance(field, SidedField)
+    rule = body_rule(body, 0.1)
+    inside = np.linalg.norm(rule.points[:, :2] - 0.5, axis=1) < 0.3
+    lift = field.displacement(rule.points, rule.points)[:, 2]
+    assert np.allclose(lift, inside)
+    jump = jump_error(
+        field, SolutionField(solid_solution(points, cells, 0 * u)), surface_rule(body, 0.1)
+    )
+    area = 2 * np.pi * 0.3
+    assert jump.absolute == pytest.approx(np.sqrt(area), rel=1e-3)  # that of the trimmed area
+    assert isinstance(body.patches[0].arc, Arc)

@@ -1,10 +1,16 @@
-"""Declared dependencies are those that are imported, and the other way round."""
+"""What the tree imports, pins and compiles: dependencies, locks, layers, sources."""
 
 import ast
+import os
 import re
+import shutil
+import subprocess
 import sys
 import tomllib
+from collections import Counter
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -91,3 +97,148 @@ def test_every_base_dependency_is_used():
 def test_programs_of_foreign_solvers_import_nothing_of_the_project():
     for file in (ROOT / "verify" / "foreign" / "programs").rglob("*.py"):
         assert not imported_by(file) & {"verify", "reference"}, file
+
+
+FULL = ROOT / ".ci/requirements.lock"
+WITHOUT_DOLFINX = ROOT / ".ci/requirements-system-dolfinx.lock"
+DOCS = ROOT / ".ci/requirements-docs.lock"
+EACH = pytest.mark.parametrize("lock", [FULL, WITHOUT_DOLFINX, DOCS], ids=lambda lock: lock.name)
+
+
+def normal(name):
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def pinned(lock):
+    """Return name -> (version, number of hashes) of each entry."""
+    entries = re.split(r"\n(?=\S)", lock.read_text().strip())
+    found = {}
+    for entry in entries:
+        name, version = re.match(r"([A-Za-z0-9._-]+)==([^\s;\\]+)", entry).groups()
+        found[normal(name)] = (version, len(re.findall(r"--hash=sha256:[0-9a-f]{64}\b", entry)))
+    return found
+
+
+def asked_for(*extras):
+    """Return the names in pyproject.toml: the base, the extras and the build back end."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    lines = [*project["project"]["dependencies"], *project["build-system"]["requires"]]
+    for extra in extras:
+        lines += project["project"]["optional-dependencies"][extra]
+    names = {normal(re.match(r"[A-Za-z0-9._-]+", line).group()) for line in lines}
+    return names - {normal(project["project"]["name"])}
+
+
+def test_lock_covers_every_dependency():
+    assert asked_for("gmsh", "fenicsx", "test", "dev") <= set(pinned(FULL))
+
+
+def test_lock_for_a_system_dolfinx_covers_all_but_dolfinx():
+    names = set(pinned(WITHOUT_DOLFINX))
+    assert asked_for("gmsh", "test", "dev") <= names
+    assert not names & {"dolfinx-solver-real", "fenics-basix", "fenics-ufl", "mpi4py", "mpich"}
+
+
+def test_the_locks_agree_on_every_version():
+    full = pinned(FULL)
+    assert all(full[name] == entry for name, entry in pinned(WITHOUT_DOLFINX).items())
+    assert all(full.get(name, entry) == entry for name, entry in pinned(DOCS).items())
+
+
+def test_lock_of_the_documentation_covers_its_extra():
+    assert asked_for("docs") - asked_for() <= set(pinned(DOCS))
+
+
+@EACH
+def test_every_pin_has_a_hash(lock):
+    assert [name for name, (_, hashes) in pinned(lock).items() if hashes == 0] == []
+
+
+@EACH
+def test_lock_holds_no_address_option_or_path(lock):
+    text = lock.read_text()
+    assert "://" not in text
+    assert not re.search(r"^\s*-(?!-hash=)", text, re.MULTILINE)
+    assert "file:" not in text
+    assert " @ " not in text
+
+
+def test_every_direct_dependency_says_its_licence_in_the_guide():
+    guide = (ROOT / "docs/guide/install.md").read_text()
+    table = guide.split("\n## Licences\n")[1].split("\n## ")[0]
+    first_column = " ".join(row.split("|")[1] for row in table.splitlines() if row.startswith("|"))
+    words = {normal(word) for word in re.findall(r"[\w.-]+", first_column)}
+    assert asked_for("gmsh", "fenicsx", "test", "dev", "docs") <= words
+
+
+LINT = "from importlinter.cli import lint_imports_command; lint_imports_command()"
+
+
+def lint(place):
+    return subprocess.run(
+        [sys.executable, "-c", LINT, "--no-cache"],
+        cwd=place,
+        env=os.environ | {"PYTHONPATH": str(place), "COLUMNS": "200"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+@pytest.fixture
+def copy(root, tmp_path):
+    for package in ("verify", "reference"):
+        shutil.copytree(
+            root / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    shutil.copy(root / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def test_every_contract_is_kept(root):
+    done = lint(root)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("place", "statement", "contract"),
+    [
+        ("verify/xfem", "import reference", "The compact solvers share no code"),
+        ("reference", "import verify.xfem", "The reference shares no code"),
+        ("verify/compare", "import verify.solvers", "No solver grades itself"),
+        ("verify/report", "import verify.compare", "The report reads results"),
+    ],
+)
+def test_a_forbidden_import_is_caught(copy, place, statement, contract):
+    (copy / place / "trespasser.py").write_text(statement + "\n")
+    done = lint(copy)
+    assert done.returncode == 1, done.stdout
+    (broken,) = [line for line in done.stdout.splitlines() if contract in line and "BROKEN" in line]
+    assert broken.startswith(contract)
+
+
+def compiled_functions():
+    """Yield file and function of everything that numba compiles."""
+    for file in (ROOT / "verify").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            if isinstance(node, ast.FunctionDef) and any(
+                "jit" in ast.dump(decorator) for decorator in node.decorator_list
+            ):
+                yield file, node
+
+
+def test_no_kernel_asserts():
+    """The package has a pytest plugin: pytest rewrites its asserts, which numba cannot compile."""
+    found = [
+        f"{file.name}:{node.lineno}"
+        for file, function in compiled_functions()
+        for node in ast.walk(function)
+        if isinstance(node, ast.Assert)
+    ]
+    assert found == []
+
+
+def test_no_two_modules_of_the_tests_have_one_name():
+    """Their folders are no packages: the second of two modules of one name is not collected."""
+    names = Counter(file.name for file in (ROOT / "tests").rglob("*.py"))
+    assert [name for name, count in names.items() if count > 1] == ["conftest.py"]

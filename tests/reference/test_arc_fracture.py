@@ -29,12 +29,7 @@ def plate_with_an_arc(start=-20.0, sweep=100.0):
                 "parameters": {**circle, **covered, "stress": [0.3, 1.0, 0.2]},
             },
             "quantities": [
-                {
-                    "kind": "stress_intensity",
-                    "name": f"K_{mode} {end}",
-                    "end": end,
-                    "mode": mode,
-                }
+                {"kind": "stress_intensity", "name": f"K_{mode} {end}", "end": end, "mode": mode}
                 for end in ("start", "end")
                 for mode in ("I", "II")
             ],

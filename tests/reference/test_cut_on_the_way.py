@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from reference_scenes import needs_fenicsx
-from test_membrane_motion import HANGING as HANGING_SKIN
-from test_membrane_motion import bowl_scene, moved
+from test_membranes import HANGING as HANGING_SKIN
+from test_membranes import bowl_scene, moved
 from test_motion import moving, solved, spread
 from test_solid_motion import moving as solid
 

@@ -1,13 +1,118 @@
-"""Linear elasticity of the FEniCSx side against closed forms, each load and support in turn."""
+"""Plane elasticity on conforming meshes: tips and mouths, orders, forces, repeated meshes."""
 
 import numpy as np
 import pytest
-from reference_scenes import energy_of, needs_fenicsx, polyline, square
+from reference_scenes import areas, energy_of, exterior_facets, needs_fenicsx, polyline, square
 
 from reference.exact import exact_solution
+from verify.assess.richardson import extrapolate
+from verify.errors import InputError
 from verify.scene import Scene, load_scene
 
 pytestmark = needs_fenicsx
+
+
+def energies(case, solver):
+    from verify.solvers import find_solver
+
+    scene, found = load_scene(case), find_solver(solver)
+    exact = exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+    values = [
+        float(found.solve(scene, level).ledger["strain"][0]) for level in range(found.levels(scene))
+    ]
+    return np.array(values) / exact.strain_energy(scene) - 1
+
+
+# A cut of F facets that is a tree has F + 1 nodes. A tip keeps one, a point inside an arm or a
+# mouth gets two, a junction of k arms k: the extra nodes are F + 1 − (tips) + (k − 2 more per
+# junction), so F − 1 for a tree whose ends are all tips, one more per mouth.
+SHAPES = {
+    "inner": ([polyline("a", (0.2, 0.43), (0.7, 0.61))], -1),
+    "kinked": ([polyline("a", (0.2, 0.3), (0.5, 0.6), (0.8, 0.3))], -1),
+    "arc": ([{"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2, "sweep": 180}], -1),
+    "edge": ([polyline("a", (-0.1, 0.43), (0.5, 0.5))], 0),
+    "through": ([polyline("a", (-0.1, 0.43), (1.1, 0.6))], 1),
+    "T": ([polyline("a", (0.2, 0.5), (0.8, 0.5)), polyline("b", (0.5, 0.5), (0.5, 0.8))], -1),
+    "X": ([polyline("a", (0.2, 0.45), (0.8, 0.5)), polyline("b", (0.5, 0.2), (0.45, 0.8))], -1),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("graded", [False, True])
+def test_tips_stay_closed_mouths_open_and_junctions_get_a_node_per_sector(shape, graded):
+    from reference.meshing import Grading, conforming_mesh, singular_points
+
+    cuts, extra = SHAPES[shape]
+    scene = square(cuts)
+    points = singular_points(scene) if graded else np.zeros((0, 2))
+    mesh = conforming_mesh(scene, Grading(0.09, points, 0.5))
+    doubled = len(mesh.parent) - len(np.unique(mesh.parent))
+    assert doubled == len(mesh.cut_facets) + extra
+    assert mesh.pieces.max() + 1 == (2 if shape == "through" else 1)
+    assert exterior_facets(mesh) == len(mesh.boundary) + 2 * len(mesh.cut_facets)
+    area = areas(mesh)
+    assert area.min() > 0
+    assert area.sum() == pytest.approx(1.0, rel=1e-13)
+
+
+@pytest.mark.parametrize("sweep", [180.0, 270.0, 359.0, 360.0])
+def test_an_arc_is_cut_as_far_as_it_goes(sweep):
+    """Chords of a circle are short by (h/R)²/24."""
+    from reference.meshing import Grading, conforming_mesh
+
+    arc = {"kind": "arc", "centre": [0.51, 0.47], "radius": 0.31, "start": 20.0, "sweep": sweep}
+    mesh = conforming_mesh(square([arc]), Grading(0.06, np.zeros((0, 2)), 0.5))
+    ends = mesh.realised_cut
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+    assert length == pytest.approx(np.deg2rad(sweep) * 0.31, rel=2e-3)
+    assert mesh.pieces.max() + 1 == (2 if sweep == 360.0 else 1)
+
+
+def test_the_same_scene_gives_the_same_mesh_twice():
+    from reference.meshing import Grading, conforming_mesh, singular_points
+
+    scene = square(SHAPES["X"][0])
+    one, two = (conforming_mesh(scene, Grading(0.1, singular_points(scene), 0.5)) for _ in "ab")
+    assert np.array_equal(one.points, two.points)
+    assert np.array_equal(one.cells, two.cells)
+
+
+@pytest.mark.parametrize("solver", ["conforming", "reference"])
+def test_a_field_linear_on_each_side_is_reproduced(solver):
+    # in the space on every level; only the round-off of a direct solve is left
+    assert np.abs(energies("statics/f1_patch", solver)).max() < 1e-11
+
+
+def test_linear_elements_reach_their_order_in_energy_on_a_smooth_field():
+    errors = energies("statics/f3_inclined", "conforming")
+    order = np.log2(errors[:-1] / errors[1:])
+    assert (errors > 0).all()  # boundary values are interpolated, yet the energy is above
+    assert order[-1] == pytest.approx(2.0, abs=0.05)
+
+
+def test_graded_quadratic_elements_beat_the_demand_at_the_griffith_crack():
+    errors = energies("statics/griffith_edges", "reference")
+    assert abs(errors[-1]) < 1e-6  # 1e-5 is demanded
+    # energy norm of order 2 is energy of order 4, or order 2 in the unknowns
+    assert np.log2(errors[:-1] / errors[1:]) == pytest.approx([4.0, 4.0], abs=0.3)
+    # and the error bar that is made of the levels covers, without being ten times too wide
+    sizes = [4.0, 2.0, 1.0]
+    known = extrapolate((1 + errors).tolist(), sizes, theoretical=2, best=4)
+    assert errors[-1] <= known.half_width <= 10 * errors[-1]
+
+
+def test_ungraded_linear_elements_show_the_half_order_of_the_tip():
+    errors = energies("statics/griffith_edges", "conforming")
+    assert np.log2(errors[-2] / errors[-1]) == pytest.approx(1.0, abs=0.1)  # 2 · ½
+
+
+def test_a_piece_that_nothing_holds_is_named_and_not_solved():
+    from verify.solvers import find_solver
+
+    disc = {"kind": "arc", "name": "a", "centre": [0.5, 0.5], "radius": 0.2}
+    with pytest.raises(InputError, match="support"):
+        find_solver("reference").solve(square([disc]), 0)
+
 
 INCLINED = {"point": [0.5, 0.5], "slope": 1 / 3}
 ACROSS = polyline("cut", (-0.1, 0.3), (1.1, 0.7))

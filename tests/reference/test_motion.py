@@ -1,12 +1,18 @@
-"""Dynamic scenes on conforming elements: schemes, ledgers, cuts that open on the way."""
+"""Motion on conforming elements: schemes, ledgers, openings, vibrations, several ranks."""
 
 import numpy as np
 import pytest
-from reference_scenes import needs_fenicsx, polyline
+from ranks_of_tests import on_ranks
+from reference_scenes import needs_fenicsx, polyline, square
+from scipy.sparse.linalg import eigsh
 
+from reference.meshing.imprint import imprint, structured_triangles
+from reference.meshing.opening import open_cut
+from verify.errors import InputError
 from verify.scene import Scene, load_scene
 
 pytestmark = needs_fenicsx
+
 
 MIDDLE = polyline("middle", [-0.1, 0.5], [1.1, 0.5])
 
@@ -117,11 +123,7 @@ def test_supports_that_move_do_the_work_that_the_body_takes_up():
     """A slow ramp ends in the energy of the static stretch; what moves is that much or less."""
     walls = [
         {"where": "left", "displacement": [0.0, 0.0]},
-        {
-            "where": "right",
-            "displacement": [0.02, 0.0],
-            "history": [[0.0, 0.0], [4.0, 1.0]],
-        },
+        {"where": "right", "displacement": [0.02, 0.0], "history": [[0.0, 0.0], [4.0, 1.0]]},
     ]
     ledger = solved(moving(supports=walls, duration=5.0)).ledger
     assert spread(ledger["total"] + ledger["strain"].max()) < 1e-10
@@ -163,3 +165,159 @@ def test_small_elements_are_not_turned_inside_out_when_a_load_is_let_go_at_once(
     ledger = solved(Scene.model_validate(case), "reference", level).ledger
     total = ledger["kinetic"] + ledger["strain"]
     assert np.ptp(total) < 1e-9 * total[0]
+
+
+CUTS = {
+    "whole": ([], [0.65408379]),
+    "split": ([polyline("a", (-0.1, 0.1), (1.1, 0.1))], [0.33435932, 0.33435932]),
+    "half split": ([polyline("a", (0.5, 0.1), (1.1, 0.1))], [0.603212]),
+}
+
+
+def frequencies(cuts, count, size=0.05, graded=True):
+    """Lowest angular frequencies, rad/s, of a beam of length 1 and depth 0.2."""
+    from reference.linear_system import linear_system
+    from reference.meshing import Grading, conforming_mesh, singular_points
+    from reference.space import conforming_space
+
+    scene = square(
+        cuts,
+        geometry={"kind": "rectangle", "lower": [0, 0], "upper": [1, 0.2]},
+        material={"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0},
+        supports=[{"where": "left", "displacement": [0, 0]}],
+    )
+    points = singular_points(scene) if graded else np.zeros((0, 2))
+    space = conforming_space(conforming_mesh(scene, Grading(size, points, 0.2)), 2)
+    stiffness, mass, held = linear_system(scene, space, None)
+    free = np.flatnonzero(~held)
+    stiffness, mass = (one[free][:, free] for one in (stiffness, mass))
+    squares = eigsh(stiffness, count, mass, sigma=0.0, return_eigenvectors=False)
+    return np.sqrt(np.sort(squares))
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_cantilevers_swing_at_the_known_frequencies(name):
+    cuts, known = CUTS[name]
+    assert frequencies(cuts, len(known), 0.02) == pytest.approx(known, rel=1e-5)
+
+
+HALVED = np.array([[0.0, -1.0], [0.0, 1.0]])
+
+
+def spaces(lower, upper, counts, cut, degree=1):
+    """Give one mesh twice: with its cut closed, and open."""
+    from reference.space import conforming_space
+
+    points, cells, facets = imprint(*structured_triangles(lower, upper, counts), [cut])
+    none = np.zeros((0, 2), dtype=np.int64)
+    return [conforming_space(open_cut(points, cells, f), degree) for f in (none, facets)]
+
+
+def test_a_state_is_not_carried_over_to_another_mesh():
+    from reference.dynamics import inherit
+
+    closed, _ = spaces((-1.0, 0.0), (1.0, 1.0), (4, 4), HALVED)
+    other, _ = spaces((-1.0, 0.0), (1.0, 1.0), (6, 4), HALVED)
+    with pytest.raises(InputError, match="does not have the cells"):
+        inherit(closed, other, closed.node_points)
+
+
+@pytest.mark.parametrize("kinematics, rho", [("linear", 0.3), ("corotational", 0.6)])
+def test_both_solvers_find_the_same_motion(kinematics, rho):
+    from verify.solvers.conforming import ConformingSolver
+    from verify.solvers.xfem import XfemSolver
+
+    scene = square(
+        supports=[{"where": "left", "displacement": [0, 0]}],
+        material={"young": 1e4, "poisson": 0.3, "plane": "strain", "density": 1000.0},
+        loads=[{"kind": "gravity", "acceleration": [0, -9.8]}],
+        analysis={
+            "kind": "dynamic", "kinematics": kinematics, "duration": 0.3, "time_step": 0.01,
+            "outputs": 4,
+        },
+    )  # fmt: skip
+    given = {"scheme": "generalised_alpha", "spectral_radius": rho}
+    ours = XfemSolver().solve(scene, 0, 0, mass="consistent", **given)
+    theirs = ConformingSolver().solve(scene, 0, 0, **given)
+    pairs = np.linalg.norm(ours.points[:, None] - theirs.points[None], axis=2).argmin(axis=1)
+    found, wanted = ours.displacement, theirs.displacement[:, pairs]
+    size = np.abs(wanted).max()
+    assert size > 0.2
+    # the reference ends a step at 1e-11 of its forces, ours at 1e-10 of its accelerations
+    assert np.abs(found - wanted).max() < 1e-8 * size
+    lost = [one.ledger["algorithmic"][-1] for one in (ours, theirs)]
+    assert lost[0] == pytest.approx(lost[1], rel=1e-5)
+    assert lost[0] > 0.0
+
+
+_MOTIONS = """
+import test_motion, test_solid_motion
+from verify.compare.locate import SolutionField
+from verify.solvers import find_solver
+
+def plane(kinematics):
+    "A square that is pulled, turned and damped: one cut open before, one at 0, one on the way."
+    cuts = [test_motion.polyline("before", [-0.1, 0.8], [0.3, 0.8]),
+            test_motion.polyline("slanted", [0.4, 0.75], [1.1, 0.65]),
+            {**test_motion.MIDDLE, "opens_at": 0.025}]
+    scene = test_motion.moving(
+        cuts, kinematics, duration=0.05, outputs=3,
+        supports=[{"where": "bottom", "displacement": [0.1, 0.0],
+                   "history": [[0.0, 0.0], [0.03, 1.0]]},
+                  {"where": "left", "displacement": [0.0], "components": ["x"]}],
+        loads=[{"kind": "gravity", "acceleration": [0, -0.98]},
+               {"kind": "traction", "where": "top", "traction": [100.0, 200.0],
+                "history": [[0.0, 1.0], [0.02, 0.0]]}],
+        initial={"kind": "equilibrium", "cuts": "closed"})
+    damped = scene.analysis.model_copy(update={"damping": (1.0, 1e-3)})
+    return scene.model_copy(update={"analysis": damped})
+
+def space():
+    "A cube that hangs at rest and is cut through at 0."
+    return test_solid_motion.moving(
+        [test_solid_motion.MIDDLE], duration=0.04,
+        supports=[{"where": "top", "displacement": [0, 0, 0]}],
+        loads=[{"kind": "gravity", "acceleration": [0.5, 0, -0.98]}],
+        initial={"kind": "equilibrium", "cuts": "closed"})
+
+answer = {}
+for name, scene, schemes in [
+    ("linear", plane("linear"), ["generalised_alpha"]),
+    ("turning", plane("corotational"), ["energy_momentum"]),
+    ("space", space(), ["energy_momentum"]),
+]:
+    points = np.random.default_rng(1).random((300, scene.dimension))
+    for scheme in schemes:
+        degree = 2 if name == "linear" else 1
+        found = find_solver("conforming").solve(scene, 0, 0, scheme=scheme, degree=degree)
+        fields = [SolutionField(found, t).displacement(points) for t in range(len(found.times))]
+        # on all ranks alike: they need no talk to take the same steps
+        sums = world.allgather(float(np.sum(found.displacement)))
+        assert len(set(sums)) == 1
+        answer[name, scheme] = found.ledger, np.array(fields), found.iterations
+"""
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ranks")
+    return [on_ranks(count, _MOTIONS, folder) for count in (1, 2)]
+
+
+def test_two_ranks_move_every_point_as_one_does(answers):
+    one, two = answers
+    assert len(one) == 3
+    for motion, (_, fields, iterations) in one.items():
+        assert np.abs(fields[-1] - fields[0]).max() > 1e-3, motion
+        # Newton's residual is 1e-11 of the forces, and most steps end far below it
+        assert two[motion][1] == pytest.approx(fields, abs=1e-10 * np.abs(fields).max()), motion
+        assert two[motion][2] == iterations, motion
+
+
+def test_two_ranks_keep_the_account_of_one(answers):
+    one, two = answers
+    for motion, (ledger, _, _) in one.items():
+        energy = max(np.abs(ledger[name]).max() for name in ("kinetic", "strain", "gravity"))
+        for name, column in ledger.items():
+            size = np.abs(column).max() if "momentum" in name else energy
+            assert two[motion][0][name] == pytest.approx(column, abs=1e-10 * size), (motion, name)

@@ -91,10 +91,7 @@ def bent(height, curvature, poisson):
     x = curvature * height / 2
     c, s = np.cosh(x), np.sinh(x)
     free = 2 * (lam + mu) - lam * b
-    rows = [
-        [stiff * s + lam * c, stiff * c + lam * s],
-        [-stiff * s + lam * c, stiff * c - lam * s],
-    ]
+    rows = [[stiff * s + lam * c, stiff * c + lam * s], [-stiff * s + lam * c, stiff * c - lam * s]]
     A, B = np.linalg.solve(rows, [free, free]) / curvature
 
     def radius(X):
@@ -138,10 +135,7 @@ def bending_errors(poisson, d, counts):
     ]
 
 
-@pytest.mark.parametrize(
-    "poisson, worse",
-    [(0.3, 0.5), (0.49, 5), (0.4999, 50)],
-)
+@pytest.mark.parametrize("poisson, worse", [(0.3, 0.5), (0.49, 5), (0.4999, 50)])
 def test_a_thick_strip_bends_as_exactly_at_4999_as_at_a_third(poisson, worse):
     """The energy is off by 5.1e-4 with a pressure at every ν, without one by up to 5.0e-2."""
     pure, mixed = bending_errors(poisson, 2, (3, 8))

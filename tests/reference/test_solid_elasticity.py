@@ -1,15 +1,18 @@
-"""Linear elasticity in space against closed forms; directly, by multigrid, on several ranks."""
+"""Solids by the FEniCSx side: statics, how it is solved, finite rotation and strain."""
 
 import numpy as np
 import pytest
 from ranks_of_tests import on_ranks
 from reference_scenes import energy_of, needs_fenicsx
-from solid_scenes import EXACT, SHAPES, cube, disc
+from solid_scenes import EXACT, SHAPES, cube, disc, polygon
 
 from reference.exact import exact_solution
-from verify.scene import load_scene
+from reference.meshing import imprint_polygons, open_cut, structured_tetrahedra
+from verify.scene import Material, load_scene
+from verify.scene.physics import Rotation
 
 pytestmark = needs_fenicsx
+
 
 THROUGH = SHAPES["through"][0]
 NORMAL = [0.0, -0.2 / 3, 1.0]
@@ -165,3 +168,191 @@ def test_two_ranks_give_the_answer_of_one(degree, method, tmp_path):
     script = _PARALLEL.format(size=0.3, degree=degree, method=method)
     one, two = (on_ranks(count, script, tmp_path)[:3] for count in (1, 2))
     assert two == pytest.approx(one, rel=1e-10)
+
+
+TISSUE = Material(young=1.0, poisson=0.3)
+LAM, MU = 0.3 / (1.3 * 0.4), 1 / 2.6
+
+
+def body(degree, counts=(2, 2, 2), cuts=()):
+    from reference.space import conforming_space
+
+    points, cells = structured_tetrahedra((0, 0, 0), (1, 1, 1), counts)
+    polygons = [np.array(cut, dtype=float) for cut in cuts]
+    return conforming_space(open_cut(*imprint_polygons(points, cells, polygons)), degree)
+
+
+def solve(space, nodes, prescribed, **parameters):
+    from reference.large_strain import solve_large_strain
+
+    unknowns = (3 * nodes[:, None] + [0, 1, 2]).ravel().astype(np.int32)
+    return solve_large_strain(
+        TISSUE, space, unknowns, lambda factor: prescribed(factor).ravel(), **parameters
+    )
+
+
+def law(space):
+    from reference.dynamics_law import CorotatedLaw
+
+    return CorotatedLaw(TISSUE, space)
+
+
+def turn(degrees, axis=(1.0, 2.0, -1.0)):
+    return Rotation(angle=float(degrees), centre=[0.0, 0.0, 0.0], axis=list(axis)).matrix()
+
+
+def test_the_sum_of_stretches_is_that_of_the_singular_values_with_the_sign_of_the_volume():
+    from reference.polar_stretch import stretch_trace
+
+    random = np.random.default_rng(0)
+    F = random.standard_normal((2000, 3, 3))
+    F[:500] = np.eye(3) + 1e-6 * F[:500]  # three nearly equal stretches
+    F[500:600] = F[500:600, :, :1] @ F[500:600, :1]  # rank one
+    F[-1] = 0.0
+    values = np.linalg.svd(F, compute_uv=False)
+    values[:, 2] *= np.sign(np.linalg.det(F))
+    # a root of a quartic from its coefficients: round-off over its distance from the others
+    apart = 1e-30 + (values[:, 1] + values[:, 2]) / np.maximum(values[:, 0], 1e-300)
+    error = np.abs(stretch_trace(F - np.eye(3)) + 3 - values.sum(axis=1))
+    error /= np.maximum(values[:, 0], 1e-300)
+    assert (error <= np.minimum(1e-13 / apart, 1e-6)).all()
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-8, 1e-15, 1e-200])
+def test_small_strains_keep_their_digits(size):
+    """tr(U − I) = tr H + |w|² to the third order, w the axial vector of the rotation."""
+    from reference.polar_stretch import stretch_trace
+
+    H = size * np.random.default_rng(3).standard_normal((200, 3, 3))
+    w = 0.5 * np.linalg.norm([H[:, 2, 1] - H[:, 1, 2], H[:, 0, 2] - H[:, 2, 0],
+                              H[:, 1, 0] - H[:, 0, 1]], axis=0)  # fmt: skip
+    error = np.abs(stretch_trace(H) - np.einsum("nii->n", H) - w**2)
+    assert (error < 50 * size**3 + 1e-14 * size).all()
+
+
+def test_a_turn_by_120_degrees_stores_nothing_and_pulls_nowhere():
+    space = body(2, (1, 1, 1))
+    x = space.node_points
+    turned = (x @ turn(120).T - x).ravel()
+    mechanics = law(space)
+    assert abs(mechanics.energy(turned)) < 1e-14
+    assert np.abs(mechanics.force(turned)).max() < 1e-15
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_halves_turned_each_by_its_own_rotation_are_stretched_exactly(degree):
+    # a patch test at large strain: W per volume at stretch 1.5 with free sides, exactly
+    space = body(degree, cuts=[[(0.5, -1, -1), (0.5, 2, -1), (0.5, 2, 2), (0.5, -1, 2)]])
+    points = space.node_points
+    nodes = np.flatnonzero((points[:, 2] < 1e-12) | (points[:, 2] > 1 - 1e-12))
+    left = np.zeros(len(points), dtype=bool)
+    left[space.cell_nodes[space.centroids[:, 0] < 0.5]] = True
+
+    def stretched(stretch):
+        across = 1 - LAM / (2 * (LAM + MU)) * (stretch - 1)
+        return np.diag([across, across, stretch])
+
+    def field(factor):
+        stretches = stretched(1 + 0.5 * factor)
+        one, two = (points @ (turn(a * factor) @ stretches).T - points for a in (70, -110))
+        return np.where(left[:, None], one, two)
+
+    found = solve(space, nodes, lambda factor: field(factor)[nodes])
+    # uniaxial stress: ½ E (s − 1)², as the energy is Hooke's in U − I
+    assert found.strain_energy == pytest.approx(0.5 * 0.25, rel=1e-10)
+    assert found.displacement == pytest.approx(field(1.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("energy", ["corotated", "neo_hookean", "st_venant_kirchhoff"])
+def test_force_and_tangent_are_the_derivatives_of_the_energy(energy):
+    import ufl
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
+    from reference.polar_stretch import PolarStretch
+    from reference.strain_energies import ENERGIES, virtual_work
+
+    space = body(2, (1, 1, 1))
+    V = space.function_space
+    u = fem.Function(V)
+    polar = PolarStretch(u, 6)
+    total = ENERGIES[energy](polar, LAM, MU) * polar.measure
+    force = virtual_work(energy, polar, LAM, MU, ufl.TestFunction(V))
+    forms = [fem.form(f) for f in (total, force, polar.derivative(force, ufl.TrialFunction(V)))]
+    random = np.random.default_rng(1)
+    start, way = 0.03 * random.standard_normal((2, u.x.array.size))
+    start += (space.node_points @ turn(100).T - space.node_points).ravel()
+
+    def put(share):
+        u.x.array[:] = start + share * way
+        polar.update()
+
+    def at(share):
+        put(share)
+        return fem.assemble_scalar(forms[0]), fem.assemble_vector(forms[1]).array.copy()
+
+    step = 1e-4
+    (e, f), (e_less, f_less) = at(step), at(-step)
+    put(0.0)
+    tangent = petsc.assemble_matrix(forms[2])
+    tangent.assemble()
+    x, y = tangent.createVecs()
+    x.array[:] = way
+    tangent.mult(x, y)
+    force = at(0.0)[1]
+    # central differences: third derivatives times step²; strains along the way are about 0.3
+    assert force @ way == pytest.approx((e - e_less) / (2 * step), rel=1e-6)
+    slope = (f - f_less) / (2 * step)
+    assert y.array == pytest.approx(slope, abs=1e-6 * np.abs(slope).max())
+
+
+def hanging(cuts):
+    """Give a cube that is turned by 60° at its base and hangs under a large weight."""
+    base = {"where": "bottom", "displacement": [0.1, 0.0, 0.0]}
+    base["rotation"] = {"angle": 60.0, "centre": [0.5, 0.5, 0.0], "axis": [0.0, 1.0, 1.0]}
+    return cube(
+        cuts,
+        mesh={"cells": [[2, 2, 4]]},
+        supports=[base],
+        loads=[{"kind": "gravity", "acceleration": [0.05, 0.0, -0.1]}],
+        analysis={"kinematics": "corotational"},
+    )
+
+
+def test_linear_elements_equal_another_code_at_finite_rotation():
+    """Of one rotation per element XFEM makes the same model where the cut runs along facets."""
+    from verify.solvers import find_solver
+
+    half = polygon("half", (-1, -1, 0.5), (0.5, -1, 0.5), (0.5, 2, 0.5), (-1, 2, 0.5))
+    for cuts in ([], [half]):
+        scene = hanging(cuts)
+        mine, other = (
+            find_solver(name).solve(scene, 0, repetitions=0) for name in ("conforming", "xfem")
+        )
+        assert mine.ledger["strain"][0] == pytest.approx(other.ledger["strain"][0], rel=1e-9)
+
+
+_TURNED = """
+import reference.strain_equations
+from test_solid_elasticity import hanging
+from reference.boundary_values import constrained_values
+from reference.elasticity import load_form
+from reference.large_strain import solve_large_strain
+from reference.space import conforming_space
+from verify.solvers.conforming_meshes import peer_mesh
+
+reference.strain_equations._MOST_DIRECT = 1_000_000 if world.size == 1 else 0
+scene = hanging([])
+space = conforming_space(peer_mesh(scene, 0, "imprinted"), 1, world)
+found = solve_large_strain(
+    scene.material, space, constrained_values(scene, space, None)[0],
+    lambda factor: constrained_values(scene, space, None, factor)[1],
+    lambda v: load_form(scene, space, v, None))
+answer = [found.strain_energy, found.smallest_jacobian, float(np.linalg.norm(found.displacement))]
+"""
+
+
+def test_two_ranks_and_multigrid_give_the_answer_of_one_rank_and_a_factorisation(tmp_path):
+    one, two = (on_ranks(count, _TURNED, tmp_path) for count in (1, 2))
+    # Newton's residual is 1e-11 of the forces
+    assert two == pytest.approx(one, rel=1e-9)

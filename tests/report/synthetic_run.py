@@ -196,9 +196,7 @@ def _strip() -> CaseResult:
     stored = "cases/statics__tissue_strip/reference-2/solution.json"
     solves.append(replace(finest, solution=stored))
     reason = "the reference's uncertainty 0.03 is not clearly below the error 0.12 that it judges"
-    verdicts = [
-        _verdict("error", "energy_norm", "UNDECIDED", 0.12, 0.03, "at most 0.1", reason),
-    ]
+    verdicts = [_verdict("error", "energy_norm", "UNDECIDED", 0.12, 0.03, "at most 0.1", reason)]
     sizes = ((2e-3, 5312), (1e-3, 20800), (5e-4, 81234))
     reference = {
         "kind": "conforming",

@@ -96,7 +96,7 @@ STUDIES = {
                 "covered": True,
                 "left_out": "",
             }
-        ],
+        ]
     },
 }
 

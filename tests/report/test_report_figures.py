@@ -1,21 +1,33 @@
-"""Claims about the figures: what is drawn lies where its number says."""
+"""Figures: every error where its number says, motions, openings, outlines, error maps, notices."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_run import make_run
+from page_parser import parsed
+from synthetic_run import cut_square, make_run
 
-from verify.report import load_run
+from verify.report import load_run, render
+from verify.report.bodies import Body, deformed_body
 from verify.report.case_view import floor_text, required_slope
 from verify.report.curves import duration, error_curves, floor, limits
-from verify.report.figures import convergence
+from verify.report.error_maps import scale_top
+from verify.report.figures import convergence, profiles
 from verify.report.figures.convergence import error_panel, error_range
-from verify.report.figures.style import (
-    Palette,
-    drawing,
+from verify.report.figures.style import Palette, drawing
+from verify.report.opening_view import opening_figures
+from verify.report.pictures import case_pictures
+from verify.result import (
+    Metric,
+    Notice,
+    NoticeKind,
+    OpeningCurve,
+    OpeningProfile,
+    SolveRecord,
+    Status,
 )
-from verify.result import Metric, SolveRecord, Status
+from verify.result_files import read_result, write_result
 
 
 @pytest.fixture(scope="module")
@@ -96,3 +108,201 @@ def test_time_is_added_repetition_by_repetition():
     assert (time.low, time.median, time.high) == (3.0, 6.0, 10.0)
     assert time.meshing == 100.0
     assert time.phases == ("assembly", "solve")
+
+
+TIMES = [0.0, 0.25, 0.5, 0.75, 1.0]
+
+
+def moving_run(root, solvers=("xfem", "conforming"), opens_at=0.4):
+    """Make the first case of a run move; every solver has its own energies."""
+    make_run(root, pictures=False)
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    result = json.loads(file.read_text())
+    model = max((s for s in result["solves"] if s["solver"] == "xfem"), key=lambda s: s["level"])
+    result["solves"] = []
+    for k, solver in enumerate(solvers):
+        kinetic = [(k + 1) * t for t in TIMES]
+        strain = [3.0 - value for value in kinetic]
+        account = {"time": TIMES, "kinetic": kinetic, "strain": strain, "total": [3.0] * 5,
+                   "algorithmic": [0.0] * 5, "linear_momentum_x": [3.0 * t for t in TIMES],
+                   "linear_momentum_y": [4.0 * t for t in TIMES],
+                   "angular_momentum_z": [-t for t in TIMES]}  # fmt: skip
+        series = {"time": TIMES, "displacement_l2": [0.01 * (k + 1) * t for t in TIMES]}
+        drift = {"name": "energy_drift", "value": 1e-3, "unit": "1", "reference": None,
+                 "uncertainty": 0.0, "source": "ledger of the solution"}  # fmt: skip
+        extra = {"solver": solver, "account": account, "series": series}
+        result["solves"].append({**model, **extra, "metrics": [*model["metrics"], drift]})
+    result["scene"]["cuts"] = [{"kind": "polyline", "opens_at": opens_at}]
+    verdict = dict(result["verdicts"][0], metric="energy_drift", verdict="FAIL", limit="at most 0")
+    result["verdicts"].append(verdict)
+    file.write_text(json.dumps(result))
+    return root
+
+
+def panels(root):
+    page = parsed(render(root).read_text(encoding="utf-8"))
+    return page, [svg["aria-label"] for svg in page.all("svg") if svg.get("class") == "profile"]
+
+
+def test_errors_energies_and_momenta_of_every_solver_are_drawn_over_time(tmp_path):
+    _, labels = panels(moving_run(tmp_path / "run"))
+    assert len(labels) == 6  # an error, kinetic and strain energy, the total, two momenta
+    (kinetic,) = [text for text in labels if text.startswith("kinetic")]
+    assert "XFEM: 0 to 1" in kinetic
+    assert "conforming P1: 0 to 2" in kinetic
+    assert not any("scheme" in text for text in labels)  # zero throughout
+    (linear,) = [text for text in labels if "linear momentum" in text]
+    assert "XFEM: 0 to 5" in linear  # |(3, 4)|
+    (total,) = [text for text in labels if "change of the total" in text]
+    assert "conforming P1: 0 to 0" in total
+
+
+def test_an_error_below_the_uncertainty_of_its_reference_is_named_and_not_drawn(tmp_path):
+    root = moving_run(tmp_path / "run")
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    result = json.loads(file.read_text())
+    for solve, width in zip(result["solves"], (0.02, 1e-4), strict=True):  # errors 0.01 and 0.02
+        largest = {"name": "displacement_l2_max", "value": max(solve["series"]["displacement_l2"]),
+                   "unit": "1", "reference": None, "uncertainty": width, "source": ""}  # fmt: skip
+        solve["metrics"].append(largest)
+    file.write_text(json.dumps(result))
+    page, labels = panels(root)
+    (drawn,) = [text for text in labels if "L² error" in text]
+    assert "conforming P1: 0 to 0.02" in drawn
+    assert "XFEM" not in drawn
+    assert "not above the uncertainty of the comparison: " in page.text
+
+
+CLOSED = "its faces overlap by up to 18.5 mm at (0.05, 0.05) m"
+NO_TIP = "the end of the arc (0.1, 0) m is no tip"
+
+
+@pytest.fixture(scope="module")
+def warned(tmp_path_factory):
+    root = make_run(tmp_path_factory.mktemp("warned") / "run", pictures=False)
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    notices = [
+        Notice(NoticeKind.WARNING, "cut 0", "xfem", CLOSED),
+        Notice(NoticeKind.UNAVAILABLE, "K_I", None, NO_TIP),
+    ]
+    write_result(replace(read_result(file), notices=notices), file)
+    render(root)
+    return root, read_result(file)
+
+
+def test_a_warning_stands_on_top_of_the_case_in_the_summary_and_beside_the_badge(warned):
+    page = (warned[0] / "report.html").read_text()
+    top, case = page.index("Warned of"), page.index('id="case-1"')
+    assert top < case
+    assert "statics/f3_inclined" in page[top : top + 200]  # which case; its banner says the rest
+    matrix = page.index('<table class="matrix">')
+    assert matrix < page.index("1 warning", matrix) < case
+    inside = page[case:]
+    banner = inside.index('class="banner"')
+    assert banner < inside.index("<table")
+    assert CLOSED in inside[banner : banner + 400]
+    assert inside.index("1 warning") < banner
+    parsed(page)
+
+
+ARC = [0.0, 0.1, 0.2, 0.3]
+WIDTH = [0.0, 0.002, 0.002, 0.0]
+
+
+def curve(solver, level=1, scale=1.0, band=()):
+    normal = [scale * v for v in (0.0, 0.01, -0.02, 0.0)]
+    return OpeningCurve(solver, level, normal, [0.0] * 4, list(band), [0.0] * len(band))
+
+
+def profile(*curves, time=None, why=""):
+    points = [[s, 0.5] for s in ARC]
+    return OpeningProfile("slit", "arc length along the cut", time, why, ARC, points, list(curves))
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    root = make_run(tmp_path_factory.mktemp("openings") / "run", pictures=False)
+    return read_result(root / "cases" / "statics__tissue_strip" / "result.json")
+
+
+@pytest.fixture
+def openings_drawn(result, monkeypatch):
+    """Return the figures of some profiles, and of each panel what is drawn, before it is SVG."""
+
+    def of(*shown):
+        panels = []
+
+        def keep(figure, alt, kind="panel"):
+            (axes,) = figure.axes
+            lines = {line.get_label(): line.get_xydata() for line in axes.lines}
+            bands = [path.vertices for band in axes.collections for path in band.get_paths()]
+            panels.append((lines, bands))
+            return drawing(figure, alt, kind)
+
+        monkeypatch.setattr(profiles, "drawing", keep)
+        return opening_figures(replace(result, openings=list(shown)), Palette()), panels
+
+    return of
+
+
+def test_reference_and_solvers_are_in_one_figure_with_the_band(openings_drawn):
+    shown = profile(curve("reference", 2, band=WIDTH), curve("xfem"), curve("guest"))
+    (figure,), ((lines, bands),) = openings_drawn(shown)  # the tangential jump is zero
+    assert list(lines) == ["reference", "XFEM", "guest"]
+    assert lines["XFEM"][:, 0] == pytest.approx(ARC)
+    assert lines["XFEM"][:, 1] == pytest.approx([0.0, 0.01, -0.02, 0.0])
+    (band,) = bands
+    at = band[np.isclose(band[:, 0], 0.1)]  # as wide as stated: 0.01 ± 0.002
+    assert [at[:, 1].min(), at[:, 1].max()] == pytest.approx([0.008, 0.012])
+    assert "at most 0.002 m of the normal jump" in figure.caption
+
+
+def body_with(values):
+    body = deformed_body(cut_square(8), 0.0)
+    return replace(body, values=np.resize(values, len(body.points)))
+
+
+def test_a_solver_that_errs_a_hundred_times_more_does_not_wash_the_others_out():
+    others = [body_with(np.linspace(0.0, most, 50)) for most in (1.0, 1.2, 1.5)]
+    assert scale_top(others) == 1.5
+    assert scale_top([*others, body_with([100.0])]) == pytest.approx(2 * 1.2, rel=0.05)
+
+
+def lengths(body: Body) -> float:
+    ends = body.points[body.edges]
+    return float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum())
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_outline_is_the_boundary_with_both_faces_of_the_cut(order):
+    body = deformed_body(cut_square(8, order), 0.0)
+    assert lengths(body) == pytest.approx(4 + 2 * np.hypot(1, 1 / 3), rel=1e-12)
+
+
+def test_missing_and_damaged_solutions_become_notes(tmp_path):
+    root = make_run(tmp_path / "run")
+    folder = root / "cases" / "statics__f3_inclined"
+    (folder / "xfem-3" / "solution.vtu").write_text("no mesh")
+    (folder / "conforming-3" / "solution.json").unlink()
+    for solver in ("xfem", "conforming"):
+        (folder / f"error_field_{solver}.vtu").unlink()
+    shown = case_pictures(root, load_run(root).entries[0])
+    assert not shown.all
+    notes = " ".join(shown.notes)
+    # the rest of each sentence is that of verify.solution
+    assert "No picture of XFEM, level 3: " in notes
+    assert "No picture of conforming P1, level 3: " in notes
+    assert "stored" in notes
+
+
+def test_a_solution_outside_the_run_directory_is_not_read(tmp_path):
+    root = make_run(tmp_path / "run")
+    file = root / "cases" / "statics__f3_inclined" / "result.json"
+    result = json.loads(file.read_text())
+    for solve in result["solves"]:
+        solve["solution"] = "../../secret/solution.json"
+    result["pictures"] = {"error_field of xfem": "/etc/passwd"}
+    file.write_text(json.dumps(result))
+    shown = case_pictures(root, load_run(root).entries[0])
+    assert not shown.all
+    assert "directory" in shown.notes[0]

@@ -1,11 +1,26 @@
-"""A number and the interval that it lies in are written so that the width can be seen."""
+"""Numbers and rankings: digits that tell ends apart, marks beside ranks, pages of studies."""
 
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from page_parser import parsed
+from synthetic_run import make_run
+from synthetic_studies import HOSTILE, STUDIES
 
+from verify.cli import run_ranking as runner_ranking
+from verify.cli.run_ranking import rank_run
+from verify.conformance import CheckResult, State
+from verify.report import load_run, render
+from verify.report.figures import studies as figures
+from verify.report.figures.style import Palette
 from verify.report.notation import error_text, number, with_interval
 from verify.report.sliver_view import graded
+from verify.report.study_page import render_study
 from verify.report.tables import check_row
-from verify.result import Verdict, VerdictRecord
+from verify.result import Status, Verdict, VerdictRecord
 
 
 @pytest.mark.parametrize(
@@ -83,3 +98,122 @@ def test_a_graded_number_is_not_rounded_down_to_what_it_exceeds(value, grade, wr
 
 def test_an_error_that_is_no_number_is_shown_as_none():
     assert error_text(float("nan"), 1e-3) == number(float("nan"))
+
+
+def ranked(root, conformance=False):
+    return rank_run(root, load_run(root).results, {}, conformance, 10.0, lambda text: None)
+
+
+def text_of(root):
+    return parsed(render(root).read_text(encoding="utf-8")).text
+
+
+@pytest.fixture
+def suite(monkeypatch):
+    """Replace the suite by one that says that XFEM breaks something; count how often it runs."""
+    asked = []
+
+    def conform(solver, parameters, timeout):
+        asked.append((solver, dict(parameters)))
+        state = State.FAIL if solver == "xfem" else State.PASS
+        return [
+            CheckResult("traction", "two halves contract each for itself", state, 1.0, 0.1, "off"),
+            CheckResult("refusals", "it does not crash", State.PASS),
+        ]
+
+    monkeypatch.setattr("verify.conformance.conform", conform)
+    return asked
+
+
+def test_a_run_of_several_solvers_says_which_and_a_run_without_ranking_does_not(tmp_path):
+    root = make_run(tmp_path / "run", pictures=False)
+    assert "solvers on" not in text_of(root)
+    ranked(root)
+    said = text_of(root)
+    assert "solvers on 3 cases" in said
+    assert "conformance" in said
+    stored = json.loads((root / "results.json").read_text())["ranking"]
+    assert stored == json.loads((root / "ranking.json").read_text())
+
+
+def test_a_solver_that_does_not_conform_carries_a_mark_wherever_it_is_ranked(tmp_path, suite):
+    root = make_run(tmp_path / "run", pictures=False)
+    ranked(root, conformance=True)
+    page = parsed(render(root).read_text(encoding="utf-8"))
+    assert "two halves contract each for itself" in page.text
+    marks = page.all("abbr")
+    assert len(marks) >= 2
+    assert re.search(r"XFEM\s*†", page.text)
+    assert not re.search(r"conforming P1\s*†", page.text)
+
+
+def test_conformance_is_taken_over_until_the_solver_changes(tmp_path, suite, monkeypatch):
+    root = make_run(tmp_path / "run", pictures=False)
+    ranked(root, conformance=True)
+    first = list(suite)
+    # 'other' is no solver that could be asked
+    assert [name for name, _ in first] == ["xfem", "conforming"]
+    ranked(root, conformance=False)
+    assert suite == first
+    assert "checks" in json.loads((root / "ranking.json").read_text())["conformance"]["xfem"]
+    monkeypatch.setattr(runner_ranking, "code_of_solver", lambda name: "changed")
+    ranked(root, conformance=True)
+    assert len(suite) == 2 * len(first)
+
+
+def test_a_solver_that_solved_nothing_is_not_asked_for_more(tmp_path, suite):
+    root = make_run(tmp_path / "run", pictures=False)
+    results = load_run(root).results
+    for result in results:
+        ended = [s if s.solver != "conforming" else replace(s, status=Status.FAILED)
+                 for s in result.solves]  # fmt: skip
+        result.solves[:] = ended
+    rank_run(root, results, {}, True, 10.0, lambda text: None)
+    assert [name for name, _ in suite] == ["xfem"]
+
+
+@pytest.mark.parametrize("kind", STUDIES)
+def test_page_and_markdown_say_the_same_and_no_text_of_a_record_becomes_markup(studies, kind):
+    text = render_study(studies, kind).read_text(encoding="utf-8")
+    page = parsed(text)
+    assert HOSTILE in page.text
+    assert "alert(1)</script>" not in text
+    markdown = render_study(studies, kind, "markdown").read_text(encoding="utf-8")
+    assert "a\\|b &lt;script&gt;alert(1)&lt;/script&gt; \\`x\\` \\*y\\*" in markdown
+    for said in ("1 finding: 0 passed, 1 failed, 0 undecided.", "Seen: 2 of 3."):
+        assert said in page.text
+        assert said in markdown
+    assert markdown.count("![") == len(page.all("svg"))
+    assert all((studies / name).is_file() for name in pictures(markdown))
+
+
+def pictures(markdown):
+    return [part.split(")")[0] for part in markdown.split("](")[1:]]
+
+
+def test_numbers_of_studies_are_those_of_the_record(studies):
+    texts = {k: render_study(studies, k).read_text(encoding="utf-8") for k in STUDIES}
+    for kind, said in (
+        ("slivers", "◐ 0.899"), ("slivers", "◐ 1004"),
+        ("slivers", "∝ ε^0.00"), ("energy", "XFEM scheme=x"), ("energy", "2.50×10⁻¹³"),
+        ("cost", "500 ms (400–600)"), ("cost", "not reached"), ("cost", "2.5 ms"),
+        ("budget", "−2.03 %"), ("budget", "round-off"), ("budget", "it ran away"),
+        ("calibration", "2.00"), ("calibration", "1 marks, 0 not covered"),
+    ):  # fmt: skip
+        assert said in texts[kind], (kind, said)
+
+
+def test_a_place_that_is_not_known_is_a_gap_of_the_curve_and_not_bridged(monkeypatch):
+    kept = []
+
+    def keep(figure, alt):
+        kept.extend(line.get_xydata() for line in figure.axes[0].lines)
+        return alt
+
+    monkeypatch.setattr(figures, "drawing", keep)
+    places = [(0.25, 0.1), (None, 0.01), (4.0, 0.0), (8.0, 1e-3), (16.0, 1e-4)]
+    said = figures.loglog("error", "time", [figures.Series("strain energy", places)], Palette())
+    (curve,) = kept
+    assert np.isfinite(curve).all(axis=1).tolist() == [True, False, False, True, True]
+    assert curve[3:] == pytest.approx(np.array([(8.0, 1e-3), (16.0, 1e-4)]))
+    assert "strain energy: 0.1 at 0.25, 0.001 at 8, 0.0001 at 16." in said

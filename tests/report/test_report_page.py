@@ -1,14 +1,22 @@
-"""Claims about the page: whole, self-contained, escaped, complete."""
+"""The page: well formed, closed to hostile words, complete after a death; its exports."""
 
+import csv
+import io
 import json
+import random
 import re
 import subprocess
 import sys
+from dataclasses import asdict
+from xml.etree import ElementTree
 
+import pytest
 from page_parser import parsed
 from synthetic_run import HOSTILE, make_run
 
-from verify.report import render
+from verify.report import load_run, render, render_markdown
+from verify.report.exports import COLUMNS
+from verify.result import SolveRecord, Status
 
 
 def page_of(root):
@@ -72,3 +80,179 @@ def test_the_report_needs_no_solver():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_junit_has_one_test_case_per_verdict_with_its_outcome(plain_run):
+    root = ElementTree.parse(plain_run / "junit.xml").getroot()
+    counts = {key: root.get(key) for key in ("tests", "failures", "errors", "skipped")}
+    assert counts == {"tests": "6", "failures": "1", "errors": "1", "skipped": "1"}
+    assert "0.38 is below 0.45" in root.find(".//failure").get("message")
+    assert "level 3 timed out" in root.find(".//error").get("message")
+    assert "is not clearly below" in root.find(".//skipped").get("message")
+    assert len(root.findall("testsuite")) == 3
+
+
+def test_csv_has_a_row_per_metric_and_one_per_failed_solve(plain_run):
+    rows = list(csv.DictReader(io.StringIO((plain_run / "results.csv").read_text())))
+    assert tuple(rows[0]) == COLUMNS
+    # 8 solves × 2 metrics; 7 × 3 and two that failed; 8 × 2 and a reference without metrics
+    assert len(rows) == 16 + 21 + 2 + 16 + 1
+    ended = [row for row in rows if row["status"] in ("timeout", "refused")]
+    assert [row["reason"] for row in ended] == [
+        "killed after 60 s",
+        "cannot do a tip inside an element",
+    ]
+    assert all(row["value"] == "" for row in ended)
+
+
+def test_csv_and_json_hold_the_numbers_to_the_last_digit(plain_run):
+    row = next(csv.DictReader(io.StringIO((plain_run / "results.csv").read_text())))
+    document = json.loads((plain_run / "results.json").read_text())
+    solve = document["cases"][0]["result"]["solves"][0]
+    assert float(row["value"]) == solve["metrics"][0]["value"]
+    timings = solve["timings"]
+    totals = sorted(sum(values) for values in zip(*timings.values(), strict=True))
+    assert float(row["seconds_median"]) == pytest.approx(totals[1], rel=1e-15)
+
+
+def test_meshing_is_no_part_of_the_time_that_is_compared(plain_run):
+    rows = list(csv.DictReader(io.StringIO((plain_run / "results.csv").read_text())))
+    times = {(r["solver"], r["level"]): r for r in rows if r["case"] == "statics/f3_inclined"}
+    xfem, conforming = times["xfem", "2"], times["conforming", "2"]
+    assert xfem["seconds_median"] == conforming["seconds_median"]
+    assert xfem["meshing_median"] == ""
+    assert float(conforming["meshing_median"]) > 0
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    root = make_run(tmp_path_factory.mktemp("markdown") / "run")
+    return root, render_markdown(root).read_text(encoding="utf-8")
+
+
+def test_every_table_has_rows_of_one_width_and_holds_the_numbers_of_the_page(written):
+    root, text = written
+    page = parsed((root / "report.html").read_text(encoding="utf-8"))
+    tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    assert len(tables) == len(page.all("table"))
+    for table in tables:
+        rows = table.splitlines()
+        widths = {len(re.findall(r"(?<!\\)\|", row)) for row in rows}
+        assert len(widths) == 1, rows[0]
+    for words in ("8.0787579", "UNDECIDED", "killed after 60 s", "×10⁻"):
+        assert words in text
+
+
+ABSURD = (
+    0.0, -0.0, 1.0, -1.0, 1e300, -1e300, 1.7976931348623157e308, 5e-324, 1e-300, 1e17, 10**30, -5,
+    None,
+)  # fmt: skip
+LOST = ("nan", "inf", "-inf")
+
+
+def spoilt(value, chance, rng, place, lost):
+    """Numbers of a result replaced by others, some of them by what JSON has no word for."""
+    if isinstance(value, dict):
+        return {
+            k: v if k == "level" else spoilt(v, chance, rng, f"{place}/{_key(k)}", lost)
+            for k, v in value.items()
+        }
+    if isinstance(value, list):
+        return [spoilt(v, chance, rng, f"{place}/{i}", lost) for i, v in enumerate(value)]
+    if isinstance(value, bool) or not isinstance(value, int | float) or rng.random() > chance:
+        return value
+    if isinstance(value, float) and rng.random() < 0.3:
+        lost[place] = rng.choice(LOST)
+        return None
+    return rng.choice([n for n in ABSURD if isinstance(value, float) or isinstance(n, int)])
+
+
+def _key(key):
+    return key.replace("~", "~0").replace("/", "~1")
+
+
+def spoil(root, seed):
+    rng = random.Random(seed)
+    chance = rng.choice((0.02, 0.2, 1.0))
+    for file in sorted(root.glob("cases/*/result.json")):
+        content, lost = json.loads(file.read_text()), {}
+        kept = {key: content[key] for key in ("schema", "scene")}
+        content = spoilt(content, chance, rng, "", lost) | kept
+        lost = {place: word for place, word in lost.items() if not place.startswith("/scene/")}
+        file.write_text(json.dumps({**content, "not_finite": lost}))
+
+
+def assert_whole(text):
+    assert "</html>" in text
+    assert "cannot be shown" not in text
+    assert "pictures of this case failed" not in text
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_numbers_of_any_size_are_reported(tmp_path, seed):
+    root = make_run(tmp_path / "run", pictures=False)
+    spoil(root, seed)
+    assert_whole(render(root).read_text())
+
+
+@pytest.fixture
+def root(tmp_path):
+    return make_run(tmp_path / "run", pictures=False)
+
+
+def said(root):
+    return parsed(render(root).read_text(encoding="utf-8")).text
+
+
+def result_of(root):
+    return root / "cases" / "statics__f3_inclined" / "result.json"
+
+
+def test_a_killed_run_lists_what_had_finished_and_what_had_not_started(root):
+    record = json.loads((root / "run.json").read_text())
+    record["finished"] = None
+    record["cases"].append("statics/never_begun")
+    (root / "run.json").write_text(json.dumps(record))
+    folder = result_of(root).parent
+    result_of(root).unlink()
+    for level, status in enumerate((Status.SOLVED, Status.FAILED)):
+        solve = SolveRecord("statics/f3_inclined", "xfem", level, status, "boom")
+        (folder / f"xfem-{level}").mkdir()
+        content = {"key": "k", "record": asdict(solve), "files": {}}
+        (folder / f"xfem-{level}" / "record.json").write_text(json.dumps(content))
+    text = said(root)
+    assert "the run has not finished" in text
+    assert "statics/f3_inclined: not judged: the run was stopped before its comparison" in text
+    assert "1 of its solves had finished" in text
+    assert "boom" in text
+    assert "statics/never_begun: not started" in text
+    suite = ElementTree.parse(root / "junit.xml").getroot()
+    assert suite.get("errors") == "3"  # one of its own, the unjudged case, the one not begun
+
+
+@pytest.mark.parametrize(
+    "content, reason",
+    [
+        ("{", "not a JSON file"),
+        ("", "not a JSON file"),
+        ("[]", "object"),
+        ('{"schema": 99}', "not a result of schema version 1"),
+        ('{"schema": 1}', "not a readable result"),
+        ("\ud800".encode("utf-8", "surrogatepass"), "not a JSON file"),
+    ],
+)
+def test_a_damaged_result_is_a_row_with_its_reason(root, content, reason):
+    result_of(root).write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert reason in said(root)
+    entry = load_run(root).entries[0]
+    assert entry.result is None
+    assert reason in entry.defect
+
+
+def test_a_case_without_solves_checks_or_levels_renders(root):
+    result = json.loads(result_of(root).read_text())
+    result.update(solves=[], rates=[], verdicts=[], reference={}, scene={})
+    result_of(root).write_text(json.dumps(result))
+    text = said(root)
+    assert "No check is stated for statics/f3_inclined" in text
+    assert "No reference is recorded" in text

@@ -1,8 +1,20 @@
-"""From the solves of a case to its verdicts, and to the exit code."""
+"""Verdicts of a run: who is judged, exit codes, error fields, critical steps of rivals."""
 
+import itertools
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
+
+from verify.compare.locate import SolutionField
+from verify.reference_record import ReferenceRecord
+from verify.result import CRITICAL_STEP, CaseResult, SolveRecord, Status, Verdict, VerdictRecord
+from verify.runner import exit_code
+from verify.runner.error_field import nodal_error
+from verify.runner.solve import solve_job
+from verify.scene import load_scene, scene_content
+from verify.solution import Solution
 
 INSTANT, WRONG = "fake_solvers:Instant", "fake_solvers:Wrong"
 
@@ -92,3 +104,101 @@ def test_changed_acceptance_is_judged_again_without_solving(verify):
     case.write_text(case.read_text().replace("at_most = 1e-10", "at_most = 10.0"))
     assert verdicts(verify(*command, COUNT_SOLVES=str(solves)))[WRONG][0] == "PASS"
     assert len(solves.read_text().splitlines()) == 2
+
+
+def result(verdicts=(), statuses=()):
+    judged = [VerdictRecord("value", "xfem", "m", v, 1, 1, 1, "", "") for v in verdicts]
+    solves = [SolveRecord("c", "xfem", i, status) for i, status in enumerate(statuses)]
+    return CaseResult("c", "", "", "", {}, ReferenceRecord(), solves, [], judged)
+
+
+PASS, FAIL, UNDECIDED, ERROR = Verdict.PASS, Verdict.FAIL, Verdict.UNDECIDED, Verdict.ERROR
+SOLVED, REFUSED = Status.SOLVED, Status.REFUSED
+
+
+@pytest.mark.parametrize(
+    "verdicts, statuses, normal, strict",
+    [
+        ([PASS], [SOLVED], 0, 0),
+        ([PASS, UNDECIDED], [SOLVED], 0, 5),
+        ([PASS], [SOLVED, REFUSED], 0, 5),
+        ([], [SOLVED], 0, 5),
+        ([PASS, FAIL], [SOLVED], 1, 1),
+        ([ERROR], [SOLVED], 3, 3),
+        ([PASS], [SOLVED, Status.TIMEOUT], 3, 3),
+        ([PASS], [SOLVED, Status.MEMORY], 3, 3),
+        ([PASS], [SOLVED, Status.FAILED], 3, 3),
+        ([FAIL, ERROR], [SOLVED, Status.FAILED], 1, 1),
+        ([], [REFUSED], 4, 4),
+        ([], [], 4, 4),
+    ],
+)
+def test_the_exit_code_of_one_case(verdicts, statuses, normal, strict):
+    assert exit_code([result(verdicts, statuses)]) == normal
+    assert exit_code([result(verdicts, statuses)], strict=True) == strict
+
+
+def test_a_known_finding_does_not_count_and_another_failure_does():
+    case = result([PASS, FAIL], [SOLVED])
+    case.verdicts[1] = replace(case.verdicts[1], known="its reason")
+    assert case.verdict is FAIL
+    assert exit_code([case], strict=True) == 0
+    assert exit_code([case, result([FAIL], [SOLVED])]) == 1
+
+
+def test_the_order_of_the_cases_does_not_matter():
+    cases = [result([FAIL], [SOLVED]), result([ERROR], [Status.FAILED]), result([PASS], [SOLVED])]
+    assert {exit_code(list(order)) for order in itertools.permutations(cases)} == {1}
+    assert {exit_code(list(order)) for order in itertools.permutations(cases[1:])} == {3}
+
+
+def opened_square(columns: int, height: float) -> Solution:
+    """Two layers on each side of the cut y = 0, the inner ones of this height, opened by 1."""
+    x = np.linspace(0.0, 1.0, columns + 1)
+    points, cells, displacement = [], [], []
+    for sign in (1.0, -1.0):
+        start = len(points)
+        for y in (0.0, sign * height, sign * 0.5):
+            points += [(a, y) for a in x]
+            displacement += [(0.0, 0.5 * sign)] * len(x)
+        for row in range(2):
+            for i in range(columns):
+                a = start + row * (columns + 1) + i
+                b, c, d = a + 1, a + columns + 1, a + columns + 2
+                cells += [(a, b, d), (a, d, c)]
+    return Solution(np.array(points), np.array(cells), np.array(displacement)[None])
+
+
+def test_lips_are_compared_with_their_own_side_however_slender_the_cells() -> None:
+    # the cells at the cut are up to 1e5 times longer than high, and the meshes do not match
+    for height in (1e-1, 1e-3, 1e-6):
+        own, other = opened_square(10, height), opened_square(7, 0.3)
+        assert nodal_error(own, SolutionField(other)).max() <= 1e-12
+
+
+def note(case, solver, folder):
+    scene = load_scene(case)
+    content = scene_content(scene)
+    job = {"scene": content, "solver": solver, "level": 0, "repetitions": 1,
+           "parameters": {}}  # fmt: skip
+    outcome = solve_job(job, folder, store=False)
+    assert outcome["status"] == "solved", outcome
+    return outcome["notes"].get(CRITICAL_STEP)
+
+
+def test_every_rival_of_a_motion_says_its_critical_step(tmp_path):
+    """Subdivision makes slivers elements of their own: its step is shorter; springs have none."""
+    steps = {
+        name: float(note("cutting/plate_crossed_quick", name, tmp_path).removesuffix(" s"))
+        for name in ("xfem", "conforming", "subdivision")
+    }
+    assert 0.0 < steps["subdivision"] < 0.9 * steps["xfem"]
+    assert steps["conforming"] > 0.0
+    assert "springs" in note("cutting/plate_crossed_quick", "mass_spring", tmp_path)
+
+
+def test_a_scene_at_rest_has_no_critical_step(tmp_path):
+    scene = load_scene("statics/f1_patch")
+    job = {"scene": scene_content(scene), "solver": "xfem", "level": 0, "repetitions": 1,
+           "parameters": {}}  # fmt: skip
+    assert CRITICAL_STEP not in solve_job(job, tmp_path, store=False)["notes"]

@@ -20,10 +20,7 @@ def scene(regions: list[dict], **material) -> Scene:
 
 def test_a_region_inherits_what_it_does_not_name_and_the_last_one_counts() -> None:
     one = scene(
-        [
-            {"where": "x > 0.5", "young": 2.0, "density": 30.0},
-            {"where": "y > 0.5", "poisson": 0.1},
-        ],
+        [{"where": "x > 0.5", "young": 2.0, "density": 30.0}, {"where": "y > 0.5", "poisson": 0.1}],
         density=10.0,
     )
     found = one.material.at(np.array([[0.2, 0.2], [0.7, 0.2], [0.7, 0.7]]))

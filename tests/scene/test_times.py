@@ -1,12 +1,21 @@
-"""Times of a scene: histories, output times, openings, the state at the beginning."""
+"""Histories and paths in time; lengths and contacts of cuts in the plane."""
 
 import numpy as np
 import pytest
 from case_texts import body_text, support_text
+from hypothesis import given
+from hypothesis import strategies as st
 
 from verify.errors import InputError
-from verify.scene import Rotation, Support, load_scene
+from verify.scene import Rotation, Support, ToolPathCut, load_scene
 from verify.scene.history import factor_at, first_factor, jumps, slope_at
+from verify.scene.planar import (
+    distance_to_outline,
+    inner_parts,
+    inside_polygon,
+    overlap_length,
+    point_along,
+)
 
 MOVING = (
     body_text("A square", "It shall move.", [1.0, 1.0], [[4, 4]], density="1.0")
@@ -112,3 +121,114 @@ def test_polylines_that_touch_at_an_end_within_round_off_do_not_lie_on_each_othe
     for name, (a, b) in {"one": (0.1, 0.30000000000000004), "two": (0.3, 0.7)}.items():
         cuts += f'[[cuts]]\nkind = "polyline"\nname = "{name}"\npoints = [[{a}, 0.5], [{b}, 0.5]]\n'
     load(tmp_path, STATIC + HELD + cuts)
+
+
+def _path(**given: object) -> ToolPathCut:
+    return ToolPathCut.model_validate({"kind": "tool_path", **given})
+
+
+def test_plane_path_passes_its_points_at_arc_length_over_speed() -> None:
+    # two legs, 0.5 and 1.0 long, at 2 m/s from t = -0.1 s on
+    points = [[0.1, 0.2], [0.4, 0.6], [1.2, 1.2]]
+    path = _path(points=points, speed=2.0, starts_at=-0.1)
+    legs = np.array(points)
+    places = np.array([legs[0], 0.3 * legs[0] + 0.7 * legs[1], legs[1], legs[1:].mean(axis=0)])
+    np.testing.assert_allclose(path.passed_at(places), -0.1 + np.array([0, 0.35, 0.5, 1.0]) / 2)
+    np.testing.assert_allclose(path.whole().vertices(), legs)
+
+
+def test_blade_that_waits_has_been_there_since_it_arrived() -> None:
+    path = _path(points=[[0, 0.1], [0.5, 0.3], [0.5, 0.3], [1, 0.2]], times=[-1, 0.5, 2.0, 3.0])
+    assert path.passed_at(np.array([[0.5, 0.3]])) == pytest.approx(0.5)
+    assert len(path.whole().vertices()) == 3
+
+
+def test_straight_blade_in_space_passes_by_the_tip_not_by_the_depth() -> None:
+    tips = np.array([[0.0, -0.2, 1.1], [0.1, 0.5, 1.0], [0.4, 1.2, 1.1]])
+    path = _path(points=tips.tolist(), direction=[0.2, 0.1, -1.0], depth=0.7, times=[0, 1, 3])
+    blade = path.blade[0]
+    rng = np.random.default_rng(3)
+    share, along = rng.random(40), rng.random(40)
+    first = tips[0] + share[:, None] * (tips[1] - tips[0]) + along[:, None] * blade
+    second = tips[1] + share[:, None] * (tips[2] - tips[1]) + along[:, None] * blade
+    np.testing.assert_allclose(path.passed_at(first), share, atol=1e-9)
+    np.testing.assert_allclose(path.passed_at(second), 1 + 2 * share, atol=1e-9)
+    assert path.whole().kind == "swept"
+    np.testing.assert_allclose(path.whole().along, blade)
+
+
+def test_final_cut_has_the_positive_side_of_motion_times_blade() -> None:
+    path = _path(
+        points=[[0.0, 0.0, 1.0], [0.3, 1.0, 1.0]], direction=[0, 0.1, -1], depth=0.5, speed=1.0
+    )
+    points, triangles = path.surface()
+    a, b, c = points[triangles[0]]
+    normal = np.cross(b - a, c - a)
+    assert normal @ np.cross([0.3, 1.0, 0.0], path.blade[0]) > 0
+
+
+def test_blade_that_turns_in_its_plane_sweeps_a_polygon() -> None:
+    # the blade swings in the plane x = 0.3 while its tip goes on
+    path = _path(
+        points=[[0.3, 0.0, 1.0], [0.3, 1.0, 1.0]],
+        direction=[[0, -0.3, -1], [0, 0.4, -1]], depth=0.5, times=[0.0, 2.0],
+    )  # fmt: skip
+    whole = path.whole()
+    assert whole.kind == "polygon"
+    blade = path.blade
+    for share, along in ((0.25, 0.4), (0.8, 0.9), (0.0, 0.0)):
+        tip = (1 - share) * np.array(path.points[0]) + share * np.array(path.points[1])
+        place = tip + along * ((1 - share) * blade[0] + share * blade[1])
+        assert path.passed_at(place[None])[0] == pytest.approx(2.0 * share, abs=1e-9)
+
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+NOTCHED = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0],
+                    [1.0, 2.0], [0.0, 2.0]])  # fmt: skip
+
+
+def length(parts):
+    return sum(float(np.linalg.norm(b - a)) for a, b in parts)
+
+
+@given(
+    st.tuples(*[st.floats(-2, 3) for _ in range(4)]).filter(
+        lambda v: np.hypot(v[2] - v[0], v[3] - v[1]) > 1e-3
+    )
+)
+def test_the_inner_length_equals_that_of_clipping_against_half_planes(values):
+    a, b = np.array(values[:2]), np.array(values[2:])
+    low, high = 0.0, 1.0  # Liang–Barsky
+    for c in range(2):
+        for sign, bound in ((1, 1.0), (-1, 0.0)):
+            p, q = sign * (b[c] - a[c]), sign * (bound - a[c])
+            if p > 0:
+                high = min(high, q / p)
+            elif p < 0:
+                low = max(low, q / p)
+            elif q < 0:
+                high = -1.0
+    expected = max(high - low, 0.0) * np.linalg.norm(b - a)
+    middle = a + 0.5 * (low + high) * (b - a)
+    if distance_to_outline(middle[None], SQUARE)[0] > 1e-8:
+        # a part that runs along the boundary (within 1e-9) is none
+        assert length(inner_parts(np.array([a, b]), SQUARE)) == pytest.approx(expected, abs=1e-7)
+
+
+def test_winding_decides_inside_for_both_orientations():
+    points = np.array([[0.5, 0.5], [1.5, 1.5], [2.5, 1.5], [-0.1, 0.5]])
+    assert inside_polygon(points, NOTCHED).tolist() == [True, False, True, False]
+    assert inside_polygon(points, NOTCHED[::-1]).tolist() == [True, False, True, False]
+
+
+def test_overlap_is_the_shared_length_and_a_crossing_has_none():
+    level = np.array([[0.0, 0.0], [1.0, 0.0]])
+    assert overlap_length(level, np.array([[0.75, 0.0], [2.0, 0.0]])) == pytest.approx(0.25)
+    assert overlap_length(level, np.array([[2.0, 0.0], [-1.0, 0.0]])) == pytest.approx(1.0)
+    assert overlap_length(level, np.array([[0.5, -1.0], [0.5, 1.0]])) == 0.0
+    assert overlap_length(level, np.array([[1.0, 0.0], [2.0, 0.0]])) == 0.0
+
+
+def test_a_fraction_of_the_length_is_found_across_kinks():
+    kinked = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.0]])
+    np.testing.assert_allclose(point_along(kinked, 0.5), [1.0, 1.0], atol=1e-15)

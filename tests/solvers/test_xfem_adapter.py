@@ -1,12 +1,13 @@
-"""The adapter puts a scene before the compact solver as it was meant, and says what it changed."""
+"""XFEM as a solver: bases, energies, ends, given meshes, parts of supports; guests that load."""
 
 import meshio
 import numpy as np
 import pytest
 from case_texts import body_text, cut_text, support_text, weight_text
 
-from verify.errors import UnsupportedSceneError
-from verify.scene import load_scene
+from verify.errors import InputError, UnsupportedSceneError
+from verify.scene import Scene, load_scene
+from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.xfem.structured_meshes import rectangle_mesh
 
@@ -141,3 +142,172 @@ def test_a_part_may_end_at_a_cut_inside_an_element(tmp_path):
     # of the two unknowns of a node one side is held alone: which the shifted ones cannot say
     with pytest.raises(UnsupportedSceneError, match="element"):
         XfemSolver().solve(strip, 0, 0, basis="heaviside")
+
+
+FENICSX = [pytest.param(name, marks=pytest.mark.fenicsx) for name in ("reference", "conforming")]
+SOLVERS = [*FENICSX, "xfem", "virtual_node", "subdivision"]
+MOVES = {"above": [0.1, 0.2, 0.05], "below": [-0.1, -0.3, 0.02]}
+CORNER = {"where": "x < 1e-6 and y < 1e-6", "displacement": [0.0, 0.0]}
+
+
+def parted(normal, point, ends, further=()):
+    """Give a body cut along a plane, whose parts are moved apart by their own borders."""
+    d = len(normal)
+    height = " + ".join(
+        f"{n!r}*({x} - {p!r})" for n, x, p in zip(normal, "xyz", point, strict=False)
+    )
+    return Scene.model_validate({
+        "title": "parted",
+        "requirement": "none",
+        "geometry": {
+            "kind": "rectangle" if d == 2 else "box", "lower": [0.0] * d, "upper": [1.0] * d
+        },
+        "mesh": {"cells": [[5] * d]},
+        "material": {"young": 1.0, "poisson": 0.3} | ({"plane": "strain"} if d == 2 else {}),
+        "supports": [
+            *({"where": f"{height} {sign} 0", "displacement": MOVES[side][:d]}
+              for side, sign in (("above", ">"), ("below", "<"))),
+            *further,
+        ],
+        "cuts": [{"kind": "polyline" if d == 2 else "polygon", "points": ends}],
+        "reference": {"size": 0.3 if d == 2 else 0.5},
+    })  # fmt: skip
+
+
+def inclined():
+    return parted([-1 / 3, 1.0], [0.5, 0.53], [[-0.1, 0.33], [1.1, 0.73]])
+
+
+def in_space():
+    """Conforming meshes of a box follow parts that end parallel to its edges."""
+    ring = [(-0.1, -0.1), (1.1, -0.1), (1.1, 1.1), (-0.1, 1.1)]
+    return parted([0.0, 0.0, 1.0], [0.5, 0.5, 0.47], [[x, y, 0.47] for x, y in ring])
+
+
+def through_nodes(further=()):
+    """The cut comes out at nodes of the mesh, one of them a corner of the body."""
+    return parted([-0.6, 1.0], [0.0, 0.0], [[-0.1, -0.06], [1.1, 0.66]], further)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("scene", [inclined, in_space, through_nodes])
+def test_parts_that_their_own_borders_move_rigidly_store_nothing(scene, solver):
+    """A node of the mouth that is held as the other side stores a hundredth of a joule or more."""
+    found = find_solver(solver).solve(scene(), 0, repetitions=0)
+    assert found.ledger["strain"][0] == pytest.approx(0.0, abs=1e-20)
+    assert len(np.unique(found.displacement[0].round(12), axis=0)) == 2
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_part_that_is_a_point_at_a_mouth_holds_both_sides_there(solver):
+    """No boundary of either side lies on the point: it cannot tell them apart."""
+    found = find_solver(solver).solve(through_nodes([CORNER]), 0, repetitions=0)
+    at = np.linalg.norm(found.points, axis=1) < 1e-9
+    assert at.sum() == 2
+    assert found.displacement[0][at] == pytest.approx(np.zeros((2, 2)), abs=1e-15)
+
+
+_MIDDLE = np.array([0.53, 0.47])
+
+
+def _three_cuts(gap, kinematics="linear"):
+    """A square with three inclined cuts, each `gap` off a common point; all sides are held."""
+    cuts = []
+    for k, angle in enumerate((0.3, 1.4, 2.5)):
+        normal = np.array([np.cos(angle), np.sin(angle)])
+        along = np.array([-normal[1], normal[0]])
+        ends = _MIDDLE + gap * normal + np.array([[-2.0], [2.0]]) * along
+        cuts.append({"kind": "polyline", "name": f"cut {k}", "points": ends.tolist()})
+    content = {
+        "title": "three cuts",
+        "requirement": "they are solved",
+        "geometry": {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]},
+        "mesh": {"cells": [[5, 4]]},
+        "material": {"young": 1.0, "poisson": 0.3, "plane": "strain"},
+        "analysis": {"kinematics": kinematics},
+        "supports": [{"where": "boundary", "displacement": [0.0, 0.0]}],
+        "loads": [{"kind": "body_force", "force": [0.0, -0.01]}],
+        "cuts": cuts,
+    }
+    return Scene.model_validate(content)
+
+
+def _speck(solution):
+    kind = "loose part of round-off size joined to its neighbour"
+    return [entry for entry in solution.regularisations if entry.kind == kind]
+
+
+@pytest.mark.parametrize("kinematics", ["linear", "finite_rotation"])
+def test_a_part_of_round_off_size_moves_with_its_neighbour_and_is_counted(kinematics):
+    solver = find_solver("xfem")
+    met = solver.solve(_three_cuts(0.0, kinematics), 0)
+    assert not _speck(met)
+    for share in (1e-13, 1e-10, 1e-7, 1e-4):
+        missed = solver.solve(_three_cuts(0.2 * share, kinematics), 0)
+        (entry,) = _speck(missed)
+        # a triangle whose sides are some gaps long, of elements with legs of 0.2 and 0.25
+        assert entry.count == 1
+        assert 0.0 < entry.size < 10 * share**2
+        # the cuts moved by the gap, and what is between them moves as its neighbour does
+        assert np.abs(missed.displacement).max() == pytest.approx(
+            np.abs(met.displacement).max(), rel=1e-2 * max(share / 1e-4, 1e-6)
+        )
+
+
+@pytest.mark.fenicsx
+@pytest.mark.parametrize(
+    "solver, shares", [("conforming", (1e-13, 1e-10, 1e-7, 1e-4)), ("reference", (1e-10, 1e-4))]
+)
+def test_conforming_meshes_join_and_count_it_too(solver, shares):
+    asked = find_solver(solver)
+    met = asked.solve(_three_cuts(0.0), 0, repetitions=0)
+    assert not _speck(met)
+    joined = 0
+    for share in shares:
+        missed = asked.solve(_three_cuts(0.2 * share), 0, repetitions=0)
+        joined += sum(entry.count for entry in _speck(missed))
+        # cuts that moved by a ten-thousandth of an element change the energy by about as much
+        assert missed.ledger["strain"][0] == pytest.approx(met.ledger["strain"][0], rel=1e-4)
+    # gmsh and the imprint take what is closer than 1e-9 of the body for one point
+    assert joined >= 1
+    assert _speck(missed)
+
+
+GUESTS = {
+    "syntax": ("import os\nclass A\n", ["SyntaxError", "syntax.py:2"]),
+    "raises": (
+        "class A:\n    def __init__(self):\n        {}['young']\n",
+        ["young", "raises.py:3"],
+    ),
+    "imports": ("\nfrom verify.scene import Nothing\n", ["Nothing", "imports.py:2"]),
+    "needs": ("import numpy\nimport no_such_thing\n", ["'no_such_thing'", "needs.py:2"]),
+    "leaves": ("raise SystemExit('not today')\n", ["not today", "leaves.py:1"]),
+    "asks": ("class A:\n    def __init__(self, more): ...\n", ["'more'", "without arguments"]),
+    "lacks": ("class A:\n    def refuses(self, scene): ...\n", ["has no levels()", "solve"]),
+    "gives": ("def A(): ...\n", ["has no refuses()"]),
+}
+
+
+@pytest.mark.parametrize("name", GUESTS)
+def test_a_guest_that_cannot_be_loaded_is_said_with_file_and_line(name, tmp_path, monkeypatch):
+    text, tokens = GUESTS[name]
+    (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(InputError) as said:
+        find_solver(f"{name}:A")
+    for token in (f"'{name}:A'", *tokens):
+        assert token in str(said.value)
+
+
+@pytest.mark.parametrize(
+    "name, token",
+    [
+        ("no_such_module:A", "no module 'no_such_module'"),
+        (":A", "MODULE:CLASS"),
+        ("json:", "MODULE:CLASS"),
+        ("json:Solver", "no 'Solver'"),
+    ],
+)
+def test_a_name_of_no_class_says_what_was_expected(name, token):
+    with pytest.raises(InputError, match=token):
+        find_solver(name)

@@ -73,8 +73,7 @@ def test_the_question_does_not_change_the_scene_that_is_solved() -> None:
 
 def test_the_static_answer_beside_a_motion_is_that_of_the_last_loads() -> None:
     moving = scene(
-        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.1},
-        adequacy={"motion": True},
+        analysis={"kind": "dynamic", "duration": 1.0, "time_step": 0.1}, adequacy={"motion": True}
     )
     assert other_scene(moving, "motion").analysis.kind == "static"
     with pytest.raises(ValidationError, match="dynamic"):

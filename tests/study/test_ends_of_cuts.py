@@ -1,10 +1,4 @@
-"""Cost of the end of a cut: the error is that of another end, wherever it falls in an element.
-
-Away from an end, and to first order, the error of linear elements without tip functions is what the
-displacement changes by when the end is moved. By how many elements follows from where the end is
-realised and from the nodes of the edge there. That is held here on cracks whose ends fall on twelve
-fractions of an element, in two directions, on two levels (the finer one: `make heavy`).
-"""
+"""Cost of the end of a cut: another end, wherever it falls in an element, and with nodes there."""
 
 from functools import cache
 
@@ -141,3 +135,41 @@ def test_ends_on_nodes_of_the_mesh_cost_xfem_what_they_cost_conforming_elements(
     one, other = crack.solve("xfem"), crack.solve("conforming")
     assert one.error == pytest.approx(other.error, rel=1e-9)
     assert [end.nodes for end in one.realised] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+LIMIT = 1.15
+HALF = np.array([0.9396926207859084, 0.3420201433256687])  # of `statics/griffith_inside`
+MESHES = {"structured": {"cells": [[16, 16]]}, "unstructured": {"sizes": [0.25]}}
+
+
+def ratios(crack, conforming):
+    """Errors in L2 and in energy over those of the conforming mesh."""
+    found = crack.solve("xfem", tip="partial")
+    energy = np.sqrt(found.released / conforming.released)  # the held outline: E_h − E = ‖e‖²
+    return found.error / conforming.error, energy
+
+
+@pytest.mark.parametrize(
+    "count", [16, 32, *(pytest.param(n, marks=pytest.mark.heavy) for n in (64, 128))]
+)
+def test_the_griffith_crack_inside_elements_is_within_the_limit_on_every_level(count):
+    crack = Crack(crack_scene([-HALF, HALF], 20.0, {"cells": [[count, count]]}))
+    assert max(ratios(crack, crack.solve("conforming"))) < LIMIT
+
+
+def random_crack(seed, pattern):
+    random = np.random.default_rng(seed)
+    angle, centre = random.uniform(-80.0, 80.0), random.uniform(-0.12, 0.12, 2)
+    turn = np.deg2rad(angle)
+    along = random.uniform(0.8, 1.1) * np.array([np.cos(turn), np.sin(turn)])
+    mesh = MESHES[pattern] | {"pattern": pattern}
+    return Crack(crack_scene([centre - along, centre + along], angle, mesh))
+
+
+@pytest.mark.parametrize("pattern", MESHES)
+@pytest.mark.parametrize(
+    "seed", [0, 1, *(pytest.param(n, marks=pytest.mark.heavy) for n in range(2, 24))]
+)
+def test_cracks_in_general_position_are_within_the_limit(seed, pattern):
+    crack = random_crack(seed, pattern)
+    assert max(ratios(crack, crack.solve("conforming"))) < LIMIT

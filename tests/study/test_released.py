@@ -110,10 +110,7 @@ def test_the_advance_of_a_blade_is_what_it_sweeps_inside_the_body(angle):
 
 @pytest.mark.parametrize(
     "solver, scheme, least, angle, most",
-    [
-        ("xfem", "implicit_euler", 0.5, 17.0, 0.25),
-        ("conforming", "newmark", 0.0, 17.0, 0.25),
-    ],
+    [("xfem", "implicit_euler", 0.5, 17.0, 0.25), ("conforming", "newmark", 0.0, 17.0, 0.25)],
 )
 def test_what_a_blade_releases_is_found_again(solver, scheme, least, angle, most):
     """G = μ w₀²/b per unit advance: as waves, or dissipated; a general position is no exception.

@@ -1,10 +1,14 @@
-"""Stress-intensity factors as a quantity of interest: of any solver's solution, with reasons."""
+"""Stress-intensity factors as quantities of interest, in the plane and along fronts."""
 
+from itertools import permutations
+
+import numpy as np
 import pytest
 
 from reference.exact import exact_solution
 from verify.assess.quantities import Measured, unit_of
 from verify.assess.reference import conforming_reference, exact_reference
+from verify.assess.stress_intensity import exact_intensity, solution_intensity
 from verify.assess.unavailable import unavailable_quantities
 from verify.compare.body import body_of
 from verify.compare.hooke import hooke
@@ -12,6 +16,7 @@ from verify.errors import InputError
 from verify.result import Metric, SolveRecord, Status
 from verify.runner.checking import check_scene
 from verify.scene import Scene, load_scene
+from verify.solution import Solution
 from verify.solvers import find_solver
 
 ASKED = [
@@ -84,9 +89,7 @@ MOTION = {"kind": "dynamic", "duration": 1.0, "outputs": 5}
         (
             {
                 "analysis": MOTION,
-                "loads": [
-                    {"kind": "body_force", "force": [0, 1], "history": [[1, 0], [1, 1]]},
-                ],
+                "loads": [{"kind": "body_force", "force": [0, 1], "history": [[1, 0], [1, 1]]}],
             },
             {},
             "body force jumps",
@@ -144,3 +147,126 @@ def test_missing_quantities_are_noticed_with_their_levels_and_reason():
     (one,) = unavailable_quantities(case, all_alike)
     assert (one.solver, one.text) == (None, "too coarse")
     assert unavailable_quantities(case, [solved("a", 0, 1.0)]) == []
+
+
+def penny(*asked, **changes):
+    """Give the inclined penny under tension and pressure, with factors asked for."""
+    content = load_scene("curved/penny").model_dump(mode="json", by_alias=True)
+    quantities = [
+        {"kind": "stress_intensity", "name": f"q{i}", "cut": "crack"} | one
+        for i, one in enumerate(asked)
+    ]
+    content |= {"quantities": quantities, "acceptance": [], "known_findings": []} | changes
+    return Scene.model_validate(content)
+
+
+def exact_of(scene):
+    return exact_solution(scene.exact.solution, scene.exact.parameters, scene.material)
+
+
+def front_point(degrees):
+    """Where the shear of the inclined penny points ahead, turned on about its normal."""
+    normal, centre = np.array([0.36, -0.48, 0.8]), np.array([0.07, -0.04, 0.03])
+    ahead = np.array([0.0, 0.0, 1.0]) - 0.8 * normal
+    ahead /= np.linalg.norm(ahead)
+    turn = np.deg2rad(degrees)
+    spoke = np.cos(turn) * ahead + np.sin(turn) * np.cross(normal, ahead)
+    return (centre + spoke).tolist()
+
+
+@pytest.mark.heavy
+@pytest.mark.fenicsx
+def test_the_three_modes_of_an_inclined_penny_are_kassirs_and_sihs():
+    """Graded quadratic elements, 0.06 a at the front: the energy is 1e-3 off, and so is K."""
+    scene = penny(
+        *({"mode": mode, "point": front_point(60.0)} for mode in ("I", "II", "III")),
+        reference={"size": 1.0},
+    )
+    found = find_solver("reference").solve(scene, 1, repetitions=0)
+    exact = exact_of(scene)
+    stated = np.array([exact_intensity(scene, exact, asked) for asked in scene.quantities])
+    assert stated == pytest.approx([1.2864, 0.3186, 0.3863], abs=1e-4)
+    values = [solution_intensity(scene, found, asked) for asked in scene.quantities]
+    assert values == pytest.approx(stated, abs=5e-3 * stated[0])
+
+
+@pytest.mark.fenicsx
+def test_the_factors_of_a_pressed_crack_are_those_of_its_closed_form():
+    """The faces are freed by a uniform stress: its own field has no factor."""
+    content = load_scene("statics/griffith_inside").model_dump(mode="json", by_alias=True)
+    content["exact"]["parameters"] |= {"stress": [0.3, 0.0, 0.0], "pressure": 1.0}
+    content |= {
+        "loads": [{"kind": "cut_faces", "pressure": 1.0}],
+        "quantities": [
+            {"kind": "stress_intensity", "name": mode, "end": "end", "mode": mode}
+            for mode in ("I", "II")
+        ],
+        "acceptance": [],
+        "reference": {"kind": "conforming"},
+    }
+    scene = Scene.model_validate(content)
+    found = find_solver("reference").solve(scene, 0, repetitions=0)
+    exact = exact_of(scene)
+    for asked in scene.quantities:
+        stated = exact_intensity(scene, exact, asked)
+        assert solution_intensity(scene, found, asked) == pytest.approx(stated, abs=2e-3)
+
+
+def straight(n, *asked, **changes):
+    """A box that is cut in the plane z = 0 up to a straight front, 20 degrees off y."""
+    ahead, along = np.array([[0.94, -0.342, 0.0], [0.342, 0.94, 0.0]])
+    point = np.array([0.04, -0.03, 0.0])
+    corners = [point + a * along - b * ahead for a, b in ((-2, 0), (2, 0), (2, 3), (-2, 3))]
+    content = {
+        "title": "box",
+        "requirement": "none",
+        "geometry": {"kind": "box", "lower": [-0.5] * 3, "upper": [0.5] * 3},
+        "mesh": {"cells": [[n, n, n]]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "supports": [{"where": "boundary", "displacement": "exact"}],
+        "exact": {
+            "solution": "straight_front",
+            "parameters": {"point": point.tolist(), "normal": [0.0, 0.0, 1.0],
+                           "axis": ahead.tolist(), "intensity": [1.0, 0.6, -0.8]},
+        },
+        "cuts": [{"kind": "polygon", "points": [c.tolist() for c in corners]}],
+        "quantities": [
+            {"kind": "stress_intensity", "name": f"q{i}", "point": point.tolist()} | one
+            for i, one in enumerate(asked)
+        ],
+    }  # fmt: skip
+    return Scene.model_validate(content | changes)
+
+
+def sampled(scene, n):
+    """The exact field at the corners of every tetrahedron of a grid, on the side of its centre."""
+    places = np.linspace(-0.5, 0.5, n + 1)
+    grid = np.stack(np.meshgrid(places, places, places, indexing="ij"), axis=-1)
+    corners = []
+    for path in permutations(range(3)):
+        at = np.zeros(3, dtype=int)
+        row = [at.copy()]
+        for axis in path:
+            at[axis] += 1
+            row.append(at.copy())
+        corners.append(np.stack([grid[i : n + i, j : n + j, k : n + k] for i, j, k in row], axis=3))
+    cells = np.stack(corners).reshape(-1, 4, 3)
+    turned = np.linalg.det(cells[:, 1:] - cells[:, :1]) < 0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    points = cells.reshape(-1, 3)
+    u = exact_of(scene).displacement(points, np.repeat(cells.mean(axis=1), 4, axis=0))
+    return Solution(points, np.arange(len(points)).reshape(-1, 4), u[None], np.zeros(1))
+
+
+def test_the_three_modes_at_a_straight_front_are_those_of_its_field():
+    """Interpolated linearly on a mesh whose cells the front runs through: order h over the radius.
+
+    At h = 1/16 and a mean radius of 0.3 that is the share h/r = 0.2 of the squares of the strain
+    next to the front, whose own share of the integral is h/r again: 4 % of the largest factor.
+    """
+    modes = ("I", "II", "III")
+    scene = straight(16, *({"mode": mode} for mode in modes))
+    values = [solution_intensity(scene, sampled(scene, 16), asked) for asked in scene.quantities]
+    assert values == pytest.approx([1.0, 0.6, -0.8], abs=0.04)
+    exact = exact_of(scene)
+    assert [exact_intensity(scene, exact, q) for q in scene.quantities] == [1.0, 0.6, -0.8]

@@ -82,3 +82,13 @@ def boundary_nodes(phantom):
     for cell, opposite in mesh.boundary_facets:
         on_boundary[np.delete(mesh.cells[cell], opposite)] = True
     return on_boundary[phantom.node_parent]
+
+
+def shaken(mesh, seed, amount=0.2):
+    """Inner nodes moved at random: every element is cut in its own way."""
+    random = np.random.default_rng(seed)
+    points = mesh.points.copy()
+    inner = ((points > 1e-9) & (points < 1.0 - 1e-9)).all(axis=1)
+    size = np.linalg.norm(mesh.edge_vectors, axis=2).min()
+    points[inner] += amount * size * random.uniform(-1.0, 1.0, (inner.sum(), mesh.space))
+    return SimplexMesh(points, mesh.cells)

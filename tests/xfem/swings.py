@@ -1,8 +1,7 @@
 """Bodies held at one face and let go from a stretch of 15 %: what their energy does."""
 
 import numpy as np
-from cut_bodies import DENSITY, material
-from test_sliver_policies import shaken
+from cut_bodies import DENSITY, material, shaken
 
 from verify.xfem.block_pattern import body_pattern
 from verify.xfem.body import DynamicBody

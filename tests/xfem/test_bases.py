@@ -7,12 +7,7 @@ from scipy.sparse import csr_array
 from thesis_blocks import shifted_stiffness
 from xfem_bodies import boundary_nodes, sparse_stiffness
 
-from verify.xfem.bases import (
-    from_sidewise,
-    sidewise_from,
-    transformation,
-    transformed_matrix,
-)
+from verify.xfem.bases import from_sidewise, sidewise_from, transformation, transformed_matrix
 from verify.xfem.cuts import ImplicitCut, Plane, Polyline
 from verify.xfem.elasticity import isotropic
 from verify.xfem.errors import BasisError

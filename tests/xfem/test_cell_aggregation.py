@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import xfem_exact_fields as exact
-from cut_bodies import rotation
-from test_sliver_policies import degenerate_cuts, shaken
+from cut_bodies import rotation, shaken
+from test_sliver_policies import degenerate_cuts
 from xfem_bodies import boundary_nodes, relative_l2_error
 
 from verify.xfem.block_pattern import body_pattern

@@ -34,10 +34,7 @@ PLANAR = {
     "branch after its stem": ([STEM, line(0.47, 0.52, 0.47, 2.0)], 3),
     "branch before its stem": ([line(0.47, 0.52, 0.47, 2.0), STEM], 3),
     "branch from a node": ([line(-1.0, 0.5, 2.0, 0.5), line(0.5, 0.5, 0.6, 2.0)], 3),
-    "crossing, then a branch": (
-        [STEM, line(0.47, -1.0, 0.47, 2.0), line(0.47, 0.8, -1.0, 0.9)],
-        5,
-    ),
+    "crossing, then a branch": ([STEM, line(0.47, -1.0, 0.47, 2.0), line(0.47, 0.8, -1.0, 0.9)], 5),
     "three through one point": (
         [line(-1.0, 0.53, 2.0, 0.53), line(0.53, -1.0, 0.53, 2.0), line(-1.0, -1.0, 2.0, 2.0)],
         6,

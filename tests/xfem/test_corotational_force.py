@@ -1,20 +1,25 @@
-"""Corotational force, energy and stiffness: exact values, derivatives, invariances."""
+"""Corotation: polar rotations, energy, forces and tangents, equilibria of turned problems."""
 
 import numpy as np
 import pytest
-from cut_bodies import (
-    SOFT,
-    cut_body,
-    cut_cube,
-    cut_membrane,
-    cut_square,
-    material,
-    rotation,
-)
+from cut_bodies import SOFT, cut_body, cut_cube, cut_membrane, cut_square, material, rotation
 
+from verify.accelerated import FAST
+from verify.xfem import static_newton, statics
 from verify.xfem.block_pattern import block_pattern
+from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
+from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce, inverted_cells
+from verify.xfem.kernels import PLAIN
+from verify.xfem.phantom import cut_mesh
+from verify.xfem.polar import (
+    largest_eigenvector,
+    nearest_rotations,
+    rotation_matrices,
+    rotations_in_space,
+)
+from verify.xfem.structured_meshes import rectangle_mesh
 
 
 def _bodies():
@@ -145,3 +150,132 @@ def test_internal_forces_have_no_resultant_and_in_corotation_no_moment(force):
         x = force.phantom.node_points + u
         moment = np.einsum("ni,nj->ij", x, f)
         assert np.abs(moment - moment.T).max() < 1e-14 * size * np.abs(x).max()
+
+
+def _rotation(F, start=None):
+    """In space by Newton's method from a quaternion."""
+    if len(F) == 2 or start is None:
+        return nearest_rotations(F[None])[0]
+    R = np.empty((1, 3, 3))
+    rotations_in_space(F[None], start[None].copy(), R)
+    return R[0]
+
+
+def _by_eigenvector(F, _start=None):
+    q, R = np.empty((1, 4)), np.empty((1, 3, 3))
+    largest_eigenvector(F, q[0])
+    rotation_matrices(q, R)
+    return R[0]
+
+
+def _by_svd(F):
+    U, _, V = np.linalg.svd(F)
+    flip = np.eye(len(F))
+    flip[-1, -1] = np.sign(np.linalg.det(U @ V))
+    return U @ flip @ V
+
+
+@pytest.mark.parametrize(
+    ("dim", "rotation"), [(2, _rotation), (3, _rotation), (3, _by_eigenvector)]
+)
+def test_rotation_equals_that_of_the_singular_value_decomposition_also_when_inverted(dim, rotation):
+    rng = np.random.default_rng(7)
+    for _ in range(2000):
+        F = rng.normal(size=(dim, dim))
+        start = rng.normal(size=4)
+        R = rotation(F, start / np.linalg.norm(start))
+        s = np.linalg.svd(F)[1]
+        # the rotation is as sensitive as 1/(σ₂ ± σ₃)
+        gap = (s[-2] + np.sign(np.linalg.det(F)) * s[-1]) / s[0]
+        assert np.abs(R - _by_svd(F)).max() * gap < 1e-13
+        assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    "stretches",
+    [
+        (0.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
+        (1.0, 1.0, 0.0),
+        (-1.0, -1.0, -1.0),
+        (1.0, 1.0, -1.0),
+        (1.0, 1e-12, -1e-12),
+        (1.0, 1.0, -1.0 + 1e-9),
+        (1e-200, 1e-200, 1e-200),
+        (1e120, 1e120, -1e120),
+    ],
+)
+@pytest.mark.parametrize("rotation", [_rotation, _by_eigenvector])
+def test_collapsed_and_inverted_pieces_have_a_rotation_that_attains_the_largest_trace(
+    stretches, rotation
+):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        Q = [_by_svd(rng.normal(size=(3, 3))) for _ in range(2)]
+        F = Q[0] @ np.diag(stretches) @ Q[1].T
+        R = rotation(F)
+        s = np.sort(np.abs(stretches))
+        most = s[2] + s[1] + np.copysign(s[0], np.prod(np.sign(stretches)))
+        assert np.abs(R.T @ R - np.eye(3)).max() < 1e-14
+        assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-13)
+        assert np.trace(R.T @ F) == pytest.approx(most, rel=1e-13, abs=1e-14 * s[2])
+
+
+def test_a_turned_problem_has_the_turned_equilibrium():
+    found = []
+    for angle in (0.0, 2.1):
+        Q = rotation(2, angle)
+        mesh = rectangle_mesh((6, 6))
+        mesh = type(mesh)(mesh.points @ Q.T, mesh.cells)
+        v = cut_mesh(mesh, [Plane(Q @ [0.5, 0.47], Q @ [0.2, 1.0])])
+        X = v.node_points @ Q
+        fixed = np.repeat((X[:, :1] < 1e-9), 2, axis=1)
+        load = np.zeros_like(X)
+        load[X[:, 0] > 1.0 - 1e-9] = Q @ [0.0, -0.002]
+        result = static_equilibrium(InternalForce(v, material(2, 1.0)), fixed, load=load)
+        found.append((result.energy, result.displacement @ Q))
+    assert np.abs(found[0][1]).max() > 0.1
+    assert found[1][0] == pytest.approx(found[0][0], rel=1e-9)
+    assert np.abs(found[1][1] - found[0][1]).max() < 1e-9
+
+
+def test_newton_does_not_see_slivers():
+    counts = []
+    for epsilon in (0.5, 1e-2, 1e-6, 1e-12, 0.0):
+        v = cut_square(8, (0.5, 0.5 + epsilon / 8.0), (0.0, 1.0))
+        X = v.node_points
+        ends = (X[:, 1] == 0.0) | (X[:, 1] == 1.0)
+        fixed = np.repeat(ends[:, None], 2, axis=1)
+        turned = np.where(v.node_side[:, :1] > 0, X @ rotation(2, 0.8).T - X, 0.0)
+        turned[:, 0] += 0.2 * X[:, 1] * X[:, 0]
+        force = InternalForce(v, material(2))
+        counts.append(static_equilibrium(force, fixed, lambda s, u=turned: s * u).iterations[0])
+    assert max(counts) <= 8
+    assert max(counts) - min(counts) <= 2
+
+
+@pytest.mark.parametrize("limit", [10_000, 3])
+@pytest.mark.parametrize("kernels", [PLAIN, FAST])
+def test_iterated_corrections_find_the_equilibrium_that_factorised_ones_do(
+    monkeypatch, limit, kernels
+):
+    """Also where the tangent is indefinite on the way, and where iterations run out."""
+    v = cut_cube(3)
+    X = v.node_points
+    ends = (X[:, 0] < 1e-9) | (X[:, 0] > 1.0 - 1e-9)
+
+    def twisted(s):
+        turned = (X - 0.5) @ rotation(3, 1.5 * s, (1.0, 0.0, 0.0)).T - (X - 0.5)
+        return np.where((X[:, 0] > 0.5)[:, None], turned, 0.0)
+
+    fixed = np.repeat(ends[:, None], 3, axis=1)
+    force = InternalForce(v, material(3))
+    direct = static_equilibrium(force, fixed, twisted, load_steps=2)
+    monkeypatch.setattr(statics, "ITERATE_FROM", 0)
+    monkeypatch.setattr(static_newton, "_MOST", limit)
+    iterated = static_equilibrium(
+        InternalForce(v, material(3), kernels=kernels), fixed, twisted, load_steps=2
+    )
+    # both to 1e-10 of the forces
+    np.testing.assert_allclose(iterated.displacement, direct.displacement, atol=1e-9)
+    assert iterated.energy == pytest.approx(direct.energy, rel=1e-9)

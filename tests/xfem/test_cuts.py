@@ -1,11 +1,21 @@
-"""Cuts know on which side a point lies, how far away, and whether they reach it."""
+"""Geometry of cuts: level sets, sweeps of a tool, nearest facets, areas of thin triangles."""
+
+from fractions import Fraction
+from math import isqrt
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from verify.xfem.cuts import PolygonPatch, Polyline, TriangulatedSurface
+from verify.compare.splitting import measures
+from verify.simulator.collision.surface_collider import SurfaceCollider
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.simulator.mapping.body_surface import BodySurface
+from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath, TriangulatedSurface
+from verify.xfem.mesh import SimplexMesh
+from verify.xfem.nearest_points import nearest_on_facet
+from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 COORDINATE = st.floats(-3.0, 3.0)
 
@@ -87,3 +97,207 @@ def test_a_flat_triangulated_patch_is_its_plane_and_ends_at_its_rim():
     to_rim = np.minimum(flat[:, :2], 2.0 - flat[:, :2]).min(axis=1)
     want = np.where(past > 0.0, -past, to_rim)
     assert surface.depth(flat) == pytest.approx(want, abs=1e-14)
+
+
+def test_a_sweep_in_the_plane_has_the_level_set_of_its_polyline() -> None:
+    tips = [[0.0, 0.0], [0.5, 0.1], [0.9, 0.6], [1.0, 1.2]]
+    points = np.random.default_rng(1).uniform(-0.5, 1.5, (400, 2))
+    sweep = ToolPath.of_tip(tips, range(4)).sweep
+    np.testing.assert_allclose(
+        sweep.level_set(points), Polyline(tips).level_set(points), atol=1e-14
+    )
+
+
+def test_a_sweep_in_space_has_the_level_set_of_its_triangulation() -> None:
+    # a bent blade of three points on a bent path
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, 6), np.linspace(0.0, 1.0, 3), indexing="ij")
+    blades = np.stack([x, y, 0.3 * np.sin(2.0 * x) + 0.2 * y**2], axis=2)
+    number = np.arange(18).reshape(6, 3)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    triangles = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
+    surface = TriangulatedSurface(blades.reshape(-1, 3), triangles)
+    points = np.random.default_rng(2).uniform(-0.3, 1.3, (500, 3))
+    sweep = ToolPath(blades, np.arange(6)).sweep
+    np.testing.assert_allclose(sweep.level_set(points), surface.level_set(points), atol=1e-13)
+    # both call a point past the rim the same, and by the same distance
+    past = surface.depth(points) < -1e-12
+    np.testing.assert_allclose(sweep.depth(points)[past], surface.depth(points)[past], atol=1e-13)
+    assert (sweep.depth(points)[~past] >= -1e-12).all()
+
+
+def test_the_blade_passes_points_in_proportion_to_its_travel() -> None:
+    # 0.6 m in 2 s, 3 s of rest, 0.4 m in 1 s
+    path = ToolPath.of_tip([[0.0, 0.0], [0.6, 0.0], [0.6, 0.0], [1.0, 0.0]], [0.0, 2.0, 5.0, 6.0])
+    x = np.array([0.0, 0.15, 0.6, 0.8, 1.0])
+    travel = path.sweep.travel(np.stack([x, np.zeros(5)], axis=1))
+    np.testing.assert_allclose(travel, x, atol=1e-15)
+    np.testing.assert_allclose(path.time_at(travel), [0.0, 0.5, 2.0, 5.5, 6.0], atol=1e-14)
+    assert path.travel_at(3.0) == pytest.approx(0.6)
+    assert path.travel_at(-1.0) < 0.0
+    part = path.sweep.until(path.travel_at(5.5))
+    np.testing.assert_array_equal(
+        part.depth(np.stack([x, np.zeros(5)], axis=1)) >= 0.0, [True, True, True, True, False]
+    )
+
+
+def test_a_blade_that_turns_about_its_end_sweeps_a_connected_fan() -> None:
+    angle = np.linspace(0.0, 1.2, 7)
+    far = np.stack([np.cos(angle), np.sin(angle), np.zeros(7)], axis=1)
+    path = ToolPath(np.stack([np.zeros((7, 3)), far], axis=1), angle)
+    facets = path.surface.facets
+    assert len(facets) == 6
+    inner_edges = (~path.surface.arrays.edge_rim).sum()
+    assert inner_edges == 2 * 5
+
+
+@pytest.mark.parametrize(
+    ("tips", "depth"),
+    [
+        ([[0.2, 0.3], [0.2, 0.3]], None),
+        ([[0.2, 0.3, 0.1], [0.2, 0.3, 0.1]], [0.0, 0.0, 0.5]),
+        ([[0.2, 0.3, 0.1], [0.2, 0.3, 0.9]], [0.0, 0.0, 0.5]),
+        ([[0.2, 0.3, 0.1], [0.2, 0.3 + 1e-13, 0.9]], [0.0, 0.0, 0.5]),
+    ],
+    ids=["rests", "blade rests", "moves along itself", "nearly along itself"],
+)
+def test_a_blade_that_stays_on_its_line_sweeps_nothing(tips, depth) -> None:
+    path = ToolPath.of_tip(tips, [0.0, 1.0], depth)
+    points = np.random.default_rng(3).uniform(0.0, 1.0, (20, len(tips[0])))
+    assert (path.sweep.depth(points) < 0.0).all()
+    assert (path.sweep.level_set(points) > 0.0).all()
+
+
+@pytest.mark.parametrize("move", [0.0, 1e-300, 1e-160, 1e-40, 1e-16])
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_a_move_of_round_off_size_does_not_change_the_sweep(move, at) -> None:
+    tips = np.array([[0.0, 0.0], [0.5, 0.2], [1.0, 0.9]])
+    points = np.random.default_rng(4).uniform(-0.5, 1.5, (50, 2))
+    jittered = np.insert(tips, at + 1, tips[at] + [0.0, move], axis=0)
+    sweeps = ToolPath.of_tip(tips, range(3)).sweep, ToolPath.of_tip(jittered, range(4)).sweep
+    for ask in ("level_set", "depth", "travel"):
+        np.testing.assert_allclose(*(getattr(one, ask)(points) for one in sweeps), atol=4e-16)
+
+
+def _model(dim, seed):
+    """A cut body, its surface displaced at random, and the collider on it."""
+    mesh = box_mesh((4, 4, 4)) if dim == 3 else rectangle_mesh((8, 8))
+    cutter = SemiProgressiveCutter(mesh)
+    body = BodySurface(cutter.body)
+    collider = SurfaceCollider(body.surface)
+    depth = [0.0, 0.1, 1.4] if dim == 3 else None
+    tips = [[-0.1, 0.47, -0.2], [1.1, 0.53, -0.2]]
+    cutter.begin(ToolPath.of_tip([tip[:dim] for tip in tips], [0.0, 1.0], depth))
+    rng = np.random.default_rng(seed)
+    for time in (0.4, 1.0):
+        body.update(cutter.advance(time))
+        displacement = 0.05 * rng.normal(size=(cutter.body.node_count, dim))
+        collider.refit(displacement)
+    collider.refit(displacement)  # once without a change of the surface
+    rows = body.surface.used
+    corners = body.surface.positions(displacement)[body.surface.facets.rows[rows]]
+    return cutter, body, collider, rows, corners, rng
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_nearest_facet_is_that_of_all(dim) -> None:
+    _, body, collider, rows, corners, rng = _model(dim, 1)
+    points = rng.uniform(-0.3, 1.3, (60, dim))
+    contacts = collider.nearest(points)
+    weights = np.empty(dim)
+    for q, x in enumerate(points):
+        best = np.inf
+        for facet in corners:
+            nearest_on_facet(x, facet, weights)
+            best = min(best, np.linalg.norm(weights @ facet - x))
+        assert contacts.distance[q] == pytest.approx(best, rel=1e-12)
+        foot = contacts.at[q] @ corners[np.searchsorted(rows, contacts.facet[q])]
+        assert np.linalg.norm(foot - x) == pytest.approx(best, rel=1e-12)
+    np.testing.assert_array_equal(contacts.piece, body.surface.facet_piece.rows[contacts.facet])
+    # a limit hides what is farther, and nothing else
+    limited = collider.nearest(points, limit=0.05)
+    np.testing.assert_array_equal(limited.facet >= 0, contacts.distance < 0.05)
+    assert np.isinf(limited.distance[limited.facet < 0]).all()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_segment_pierces_what_a_linear_solve_says(dim) -> None:
+    _, _, collider, rows, corners, rng = _model(dim, 3)
+    hits = 0
+    for _ in range(40):
+        start, end = rng.uniform(-0.3, 1.3, (2, dim))
+        contacts = collider.pierced(start, end)
+        expected = {}
+        for facet, corner in zip(rows, corners, strict=True):
+            matrix = np.column_stack([start - end, *(corner[1:] - corner[0])])
+            share, *rest = np.linalg.solve(matrix, start - corner[0])
+            if 0 <= share <= 1 and min([*rest, 1 - sum(rest)]) >= 0:
+                expected[int(facet)] = share
+        assert sorted(contacts.facet.tolist()) == sorted(expected)
+        assert (np.diff(contacts.share) >= 0.0).all()
+        for k, facet in enumerate(contacts.facet):
+            assert contacts.share[k] == pytest.approx(expected[int(facet)], abs=1e-10)
+            foot = contacts.at[k] @ corners[np.searchsorted(rows, facet)]
+            np.testing.assert_allclose(foot, start + contacts.share[k] * (end - start), atol=1e-12)
+        hits += len(expected)
+    assert hits > 40
+
+
+_EPS = np.finfo(float).eps
+_DIGITS = 10**60
+
+
+def _minus(a, b):
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def _cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _exact_area(corners):
+    """Area of the triangle whose corners are these floating-point numbers, to 30 digits."""
+    a, b, c = ([Fraction(float(x)) for x in corner] for corner in corners)
+    square = sum(x * x for x in _cross(_minus(b, a), _minus(c, a))) / 4
+    scaled = square * _DIGITS**2
+    return float(Fraction(isqrt(scaled.numerator * 10**8 // scaled.denominator), _DIGITS * 10**4))
+
+
+def _thin_triangles(count):
+    """Needles and caps in any direction, heights over bases from 1e-1 to 1e-9."""
+    rng = np.random.default_rng(4)
+    for _ in range(count):
+        thin = 10.0 ** rng.uniform(-9, -1)
+        apex = rng.choice([0.0, thin, rng.uniform(-0.5, 1.5)])
+        turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        flat = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [apex, thin, 0.0]])
+        yield 10.0 ** rng.uniform(-3, 3) * (flat @ turn.T)
+
+
+def _allowed(corners):
+    """Round-off of the product of the two shorter edges over the area: a few last places."""
+    lengths = np.sort(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1))
+    return 8 * _EPS * max(1.0, lengths[0] * lengths[1] / (2 * _exact_area(corners)))
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2]])
+def test_the_area_of_a_thin_triangle_in_space_is_exact_in_any_order_of_its_corners(order):
+    for corners in _thin_triangles(300):
+        area = SimplexMesh(corners, [order]).measures[0]
+        exact = _exact_area(corners)
+        assert abs(area / exact - 1.0) <= _allowed(corners)
+        compared = measures(corners[None, order])[0]
+        assert abs(compared / exact - 1.0) <= _allowed(corners)
+
+
+def test_gradients_on_a_thin_triangle_in_space_are_those_of_a_linear_field():
+    for corners in _thin_triangles(300):
+        gradients = SimplexMesh(corners, [[0, 1, 2]]).gradients[0]
+        # the gradient of a shape function takes it from 0 to 1 along the edges
+        edges = corners[1:] - corners[0]
+        rise = edges @ gradients.T
+        expected = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+        lengths = np.linalg.norm(edges, axis=1)
+        size = np.abs(gradients).max() * lengths.max()
+        assert np.abs(rise - expected).max() <= 8 * _EPS * max(1.0, size)

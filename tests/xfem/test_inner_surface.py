@@ -1,4 +1,4 @@
-"""The surface of cut material: inner faces from the cut, watertight with the split outer ones."""
+"""Surfaces of cut bodies: closed parts, facing sides, embedded surfaces that follow and bear."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ from surface_measures import enclosed_by_body, loose_edges, pinched_edges, volum
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
+from verify.simulator.mapping.embedded_surface import EmbeddedSurface
 from verify.xfem.cuts import ToolPath
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
@@ -111,3 +112,119 @@ def test_a_surface_begun_after_a_cut_is_the_one_that_has_followed_it() -> None:
         corners = np.sort(x[body.surface.facets.rows[body.surface.used]].reshape(-1, 9), axis=1)
         shapes.append(corners[np.lexsort(corners.T)])
     np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-13)
+
+
+PATHS = [
+    ToolPath.of_tip([[-0.1, -0.2, 0.48], [1.1, -0.2, 0.55]], [0.0, 1.0], [0.0, 1.4, 0.05]),
+    ToolPath.of_tip([[0.3, 1.1, 1.1], [0.33, 0.1, 1.2]], [2.0, 3.0], [0.1, 0.0, -0.7]),
+]
+
+
+def _sphere(refinements, centre, radius):
+    """An octahedron refined: vertices and outward triangles, not those of any mesh here."""
+    points = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    cells = np.array(
+        [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]]
+    )
+    for _ in range(refinements):
+        edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        unique, back = np.unique(edges, axis=0, return_inverse=True)
+        middle = points[unique].mean(axis=1)
+        number = len(points) + back.reshape(-1, 3)
+        points = np.concatenate([points, middle / np.linalg.norm(middle, axis=1)[:, None]])
+        a, b, c = cells.T
+        ab, bc, ca = number.T
+        cells = np.concatenate(
+            [np.stack(t, 1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+    return centre + radius * points, cells
+
+
+def _own_boundary(mesh):
+    outer = BodySurface(SemiProgressiveCutter(mesh).body).surface
+    heaviest = np.abs(outer.weights.rows).argmax(axis=1)
+    node = outer.nodes.rows[np.arange(len(heaviest)), heaviest]
+    return node[outer.facets.rows]
+
+
+def _cut(mesh, paths, surface_points=None, facets=None):
+    cutter = SemiProgressiveCutter(mesh)
+    body = BodySurface(cutter.body)
+    if facets is None:
+        surface_points, facets = mesh.points, _own_boundary(mesh)
+    embedded = EmbeddedSurface(cutter, surface_points, facets)
+    for path in paths:
+        cutter.begin(path)
+        for time in np.linspace(path.times[0], path.times[-1], 4):
+            increment = cutter.advance(time)
+            body.update(increment)
+            embedded.update(increment)
+    return cutter, body, embedded
+
+
+@pytest.mark.parametrize("refinements", [1, 3])
+def test_an_affine_motion_moves_every_vertex_as_it_moves_the_material(refinements) -> None:
+    points, facets = _sphere(refinements, 0.5, 0.45)
+    cutter, _, embedded = _cut(box_mesh((4, 5, 3)), PATHS, points, facets)
+    gradient, shift = np.random.default_rng(6).normal(size=(3, 3)), np.array([1.0, -2.0, 3.0])
+    nodes = cutter.mesh.points[cutter.body.node_parent.rows]
+    moved = embedded.surface.positions(nodes @ gradient + shift)
+    expected = embedded.surface.material.rows @ (np.eye(3) + gradient) + shift
+    np.testing.assert_allclose(moved, expected, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "paths"),
+    [
+        (box_mesh((4, 3, 5)), PATHS),
+        (
+            rectangle_mesh((6, 7)),
+            [
+                ToolPath.of_tip([[-0.1, 0.43], [0.4, 0.51], [0.8, 0.3]], [0.0, 1.0, 2.0]),
+                ToolPath.of_tip([[0.3, 1.1], [0.33, 0.1]], [3.0, 4.0]),
+            ],
+        ),
+    ],
+)
+def test_the_mesh_boundary_embedded_opens_exactly_as_the_material_does(mesh, paths) -> None:
+    cutter, body, embedded = _cut(mesh, paths)
+    displacement = np.random.default_rng(7).normal(size=(cutter.body.node_count, mesh.dim))
+    used = body.surface.used
+    outer = used[~body.surface.inner.rows[used]]
+    sizes, vertices = [], []
+    for surface, rows in ((body.surface, outer), (embedded.surface, embedded.surface.used)):
+        x = surface.positions(displacement)
+        facets = surface.facets.rows[rows]
+        corners = x[facets]
+        edges = corners[:, 1:] - corners[:, :1]
+        sizes.append(np.sqrt(np.linalg.det(edges @ edges.transpose(0, 2, 1))).sum())
+        vertices.append(np.unique(x[np.unique(facets)].round(9), axis=0))
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-12)
+    assert vertices[0].shape == vertices[1].shape
+    np.testing.assert_allclose(vertices[0], vertices[1], atol=1e-9)
+
+
+def test_virtual_work_is_the_same_on_the_surface_and_on_the_unknowns() -> None:
+    points, facets = _sphere(3, 0.5, 0.45)
+    cutter, body, embedded = _cut(box_mesh((4, 4, 4)), PATHS, points, facets)
+    rng = np.random.default_rng(8)
+    motion = rng.normal(size=(cutter.body.node_count, 3))
+    for surface in (embedded.surface, body.surface):
+        force = rng.normal(size=surface.material.rows.shape)
+        nodal = surface.nodal_forces(force, np.zeros_like(motion))
+        velocity = surface.positions(motion) - surface.material.rows
+        work = (force * velocity).sum()
+        assert (nodal * motion).sum() == pytest.approx(work, rel=1e-12)
+        # forces in equilibrium stay so: resultant and moment
+        np.testing.assert_allclose(nodal.sum(axis=0), force.sum(axis=0), atol=1e-11)
+        x = cutter.mesh.points[cutter.body.node_parent.rows]
+        np.testing.assert_allclose(
+            np.cross(x, nodal).sum(axis=0),
+            np.cross(surface.material.rows, force).sum(axis=0),
+            atol=1e-10,
+        )
+        facet = int(surface.used[17])
+        at, push = np.array([0.2, 0.5, 0.3]), np.array([1.0, 2.0, -3.0])
+        nodal = surface.facet_force(facet, at, push, np.zeros_like(motion))
+        moved = at @ velocity[surface.facets.rows[facet]]
+        assert (nodal * motion).sum() == pytest.approx(push @ moved, rel=1e-12)

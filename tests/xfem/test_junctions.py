@@ -1,18 +1,27 @@
-"""Cuts that end in one point inside an element part the body together, as none does alone."""
+"""Cuts that meet: forks, branches, corners, element faces."""
 
 from itertools import permutations
 
 import numpy as np
 import pytest
-from test_sliver_policies import shaken
+from cut_bodies import shaken
 from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
-from verify.xfem.cuts import PolygonPatch, Polyline
+from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
+from verify.xfem.cuts import ImplicitCut
+from verify.xfem.elasticity import isotropic
+from verify.xfem.faceted_cuts import Polyline
+from verify.xfem.flat_cuts import Plane, PolygonPatch
+from verify.xfem.loads import body_force
+from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import treat_slivers
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
+from verify.xfem.supports import Supports
+from verify.xfem.tool_path import ToolPath
 
 
 def sectors(rng, count, least=0.35):
@@ -160,3 +169,122 @@ def test_pieces_that_no_cut_keeps_apart_are_slivers_together_or_not_at_all(polic
     # only what is dropped goes to another part
     moved = report.volume_share if policy == "drop" else 0.0
     np.testing.assert_allclose(areas(treated.corners), areas(phantom), atol=moved + 1e-12)
+
+
+def without_a_quarter(mesh):
+    """Leave out x < ½ < y: a re-entrant corner, in space a re-entrant edge, remains."""
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    cells = mesh.cells[~((centre[:, 0] < 0.5) & (centre[:, 1] > 0.5))]
+    used, numbers = np.unique(cells, return_inverse=True)
+    return SimplexMesh(mesh.points[used], numbers.reshape(cells.shape))
+
+
+def angle_body(dim):
+    return without_a_quarter(rectangle_mesh((4, 4)) if dim == 2 else box_mesh((2, 2, 2)))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("slope", [1.0, 0.6, 1.7])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_cut_through_a_re_entrant_corner_leaves_no_hinge(dim, slope, side):
+    """Above the line are two parts that meet in the corner only, whichever side is called plus."""
+    mesh = angle_body(dim)
+    normal = side * np.array([-slope, 1.0, 0.0])[:dim]
+    phantom = cut_mesh(mesh, [Plane([0.5] * dim, normal)])
+    assert phantom.bodies.max() + 1 == 3
+    assert zero_modes(phantom)[0] == 3 * (3 if dim == 2 else 6)
+    above = phantom.mesh.points[:, 1] - 0.5 - slope * (phantom.mesh.points[:, 0] - 0.5)
+    assert len(np.unique(phantom.bodies[: len(mesh.points)][above > 1e-9])) == 2
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("tip", ["inside", "through", "nearest"])
+def test_a_branch_from_a_stem_along_edges_or_faces_comes_off(side, way, tip):
+    """Pieces without volume beside the stem must not hold the two sides of the branch together."""
+    end = 0.5 + 3.0 * way
+    plate = rectangle_mesh((4, 4))
+    branches = [Polyline([[0.47, 0.5], [0.6, end]]), Polyline([[0.6, end], [0.47, 0.5]])]
+    for branch in branches:
+        stem = Plane([0.5, 0.5], [0.0, side])
+        for cuts in ([stem, branch], [branch, stem]):
+            assert cut_mesh(plate, cuts, tip).bodies.max() + 1 == 3
+    path = ToolPath.of_tip([[0.6, end], [0.47, 0.5]], [2.0, 3.0])
+    cutter = SemiProgressiveCutter(plate)
+    for stroke in (ToolPath.of_tip([[0.5 - side, 0.5], [0.5 + side, 0.5]], [0.0, 1.0]), path):
+        cutter.begin(stroke)
+        cutter.advance(stroke.times[-1])
+    assert cutter.phantom_mesh().bodies.max() + 1 == 3
+
+    block = box_mesh((2, 2, 2))
+    rim = [[0.45, -1.0, 0.5], [0.45, 2.0, 0.5], [0.55, 2.0, end], [0.55, -1.0, end]]
+    for outline in (rim, rim[::-1]):
+        cuts = [Plane([0.5] * 3, [0.0, 0.0, side]), PolygonPatch(outline)]
+        phantom = cut_mesh(block, cuts, tip)
+        assert phantom.bodies.max() + 1 == 3
+
+
+def doubled(mesh, on_cut, above):
+    """The conforming mesh: nodes on the cut (not at its tip) doubled for the cells above it."""
+    new = np.full(len(mesh.points), -1)
+    new[on_cut] = len(mesh.points) + np.arange(on_cut.sum())
+    cells = np.where(above[:, None] & (new[mesh.cells] >= 0), new[mesh.cells], mesh.cells)
+    return SimplexMesh(np.concatenate([mesh.points, mesh.points[on_cut]]), cells)
+
+
+def through(x):
+    return np.ones(len(x), dtype=bool)
+
+
+def half_way(x):
+    return x[:, 0] < 0.5 - 1e-9
+
+
+PLATE = rectangle_mesh((8, 8))
+SLANTED = SimplexMesh(PLATE.points @ np.array([[1.0, 0.3], [0.2, 1.1]]).T, PLATE.cells)
+BLOCK = box_mesh((4, 2, 4))
+
+
+@pytest.mark.parametrize("reach", [through, half_way])
+@pytest.mark.parametrize("plane", ["level", "diagonal"])
+@pytest.mark.parametrize("name", ["plate", "slanted plate", "block"])
+def test_a_cut_along_element_faces_equals_the_mesh_with_doubled_nodes(name, plane, reach):
+    mesh = {"plate": PLATE, "slanted plate": SLANTED, "block": BLOCK}[name]
+    dim = mesh.dim
+    # the level set in the reference coordinates of the structured mesh, as a plane in space
+    reference = PLATE.points if dim == 2 else BLOCK.points
+    last = dim - 1
+    height = reference[:, last] - (0.5 if plane == "level" else reference[:, 0])
+    fit = np.linalg.lstsq(np.c_[mesh.points, np.ones(len(mesh.points))], height, rcond=None)[0]
+    to_reference = np.linalg.lstsq(np.c_[mesh.points, np.ones(len(mesh.points))], reference, None)[
+        0
+    ]
+    flat = Plane(-fit[dim] * fit[:dim] / (fit[:dim] @ fit[:dim]), fit[:dim])
+
+    def depth(x):
+        first = (np.c_[x, np.ones(len(x))] @ to_reference)[:, 0]
+        return np.full(len(x), np.inf) if reach is through else 0.5 - first
+
+    phantom = cut_mesh(mesh, [ImplicitCut(flat.level_set, depth)])
+    on_cut = (np.abs(height) < 1e-9) & reach(reference)
+    above = height[mesh.cells].mean(axis=1) > 0.0
+    conforming = doubled(mesh, on_cut, above)
+    assert phantom.node_count == len(conforming.points)
+    assert (phantom.fraction == 1.0).all()
+
+    state = "plane strain" if dim == 2 else "solid"
+    material, gravity = isotropic(1.0, 0.3, state), np.eye(dim)[last] * -0.1
+    solutions = []
+    for body in (phantom, cut_mesh(conforming, [])):
+        place = np.concatenate([reference, reference[on_cut]])[body.node_parent]
+        held = (place[:, last] < 1e-9) | (place[:, last] > 1.0 - 1e-9)
+        held = held & ~((np.abs(place[:, 0]) < 1e-9) & (plane == "diagonal"))
+        supports = Supports(np.repeat(held[:, None], dim, axis=1), np.zeros((len(held), dim)))
+        solutions.append(solve_static(body, material, supports, body_force(body, gravity)))
+    ours, theirs = solutions
+    assert ours.strain_energy == pytest.approx(theirs.strain_energy, rel=1e-12)
+    # compare cell by cell: the numbering of the doubled nodes differs
+    order = np.argsort(phantom.parent)
+    got = ours.displacement[phantom.cells[order]]
+    want = theirs.displacement[conforming.cells]
+    assert np.abs(got - want).max() < 1e-12 * np.abs(want).max()

@@ -1,16 +1,25 @@
-"""Pieces of cut cells: exact volumes, no lost piece, no crash, however degenerate the cut."""
+"""Division of cells by cuts: volumes, watertight pieces, degrees of freedom of every side."""
+
+from itertools import permutations
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay
 
 from verify.xfem.cuts import ImplicitCut, Plane
+from verify.xfem.elasticity import isotropic
+from verify.xfem.join import join_parts
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.pieces import split_cells
+from verify.xfem.statics import solve_static
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 from verify.xfem.subdivision import subdivide
+from verify.xfem.supports import Supports
 
 TRIANGLE = SimplexMesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0, 1, 2]])
 TETRAHEDRON = SimplexMesh(np.concatenate([np.zeros((1, 3)), np.eye(3)]), [[0, 1, 2, 3]])
@@ -155,3 +164,96 @@ def test_a_cut_splits_as_it_does_beside_one_that_meets_nothing(tip) -> None:
             np.testing.assert_allclose(mine, getattr(among.simplices, name), rtol=1e-14, atol=1e-16)
         np.testing.assert_allclose(alone.points.positions, among.points.positions, atol=1e-15)
         np.testing.assert_array_equal(alone.points.ends, among.points.ends)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_parts_share_dof_nodes_where_points_of_a_common_face_lie_in_both(dim) -> None:
+    rng = np.random.default_rng(dim)
+    mesh = rectangle_mesh((4, 4)) if dim == 2 else box_mesh((2, 2, 2))
+    for _ in range(6):
+        cuts = [Plane(rng.uniform(0.3, 0.7, dim), rng.normal(size=dim)) for _ in range(5 - dim)]
+        partition = split_cells(mesh, cuts)
+        joined = join_parts(mesh, partition, partition.fraction > 0.0)
+        cell = joined.cells[joined.piece_cell]
+        label = np.zeros((len(cell), len(cuts)), dtype=int)
+        label[: len(partition.label)] = partition.label
+        slots = np.arange(joined.group.size).reshape(joined.group.shape)
+        pairs = []
+        for here, opposite in np.argwhere(mesh.neighbours > np.arange(len(mesh.cells))[:, None]):
+            there = mesh.neighbours[here, opposite]
+            nodes = np.delete(mesh.cells[here], opposite)
+            # many of them near corners and edges, where contacts may be small
+            weights = rng.dirichlet(np.full(dim, 0.3), 4000)
+            at = weights @ partition.points.values[nodes]
+            for side in np.unique(np.sign(at), axis=0):
+                fits = ((label == 0) | (label == side)).all(axis=1)
+                touching = [slots[fits & (cell == one)] for one in (here, there)]
+                assert all(len(found) <= 1 for found in touching)
+                if all(len(found) for found in touching):  # both are cells of the patch
+                    pairs += [
+                        [
+                            found[0, mesh.cells[one] == node].item()
+                            for found, one in zip(touching, (here, there), strict=True)
+                        ]
+                        for node in nodes
+                    ]
+        row, column = np.transpose(pairs)
+        graph = coo_array((np.ones(len(row)), (row, column)), shape=(slots.size, slots.size))
+        count, part = connected_components(graph, directed=False)
+        # each sampled contact is one of the joins, and there are no others
+        assert count == joined.group.max() + 1
+        assert len(np.unique(np.stack([part, joined.group.ravel()]), axis=1).T) == count
+
+
+def _coarse_mesh(dim, rng):
+    """Few unstructured simplices, so that several planes go through each."""
+    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
+    points = np.vstack([corners, rng.random((6, dim))])
+    return SimplexMesh(points, Delaunay(points).simplices.astype(np.int64))
+
+
+def _signs(planes, points):
+    return np.stack([np.sign((points - p.point) @ p.normal) for p in planes], axis=1)
+
+
+def _random_planes(dim, rng):
+    count = rng.integers(2, 5)
+    normals = rng.standard_normal((count, dim))
+    if rng.random() < 0.5:  # layers: each is split off what the one before it has left
+        normals[:] = normals[0] + 0.05 * rng.standard_normal((count, dim))
+    return [Plane(0.2 + 0.6 * rng.random(dim), n / np.linalg.norm(n)) for n in normals]
+
+
+@pytest.mark.parametrize(("dim", "bodies"), [(2, 60), (3, 25)])
+def test_every_unknown_lies_on_the_sides_of_its_pieces_in_any_order_of_the_cuts(dim, bodies):
+    rng = np.random.default_rng(dim)
+    places = 0
+    for _ in range(bodies):
+        mesh, planes = _coarse_mesh(dim, rng), _random_planes(dim, rng)
+        orders = list(permutations(range(len(planes))))
+        for order in [orders[k] for k in rng.choice(len(orders), 2, replace=False)]:
+            cuts = [planes[k] for k in order]
+            phantom = cut_mesh(mesh, cuts)
+            # planes end nowhere, so that no piece lies on both sides of one
+            truth = _signs(cuts, phantom.piece_centroids)
+            np.testing.assert_array_equal(phantom.piece_side, truth)
+            corners = phantom.cells.shape[1]
+            np.testing.assert_array_equal(
+                phantom.node_side[phantom.cells], np.repeat(truth[:, None], corners, axis=1)
+            )
+            places += truth.size * corners
+    assert places >= 10_000
+
+
+def test_parts_between_planes_that_move_rigidly_are_held_where_they_are():
+    mesh = rectangle_mesh((3, 3))
+    planes = [Plane([0.40, 0.0], [1.0, 0.2]), Plane([0.55, 0.0], [1.0, 0.1])]
+    for order in ((0, 1), (1, 0)):
+        phantom = cut_mesh(mesh, [planes[k] for k in order])
+        supports = Supports.none(phantom).prescribe(
+            phantom,
+            np.arange(len(mesh.points)),
+            lambda x, side: np.column_stack([0.1 * side.sum(axis=1), 0.0 * x[:, 0]]),
+        )
+        solved = solve_static(phantom, isotropic(1.0, 0.3, "plane strain"), supports)
+        assert solved.strain_energy < 1e-28

@@ -2,15 +2,7 @@
 
 import numpy as np
 import pytest
-from cut_bodies import (
-    DENSITY,
-    GRAVITY,
-    cut_body,
-    cut_membrane,
-    material,
-    penalised,
-    rotation,
-)
+from cut_bodies import DENSITY, GRAVITY, cut_body, cut_membrane, material, penalised, rotation
 from swings import let_go, rest_step, stretched
 
 from verify.xfem.block_pattern import block_pattern

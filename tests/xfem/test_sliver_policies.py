@@ -5,14 +5,14 @@ from math import factorial
 import numpy as np
 import pytest
 import xfem_exact_fields as exact
-from test_slivers import SIZES, body, clamped
+from cut_bodies import shaken
+from test_sliver_conditioning import SLIVERS, body, clamped
 from xfem_bodies import boundary_nodes, relative_l2_error
 
 from verify.xfem.cuts import ImplicitCut, Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.loads import traction
 from verify.xfem.mass import consistent_mass, side_wise_mass
-from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.slivers import DEFAULT_THRESHOLD, treat_slivers
 from verify.xfem.statics import solve_static
@@ -21,16 +21,6 @@ from verify.xfem.subdivision import subdivide
 from verify.xfem.supports import Supports
 
 POLICIES = ["keep", "drop", "merge"]
-
-
-def shaken(mesh, seed, amount=0.2):
-    """Inner nodes moved at random: every element is cut in its own way."""
-    random = np.random.default_rng(seed)
-    points = mesh.points.copy()
-    inner = ((points > 1e-9) & (points < 1.0 - 1e-9)).all(axis=1)
-    size = np.linalg.norm(mesh.edge_vectors, axis=2).min()
-    points[inner] += amount * size * random.uniform(-1.0, 1.0, (inner.sum(), mesh.space))
-    return SimplexMesh(points, mesh.cells)
 
 
 def randomly_cut(dim, seed):
@@ -73,7 +63,7 @@ def test_no_volume_mass_or_load_is_lost_and_points_stay_where_they_are(dim, poli
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", SLIVERS)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_halves_stay_separate(dim, size, policy):
     """Two bodies; one half moves rigidly at no energy while the other is held."""

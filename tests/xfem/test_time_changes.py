@@ -1,4 +1,4 @@
-"""Changes during a motion count from the next step on, as if the scheme began there."""
+"""What changes during a motion: loads, supports, observers, the sign of time; faults of a step."""
 
 import numpy as np
 import pytest
@@ -6,13 +6,14 @@ from cut_bodies import DENSITY, cut_body, cut_membrane, material
 from time_schemes import SCHEMES
 
 from verify.methods.generalised_alpha import GeneralisedAlpha
-from verify.xfem.body import DynamicBody, RayleighDamping
+from verify.xfem.body import DynamicBody, RayleighDamping, StepFailedError
 from verify.xfem.energy_balance import run
 from verify.xfem.energy_momentum import EnergyMomentum
 from verify.xfem.explicit import CentralDifferences
-from verify.xfem.implicit import Trapezoidal
+from verify.xfem.implicit import ImplicitEuler, Trapezoidal
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.mass import consistent_mass, side_wise_mass
+from verify.xfem.real_time import RealTimeEuler
 from verify.xfem.supports import Supports
 
 
@@ -131,3 +132,28 @@ def test_schemes_that_look_the_same_backwards_return_to_their_start(kind, v):
         state.velocity *= -1.0
     assert np.abs(state.displacement - start.displacement).max() < 1e-12
     assert np.abs(state.velocity - start.velocity).max() < 1e-9
+
+
+SCHEMES = [CentralDifferences, RealTimeEuler, ImplicitEuler, Trapezoidal, EnergyMomentum]
+
+
+def _body(**options):
+    v = cut_body(2)
+    return DynamicBody(InternalForce(v, material(2)), side_wise_mass(v, DENSITY), **options)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_load_that_is_not_finite_fails_the_step_and_not_the_state(scheme):
+    body = _body(load=lambda t: np.full((_nodes(), 2), np.nan if t > 0.011 else 1.0))
+    state, integrator = body.rest(), scheme(body, 0.01)
+    integrator.step(state)
+    good = state.copy()
+    with pytest.raises(StepFailedError, match=scheme.__name__):
+        integrator.step(state)
+    assert state.time == good.time
+    assert (state.displacement == good.displacement).all()
+    assert (state.velocity == good.velocity).all()
+
+
+def _nodes():
+    return cut_body(2).node_count

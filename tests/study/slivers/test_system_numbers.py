@@ -1,4 +1,9 @@
-"""Condition numbers and critical steps of systems whose numbers are known in closed form."""
+"""Systems: growth laws, condition numbers and steps in closed form and of each solver."""
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -7,9 +12,52 @@ from scipy.sparse import csr_array, diags_array
 
 from verify.assess.system_numbers import condition_numbers, critical_step, lowest_frequency
 from verify.errors import InputError
+from verify.result import Verdict
 from verify.scene import load_scene
+from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
-from verify.system import System
+from verify.study.measured_scenes import Measurement
+from verify.study.slivers.findings import findings
+from verify.study.slivers.growth import growth
+from verify.study.slivers.step_by_running import step_by_running
+from verify.system import System, checked_system
+
+SIZES = [0.5, 1e-1, *(10.0**-k for k in range(2, 13)), 0.0]
+
+
+@pytest.mark.parametrize("exponent", [-3.0, -2.0, -0.5, 0.0, 1.0])
+def test_an_exact_power_law_is_found_to_round_off(exponent):
+    law = growth(SIZES, [7.0 * s**exponent if s else 7.0 for s in SIZES])
+    assert law.exponent == pytest.approx(exponent, abs=1e-12)
+    assert law.uncertainty < 1e-11
+    assert law.points == 10
+
+
+def test_scatter_widens_the_uncertainty_and_the_true_exponent_stays_inside():
+    """A factor of up to 1.2 each way; 95 % of 200 draws, less four standard deviations of that."""
+    random = np.random.default_rng(3)
+    inside = 0
+    for _ in range(200):
+        law = growth(SIZES, [max(s, 1e-99) ** -2 * random.uniform(0.8, 1.25) for s in SIZES])
+        assert law.uncertainty > 1e-3
+        inside += abs(law.exponent + 2.0) <= law.uncertainty
+    assert inside >= 177
+
+
+def test_a_bend_is_no_power_law():
+    law = growth(SIZES, [max(s, 1e-7) for s in SIZES])
+    assert law.exponent is None
+    assert "no single exponent" in law.reason
+
+
+def test_sizes_without_a_value_are_named_and_too_few_give_no_exponent():
+    values = [s**1.5 if s > 1e-9 else None for s in SIZES]
+    law = growth(SIZES, values)
+    assert law.exponent == pytest.approx(1.5, abs=1e-12)
+    assert "1e-12" in law.reason
+    law = growth([1e-3, 1e-4, 1e-5], [1.0, None, 2.0])
+    assert law.exponent is None
+    assert law.reason.startswith("2 positive values")
 
 
 def chain(n, masses=1.0, stiffness=1.0):
@@ -74,3 +122,119 @@ def test_many_unknowns_have_the_step_of_all_eigenvalues(mass):
     scale = 1.0 / np.sqrt(np.diag(dense[1]))
     largest = eigh(*(scale[:, None] * one * scale for one in dense), eigvals_only=True)[-1]
     assert critical_step(system) == pytest.approx(2.0 / np.sqrt(largest), rel=1e-6)
+
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
+NEEDED = {"conforming": "dolfinx", "skfem_system:SkfemWithSystem": "skfem"}
+SOLVERS = [
+    pytest.param(
+        name,
+        marks=pytest.mark.skipif(
+            name in NEEDED and find_spec(NEEDED[name]) is None, reason=f"needs {NEEDED.get(name)}"
+        ),
+    )
+    for name in (
+        "xfem", "conforming", "virtual_node", "subdivision", "snapping", "uncut",
+        "skfem_system:SkfemWithSystem",
+    )
+]  # fmt: skip
+CASE = "slivers/plane_edges[epsilon=0.5]"
+
+
+@pytest.fixture(autouse=True)
+def examples(monkeypatch):
+    monkeypatch.setattr(sys, "path", [*sys.path, str(EXAMPLES)])
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene(CASE)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_system_has_the_mass_of_the_body_and_no_stiffness_against_translation(name, scene):
+    system = checked_system(find_solver(name).system(scene, 0))
+    shift = np.zeros(len(system.fixed))
+    shift[::2] = 1.0
+    assert shift @ system.mass @ shift == pytest.approx(1.0, rel=1e-12)  # ρ = 1 on a unit square
+    assert np.abs(system.stiffness @ shift).max() < 1e-12 * system.stiffness.max()
+    assert system.fixed.any()
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_all_solvers_have_the_same_stiffness_without_a_cut(name, scene):
+    """One mesh, one element: the condition number, which no numbering changes, is that of xfem."""
+    uncut = scene.model_copy(update={"cuts": []})
+    found = condition_numbers(find_solver(name).system(uncut, 0))
+    assert found == pytest.approx(condition_numbers(find_solver("xfem").system(uncut, 0)), rel=1e-9)
+
+
+def test_consistent_masses_give_the_same_critical_step_without_a_cut(scene):
+    uncut = scene.model_copy(update={"cuts": []})
+    ours = critical_step(find_solver("xfem").system(uncut, 0, mass="consistent"))
+    if find_spec("dolfinx"):
+        assert critical_step(find_solver("conforming").system(uncut, 0)) == pytest.approx(ours)
+    lumped = critical_step(find_solver("xfem").system(uncut, 0))
+    assert lumped > 1.3 * ours  # lumping slows the highest mode down, in one dimension by √3
+
+
+@pytest.mark.parametrize("basis", ["shifted", "heaviside"])
+def test_another_basis_is_another_condition_and_the_same_step(basis, scene):
+    """ω of K x = ω² M x is that of the space, whatever spans it."""
+    solver = find_solver("xfem")
+    given = {"mass": "consistent", "slivers": "keep"}
+    own = solver.system(scene, 0, **given)
+    other = checked_system(solver.system(scene, 0, basis=basis, **given))
+    assert critical_step(other) == pytest.approx(critical_step(own), rel=1e-9)
+    assert condition_numbers(other)[0] != pytest.approx(condition_numbers(own)[0], rel=0.05)
+
+
+class Explicit:
+    """Central differences with the scene's step, of which nothing but solutions is known."""
+
+    name = "explicit"
+    own_step = None
+
+    def refuses(self, scene):
+        return None if scene.analysis.kind == "dynamic" else "only motion"
+
+    def levels(self, scene):
+        return 1
+
+    def solve(self, scene, level, repetitions=1):
+        system = find_solver("xfem").system(scene, 0)
+        free = ~system.fixed
+        stiffness, mass = system.stiffness[free][:, free], system.mass.diagonal()[free]
+        step = self.own_step or scene.analysis.time_step
+        before = np.zeros(free.sum())
+        now = step * 1e-3 * np.random.default_rng(3).normal(size=free.sum())
+        for _ in range(round(scene.analysis.duration / step)):
+            before, now = now, 2.0 * now - before - step**2 * (stiffness @ now) / mass
+        points = np.array([[0.0, 0.0], [1.0, 1.0]])
+        return SimpleNamespace(points=points, displacement=now)
+
+
+def test_the_critical_step_is_found_by_running_where_there_is_no_system(scene):
+    exact = critical_step(find_solver("xfem").system(scene, 0))
+    low, high = step_by_running(Explicit(), scene, 0, 0.4 * exact, {})
+    assert low < high < 1.02 * low
+    assert low == pytest.approx(exact, rel=0.02)
+    from_above = step_by_running(Explicit(), scene, 0, 7.0 * exact, {})
+    assert from_above[0] == pytest.approx(exact, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("near", "far", "verdicts"),
+    [
+        (1.04, 1.2, [Verdict.PASS, Verdict.PASS]),
+        (1.06, 1.3, [Verdict.FAIL, Verdict.FAIL]),
+        (0.94, 0.5, [Verdict.FAIL, Verdict.PASS]),
+    ],
+)
+def test_errors_are_held_against_the_row_at_zero_and_the_conforming_mesh(near, far, verdicts):
+    def row(solver, size, value):
+        return Measurement("family", size, solver, "displacement_l2", "", value)
+
+    measured = [row("own", 0.5, far), row("own", 1e-6, near), row("own", 0.0, 1.0)]
+    measured += [row("conforming", 0.5, 1.0)]
+    assert [f.verdict for f in findings(measured, [])] == verdicts
