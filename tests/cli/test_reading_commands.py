@@ -4,7 +4,6 @@ import io
 import json
 import os
 import re
-import statistics
 import subprocess
 import sys
 import textwrap
@@ -64,12 +63,6 @@ def test_describe_says_the_requirement_and_every_check(case, capsys):
     assert type(scene).model_validate(content).model_dump() == scene.model_dump()
 
 
-def loaded_by(code):
-    probe = f"{code}\nimport sys; print(*sorted({{n.partition('.')[0] for n in sys.modules}}))"
-    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
-    return set(done.stdout.splitlines()[-1].split())
-
-
 @pytest.mark.parametrize(
     "code",
     [
@@ -79,30 +72,12 @@ def loaded_by(code):
         "from verify.cli import main; main(['schema'])",
     ],
 )
-def test_reading_commands_load_no_solver_and_no_graphics(code):
-    assert loaded_by(code).isdisjoint(HEAVY)
-
-
-def test_importing_the_command_line_loads_nothing_but_the_standard_library():
-    assert loaded_by("import verify.cli").isdisjoint(("numpy", "pydantic", "rich", *HEAVY))
-
-
-@pytest.mark.timing
-def test_list_takes_little_more_than_reading_all_case_files():
-    """In processor time: 1.04 was seen (0.9 to 1.2); numba and one solver would add a half."""
-
-    def seconds(*command):
-        before = os.times()
-        subprocess.run([sys.executable, *command], capture_output=True, check=True)
-        after = os.times()
-        return sum(after[2:4]) - sum(before[2:4])
-
-    reading = (
-        "from verify.scene import list_cases, load_scenes\n"
-        "for path in list_cases().values(): load_scenes(path)"
-    )
-    ratios = [seconds("-m", "verify", "list") / seconds("-c", reading) for _ in range(5)]
-    assert statistics.median(ratios) < 1.5
+def test_reading_commands_load_no_solver_and_no_graphics_and_importing_them_nothing(code):
+    probe = f"{code}\nimport sys; print(*sorted({{n.partition('.')[0] for n in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.splitlines()[-1].split())
+    assert loaded.isdisjoint(HEAVY)
+    assert code != "import verify.cli" or loaded.isdisjoint(("numpy", "pydantic", "rich"))
 
 
 @pytest.mark.parametrize(
@@ -124,13 +99,6 @@ def test_bash_completes(capsys, tmp_path, words, completed):
         ["bash", "-c", asked], cwd=tmp_path, capture_output=True, text=True, timeout=30, check=True
     )
     assert done.stdout.split() == [completed]
-
-
-def test_zsh_gets_a_script_with_the_cases(capsys):
-    assert main(["completion", "zsh"]) == 0
-    said = capsys.readouterr().out
-    assert said.startswith("#compdef verify")
-    assert "statics/f1_patch" in said
 
 
 class Terminal(io.StringIO):

@@ -62,32 +62,25 @@ def imported(*folders):
     return names - own - set(sys.stdlib_module_names)
 
 
-def test_framework_imports_only_its_base_dependencies():
-    assert imported("verify") - {"pytest", "distributed"} <= declared(None)
+@pytest.mark.parametrize(
+    ("folder", "groups", "besides"),
+    [
+        ("verify", [None], {"pytest", "distributed"}),
+        ("reference", [None, "gmsh", "fenicsx"], set()),
+        # pytest's own protocol has no public name; conftest.py repeats it
+        ("tests", [None, "gmsh", "fenicsx", "test", "dev"], {"_pytest"}),
+    ],
+)
+def test_a_package_imports_only_what_is_declared_for_it(folder, groups, besides):
+    assert imported(folder) - besides <= declared(*groups)
 
 
-def test_only_what_runs_on_a_cluster_imports_dask():
-    importing = {f.name for f in (ROOT / "verify").rglob("*.py") if "distributed" in imported_by(f)}
-    assert importing == {"cluster.py", "remote.py"}
-
-
-def test_only_the_pytest_plugin_imports_pytest():
-    # pytest loads it, so who needs it has it; nothing else may.
-    files = (ROOT / "verify").rglob("*.py")
-    importing = [
-        f.name for f in files if re.search(r"^\s*(import|from) pytest", f.read_text(), re.M)
-    ]
-    assert importing == ["pytest_plugin.py"]
-
-
-def test_reference_imports_only_the_base_and_the_fenicsx_extra():
-    assert imported("reference") <= declared(None, "gmsh", "fenicsx")
-
-
-def test_tests_import_only_what_is_declared():
-    # pytest's own protocol has no public name; conftest.py repeats it
-    names = imported("tests") - {"_pytest"}
-    assert names <= declared(None, "gmsh", "fenicsx", "test", "dev")
+@pytest.mark.parametrize(
+    ("name", "files"),
+    [("distributed", {"cluster.py", "remote.py"}), ("pytest", {"pytest_plugin.py"})],
+)
+def test_what_only_some_have_is_imported_by_its_own_modules_alone(name, files):
+    assert {f.name for f in (ROOT / "verify").rglob("*.py") if name in imported_by(f)} == files
 
 
 def test_every_base_dependency_is_used():
@@ -102,7 +95,6 @@ def test_programs_of_foreign_solvers_import_nothing_of_the_project():
 FULL = ROOT / ".ci/requirements.lock"
 WITHOUT_DOLFINX = ROOT / ".ci/requirements-system-dolfinx.lock"
 DOCS = ROOT / ".ci/requirements-docs.lock"
-EACH = pytest.mark.parametrize("lock", [FULL, WITHOUT_DOLFINX, DOCS], ids=lambda lock: lock.name)
 
 
 def normal(name):
@@ -129,38 +121,29 @@ def asked_for(*extras):
     return names - {normal(project["project"]["name"])}
 
 
-def test_lock_covers_every_dependency():
-    assert asked_for("gmsh", "fenicsx", "test", "dev") <= set(pinned(FULL))
+@pytest.mark.parametrize(
+    ("lock", "covered"),
+    [
+        (FULL, asked_for("gmsh", "fenicsx", "test", "dev")),
+        (WITHOUT_DOLFINX, asked_for("gmsh", "test", "dev")),
+        (DOCS, asked_for("docs") - asked_for()),
+    ],
+    ids=["full", "without DOLFINx", "docs"],
+)
+def test_a_lock_covers_every_dependency_in_the_versions_of_the_full_one(lock, covered):
+    found, full = pinned(lock), pinned(FULL)
+    assert covered <= set(found)
+    assert all(full.get(name, entry) == entry for name, entry in found.items())
+    of_dolfinx = {"dolfinx-solver-real", "fenics-basix", "fenics-ufl", "mpi4py", "mpich"}
+    assert lock is not WITHOUT_DOLFINX or not of_dolfinx & set(found)
 
 
-def test_lock_for_a_system_dolfinx_covers_all_but_dolfinx():
-    names = set(pinned(WITHOUT_DOLFINX))
-    assert asked_for("gmsh", "test", "dev") <= names
-    assert not names & {"dolfinx-solver-real", "fenics-basix", "fenics-ufl", "mpi4py", "mpich"}
-
-
-def test_the_locks_agree_on_every_version():
-    full = pinned(FULL)
-    assert all(full[name] == entry for name, entry in pinned(WITHOUT_DOLFINX).items())
-    assert all(full.get(name, entry) == entry for name, entry in pinned(DOCS).items())
-
-
-def test_lock_of_the_documentation_covers_its_extra():
-    assert asked_for("docs") - asked_for() <= set(pinned(DOCS))
-
-
-@EACH
-def test_every_pin_has_a_hash(lock):
+@pytest.mark.parametrize("lock", [FULL, WITHOUT_DOLFINX, DOCS], ids=lambda lock: lock.name)
+def test_every_pin_has_a_hash_and_no_address_option_or_path(lock):
     assert [name for name, (_, hashes) in pinned(lock).items() if hashes == 0] == []
-
-
-@EACH
-def test_lock_holds_no_address_option_or_path(lock):
     text = lock.read_text()
-    assert "://" not in text
+    assert not [word for word in ("://", "file:", " @ ") if word in text]
     assert not re.search(r"^\s*-(?!-hash=)", text, re.MULTILINE)
-    assert "file:" not in text
-    assert " @ " not in text
 
 
 def test_every_direct_dependency_says_its_licence_in_the_guide():

@@ -5,23 +5,20 @@ import statistics
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
 from verify.threads import ONE_THREAD
 
-ROOT = Path(__file__).resolve().parents[2]
 
-
-def test_without_numba_a_run_ends_with_one_line_that_names_the_cure(tmp_path):
+def test_without_numba_a_run_ends_with_one_line_that_names_the_cure(tmp_path, root):
     code = (
         "import sys; sys.modules['numba'] = None\n"
         "from verify.cli.main import main\n"
         f"sys.exit(main(['run', 'statics/f1_patch', '--out', {str(tmp_path / 'out')!r}]))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False
     )
     assert done.returncode == 3
     assert done.stderr.splitlines() == [
