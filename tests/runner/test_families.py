@@ -16,7 +16,8 @@ from verify.runner import selection
 from verify.runner.families import Families
 from verify.runner.selection import select_cases
 from verify.scene import load_scene, load_scenes
-from verify.solvers import find_solver, named
+from verify.solvers import named
+from verify.study.variants import variant_of
 
 ROWS = "\n[parameters]\nepsilon = [0.5, 0.0]\n"
 CHECK = """
@@ -166,6 +167,7 @@ def test_two_cases_of_one_name_are_refused(tmp_path):
 
 GUEST = "fake_solvers:Straining"
 TOO_FAR = f"{GUEST} strain=0.2"
+FROZEN = "fake_solvers:Frozen"
 BOUND = '\n[[acceptance]]\ncheck = "error"\nmetric = "displacement_l2"\nat_most = 1e-10\n'
 
 
@@ -227,13 +229,9 @@ def test_a_bad_one_is_said_before_anything_is_solved(verify, command, asked, sai
     assert not (verify.folder / "out").exists()
 
 
-def test_a_solver_found_with_parameters_has_them_in_every_solve_and_system():
+def test_parameters_in_a_name_are_values_and_those_of_the_solver():
     assert named.parameters_in("a b=1 c=1e-3 d=.5 e=true f=text") == {
         "b": 1, "c": 1e-3, "d": 0.5, "e": True, "f": "text",
-    }  # fmt: skip
-    found = find_solver("xfem mass=consistent tip=partial")
-    assert found.solve.keywords == found.system.keywords == {
-        "mass": "consistent", "tip": "partial",
     }  # fmt: skip
     for asked in (
         "xfem order=2",
@@ -242,8 +240,17 @@ def test_a_solver_found_with_parameters_has_them_in_every_solve_and_system():
         "conforming degree=3",
     ):
         with pytest.raises(InputError, match=r"no parameter|expected one of"):
-            find_solver(asked)
-    assert find_solver("mass_spring cut=removal scheme=implicit_euler fit=van_gelder").name
+            variant_of(asked)
+    known = variant_of("mass_spring  cut=removal scheme=implicit_euler fit=van_gelder")
+    assert known.solver == known.found().name == "mass_spring"
+    assert known.parameters == {"cut": "removal", "scheme": "implicit_euler", "fit": "van_gelder"}
+
+
+def test_a_guest_that_cannot_be_changed_has_variants(verify):
+    rows = ["--solver", f"{FROZEN} strain=0.2", "--solver", FROZEN]
+    verify("run", "square.toml", *rows, "--out", "out")
+    found = {name for (name, _), record in verify.records().items() if record["status"] == "solved"}
+    assert found == {"Frozen strain=0.2", "Frozen"}
 
 
 def test_a_guest_whose_file_changes_is_checked_for_conformance_again(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from verify.xfem.cuts import Plane
 from verify.xfem.elasticity import isotropic
 from verify.xfem.equilibrium import static_equilibrium
 from verify.xfem.internal_force import InternalForce, inverted_cells
-from verify.xfem.kernels import PLAIN
+from verify.xfem.linear_solvers import PLAIN
 from verify.xfem.phantom import cut_mesh
 from verify.xfem.polar import (
     largest_eigenvector,

@@ -13,8 +13,8 @@ from verify.simulator.collision.surface_collider import SurfaceCollider
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
 from verify.simulator.mapping.body_surface import BodySurface
 from verify.xfem.cuts import PolygonPatch, Polyline, ToolPath, TriangulatedSurface
+from verify.xfem.faceted_cuts import nearest_on_facet
 from verify.xfem.mesh import SimplexMesh
-from verify.xfem.nearest_points import nearest_on_facet
 from verify.xfem.structured_meshes import box_mesh, rectangle_mesh
 
 COORDINATE = st.floats(-3.0, 3.0)

@@ -9,10 +9,9 @@ from test_tips_beside_cuts import exterior, facet_measures
 from xfem_bodies import zero_modes
 
 from verify.simulator.cutting.semi_progressive import SemiProgressiveCutter
-from verify.xfem.cuts import ImplicitCut
+from verify.xfem.cuts import ImplicitCut, Plane, PolygonPatch
 from verify.xfem.elasticity import isotropic
 from verify.xfem.faceted_cuts import Polyline
-from verify.xfem.flat_cuts import Plane, PolygonPatch
 from verify.xfem.loads import body_force
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import cut_mesh
