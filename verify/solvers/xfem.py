@@ -1,7 +1,7 @@
 """Adapter of the compact XFEM solver: a scene in, a neutral solution out."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from time import perf_counter
 from typing import Any
 
@@ -30,28 +30,58 @@ from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import PhantomMesh, cut_mesh
 from verify.xfem.slivers import join_specks, treat_slivers
 
-_BASES = ("sidewise", "shifted", "heaviside")
-_TIPS = ("inside", "through", "nearest", "partial")
 _KERNELS = {"fast": FAST, "plain": PLAIN}
-_POLICIES = ("keep", "merge", "drop", "penalise")
+_CHOICES: Mapping[str, Collection[str]] = {
+    "basis": ("sidewise", "shifted", "heaviside"),
+    "tip": ("inside", "through", "nearest", "partial"),
+    "slivers": ("keep", "merge", "drop", "penalise"),
+    "scheme": SCHEMES,
+    "mass": MASSES,
+    "kernels": _KERNELS,
+}
 
 
 @dataclass(frozen=True)
-class _Choice:
-    """The parameters of a solve."""
+class _Parameters:
+    """The parameters of a solve, as `XfemSolver` describes them, with their defaults.
 
-    basis: str
-    load_steps: int
-    cutting: Cutting
-    marching: Marching
+    Raises
+    ------
+    InputError
+        If one has a value that it cannot have.
+    """
+
+    basis: str = "sidewise"
+    tip: str = "inside"
+    slivers: str = "keep"
+    load_steps: int = 0
+    scheme: str = "newmark"
+    mass: str = "sidewise"
+    step_factor: float = 0.9
+    spectral_radius: float = 0.8
+    kernels: str = "fast"
+
+    def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in _CHOICES}
+        check_choices(XfemSolver.name, _CHOICES, given)
+        check_steps(self.load_steps, self.step_factor)
+        self.marching()  # it checks its own
+
+    def cutting(self) -> Cutting:
+        """Return those of a body that is cut on its way."""
+        return Cutting(self.tip, self.slivers, self.mass, _KERNELS[self.kernels])
+
+    def marching(self) -> Marching:
+        """Return those of the time integration."""
+        return Marching(self.scheme, self.step_factor, self.spectral_radius)
 
     def notes(self) -> dict[str, str]:
         """Say them, for the report."""
         return {
             "method": "P1 XFEM, element-wise cut",
             "basis": self.basis,
-            "tip": self.cutting.tip,
-            "slivers": self.cutting.slivers,
+            "tip": self.tip,
+            "slivers": self.slivers,
         }
 
 
@@ -92,10 +122,8 @@ class XfemSolver:
     """
 
     name = "xfem"
-    choices: Mapping[str, Collection[str]] = {
-        "basis": _BASES, "tip": _TIPS, "slivers": _POLICIES, "scheme": SCHEMES, "mass": MASSES,
-        "kernels": _KERNELS,
-    }  # fmt: skip
+    choices = _CHOICES
+    parameters = tuple(one.name for one in fields(_Parameters))
 
     def refuses(self, scene: Scene) -> str | None:
         """Refuse what `verify.xfem` does not do through this adapter."""
@@ -109,21 +137,7 @@ class XfemSolver:
         """Return the number of mesh levels of the scene."""
         return scene.mesh.count
 
-    def solve(
-        self,
-        scene: Scene,
-        level: int,
-        repetitions: int = 1,
-        basis: str = "sidewise",
-        tip: str = "inside",
-        slivers: str = "keep",
-        load_steps: int = 0,
-        scheme: str = "newmark",
-        mass: str = "sidewise",
-        step_factor: float = 0.9,
-        spectral_radius: float = 0.8,
-        kernels: str = "fast",
-    ) -> Solution:
+    def solve(self, scene: Scene, level: int, repetitions: int = 1, **parameters: Any) -> Solution:
         """Solve `scene` on mesh `level`.
 
         Raises
@@ -131,40 +145,26 @@ class XfemSolver:
         UnsupportedSceneError
             If `refuses` gives a reason, or the parameters do not suit the scene.
         InputError
-            If a parameter is unknown, a mesh file bad, a support nowhere, or a piece not held.
+            If a parameter has a value that it cannot have, a mesh file is bad, a support nowhere, or a piece not held.
         NotInEquilibriumError, StepFailedError
             If a Newton iteration does not converge, or a motion blows up.
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        given = {"basis": basis, "tip": tip, "slivers": slivers, "scheme": scheme, "mass": mass,
-                 "kernels": kernels}  # fmt: skip
-        check_choices(self.name, self.choices, given)
-        check_steps(load_steps, step_factor)
+        given, exact = _Parameters(**parameters), exact_of(scene)
         linear_static = scene.analysis.kind == "static" and scene.analysis.kinematics == "linear"
-        if basis != "sidewise" and not linear_static:
-            raise UnsupportedSceneError(f"the {basis} basis is offered for linear statics only")
-        if slivers == "penalise":
-            _check_penalty(scene, basis, mass)
-        cutting = Cutting(tip, slivers, mass, _KERNELS[kernels])
-        marching = Marching(scheme, step_factor, spectral_radius)
-        choice, exact = _Choice(basis, load_steps, cutting, marching), exact_of(scene)
+        if given.basis != "sidewise" and not linear_static:
+            said = f"the {given.basis} basis is offered for linear statics only"
+            raise UnsupportedSceneError(said)
+        if given.slivers == "penalise":
+            _check_penalty(scene, given.basis, given.mass)
         done = repeated(
             scene, level, repetitions,
-            lambda mesh, size, trial: _run(scene, mesh, size, exact, choice, trial),
+            lambda mesh, size, trial: _run(scene, mesh, size, exact, given, trial),
         )  # fmt: skip
-        return solution_of(scene, done, choice.notes())
+        return solution_of(scene, done, given.notes())
 
-    def system(
-        self,
-        scene: Scene,
-        level: int,
-        basis: str = "sidewise",
-        tip: str = "inside",
-        slivers: str = "keep",
-        mass: str = "sidewise",
-        **_of_the_solve: Any,
-    ) -> System:
+    def system(self, scene: Scene, level: int, **parameters: Any) -> System:
         """Return stiffness, mass and supports of `scene` on mesh `level`; all cuts are open.
 
         Raises
@@ -174,26 +174,26 @@ class XfemSolver:
         """
         if reason := self.refuses(scene):
             raise UnsupportedSceneError(reason)
-        exact = exact_of(scene)
+        given, exact = _Parameters(**parameters), exact_of(scene)
         with errors_of_scene(scene):
             mesh, size = background_mesh(scene, level)
-            phantom = _cut(scene, mesh, size, exact, tip, slivers)[0]
+            phantom = _cut(scene, mesh, size, exact, given)[0]
             return system_of(
-                scene, phantom, phantom, material_of(scene, phantom.mesh), exact, mass, basis,
-                slivers == "penalise",
+                scene, phantom, phantom, material_of(scene, phantom.mesh), exact, given.mass,
+                given.basis, given.slivers == "penalise",
             )  # fmt: skip
 
 
 def _cut(
-    scene: Scene, mesh: SimplexMesh, size: float, exact: Any, tip: str, slivers: str
+    scene: Scene, mesh: SimplexMesh, size: float, exact: Any, given: _Parameters
 ) -> tuple[PhantomMesh, Any, list[Regularisation]]:
     """Cut the mesh and treat its slivers; report what was treated, and what was moved or joined."""
-    policy: Any = slivers
-    asked = to_cut(mesh, cuts_of(scene, size), tip)
+    policy: Any = given.slivers
+    asked = to_cut(mesh, cuts_of(scene, size), given.tip)
     phantom = cut_mesh(asked.mesh, asked.cuts, asked.rule)
     phantom, specks = join_specks(phantom, supports_of(scene, phantom, exact))
     report = None
-    if slivers in ("merge", "drop"):
+    if policy in ("merge", "drop"):
         held = supports_of(scene, phantom, exact).fixed.any(axis=1)
         phantom, report = treat_slivers(phantom, policy, held=held)
     return phantom, report, [*asked.done, *joined(specks)]
@@ -215,20 +215,20 @@ def _run(
     mesh: SimplexMesh,
     size: float,
     exact: Any,
-    choice: _Choice,
+    given: _Parameters,
     trial: bool,
 ) -> Answer:
     """Cut, load, solve."""
     if scene.analysis.kind == "dynamic":
         openings = openings_of(scene, size)
-        opening = XfemOpening(scene, mesh, openings, exact, choice.cutting)
-        return Motion(scene, openings, opening, choice.marching, exact).run(trial)
-    start, cutting = perf_counter(), choice.cutting
-    phantom, slivers, changes = _cut(scene, mesh, size, exact, cutting.tip, cutting.slivers)
+        opening = XfemOpening(scene, mesh, openings, exact, given.cutting())
+        return Motion(scene, openings, opening, given.marching(), exact).run(trial)
+    start = perf_counter()
+    phantom, slivers, changes = _cut(scene, mesh, size, exact, given)
     enrichment = perf_counter() - start
-    penalise = cutting.slivers == "penalise"
+    penalise, kernels = given.slivers == "penalise", _KERNELS[given.kernels]
     found = solve_equilibrium(
-        scene, phantom, exact, choice.basis, choice.load_steps, penalise, cutting.kernels
+        scene, phantom, exact, given.basis, given.load_steps, penalise, kernels
     )
     return Answer(
         phantom=phantom,
