@@ -15,8 +15,9 @@ from verify.accelerated.cholesky_kernels import BAND, factorise_fronts, solve_fr
 from verify.accelerated.front_plan_kernels import assembly_lists, front_rows
 from verify.accelerated.front_tree import levels, merge_and_order
 from verify.accelerated.minimum_degree import minimum_degree
+from verify.xfem.arrays import check_floats
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import SingularStiffnessError, XfemError, check_floats
+from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
 _Floats = NDArray[np.float64]

@@ -4,7 +4,6 @@ import numpy as np
 from numba import njit
 
 from verify.accelerated.symmetric_sweep_kernels import add_lower_product, solve_lower, solve_upper
-from verify.xfem.block_pattern import symmetric_product
 
 # sums in any order, over long flat vectors, where it lets the compiler use the vector unit
 _SUMS = {"reassoc", "contract", "nsz"}
@@ -39,6 +38,21 @@ def _square(a):
     for i in range(len(a)):
         total += a[i] * a[i]
     return total
+
+
+@njit(cache=True)
+def symmetric_product(starts, columns, diagonal, blocks, vector, out):
+    """Write K v (N, d) to `out`; blocks (B, d, d) below the diagonal are not read."""
+    space = vector.shape[1]
+    out[:] = 0.0
+    for row in range(len(diagonal)):
+        for k in range(diagonal[row], starts[row + 1]):
+            column = columns[k]
+            for a in range(space):
+                for b in range(space):
+                    out[row, a] += blocks[k, a, b] * vector[column, b]
+                    if column != row:
+                        out[column, b] += blocks[k, a, b] * vector[row, a]
 
 
 @njit(cache=True)

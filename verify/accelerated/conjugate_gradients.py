@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from verify.accelerated.conjugate_gradient_kernels import conjugate_gradients, invert_blocks
 from verify.accelerated.symmetric_sweep_kernels import take_upper, upper_pattern
+from verify.xfem.arrays import check_floats
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError, check_floats
+from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
 _Floats = NDArray[np.float64]

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verify.accelerated.cholesky import Cholesky
+from verify.xfem.arrays import check_floats
 from verify.xfem.block_pattern import BlockPattern
-from verify.xfem.errors import SingularStiffnessError, check_floats
+from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.linear_solvers import LinearSolver, SparseLU, nodal_vector
 
 _Floats = NDArray[np.float64]

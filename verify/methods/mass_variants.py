@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from verify.xfem.errors import XfemError, check_choice
+from verify.xfem.arrays import check_choice
+from verify.xfem.errors import XfemError
 from verify.xfem.mass import (
     AggregatedMass,
     Mass,

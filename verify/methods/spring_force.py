@@ -5,9 +5,10 @@ from numpy.typing import NDArray
 
 from verify.methods.spring_fit import Fit, cell_edges, spring_stiffness
 from verify.methods.spring_kernels import add_spring_stiffness, spring_force, spring_product
+from verify.xfem.arrays import check_choice
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
-from verify.xfem.errors import XfemError, check_choice
+from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, Kinematics, TangentKind
 from verify.xfem.linear_solvers import PLAIN, Kernels
 from verify.xfem.phantom import PhantomMesh

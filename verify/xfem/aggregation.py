@@ -13,15 +13,11 @@ unknowns.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.contacts import face_contacts, renumber
 from verify.xfem.phantom import Aggregation, PhantomMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
 
 _ROUND_OFF = 1e-12  # of a barycentric coordinate; of positions, over the size of the cell
 _DIGITS = 9  # to which extrapolations are compared: symmetric meshes have many that are equal
@@ -39,11 +35,11 @@ class Roots:
         Small parts with a node that only small parts use, and that follows none.
     """
 
-    following: _Bools
-    rootless: _Bools
+    following: Bools
+    rootless: Bools
 
 
-def aggregate(phantom: PhantomMesh, small: _Bools, held: _Bools) -> tuple[PhantomMesh, Roots]:
+def aggregate(phantom: PhantomMesh, small: Bools, held: Bools) -> tuple[PhantomMesh, Roots]:
     """Let nodes that only small parts use follow root cells.
 
     Parameters
@@ -75,7 +71,7 @@ def aggregate(phantom: PhantomMesh, small: _Bools, held: _Bools) -> tuple[Phanto
     return _aggregated(phantom, followed, weights, cell), roots
 
 
-def _reached(phantom: PhantomMesh, small: _Bools) -> tuple[_Ints, _Ints]:
+def _reached(phantom: PhantomMesh, small: Bools) -> tuple[Ints, Ints]:
     """Pairs (k,), (k,) of small parts and a root each, layer by layer away from the roots.
 
     A part takes the root from which its own corners are continued over the shortest way, among
@@ -96,7 +92,7 @@ def _reached(phantom: PhantomMesh, small: _Bools) -> tuple[_Ints, _Ints]:
         into[one[best]] = root[best]
 
 
-def _best(phantom: PhantomMesh, key: _Ints, root: _Ints, reach: _Floats) -> _Ints:
+def _best(phantom: PhantomMesh, key: Ints, root: Ints, reach: Floats) -> Ints:
     """Row of the best root for each key: least reach, then largest, then by place."""
     place = phantom.piece_centroids[root]
     place = np.round(place / phantom.mesh.extent, _DIGITS)
@@ -105,7 +101,7 @@ def _best(phantom: PhantomMesh, key: _Ints, root: _Ints, reach: _Floats) -> _Int
     return order[np.diff(key[order], prepend=-1) != 0]
 
 
-def _coordinates(phantom: PhantomMesh, points: _Floats, root: _Ints) -> _Floats:
+def _coordinates(phantom: PhantomMesh, points: Floats, root: Ints) -> Floats:
     """(q, k, d + 1) barycentric coordinates of points (q, k, space) in the cells of the roots."""
     mesh, cell = phantom.mesh, phantom.parent[root]
     origin = mesh.points[mesh.cells[cell, 0]]
@@ -115,8 +111,8 @@ def _coordinates(phantom: PhantomMesh, points: _Floats, root: _Ints) -> _Floats:
 
 
 def _continued(
-    phantom: PhantomMesh, alone: _Bools, sliver: _Ints, root: _Ints
-) -> tuple[_Ints, _Floats, _Ints]:
+    phantom: PhantomMesh, alone: Bools, sliver: Ints, root: Ints
+) -> tuple[Ints, Floats, Ints]:
     """Nodes (k,) that follow a root, weights (k, d + 1) of its corners, and the root (k,).
 
     Off the plane of the root triangle of a membrane there is no such field: nodes there are left
@@ -140,9 +136,7 @@ def _continued(
     return node[best], weights[best], root[best]
 
 
-def _aggregated(
-    phantom: PhantomMesh, followed: _Ints, weights: _Floats, root: _Ints
-) -> PhantomMesh:
+def _aggregated(phantom: PhantomMesh, followed: Ints, weights: Floats, root: Ints) -> PhantomMesh:
     """Return the mesh without the unknowns of nodes that follow others."""
     own = followed < 0
     node_parent, node, old_of_new = renumber(phantom, own)

@@ -8,17 +8,14 @@ u = Σ N_i u_i + Σ N_j H a_j. Both are linear changes of the side-wise unknowns
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, identity, kron
 from scipy.sparse.linalg import splu
 
-from verify.xfem.errors import BasisError, XfemError, check_choice
+from verify.xfem.arrays import Floats, Ints, check_choice
+from verify.xfem.errors import BasisError, XfemError
 from verify.xfem.phantom import PhantomMesh
 
 Basis = Literal["shifted", "heaviside"]
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 def transformation(phantom: PhantomMesh, basis: Basis) -> csr_array:
@@ -48,14 +45,14 @@ def transformation(phantom: PhantomMesh, basis: Basis) -> csr_array:
     return csr_array((values, (rows, columns)), shape=(phantom.node_count, nodes + count))
 
 
-def sidewise_from(phantom: PhantomMesh, basis: Basis, unknowns: _Floats) -> _Floats:
+def sidewise_from(phantom: PhantomMesh, basis: Basis, unknowns: Floats) -> Floats:
     """Side-wise displacement (N, d) from the unknowns (n + enriched, d) of another basis."""
     T = transformation(phantom, basis)
     _check_count(unknowns, T.shape[1], "unknowns")
     return np.asarray(T @ unknowns)
 
 
-def from_sidewise(phantom: PhantomMesh, basis: Basis, displacement: _Floats) -> _Floats:
+def from_sidewise(phantom: PhantomMesh, basis: Basis, displacement: Floats) -> Floats:
     """Unknowns (n + enriched, d) of another basis from the side-wise displacement (N, d)."""
     _check_count(displacement, phantom.node_count, "displacements")
     return np.asarray(splu(csc_array(transformation(phantom, basis))).solve(displacement))
@@ -68,12 +65,12 @@ def transformed_matrix(phantom: PhantomMesh, basis: Basis, matrix: csr_array) ->
     return csr_array(full.T @ matrix @ full)
 
 
-def _check_count(values: _Floats, count: int, what: str) -> None:
+def _check_count(values: Floats, count: int, what: str) -> None:
     if np.ndim(values) == 0 or len(values) != count:
         raise XfemError(f"{what} of shape {np.shape(values)}; expected ({count}, d)")
 
 
-def _pairs(phantom: PhantomMesh) -> tuple[_Ints, _Ints, _Floats]:
+def _pairs(phantom: PhantomMesh) -> tuple[Ints, Ints, Floats]:
     """Enriched nodes: the unknown on the node's own side, the other, and H of the node."""
     counts = np.bincount(phantom.node_parent)
     if (counts > 2).any():

@@ -13,11 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.errors import XfemError
 from verify.xfem.phantom import Aggregation, PhantomMesh
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 _Places = NDArray[np.int32]
 _ROUND_OFF = 1e-14  # of the largest diagonal entry of a node
 
@@ -44,13 +43,13 @@ class BlockPattern:
     targets: _Places
     folding: csr_array | None = None
 
-    def unfold(self, blocks: _Floats) -> _Floats:
+    def unfold(self, blocks: Floats) -> Floats:
         """Return what elements are to be added to: the blocks themselves if none lie aside."""
         if self.folding is None:
             return blocks
         return np.zeros((len(self.columns) + self.folding.shape[1], *blocks.shape[1:]))
 
-    def fold(self, added: _Floats, blocks: _Floats) -> None:
+    def fold(self, added: Floats, blocks: Floats) -> None:
         """Add what `unfold` has given, and elements have added to, to the blocks (B, d, d)."""
         if self.folding is None:
             return
@@ -75,13 +74,13 @@ class BlockPattern:
         """(B,) of each block (i, j), the place of (j, i)."""
         return _order(self.columns, self.node_count)
 
-    def matrix(self, blocks: NDArray[np.float64]) -> bsr_array:
+    def matrix(self, blocks: Floats) -> bsr_array:
         """Return the matrix of the given blocks (B, d, d), without a copy."""
         size = self.node_count * blocks.shape[1]
         return bsr_array((blocks, self.columns, self.starts), shape=(size, size))
 
 
-def block_pattern(cells: NDArray[np.int64], node_count: int) -> BlockPattern:
+def block_pattern(cells: Ints, node_count: int) -> BlockPattern:
     """Sparsity of a mesh: nodes are coupled when a cell contains both.
 
     Parameters
@@ -151,22 +150,7 @@ def _order(keys: NDArray, count: int) -> _Places:
     return order
 
 
-@njit(cache=True)
-def symmetric_product(starts, columns, diagonal, blocks, vector, out):
-    """Write K v (N, d) to `out`; blocks (B, d, d) below the diagonal are not read."""
-    space = vector.shape[1]
-    out[:] = 0.0
-    for row in range(len(diagonal)):
-        for k in range(diagonal[row], starts[row + 1]):
-            column = columns[k]
-            for a in range(space):
-                for b in range(space):
-                    out[row, a] += blocks[k, a, b] * vector[column, b]
-                    if column != row:
-                        out[column, b] += blocks[k, a, b] * vector[row, a]
-
-
-def body_pattern(phantom: PhantomMesh, couplings: _Ints | None = None) -> BlockPattern:
+def body_pattern(phantom: PhantomMesh, couplings: Ints | None = None) -> BlockPattern:
     """Sparsity of a body; its first cells are the pieces.
 
     Parameters
@@ -201,7 +185,7 @@ def body_pattern(phantom: PhantomMesh, couplings: _Ints | None = None) -> BlockP
     return BlockPattern(plain.starts, plain.columns, targets, matrix)
 
 
-def _followed(aggregation: Aggregation, cells: _Ints) -> tuple[_Ints, _Floats]:
+def _followed(aggregation: Aggregation, cells: Ints) -> tuple[Ints, Floats]:
     """Dof nodes (q, c, m) and weights of the corners of some pieces, padded with weight 0."""
     starts = aggregation.extension.indptr
     count = np.diff(starts)[cells]
@@ -213,7 +197,7 @@ def _followed(aggregation: Aggregation, cells: _Ints) -> tuple[_Ints, _Floats]:
     return nodes, weights
 
 
-def _pairs(nodes: _Ints, count: int) -> _Ints:
+def _pairs(nodes: Ints, count: int) -> Ints:
     """All pairs (k, 2) of different nodes in a row of `nodes` (q, m), each once."""
     first, second = np.triu_indices(nodes.shape[1], 1)
     pairs = np.sort(np.stack([nodes[:, first].ravel(), nodes[:, second].ravel()]), axis=0)
@@ -222,13 +206,13 @@ def _pairs(nodes: _Ints, count: int) -> _Ints:
     return pairs[pairs[:, 0] != pairs[:, 1]]
 
 
-def _with_pairs(cells: _Ints, pairs: _Ints) -> _Ints:
+def _with_pairs(cells: Ints, pairs: Ints) -> Ints:
     if len(pairs) == 0:
         return cells
     return np.concatenate([cells, pairs[:, [0] + [1] * (cells.shape[1] - 1)]])
 
 
-def pattern_places(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> _Ints:
+def pattern_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> Ints:
     """Blocks at the given rows and columns.
 
     Raises
@@ -244,9 +228,7 @@ def pattern_places(pattern: BlockPattern, rows: _Ints, columns: _Ints) -> _Ints:
     return at
 
 
-def find_places(
-    pattern: BlockPattern, rows: _Ints, columns: _Ints
-) -> tuple[_Ints, NDArray[np.bool_]]:
+def find_places(pattern: BlockPattern, rows: Ints, columns: Ints) -> tuple[Ints, Bools]:
     """Blocks at the given rows and columns, and whether the pattern has them."""
     of_row = np.repeat(np.arange(pattern.node_count), np.diff(pattern.starts))
     keys = of_row * pattern.node_count + pattern.columns
@@ -255,13 +237,13 @@ def find_places(
     return at, keys[at] == wanted
 
 
-def add_mass(blocks: _Floats, places: _Ints, values: _Floats, scale: float) -> None:
+def add_mass(blocks: Floats, places: Ints, values: Floats, scale: float) -> None:
     """Add `scale` times the mass to the diagonals of its nodal blocks."""
     for component in range(blocks.shape[1]):
         blocks[places, component, component] += scale * values
 
 
-def held_entries(pattern: BlockPattern, fixed: NDArray[np.bool_]) -> _Ints:
+def held_entries(pattern: BlockPattern, fixed: Bools) -> Ints:
     """Entries of the blocks, flat, in rows and columns of fixed components, but the diagonal's."""
     rows = np.repeat(np.arange(len(fixed)), np.diff(pattern.starts))
     some = fixed.any(axis=1)
@@ -273,7 +255,7 @@ def held_entries(pattern: BlockPattern, fixed: NDArray[np.bool_]) -> _Ints:
 
 
 def constrain(
-    pattern: BlockPattern, fixed: NDArray[np.bool_], blocks: _Floats, held: _Ints | None = None
+    pattern: BlockPattern, fixed: Bools, blocks: Floats, held: Ints | None = None
 ) -> None:
     """Decouple the fixed components: zero their rows and columns but for the diagonal.
 

@@ -11,17 +11,15 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from verify.xfem.errors import XfemError, check_floats, finite_array
+from verify.xfem.arrays import Bools, Floats, check_floats, finite_array
+from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.mass import Mass
 from verify.xfem.supports import Supports, check_fixed
-
-_Floats = NDArray[np.float64]
 
 
 @dataclass
@@ -36,8 +34,8 @@ class MotionState:
         In seconds.
     """
 
-    displacement: _Floats
-    velocity: _Floats
+    displacement: Floats
+    velocity: Floats
     time: float = 0.0
 
     def copy(self) -> "MotionState":
@@ -82,10 +80,10 @@ class MovingSupports:
         Displacement and velocity, (N, d) each, at a time; read where fixed.
     """
 
-    fixed: NDArray[np.bool_]
-    motion: Callable[[float], tuple[_Floats, _Floats]]
+    fixed: Bools
+    motion: Callable[[float], tuple[Floats, Floats]]
 
-    def at(self, time: float) -> tuple[_Floats, _Floats]:
+    def at(self, time: float) -> tuple[Floats, Floats]:
         """Prescribed displacement and velocity (N, d).
 
         Raises
@@ -129,8 +127,8 @@ class DynamicBody:
 
     force: InternalForce
     mass: Mass
-    weight: _Floats | None = None
-    load: Callable[[float], _Floats] | None = None
+    weight: Floats | None = None
+    load: Callable[[float], Floats] | None = None
     supports: Supports | MovingSupports | None = None
     damping: RayleighDamping = field(default_factory=RayleighDamping)
 
@@ -203,14 +201,14 @@ class DynamicBody:
         state.velocity[self.fixed] = velocity[self.fixed]
         return state
 
-    def prescribed(self, time: float) -> tuple[_Floats, _Floats]:
+    def prescribed(self, time: float) -> tuple[Floats, Floats]:
         """Displacement and velocity (N, d) of the supports at a time."""
         if isinstance(self.supports, MovingSupports):
             return self.supports.at(time)
         assert self.supports is not None
         return self.supports.values, np.zeros(self.shape)
 
-    def external(self, time: float) -> _Floats:
+    def external(self, time: float) -> Floats:
         """Weight and load (N, d) at a time, in newtons.
 
         Raises
@@ -226,7 +224,7 @@ class DynamicBody:
             raise XfemError(f"load of shape {np.shape(load)} at t={time:g}; expected {self.shape}")
         return self.weight + load
 
-    def viscous(self, velocity: _Floats) -> _Floats:
+    def viscous(self, velocity: Floats) -> Floats:
         """Damping force C v (N, d), K with the rotations of the last evaluation of the force."""
         if self.damping.mass == 0.0 and self.damping.stiffness == 0.0:
             return np.zeros(self.shape)
@@ -251,10 +249,10 @@ class StepForces:
         What the step has balanced with them, where that is not M (v₁ − v₀)/h.
     """
 
-    internal: _Floats
-    external: _Floats
-    viscous: _Floats
-    inertia: _Floats | None = None
+    internal: Floats
+    external: Floats
+    viscous: Floats
+    inertia: Floats | None = None
 
 
 class Integrator(Protocol):
@@ -315,7 +313,7 @@ class FreeMass:
         if body.mass.diagonal is None and body.fixed.any():
             self._solvers = [_supported(body, k) for k in range(body.shape[1])]
 
-    def solve(self, forces: _Floats) -> _Floats:
+    def solve(self, forces: Floats) -> Floats:
         """Accelerations (N, d) of forces (N, d), zero where held; writes on the forces."""
         forces[self._body.fixed] = 0.0
         if self._solvers is None:

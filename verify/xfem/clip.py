@@ -21,11 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
+from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.zero_points import ZeroPoints
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
 
 _Path = list[tuple[int, int]]
 
@@ -50,12 +48,12 @@ class Staircase(NamedTuple):
         Orientation relative to the simplex: +1 or −1, the same wherever the zero points are.
     """
 
-    start: NDArray[np.int64]
-    plus: NDArray[np.int64]
-    minus: NDArray[np.int64]
-    factors: NDArray[np.int64]
-    side: NDArray[np.int8]
-    sign: NDArray[np.int8]
+    start: Ints
+    plus: Ints
+    minus: Ints
+    factors: Ints
+    side: Sides
+    sign: Sides
 
 
 @cache
@@ -128,14 +126,14 @@ class Simplices:
         Orientation in the cell, +1 or −1: from how it came about, hence right for any sliver.
     """
 
-    piece: _Ints
-    points: _Ints
-    barycentric: _Floats
-    fraction: _Floats
-    sign: NDArray[np.int8]
+    piece: Ints
+    points: Ints
+    barycentric: Floats
+    fraction: Floats
+    sign: Sides
 
     @staticmethod
-    def of_cells(piece: _Ints, cells: _Ints) -> "Simplices":
+    def of_cells(piece: Ints, cells: Ints) -> "Simplices":
         """Whole cells (q, c) as simplices."""
         count, corners = cells.shape
         eye = np.broadcast_to(np.eye(corners), (count, corners, corners))
@@ -154,7 +152,7 @@ class Simplices:
         return Simplices(*(np.concatenate(pair) for pair in pairs))
 
 
-def staircase_entries(plus: _Bools) -> tuple[_Ints, _Ints]:
+def staircase_entries(plus: Bools) -> tuple[Ints, Ints]:
     """Entries (k,) of the staircase for simplices with these signs (q, c); of which each is."""
     stairs = staircase(plus.shape[1])
     pattern = plus @ (1 << np.arange(plus.shape[1]))
@@ -164,7 +162,7 @@ def staircase_entries(plus: _Bools) -> tuple[_Ints, _Ints]:
     return stairs.start[pattern][of] + within, of
 
 
-def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: _Ints) -> Simplices:
+def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: Ints) -> Simplices:
     """Divide simplices by a cut; those that are not clipped come first.
 
     Parameters
@@ -212,7 +210,7 @@ def divided(simplices: Simplices, zero: ZeroPoints, cut: int, below: _Ints) -> S
     return whole + new
 
 
-def bisected(simplices: Simplices, zero: ZeroPoints, numbers: _Ints) -> Simplices:
+def bisected(simplices: Simplices, zero: ZeroPoints, numbers: Ints) -> Simplices:
     """Bisect simplices at those of the given points that lie on their edges.
 
     Parameters
@@ -243,11 +241,28 @@ def bisected(simplices: Simplices, zero: ZeroPoints, numbers: _Ints) -> Simplice
     return done
 
 
-def _edge_keys(one: _Ints, other: _Ints) -> _Ints:
+def facets_between(parent: Ints, piece: Ints, points: Ints) -> tuple[Ints, Ints, Ints]:
+    """Facets (f, d) of sub-simplices between two pieces of one cell, and both pieces (f,), (f,).
+
+    Parameters
+    ----------
+    parent : (p,) int array
+        Cell of each piece.
+    piece : (q,) int array
+    points : (q, d + 1) int array
+        Numbers of the vertices.
+    """
+    facets, piece = np.sort(facets_of(points), axis=1), np.repeat(piece, points.shape[1])
+    first, second = equal_rows(np.column_stack([parent[piece], facets]))
+    met = piece[first] != piece[second]
+    return facets[first[met]], piece[first[met]], piece[second[met]]
+
+
+def _edge_keys(one: Ints, other: Ints) -> Ints:
     return np.minimum(one, other) << 32 | np.maximum(one, other)
 
 
-def _halves(simplices: Simplices, zero: ZeroPoints, at: _Ints, edge: _Ints) -> Simplices:
+def _halves(simplices: Simplices, zero: ZeroPoints, at: Ints, edge: Ints) -> Simplices:
     """Halves of simplices at points (q,) on their edges (q, 2), local corners."""
     row, ends = np.arange(len(simplices)), zero.ends[at]
     turned = simplices.points[row, edge[:, 0]] != ends[:, 0]
@@ -287,27 +302,27 @@ class Partition:
         Pairs of pieces of one cell that no cut keeps apart: together they are one.
     """
 
-    parent: _Ints
-    label: NDArray[np.int8]
+    parent: Ints
+    label: Sides
     simplices: Simplices
     points: ZeroPoints
     snapped: int
-    tied: _Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    tied: Ints = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
     @staticmethod
-    def whole(cells: _Ints, chosen: _Ints, points: ZeroPoints, snapped: int) -> "Partition":
+    def whole(cells: Ints, chosen: Ints, points: ZeroPoints, snapped: int) -> "Partition":
         """One piece of each chosen cell, before any cut."""
         label = np.zeros((len(chosen), points.values.shape[1]), dtype=np.int8)
         simplices = Simplices.of_cells(np.arange(len(chosen)), cells[chosen])
         return Partition(chosen, label, simplices, points, snapped)
 
     @property
-    def fraction(self) -> _Floats:
+    def fraction(self) -> Floats:
         """(p,) share of each piece in the volume of its cell."""
         sub = self.simplices
         return np.bincount(sub.piece, sub.fraction, minlength=len(self.parent))
 
-    def crossed_edges(self, cut: int) -> tuple[_Ints, _Ints]:
+    def crossed_edges(self, cut: int) -> tuple[Ints, Ints]:
         """Edges (q, 2) from plus to minus that a cut crosses, and the piece (q,) of each.
 
         Of pieces that the cut has divided already none are given.

@@ -7,17 +7,14 @@ to the faces of the cell. The result is a cut mesh like any other.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from verify.xfem.mesh import equal_rows, facets_of
+from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.clip import facets_between
 from verify.xfem.phantom import PhantomMesh
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
-
-def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[_Ints, _Ints]:
+def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[Ints, Ints]:
     """Pairs of pieces (k,), (k,) of neighbouring cells that share all unknowns of their face.
 
     Parameters
@@ -55,34 +52,30 @@ def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[_Ints, _Int
     return first[shared], second[shared]
 
 
-def _face_unknowns(phantom: PhantomMesh, piece: _Ints, local: _Ints) -> _Ints:
+def _face_unknowns(phantom: PhantomMesh, piece: Ints, local: Ints) -> Ints:
     """Unknowns (q, d) of the pieces on the face opposite to a corner, ascending."""
     corners = phantom.cells.shape[1]
     on_face = np.arange(corners) != local[:, None]
     return np.sort(phantom.cells[piece][on_face].reshape(-1, corners - 1), axis=1)
 
 
-def sibling_contacts(phantom: PhantomMesh, cells: _Ints) -> tuple[_Ints, _Ints, _Floats]:
+def sibling_contacts(phantom: PhantomMesh, cells: Ints) -> tuple[Ints, Ints, Floats]:
     """Pairs of pieces inside the given cells, and the area of the cut between them.
 
     Pieces with a piece without volume between them do not appear.
     """
-    sub, corners = phantom.sub_cells, phantom.cells.shape[1]
+    sub = phantom.sub_cells
     wanted = np.zeros(len(phantom.mesh.cells), dtype=bool)
     wanted[cells] = True
     rows = np.flatnonzero(wanted[phantom.parent[sub.piece]])
-    facets = np.sort(facets_of(sub.points[rows]), axis=1)
-    piece = np.repeat(sub.piece[rows], corners)
-    one, other = equal_rows(np.column_stack([phantom.parent[piece], facets]))
-    apart = piece[one] != piece[other]
-    first, second = piece[one][apart], piece[other][apart]
-    at = sub.zero_points.positions[facets[one][apart]]
+    facets, first, second = facets_between(phantom.parent, sub.piece[rows], sub.points[rows])
+    at = sub.zero_points.positions[facets]
     edges = at[:, 1:] - at[:, :1]
     area = np.sqrt(np.maximum(np.linalg.det(edges @ edges.transpose(0, 2, 1)), 0.0))
     return np.concatenate([first, second]), np.concatenate([second, first]), np.tile(area, 2)
 
 
-def absorb(phantom: PhantomMesh, into: _Ints) -> tuple[PhantomMesh, csr_array, _Ints]:
+def absorb(phantom: PhantomMesh, into: Ints) -> tuple[PhantomMesh, csr_array, Ints]:
     """Let pieces absorb siblings.
 
     Parameters
@@ -131,7 +124,7 @@ def absorb(phantom: PhantomMesh, into: _Ints) -> tuple[PhantomMesh, csr_array, _
     return treated, _extension(phantom, into, node, len(node_parent)), node
 
 
-def renumber(phantom: PhantomMesh, used: NDArray[np.bool_]) -> tuple[_Ints, _Ints, _Ints]:
+def renumber(phantom: PhantomMesh, used: Bools) -> tuple[Ints, Ints, Ints]:
     """Mesh node of each new unknown; new number of each old one, -1 if not used; old of new.
 
     Each mesh node must keep an unknown; the first of them takes the node's number.
@@ -150,7 +143,7 @@ def renumber(phantom: PhantomMesh, used: NDArray[np.bool_]) -> tuple[_Ints, _Int
     return np.concatenate([np.arange(nodes), parent[~first]]), node, old_of_new
 
 
-def _extension(phantom: PhantomMesh, into: _Ints, node: _Ints, count: int) -> csr_array:
+def _extension(phantom: PhantomMesh, into: Ints, node: Ints, count: int) -> csr_array:
     kept = np.flatnonzero(node >= 0)
     gone = np.flatnonzero(into != np.arange(len(into)))
     row, corner = np.nonzero(node[phantom.cells[gone]] < 0)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array, issparse, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from verify.xfem.arrays import Bools
 from verify.xfem.elasticity import Material
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import Mass, cell_densities
@@ -23,7 +24,7 @@ _DENSE = 400  # unknowns up to which all eigenvalues are cheaper than a Lanczos 
 def critical_step(
     stiffness: bsr_array | csr_array,
     mass: Mass,
-    fixed: NDArray[np.bool_] | None = None,
+    fixed: Bools | None = None,
     tolerance: float = 1e-6,
 ) -> float:
     """Critical step of the assembled body, by a Lanczos iteration on Cᵀ K C, M⁻¹ = C Cᵀ.

@@ -14,21 +14,16 @@ from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.clip import Partition
+from verify.xfem.arrays import Bools, Floats, Ints
+from verify.xfem.clip import Partition, facets_between
 from verify.xfem.cuts import Cut
 from verify.xfem.errors import XfemError
-from verify.xfem.mesh import equal_rows, facets_of
+from verify.xfem.mesh import connected
 from verify.xfem.zero_points import ZeroPoints
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
 TipRule = Literal["inside", "through", "nearest"]
-Reached = Callable[[_Ints, _Floats], NDArray[np.bool_]]
+Reached = Callable[[Ints, Floats], Bools]
 AT_END = 1e-9  # element sizes: an end as near as that to an edge lies on it
 REACH = 0.5  # element sizes: a zero point farther from the cut than that is not on it
 _ASIDE = 1e-4  # element sizes: steps in which a cut is felt for
@@ -49,13 +44,13 @@ class Crossing(NamedTuple):
         Number of pieces.
     """
 
-    zero: _Ints
-    piece: _Ints
-    size: _Floats
+    zero: Ints
+    piece: Ints
+    size: Floats
     pieces: int
 
 
-def level_and_depth(cut: Cut, points: _Floats) -> tuple[_Floats, _Floats]:
+def level_and_depth(cut: Cut, points: Floats) -> tuple[Floats, Floats]:
     """Level set (n,) and depth (n,) of a cut at points (n, d), in metres.
 
     Raises
@@ -77,11 +72,11 @@ def level_and_depth(cut: Cut, points: _Floats) -> tuple[_Floats, _Floats]:
 
 def crossed_through(
     cut: Cut,
-    positions: _Floats,
+    positions: Floats,
     crossing: Crossing,
     tip: TipRule,
     reached: Reached | None = None,
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+) -> tuple[Bools, Bools]:
     """Which pieces (p,) a cut goes through, and in which it ends by the rule `inside`.
 
     Parameters
@@ -120,7 +115,7 @@ def crossed_through(
     return every, some & ~every
 
 
-def _mostly_crossed(cut: Cut, positions: _Floats, crossing: Crossing) -> NDArray[np.bool_]:
+def _mostly_crossed(cut: Cut, positions: Floats, crossing: Crossing) -> Bools:
     """Which pieces a cut crosses as far as the centre of its section."""
     pairs, first = np.unique(np.stack([crossing.piece, crossing.zero]), axis=1, return_index=True)
     count = np.bincount(pairs[0], minlength=crossing.pieces)
@@ -139,14 +134,14 @@ def _mostly_crossed(cut: Cut, positions: _Floats, crossing: Crossing) -> NDArray
 class _Facets(NamedTuple):
     """Facets between two pieces of one cell: points (f, d), pieces (f,) and (f,)."""
 
-    points: _Ints
-    first: _Ints
-    second: _Ints
+    points: Ints
+    first: Ints
+    second: Ints
 
 
 def meeting_cells(
-    partition: Partition, ends: Sequence[_Ints], cells: int, joint: _Bools | None
-) -> _Bools:
+    partition: Partition, ends: Sequence[Ints], cells: int, joint: Bools | None
+) -> Bools:
     """Which cuts (m, cuts) meet cells, of those where several do and one at least ends.
 
     Parameters
@@ -170,7 +165,7 @@ def meeting_cells(
     return meets
 
 
-def without_specks(partition: Partition, cells: _Bools) -> Partition:
+def without_specks(partition: Partition, cells: Bools) -> Partition:
     """Take the volume of the pieces of some cells (m,) that rounding alone has made."""
     speck = cells[partition.parent] & (partition.fraction <= _SPECK)
     if not speck.any():
@@ -184,9 +179,9 @@ def joint_cuts(
     trial: Partition,
     alone: Partition,
     cuts: Sequence[Cut],
-    sizes: _Floats,
-    joint: _Bools | None,
-) -> _Bools:
+    sizes: Floats,
+    joint: Bools | None,
+) -> Bools:
     """Which cuts (m, cuts) part which cells together, into more pieces than each one alone.
 
     Parameters
@@ -207,7 +202,7 @@ def joint_cuts(
     facets = _inner_facets(trial, chosen)
     borne = _borne(trial, facets, cuts, sizes)
     loose = ~borne.any(axis=1)
-    part = _components(len(trial.parent), facets.first[loose], facets.second[loose])
+    part = connected(len(trial.parent), facets.first[loose], facets.second[loose])
     solid = trial.fraction > 0.0
     first = np.unique(part[solid], return_index=True)[1]
     parts = np.bincount(trial.parent[solid][first], minlength=cells)
@@ -222,7 +217,7 @@ def joint_cuts(
     return through
 
 
-def tied_pieces(partition: Partition, cuts: Sequence[Cut], sizes: _Floats, cells: _Bools) -> _Ints:
+def tied_pieces(partition: Partition, cuts: Sequence[Cut], sizes: Floats, cells: Bools) -> Ints:
     """Pairs (t, 2) of pieces of some cells (m,) that no cut keeps apart."""
     facets = _inner_facets(partition, cells)
     loose = ~_borne(partition, facets, cuts, sizes).any(axis=1)
@@ -230,23 +225,14 @@ def tied_pieces(partition: Partition, cuts: Sequence[Cut], sizes: _Floats, cells
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
-def _components(count: int, first: _Ints, second: _Ints) -> _Ints:
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
-def _inner_facets(partition: Partition, cells: _Bools) -> _Facets:
+def _inner_facets(partition: Partition, cells: Bools) -> _Facets:
     """Facets between sub-simplices with a volume, in different pieces of one of some cells (m,)."""
-    sub, corners = partition.simplices, partition.simplices.points.shape[1]
+    sub = partition.simplices
     sub = sub[cells[partition.parent[sub.piece]] & (sub.fraction > 0.0)]
-    points = np.sort(facets_of(sub.points), axis=1)
-    piece = np.repeat(sub.piece, corners)
-    first, second = equal_rows(np.column_stack([partition.parent[piece], points]))
-    met = piece[first] != piece[second]
-    return _Facets(points[first][met], piece[first][met], piece[second][met])
+    return _Facets(*facets_between(partition.parent, sub.piece, sub.points))
 
 
-def _borne(partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: _Floats) -> _Bools:
+def _borne(partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: Floats) -> Bools:
     """Which facets lie inside the extent of each cut that has their pieces on its two sides."""
     label, positions = partition.label, partition.points.positions
     borne = np.zeros((len(facets.points), len(cuts)), dtype=bool)
@@ -272,9 +258,7 @@ def _borne(partition: Partition, facets: _Facets, cuts: Sequence[Cut], sizes: _F
     return borne
 
 
-def reached(
-    cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: _Ints, size: _Floats
-) -> _Bools:
+def reached(cuts: Sequence[Cut], index: int, zero: ZeroPoints, points: Ints, size: Floats) -> Bools:
     """Which points past the end of a cut it reaches all the same: it ends on another cut there.
 
     A cut that is bent inside an element is realised beside itself, and what ends on it goes on to
@@ -311,7 +295,7 @@ def reached(
     return found
 
 
-def _end(cut: Cut, points: _Floats, size: _Floats) -> tuple[_Floats, _Floats]:
+def _end(cut: Cut, points: Floats, size: Floats) -> tuple[Floats, Floats]:
     """Nearest end (q, space) of a cut to points past it, and the direction from there to it."""
     step = _ASIDE * size
     slope = np.empty_like(points)

@@ -18,23 +18,22 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from verify.xfem.errors import XfemError, finite_array, places
+from verify.xfem.arrays import Floats, finite_array
+from verify.xfem.errors import XfemError
 from verify.xfem.faceted_cuts import Polyline, TriangulatedSurface
 from verify.xfem.tool_path import ToolPath
-
-_Floats = NDArray[np.float64]
 
 
 class Cut(Protocol):
     """A surface (3D) or curve (2D) that separates material."""
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Signed distance (n,) of points (n, d), in metres."""
         ...
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Distance (n,) to the nearest end of the cut, negative past it, in metres."""
         ...
 
@@ -56,8 +55,8 @@ class Plane:
         If the normal vanishes, or shapes do not match.
     """
 
-    point: _Floats
-    normal: _Floats
+    point: Floats
+    normal: Floats
 
     def __init__(self, point: ArrayLike, normal: ArrayLike) -> None:
         origin = finite_array(point, "plane at", (2,), (3,))
@@ -68,13 +67,13 @@ class Plane:
         object.__setattr__(self, "point", origin)
         object.__setattr__(self, "normal", direction / length)
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Signed distance to the plane."""
-        at = places(points, len(self.point), "plane")
-        distance: _Floats = (at - self.point) @ self.normal
+        at = finite_array(points, "plane: points", (None, len(self.point)))
+        distance: Floats = (at - self.point) @ self.normal
         return distance
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Infinite: a plane has no end."""
         return np.full(len(points), np.inf)
 
@@ -91,14 +90,14 @@ class ImplicitCut:
         `Cut.depth`; without it the cut has no end.
     """
 
-    function: Callable[[_Floats], _Floats]
-    extent: Callable[[_Floats], _Floats] | None = None
+    function: Callable[[Floats], Floats]
+    extent: Callable[[Floats], Floats] | None = None
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Evaluate the given function."""
         return np.asarray(self.function(points), dtype=float)
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Evaluate the given extent."""
         if self.extent is None:
             return np.full(len(points), np.inf)
@@ -121,9 +120,9 @@ class PolygonPatch:
         the corners are not in one plane.
     """
 
-    corners: _Floats
+    corners: Floats
     plane: Plane
-    _axes: _Floats
+    _axes: Floats
     _outline: Polyline
 
     def __init__(self, corners: ArrayLike) -> None:
@@ -151,19 +150,21 @@ class PolygonPatch:
         object.__setattr__(self, "_axes", np.stack(_tangents(plane.normal), axis=1))
         object.__setattr__(self, "_outline", Polyline(self._in_plane(polygon), closed=True))
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Signed distance to the plane of the polygon."""
         return self.plane.level_set(points)
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Distance to the outline in the plane, negative outside."""
-        return self._outline.level_set(self._in_plane(places(points, 3, "polygon")))
+        return self._outline.level_set(
+            self._in_plane(finite_array(points, "polygon: points", (None, 3)))
+        )
 
-    def _in_plane(self, points: _Floats) -> _Floats:
+    def _in_plane(self, points: Floats) -> Floats:
         return (points - self.plane.point) @ self._axes
 
 
-def _tangents(normal: _Floats) -> tuple[_Floats, _Floats]:
+def _tangents(normal: Floats) -> tuple[Floats, Floats]:
     helper = np.eye(3)[np.argmin(np.abs(normal))]
     first = np.cross(normal, helper)
     first /= np.linalg.norm(first)

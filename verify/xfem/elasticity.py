@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from verify.xfem.errors import XfemError, check_choice, finite_array, real_array
+from verify.xfem.arrays import Floats, check_choice, finite_array, real_array
+from verify.xfem.errors import XfemError
 
 State = Literal["plane strain", "plane stress", "solid"]
 
@@ -21,10 +22,10 @@ class Material:
         Lamé parameters in pascal, for all cells of the uncut mesh or one for each.
     """
 
-    lam: NDArray[np.float64]
-    mu: NDArray[np.float64]
+    lam: Floats
+    mu: Floats
 
-    def of_cells(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def of_cells(self, count: int) -> tuple[Floats, Floats]:
         """λ and μ (m,) of so many cells of the uncut mesh, in pascal.
 
         Raises

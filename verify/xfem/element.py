@@ -18,23 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.elasticity import Material
 from verify.xfem.phantom import PhantomMesh
-from verify.xfem.polar import adjugate
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.polar import SPINS, adjugate
 
 _SINGULAR = 1e-8  # of the trace of the stretch: a rotation without a derivative
 _COLLAPSED = 1e-6  # stretch below which a direction carries no tension that could be meant
-_SPINS = {
-    2: np.array([[[0.0, -1.0], [1.0, 0.0]]]),
-    3: np.zeros((3, 3, 3)),
-}  # of infinitesimal turns
-_SPINS[3][[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0
-_SPINS[3][[0, 1, 2], [1, 2, 0], [2, 0, 1]] = -1.0
 
 
 class Elements(NamedTuple):
@@ -57,13 +48,13 @@ class Elements(NamedTuple):
         0…d − 1 and 0…c − 1: lengths that the compiler knows.
     """
 
-    cells: _Ints
-    parent: _Ints
-    gradients: _Floats
-    volumes: _Floats
-    normals: _Floats
-    lam: _Floats
-    mu: _Floats
+    cells: Ints
+    parent: Ints
+    gradients: Floats
+    volumes: Floats
+    normals: Floats
+    lam: Floats
+    mu: Floats
     axes: tuple[int, ...]
     corners: tuple[int, ...]
 
@@ -72,7 +63,7 @@ class Elements(NamedTuple):
         """Whether cells are triangles in space."""
         return len(self.axes) == len(self.corners)
 
-    def part(self, some: slice | _Ints) -> "Elements":
+    def part(self, some: slice | Ints) -> "Elements":
         """Return some of the cells."""
         return self._replace(
             cells=self.cells[some], parent=self.parent[some], volumes=self.volumes[some]
@@ -245,19 +236,7 @@ def add_moduli(elements, A, scale, targets, blocks):
                             blocks[at, k, l] += half[k, l, m] * gradients[cell, j, m]
 
 
-@njit(cache=True)
-def add_blocks(targets, K, blocks):
-    """Add the blocks K (p, c, c, d, d) of all pairs of corners to nodal blocks."""
-    d = blocks.shape[1]
-    for p in range(K.shape[0]):
-        for i in range(K.shape[1]):
-            for j in range(K.shape[1]):
-                for k in range(d):
-                    for l in range(d):
-                        blocks[targets[p, i, j], k, l] += K[p, i, j, k, l]
-
-
-def restricted(elements: Elements) -> _Floats:
+def restricted(elements: Elements) -> Floats:
     """Projections (p, d, d) on the tangent plane of membranes; one identity of other bodies."""
     identity = np.eye(len(elements.axes))[None]
     if not elements.is_membrane:
@@ -266,9 +245,7 @@ def restricted(elements: Elements) -> _Floats:
     return identity - normals[:, :, None] * normals[:, None, :]
 
 
-def polar_slope(
-    R: _Floats, F: _Floats, singular: float = _SINGULAR
-) -> tuple[_Floats, NDArray[np.bool_]]:
+def polar_slope(R: Floats, F: Floats, singular: float = _SINGULAR) -> tuple[Floats, Bools]:
     """∂R/∂F (p, d, d, d, d) of nearest rotations; zero, and listed as such, where there is none.
 
     With the skew matrices S_a of infinitesimal rotations and G_a = R S_a it is G_a (H⁻¹)_ab G_b,
@@ -285,7 +262,7 @@ def polar_slope(
     slope : (p, d, d, d, d) float array
     without : (p,) bool array
     """
-    spins = _SPINS[F.shape[1]]
+    spins = SPINS[F.shape[1]]
     U = R.transpose(0, 2, 1) @ F
     trace = np.einsum("pkk->p", U)
     H = np.einsum("aij,bik,pkj->pab", spins, spins, 0.5 * (U + U.transpose(0, 2, 1)), optimize=True)
@@ -298,7 +275,7 @@ def polar_slope(
     return np.einsum("pskn,pslm->pknlm", G, half), without
 
 
-def consistent_moduli(elements: Elements, R: _Floats, F: _Floats) -> tuple[_Floats, int]:
+def consistent_moduli(elements: Elements, R: Floats, F: Floats) -> tuple[Floats, int]:
     """Second derivative of the potential by F, (p, d, d, d, d) per volume.
 
     Cells whose rotation is not differentiable have the rotation-fixed moduli; the second value
@@ -320,11 +297,11 @@ def consistent_moduli(elements: Elements, R: _Floats, F: _Floats) -> tuple[_Floa
     return A, int(without.sum())
 
 
-def geometric_stiffness(elements: Elements, R: _Floats, F: _Floats, least: float) -> _Floats:
-    """Stiffness (p, 3, 3) between corners of membranes, of displacements along the turned normal.
+def positive_tension(elements: Elements, R: Floats, F: Floats, least: float) -> Floats:
+    """Positive part (p, 3, 3) of the tension of membranes, α I + β U in the tangent plane.
 
-    The positive part of the tension is α I + β U in the tangent plane. Principal values below
-    `least` times μ are taken as that: without it what is slack has no stiffness.
+    Principal values below `least` times μ are taken as that: without it what is slack has no
+    stiffness.
     """
     lam, mu = elements.lam[elements.parent], elements.mu[elements.parent]
     U = R.transpose(0, 2, 1) @ F
@@ -333,7 +310,7 @@ def geometric_stiffness(elements: Elements, R: _Floats, F: _Floats, least: float
     gap = np.sqrt(np.maximum(2.0 * square - trace**2, 0.0))
     high, low = 0.5 * (trace + gap), 0.5 * (trace - gap)
 
-    def tension(stretch: _Floats) -> _Floats:
+    def tension(stretch: Floats) -> Floats:
         carries = stretch > _COLLAPSED
         value = 2.0 * mu * (stretch - 1.0) + lam * (trace - 2.0)
         return np.maximum(
@@ -344,7 +321,4 @@ def geometric_stiffness(elements: Elements, R: _Floats, F: _Floats, least: float
     apart = gap > 1e-12 * trace
     beta = np.where(apart, (first - second) / np.where(apart, gap, 1.0), 0.0)
     alpha = np.where(apart, first - beta * high, 0.5 * (first + second))
-    b = elements.gradients[elements.parent]
-    found = alpha[:, None, None] * (b @ b.transpose(0, 2, 1))
-    found += beta[:, None, None] * (b @ U @ b.transpose(0, 2, 1))
-    return found * elements.volumes[:, None, None]
+    return alpha[:, None, None] * np.eye(3) + beta[:, None, None] * U

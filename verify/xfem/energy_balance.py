@@ -15,12 +15,10 @@ leaves unsolved; if it is not round-off, the forces are not those of the motion.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Floats
 from verify.xfem.body import DynamicBody, Integrator, MotionState, StepForces
 from verify.xfem.errors import XfemError
-
-_Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,27 +40,27 @@ class EnergyBalance:
     penalty : share of a ghost penalty in the strain energy, in J
     """
 
-    time: _Floats
-    kinetic: _Floats
-    strain: _Floats
-    gravity: _Floats
-    load_work: _Floats
-    support_work: _Floats
-    damping: _Floats
-    algorithmic: _Floats
-    unbalanced: _Floats
-    momentum: _Floats
-    angular_momentum: _Floats
-    impulse: _Floats
-    penalty: _Floats
+    time: Floats
+    kinetic: Floats
+    strain: Floats
+    gravity: Floats
+    load_work: Floats
+    support_work: Floats
+    damping: Floats
+    algorithmic: Floats
+    unbalanced: Floats
+    momentum: Floats
+    angular_momentum: Floats
+    impulse: Floats
+    penalty: Floats
 
     @property
-    def mechanical(self) -> _Floats:
+    def mechanical(self) -> Floats:
         """Kinetic, strain and gravity energy: constant in a conservative motion."""
         return self.kinetic + self.strain + self.gravity
 
     @property
-    def balance(self) -> _Floats:
+    def balance(self) -> Floats:
         """All other columns together: less `unbalanced`, constant to round-off for every scheme."""
         return (
             self.mechanical - self.load_work - self.support_work + self.damping + self.algorithmic
@@ -132,7 +130,7 @@ class BalanceRecorder:
         _, strain = force.evaluate(state.displacement)
         return strain, force.penalty_energy
 
-    def _row(self, state: MotionState) -> _Floats:
+    def _row(self, state: MotionState) -> Floats:
         body = self.body
         assert body.weight is not None
         momenta = body.mass.apply(state.velocity)
@@ -156,7 +154,7 @@ class BalanceRecorder:
         return EnergyBalance(*[*table[:9], momentum, angular, impulse, table[-1]])
 
 
-def _cross(position: _Floats, momenta: _Floats) -> _Floats:
+def _cross(position: Floats, momenta: Floats) -> Floats:
     if position.shape[1] == 2:
         angular = position[:, 0] * momenta[:, 1] - position[:, 1] * momenta[:, 0]
         return np.array([angular.sum()])

@@ -23,8 +23,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats
 from verify.xfem.body import DynamicBody, StepForces
 from verify.xfem.element import Elements, add_moduli, polar_slope, restricted
 from verify.xfem.errors import XfemError
@@ -32,9 +32,6 @@ from verify.xfem.implicit import NewtonIntegrator
 from verify.xfem.internal_force import TangentKind
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.polar import adjugate, nearest_rotations
-
-_Floats = NDArray[np.float64]
-_Bools = NDArray[np.bool_]
 
 _REGULAR = 1e-6  # smallest pivot of A over its trace
 _STILL = 1e-26  # square of a relative change of C that is round-off
@@ -48,22 +45,22 @@ _IN_PLANE += np.einsum("kn,lm->knlm", _QUARTER, _QUARTER)
 class StepEnds(NamedTuple):
     """Deformation gradients and rotations (p, d, d) at the start and at the end of a step."""
 
-    F0: _Floats
-    F1: _Floats
-    R0: _Floats
-    R1: _Floats
+    F0: Floats
+    F1: Floats
+    R0: Floats
+    R1: Floats
 
-    def of(self, some: _Bools) -> "StepEnds":
+    def of(self, some: Bools) -> "StepEnds":
         """Return those of some elements."""
         return StepEnds(*(X[some] for X in self))
 
     @property
-    def traces(self) -> tuple[_Floats, _Floats]:
+    def traces(self) -> tuple[Floats, Floats]:
         """Traces t (p,) of both stretches."""
         return _inner(self.R0, self.F0), _inner(self.R1, self.F1)
 
 
-def averaged_stress(elements: Elements, ends: StepEnds, substituted: _Bools) -> _Floats:
+def averaged_stress(elements: Elements, ends: StepEnds, substituted: Bools) -> Floats:
     """Stress P (p, d, d) averaged over a step; elements that need the substitute are marked.
 
     Parameters
@@ -78,7 +75,7 @@ def averaged_stress(elements: Elements, ends: StepEnds, substituted: _Bools) -> 
     return mu * (ends.F0 + ends.F1) + factor * T
 
 
-def averaged_moduli(elements: Elements, ends: StepEnds, substituted: _Bools) -> _Floats:
+def averaged_moduli(elements: Elements, ends: StepEnds, substituted: Bools) -> Floats:
     """∂P/∂F₁ (p, d, d, d, d), the last two indices those of F₁; not symmetric.
 
     Arguments as the last call of `averaged_stress` left them.
@@ -100,11 +97,11 @@ def averaged_moduli(elements: Elements, ends: StepEnds, substituted: _Bools) -> 
     return slope + mu[..., None, None] * np.einsum("kl,nm->knlm", identity, identity)
 
 
-def _inner(A: _Floats, B: _Floats) -> _Floats:
+def _inner(A: Floats, B: Floats) -> Floats:
     return np.einsum("pkl,pkl->p", A, B)
 
 
-def _factors(elements: Elements, ends: StepEnds) -> tuple[_Floats, _Floats, _Floats]:
+def _factors(elements: Elements, ends: StepEnds) -> tuple[Floats, Floats, Floats]:
     """λ, μ and c, each (p, 1, 1)."""
     lam, mu = (x[elements.parent, None, None] for x in (elements.lam, elements.mu))
     t0, t1 = ends.traces
@@ -112,7 +109,7 @@ def _factors(elements: Elements, ends: StepEnds) -> tuple[_Floats, _Floats, _Flo
     return lam, mu, lam * (0.5 * (t0 + t1) - dim)[:, None, None] - 2.0 * mu
 
 
-def _secant(elements: Elements, ends: StepEnds, substituted: _Bools) -> _Floats:
+def _secant(elements: Elements, ends: StepEnds, substituted: Bools) -> Floats:
     """T (p, d, d); elements that need the substitute are marked."""
     t0, t1 = (t[:, None, None] for t in ends.traces)
     if len(elements.axes) == 2:
@@ -131,7 +128,7 @@ def _secant(elements: Elements, ends: StepEnds, substituted: _Bools) -> _Floats:
     return T
 
 
-def _mean_stretch(elements: Elements, ends: StepEnds) -> tuple[_Floats, _Floats, _Floats]:
+def _mean_stretch(elements: Elements, ends: StepEnds) -> tuple[Floats, Floats, Floats]:
     """Return A (p, 3, 3), of membranes regular across their plane, its inverse, a threshold."""
     A = ends.R0.transpose(0, 2, 1) @ ends.F0 + ends.R1.transpose(0, 2, 1) @ ends.F1
     A = 0.5 * (A + A.transpose(0, 2, 1)) + 2.0 * (np.eye(3) - restricted(elements))
@@ -140,7 +137,7 @@ def _mean_stretch(elements: Elements, ends: StepEnds) -> tuple[_Floats, _Floats,
     return A, inverse, _REGULAR * np.einsum("pkk->p", A)
 
 
-def _plain_slope(elements: Elements, ends: StepEnds, T: _Floats, some: _Bools) -> _Floats:
+def _plain_slope(elements: Elements, ends: StepEnds, T: Floats, some: Bools) -> Floats:
     inverse = _mean_stretch(elements, ends)[1][some]
     R1, F1 = ends.R1[some], ends.F1[some]
     dR, _ = polar_slope(R1, F1, _SINGULAR)
@@ -152,7 +149,7 @@ def _plain_slope(elements: Elements, ends: StepEnds, T: _Floats, some: _Bools) -
     return np.einsum("pkblm,pbn->pknlm", change, inverse)
 
 
-def _substitute(ends: StepEnds) -> tuple[_Floats, _Floats]:
+def _substitute(ends: StepEnds) -> tuple[Floats, Floats]:
     """T and dT of the substitute."""
     F0, F1, _, R1 = ends
     t0, t1 = ends.traces
@@ -230,7 +227,7 @@ class EnergyMomentum(NewtonIntegrator):
         self._evaluations = 0
         self._takes_all = self._asks_for_all
 
-    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
         body, start = self.body, self._start
         internal = np.zeros(body.shape)
         if body.force.is_corotational:
@@ -245,13 +242,13 @@ class EnergyMomentum(NewtonIntegrator):
         viscous = body.viscous(0.5 * (start.velocity + velocity))
         return StepForces(internal, body.external(middle), viscous)
 
-    def _ends(self, displacement: _Floats) -> StepEnds:
+    def _ends(self, displacement: Floats) -> StepEnds:
         """Both ends of the step, with the rotations of the last evaluation."""
         force = self.body.force
         F0 = force.deformation(self._start.displacement).copy()
         return StepEnds(F0, force.deformation(displacement), self._first, force.rotations)
 
-    def _average(self, displacement: _Floats, internal: _Floats) -> None:
+    def _average(self, displacement: Floats, internal: Floats) -> None:
         """Write the force of a step that ends like this; substituted cells are updated."""
         force, before = self.body.force, self._start.displacement
         if force.has_one_pass:
@@ -268,7 +265,7 @@ class EnergyMomentum(NewtonIntegrator):
         internal[:] = force.nodal_force(gradients @ P.transpose(0, 2, 1))
         force.add_penalty(0.5 * (before + displacement), 1.0, internal)
 
-    def _solved(self, displacement: _Floats, residual: _Floats, kind: TangentKind) -> _Floats:
+    def _solved(self, displacement: Floats, residual: Floats, kind: TangentKind) -> Floats:
         self._takes_all |= self._is_slow and self.body.force.is_corotational
         if not self._takes_all:
             return super()._solved(displacement, residual, kind)
@@ -277,7 +274,7 @@ class EnergyMomentum(NewtonIntegrator):
         self._general.factorize(self._blocks)
         return self._general.solve(residual)
 
-    def _add_stiffness(self, displacement: _Floats, kind: TangentKind) -> None:
+    def _add_stiffness(self, displacement: Floats, kind: TangentKind) -> None:
         force = self.body.force
         if not self._takes_all:
             super()._add_stiffness(displacement, kind)

@@ -4,15 +4,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from verify.xfem.errors import XfemError, finite_array
+from verify.xfem.arrays import Bools, Floats, finite_array
+from verify.xfem.errors import XfemError
 from verify.xfem.internal_force import InternalForce, inverted_cells
 from verify.xfem.rigid_motion import RigidMotions
 from verify.xfem.static_newton import Descent, Newton, NotInEquilibriumError
 from verify.xfem.supports import check_fixed
-
-_Floats = NDArray[np.float64]
 
 _HALVINGS = 6  # of a load step
 _FURTHER = 2  # of them, to compare with a step that has converged
@@ -48,7 +46,7 @@ class PathCheck(NamedTuple):
 class _Step(NamedTuple):
     """State (N, d) at the end of a step, and what it is judged by."""
 
-    displacement: _Floats
+    displacement: Floats
     corrections: int
     energy: float  # strain energy, J
     potential: float  # less the work of the loads, J
@@ -82,20 +80,20 @@ class LoadPath:
     def __init__(
         self,
         force: InternalForce,
-        fixed: NDArray[np.bool_],
-        prescribed: Callable[[float], _Floats],
-        load: _Floats,
+        fixed: Bools,
+        prescribed: Callable[[float], Floats],
+        load: Floats,
         newton: Newton,
     ) -> None:
         self._force, self._fixed, self._load, self._newton = force, fixed, load, newton
         self._motions = RigidMotions(force.phantom, fixed) if force.is_corotational else None
         self._prescribed = prescribed if self._motions is None else self._along_turns(prescribed)
-        self._sampled: dict[float, _Floats] = {}
+        self._sampled: dict[float, Floats] = {}
         self._stable: bool | None = None
         self._compared = 0
         self._dismissed: list[float] = []
 
-    def _along_turns(self, prescribed: Callable[[float], _Floats]) -> Callable[[float], _Floats]:
+    def _along_turns(self, prescribed: Callable[[float], Floats]) -> Callable[[float], Floats]:
         """Path as given, or, where a straight one turns bodies, one that turns them on the way."""
         assert self._motions is not None
         whole = prescribed(1.0)
@@ -109,7 +107,7 @@ class LoadPath:
         """Sum up what has been done so far."""
         return PathCheck(self._stable, self._compared, tuple(self._dismissed))
 
-    def follow(self, displacement: _Floats, parts: int) -> tuple[_Floats, tuple[int, ...]]:
+    def follow(self, displacement: Floats, parts: int) -> tuple[Floats, tuple[int, ...]]:
         """Equilibrium (N, d) at load factor 1, and the corrections of every step.
 
         Raises
@@ -123,7 +121,7 @@ class LoadPath:
             displacement = steps[-1].displacement
         return displacement, tuple(step.corrections for step in steps)
 
-    def settle(self, displacement: _Floats) -> _Floats:
+    def settle(self, displacement: Floats) -> Floats:
         """Leave an unstable equilibrium at load factor 1 for a stable one of less energy.
 
         Raises
@@ -151,7 +149,7 @@ class LoadPath:
             "stiffness. Other supports or loads that break a symmetry may help"
         )
 
-    def _advance(self, start: _Floats, since: float, until: float, room: int) -> list[_Step]:
+    def _advance(self, start: Floats, since: float, until: float, room: int) -> list[_Step]:
         """Take steps from a state at one load factor to another, in as few parts as count."""
         middle = 0.5 * (since + until)
 
@@ -196,7 +194,7 @@ class LoadPath:
             f"supports and loads account for {step.energy - step.excess:.6g} J of it; {why}"
         )
 
-    def _strains(self, start: _Floats, since: float, until: float) -> bool:
+    def _strains(self, start: Floats, since: float, until: float) -> bool:
         """Whether supports turn parts of a body far against one another on the way."""
         if self._motions is None:
             return False
@@ -206,12 +204,12 @@ class LoadPath:
             for share in (*within, until)
         )
 
-    def _change(self, displacement: _Floats, share: float) -> _Floats:
+    def _change(self, displacement: Floats, share: float) -> Floats:
         if share not in self._sampled:
             self._sampled[share] = self._prescribed(share)
         return np.where(self._fixed, self._sampled[share] - displacement, 0.0)
 
-    def _step(self, start: _Floats, until: float) -> _Step:
+    def _step(self, start: Floats, until: float) -> _Step:
         change = self._change(start, until)
         followed = start if self._motions is None else self._motions.follow(start, change)
         before, energy_before = self._force.evaluate(followed)
@@ -234,7 +232,7 @@ class LoadPath:
         size = float(np.ptp(phantom.mesh.points, axis=0).max())
         return _ROUND_OFF * self._newton.largest_stiffness * size**2
 
-    def _turns_inside_out(self, before: _Floats, after: _Floats) -> bool:
+    def _turns_inside_out(self, before: Floats, after: Floats) -> bool:
         if self._force.is_membrane:
             return False
         volumes = self._force.phantom.volumes
@@ -261,9 +259,9 @@ class StaticEquilibrium(NamedTuple):
         What has solved the linear systems.
     """
 
-    displacement: _Floats
+    displacement: Floats
     energy: float
-    reactions: _Floats
+    reactions: Floats
     iterations: tuple[int, ...]
     check: PathCheck
     solvers: frozenset[str]
@@ -271,13 +269,13 @@ class StaticEquilibrium(NamedTuple):
 
 def static_equilibrium(
     force: InternalForce,
-    fixed: NDArray[np.bool_],
-    prescribed: Callable[[float], _Floats] | None = None,
-    load: _Floats | None = None,
+    fixed: Bools,
+    prescribed: Callable[[float], Floats] | None = None,
+    load: Floats | None = None,
     load_steps: int = 1,
     tolerance: float = 1e-10,
     iterations: int = 60,
-    start: _Floats | None = None,
+    start: Floats | None = None,
 ) -> StaticEquilibrium:
     """Displacement with f_int(u) = load, u given on the fixed components.
 
@@ -334,7 +332,7 @@ def static_equilibrium(
     full_load = np.zeros(shape) if load is None else finite_array(load, "load", shape)
     displacement = np.zeros(shape) if start is None else finite_array(start, "start", shape)
 
-    def wanted(share: float) -> _Floats:
+    def wanted(share: float) -> Floats:
         values = np.zeros(shape) if prescribed is None else prescribed(share)
         if values.shape == shape:  # what is not fixed may be anything
             values = np.where(fixed, values, 0.0)

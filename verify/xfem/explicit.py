@@ -5,8 +5,8 @@ same instant. All of them are free of any linear solve if the mass is diagonal.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Floats
 from verify.xfem.body import (
     DynamicBody,
     FreeMass,
@@ -19,8 +19,6 @@ from verify.xfem.body import (
     couples_supports,
 )
 from verify.xfem.errors import XfemError
-
-_Floats = NDArray[np.float64]
 
 
 class _Explicit:
@@ -36,15 +34,15 @@ class _Explicit:
         self._mass = FreeMass(body)
 
     def _acceleration(
-        self, displacement: _Floats, velocity: _Floats, time: float
-    ) -> tuple[_Floats, StepForces]:
+        self, displacement: Floats, velocity: Floats, time: float
+    ) -> tuple[Floats, StepForces]:
         body = self.body
         internal, _ = body.force.evaluate(displacement)
         forces = StepForces(internal, body.external(time), body.viscous(velocity))
         return self._mass.solve(forces.external - forces.internal - forces.viscous), forces
 
     def _finish(
-        self, state: MotionState, displacement: _Floats, velocity: _Floats, time: float
+        self, state: MotionState, displacement: Floats, velocity: Floats, time: float
     ) -> None:
         if not (np.isfinite(displacement).all() and np.isfinite(velocity).all()):
             raise StepFailedError(
@@ -57,7 +55,7 @@ class _Explicit:
         state.displacement[:], state.velocity[:], state.time = displacement, velocity, time
 
 
-def acceleration_of(body: DynamicBody, state: MotionState) -> _Floats:
+def acceleration_of(body: DynamicBody, state: MotionState) -> Floats:
     """Acceleration (N, d) in m/s² that balances all forces of a state; zero where held.
 
     Raises
@@ -83,9 +81,9 @@ class CentralDifferences(_Explicit):
 
     def __init__(self, body: DynamicBody, step_size: float) -> None:
         super().__init__(body, step_size)
-        self._end: tuple[MotionState, _Floats, StepForces] | None = None
+        self._end: tuple[MotionState, Floats, StepForces] | None = None
 
-    def _start(self, state: MotionState) -> tuple[_Floats, StepForces]:
+    def _start(self, state: MotionState) -> tuple[Floats, StepForces]:
         """Acceleration at the start: that at the end of the last step, if it goes on from there."""
         if self._end is not None and self.body.damping == RayleighDamping():
             end, acceleration, forces = self._end

@@ -15,13 +15,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from verify.xfem.errors import XfemError, finite_array, index_array, places
+from verify.xfem.arrays import Bools, Floats, Ints, finite_array, index_array
+from verify.xfem.errors import XfemError
 from verify.xfem.mesh import facets_of, neighbours_across
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 _FLAT = 1e-12  # area over squared edge below which a triangle has none
 
 
@@ -121,17 +120,17 @@ class FacetArrays(NamedTuple):
         Of a sweep: how far the blade has come at each corner, in metres.
     """
 
-    corners: _Floats
-    normals: _Floats
-    edge_normals: _Floats
-    vertex_normals: _Floats
-    edge_rim: NDArray[np.bool_]
-    vertex_rim: NDArray[np.bool_]
-    rim: _Floats
-    travel: _Floats
+    corners: Floats
+    normals: Floats
+    edge_normals: Floats
+    vertex_normals: Floats
+    edge_rim: Bools
+    vertex_rim: Bools
+    rim: Floats
+    travel: Floats
 
 
-def facet_arrays(points: _Floats, facets: _Ints, travel: _Floats | None = None) -> FacetArrays:
+def facet_arrays(points: Floats, facets: Ints, travel: Floats | None = None) -> FacetArrays:
     """Find normals and rim of facets (t, k) with vertices (n, k), and the travel (n,) there."""
     count = facets.shape[1]
     corners = np.ascontiguousarray(points[facets])
@@ -166,11 +165,11 @@ def facet_arrays(points: _Floats, facets: _Ints, travel: _Floats | None = None) 
     )
 
 
-def _of_length_one(vectors: _Floats) -> _Floats:
+def _of_length_one(vectors: Floats) -> Floats:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1), 1e-300)[..., None]
 
 
-def _corner_angles(corners: _Floats) -> _Floats:
+def _corner_angles(corners: Floats) -> Floats:
     angles = np.empty(corners.shape[:2])
     for k in range(3):
         p, q = (corners[:, (k + i) % 3] - corners[:, k] for i in (1, 2))
@@ -259,7 +258,7 @@ class FacetCut:
 
     _name: ClassVar[str]
 
-    def _mesh(self) -> tuple[_Floats, _Ints]:
+    def _mesh(self) -> tuple[Floats, Ints]:
         raise NotImplementedError
 
     @cached_property
@@ -267,17 +266,17 @@ class FacetCut:
         """Its facets, as kernels take them."""
         return facet_arrays(*self._mesh())
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """Signed distance (n,) to the facets, to their tangent plane past the rim."""
         return self._probe(points)[:, 0]
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Distance (n,) to the rim along the tangent, negative past it; infinite without a rim."""
         return self._probe(points)[:, 1]
 
-    def _probe(self, points: _Floats) -> _Floats:
-        at = places(points, self.arrays.corners.shape[2], self._name)
-        return _probe_points(np.ascontiguousarray(at), self.arrays)
+    def _probe(self, points: Floats) -> Floats:
+        at = finite_array(points, f"{self._name}: points", (None, self.arrays.corners.shape[2]))
+        return _probe_points(at, self.arrays)
 
 
 @dataclass(frozen=True)
@@ -301,7 +300,7 @@ class Polyline(FacetCut):
         the one before, or segments that intersect.
     """
 
-    vertices: _Floats
+    vertices: Floats
     closed: bool
     _name = "polyline"
 
@@ -314,13 +313,13 @@ class Polyline(FacetCut):
         object.__setattr__(self, "closed", bool(closed))
         _check_segments(self.vertices, self.closed)
 
-    def _mesh(self) -> tuple[_Floats, _Ints]:
+    def _mesh(self) -> tuple[Floats, Ints]:
         count = len(self.vertices)
         first = np.arange(count if self.closed else count - 1)
         return self.vertices, np.stack([first, (first + 1) % count], axis=1)
 
 
-def _check_segments(vertices: _Floats, closed: bool) -> None:
+def _check_segments(vertices: Floats, closed: bool) -> None:
     starts = vertices if closed else vertices[:-1]
     segments = np.diff(vertices, axis=0, append=vertices[:1])[: len(starts)]
     lengths = np.linalg.norm(segments, axis=1)
@@ -336,7 +335,7 @@ def _check_segments(vertices: _Floats, closed: bool) -> None:
         raise XfemError(f"segments {pair[0]} and {pair[1]} of the polyline intersect")
 
 
-def _first_intersection(starts: _Floats, segments: _Floats, closed: bool) -> tuple[int, int] | None:
+def _first_intersection(starts: Floats, segments: Floats, closed: bool) -> tuple[int, int] | None:
     """First pair of segments, not neighbours, that have a point in common."""
     count = len(starts)
     ends = starts + segments
@@ -355,7 +354,7 @@ def _first_intersection(starts: _Floats, segments: _Floats, closed: bool) -> tup
     return None
 
 
-def _cross(a: _Floats, b: _Floats) -> _Floats:
+def _cross(a: Floats, b: Floats) -> Floats:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
@@ -377,8 +376,8 @@ class TriangulatedSurface(FacetCut):
         not consistent, or more than two triangles at an edge).
     """
 
-    points: _Floats
-    triangles: _Ints
+    points: Floats
+    triangles: Ints
     _name = "surface"
 
     def __init__(self, points: ArrayLike, triangles: ArrayLike) -> None:
@@ -400,5 +399,5 @@ class TriangulatedSurface(FacetCut):
         if len(np.unique(edges, axis=0)) < len(edges):
             raise XfemError("the triangles of the surface are not consistently oriented")
 
-    def _mesh(self) -> tuple[_Floats, _Ints]:
+    def _mesh(self) -> tuple[Floats, Ints]:
         return self.points, self.triangles

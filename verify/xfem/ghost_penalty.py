@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.block_pattern import BlockPattern, body_pattern, pattern_places
 from verify.xfem.contacts import face_contacts
 from verify.xfem.elasticity import Material
@@ -20,9 +21,6 @@ from verify.xfem.mass import Mass, cell_densities
 from verify.xfem.phantom import PhantomMesh
 
 DEFAULT_FACTOR = 0.01  # least accuracy lost for a bounded condition number: see the docs on slivers
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 class GhostPenalty:
@@ -93,10 +91,10 @@ class GhostPenalty:
         self._heights = 0.5 * (height + across)
         self._cells = cells
         self.modulus = self._of_faces(lam + 2.0 * mu)
-        self.couplings: _Ints = np.stack(
+        self.couplings: Ints = np.stack(
             [phantom.cells[pieces[0], local], phantom.cells[pieces[1], there]], axis=1
         )
-        self._places: tuple[BlockPattern, _Ints] | None = None
+        self._places: tuple[BlockPattern, Ints] | None = None
 
     @cached_property
     def matrix(self) -> csr_array:
@@ -108,7 +106,7 @@ class GhostPenalty:
         """Sparsity of stiffness and penalty; its first cells are those of the body."""
         return body_pattern(self.phantom, self.couplings)
 
-    def add_stiffness(self, pattern: BlockPattern, blocks: _Floats, scale: float = 1.0) -> None:
+    def add_stiffness(self, pattern: BlockPattern, blocks: Floats, scale: float = 1.0) -> None:
         """Add `scale` times the penalty to nodal blocks (B, d, d) of a pattern.
 
         Raises
@@ -124,16 +122,16 @@ class GhostPenalty:
             blocks[at, axis, axis] += scale * values
 
     @cached_property
-    def _entries(self) -> tuple[_Ints, _Ints, _Floats]:
+    def _entries(self) -> tuple[Ints, Ints, Floats]:
         entries = self.matrix.tocoo()
         return entries.row.astype(np.int64), entries.col.astype(np.int64), entries.data
 
-    def force(self, displacement: _Floats) -> tuple[_Floats, float]:
+    def force(self, displacement: Floats) -> tuple[Floats, float]:
         """Force (N, d) of the penalty, in newtons, and its energy."""
         force = self.matrix @ displacement
         return force, 0.5 * float((force * displacement).sum())
 
-    def mass(self, mass: Mass, density: _Floats | float) -> Mass:
+    def mass(self, mass: Mass, density: Floats | float) -> Mass:
         """Mass with the counterpart γ Σ ρ h³ A |⟦∂v/∂n⟧|²; not diagonal any more.
 
         It does not act on rigid motion: total mass, weight and momenta stay.
@@ -143,8 +141,8 @@ class GhostPenalty:
         extra = self.jumps.T @ (self.jumps * weights[:, None])
         return Mass(csr_array(mass.matrix + extra), None, mass.weights)
 
-    def _of_faces(self, values: NDArray) -> _Floats:
+    def _of_faces(self, values: NDArray) -> Floats:
         """Larger of the values of both cells at each face."""
         each = np.broadcast_to(values, len(self.phantom.mesh.cells))
-        larger: _Floats = each[self._cells].max(axis=0)
+        larger: Floats = each[self._cells].max(axis=0)
         return larger

@@ -3,8 +3,8 @@
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Floats
 from verify.xfem.block_pattern import add_mass, constrain, held_entries
 from verify.xfem.body import (
     DynamicBody,
@@ -18,8 +18,6 @@ from verify.xfem.body import (
 from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.internal_force import TangentKind, inverted_cells
 from verify.xfem.linear_solvers import LinearSolver
-
-_Floats = NDArray[np.float64]
 
 _HALVINGS = 10
 _SLOW = 0.5  # of the residual: what a correction leaves that takes too little off
@@ -92,21 +90,21 @@ class NewtonIntegrator(ABC):
         self._start = MotionState(np.empty(body.shape), np.empty(body.shape))
 
     @abstractmethod
-    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
         """Evaluate the forces of a step that ends like this, and leave the rotations there."""
 
     def _prepare(self) -> None:  # noqa: B027
         """Evaluate what is needed of the start of the step; nothing by default."""
 
-    def _load_at_start(self) -> _Floats:
+    def _load_at_start(self) -> Floats:
         """External force (N, d) at the start of the step, after what jumps then."""
         return self.body.external(self._start.time + _JUST * self.step_size).copy()
 
-    def _load_at_end(self, time: float) -> _Floats:
+    def _load_at_end(self, time: float) -> Floats:
         """External force (N, d) of a step that ends at a time, before what jumps then."""
         return self.body.external(time - _JUST * self.step_size)
 
-    def _internal(self, displacement: _Floats) -> _Floats:
+    def _internal(self, displacement: Floats) -> Floats:
         """Return the internal force (N, d); where one pass finds it, also the stiffness."""
         body = self.body
         if not (body.force.has_one_pass and body.force.is_corotational):
@@ -127,7 +125,7 @@ class NewtonIntegrator(ABC):
         """Of the rotation-fixed tangent, in the matrix of a correction."""
         return self.share * (1.0 + self.rate / self.step_size * self.body.damping.stiffness)
 
-    def _add_stiffness(self, displacement: _Floats, kind: TangentKind) -> None:
+    def _add_stiffness(self, displacement: Floats, kind: TangentKind) -> None:
         """Add the derivative of the internal force of the step to the blocks."""
         force = self.body.force
         force.add_stiffness(self.body.pattern, self._blocks, self.share, kind, displacement)
@@ -148,7 +146,7 @@ class NewtonIntegrator(ABC):
         state.time = self._start.time + self.step_size
         return forces
 
-    def _velocity(self, displacement: _Floats) -> _Floats:
+    def _velocity(self, displacement: Floats) -> Floats:
         velocity = (self.rate / self.step_size) * (displacement - self._start.displacement)
         velocity -= (self.rate - 1.0) * self._start.velocity
         if not self.body.moving:
@@ -156,7 +154,7 @@ class NewtonIntegrator(ABC):
             velocity[self.body.fixed] = 0.0
         return velocity
 
-    def _residual(self, displacement: _Floats) -> tuple[_Floats, float, StepForces, float]:
+    def _residual(self, displacement: Floats) -> tuple[Floats, float, StepForces, float]:
         """Residual force (N, d), its norm, the forces, and the scale to which it compares.
 
         Norms are of accelerations. The forces on a sliver of 1e-12, in space 1e-38 of those on its
@@ -178,10 +176,10 @@ class NewtonIntegrator(ABC):
     def _weight(self) -> float:
         return self.rate if self.weight is None else self.weight
 
-    def _size(self, force: _Floats) -> float:
+    def _size(self, force: Floats) -> float:
         return float(np.linalg.norm(self._inverse_mass * force))
 
-    def _solve(self, displacement: _Floats) -> tuple[_Floats, _Floats, StepForces]:
+    def _solve(self, displacement: Floats) -> tuple[Floats, Floats, StepForces]:
         body = self.body
         prescribed, _ = body.prescribed(self._start.time + self.step_size)
         displacement[body.fixed] = prescribed[body.fixed]
@@ -239,7 +237,7 @@ class NewtonIntegrator(ABC):
         expected = self._left[number] if number < len(self._left) else _INEXACT / _SPARE
         return min(max(_FINE, _SPARE * max(expected, enough)), _COARSE)
 
-    def _round_off(self) -> _Floats:
+    def _round_off(self) -> Floats:
         """(N, 1) error of the acceleration of each node for positions of size one, rounded."""
         body = self.body
         self._blocks[:] = 0.0
@@ -247,12 +245,12 @@ class NewtonIntegrator(ABC):
         stiffness = np.abs(self._blocks[body.pattern.diagonal]).max(axis=(1, 2))[:, None]
         return _ROUND_OFF * (self._inverse_mass * stiffness + self._weight / self.step_size**2)
 
-    def _excess(self, residual: _Floats, noise: _Floats) -> float:
+    def _excess(self, residual: Floats, noise: Floats) -> float:
         """Norm of the accelerations that are left, as far as they are more than round-off."""
         left = np.abs(self._inverse_mass * residual) - noise
         return float(np.linalg.norm(np.maximum(left, 0.0)))
 
-    def _why(self, displacement: _Floats, leaps: int) -> str:
+    def _why(self, displacement: Floats, leaps: int) -> str:
         """Say what stood in the way of Newton's method."""
         if not np.isfinite(displacement).all():
             return "The iterates left the finite numbers: the step is far too long"
@@ -268,8 +266,8 @@ class NewtonIntegrator(ABC):
         return f"{'; '.join(found)}. A shorter step may help"
 
     def _correction(
-        self, displacement: _Floats, residual: _Floats, tolerance: float = _INEXACT
-    ) -> _Floats:
+        self, displacement: Floats, residual: Floats, tolerance: float = _INEXACT
+    ) -> Floats:
         self.solves += 1
         self._solver.tolerance = tolerance
         try:
@@ -286,7 +284,7 @@ class NewtonIntegrator(ABC):
                 "step is too long, or a load is not finite"
             ) from failure
 
-    def _solved(self, displacement: _Floats, residual: _Floats, kind: TangentKind) -> _Floats:
+    def _solved(self, displacement: Floats, residual: Floats, kind: TangentKind) -> Floats:
         given = None if self.body.force.is_corotational else (self.step_size, self.body.damping)
         if given is None or given != self._factorised:  # the matrix of linear motion stays
             self._factorised = None
@@ -295,7 +293,7 @@ class NewtonIntegrator(ABC):
             self._factorised = given
         return self._solver.solve(residual)
 
-    def _assemble(self, displacement: _Floats, kind: TangentKind) -> None:
+    def _assemble(self, displacement: Floats, kind: TangentKind) -> None:
         body, h = self.body, self.step_size
         per_velocity = self.share * self.rate / h
         if not self._is_linearised or kind != "consistent":
@@ -321,7 +319,7 @@ class ImplicitEuler(NewtonIntegrator):
     rate = 1.0
     share = 1.0
 
-    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
         internal = self._internal(displacement)
         return StepForces(internal, self._load_at_end(time), self.body.viscous(velocity))
 
@@ -342,7 +340,7 @@ class Trapezoidal(NewtonIntegrator):
         viscous = self.body.viscous(start.velocity)
         self._before = StepForces(internal, self._load_at_start(), viscous)
 
-    def _forces(self, displacement: _Floats, velocity: _Floats, time: float) -> StepForces:
+    def _forces(self, displacement: Floats, velocity: Floats, time: float) -> StepForces:
         internal = self._internal(displacement)
         return StepForces(
             0.5 * (self._before.internal + internal),

@@ -11,8 +11,8 @@ changes, both by what the field of the slivers was off the root's.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Ints
 from verify.xfem.body import DynamicBody, MotionState, check_state
 from verify.xfem.errors import XfemError
 from verify.xfem.mass import AggregatedMass
@@ -52,7 +52,7 @@ def inherit_state(
     return MotionState(displacement[own], velocity, state.time)
 
 
-def ancestors(old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
+def ancestors(old: PhantomMesh, new: PhantomMesh) -> Ints:
     """Corner of the old body from which each corner (N_corners,) of the new one comes.
 
     Corners are dof nodes where no cells are aggregated.
@@ -83,7 +83,7 @@ def ancestors(old: PhantomMesh, new: PhantomMesh) -> NDArray[np.int64]:
     return source
 
 
-def _parts_of(old: PhantomMesh, new: PhantomMesh, cuts: int) -> NDArray[np.int64]:
+def _parts_of(old: PhantomMesh, new: PhantomMesh, cuts: int) -> Ints:
     """(p,) piece of the old body of which each new piece is a part."""
     starts = np.searchsorted(old.parent, np.arange(len(old.mesh.cells) + 1))
     counts = np.diff(starts)

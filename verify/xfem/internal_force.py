@@ -7,27 +7,25 @@ cell need not agree on one. `verify.xfem.element` has the equations.
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, Ints, check_choice, check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.elasticity import Material
 from verify.xfem.element import (
-    add_blocks,
     add_force,
     add_moduli,
     add_rotation_fixed,
     consistent_moduli,
     deform,
     elements_of,
-    geometric_stiffness,
+    positive_tension,
 )
-from verify.xfem.errors import XfemError, check_choice, check_floats
+from verify.xfem.errors import XfemError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.linear_solvers import PLAIN, Kernels, OnePass
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.polar import rotations_in_plane, rotations_in_space
 
-_Floats = NDArray[np.float64]
 Kinematics = Literal["corotational", "linear"]
 TangentKind = Literal["rotation-fixed", "geometric", "consistent", "tension"]
 
@@ -90,7 +88,7 @@ class InternalForce:
         self._passed = False  # whether the last rotations are those of the pass
 
     @property
-    def rotations(self) -> _Floats:
+    def rotations(self) -> Floats:
         """(p, d, d) rotation of each cell at the last evaluation."""
         if self._passed and self._pass is not None:
             self._pass.write_rotations(self._rotations)
@@ -118,13 +116,13 @@ class InternalForce:
         solid = self.phantom.mesh.dim == 3 and self.phantom.aggregation is None
         return solid and self.kernels.one_pass is not None
 
-    def deformation(self, displacement: _Floats) -> _Floats:
+    def deformation(self, displacement: Floats) -> Floats:
         """Deformation gradients (p, d, d), of membranes zero across their plane; overwritten."""
         self._check(displacement=displacement)
         deform(self.elements, self.phantom.extend(displacement), 1.0, self._gradient)
         return self._gradient
 
-    def evaluate(self, displacement: _Floats, out: _Floats | None = None) -> tuple[_Floats, float]:
+    def evaluate(self, displacement: Floats, out: Floats | None = None) -> tuple[Floats, float]:
         """Return internal force (N, d) in newtons and strain energy in joules; update rotations.
 
         Parameters
@@ -150,29 +148,29 @@ class InternalForce:
             force += penalty
         return force, energy + self.penalty_energy
 
-    def add_tangent_product(self, vector: _Floats, scale: float, out: _Floats) -> None:
+    def add_tangent_product(self, vector: Floats, scale: float, out: Floats) -> None:
         """Add `scale` K v (N, d), K the rotation-fixed tangent of the last evaluation, to `out`."""
         self._check(vector=vector, force=out)
         deform(self.elements, self.phantom.extend(vector), 0.0, self._gradient)
         self._add_force(self._gradient, 0.0, scale, out)
         self.add_penalty(vector, scale, out)
 
-    def add_penalty(self, vector: _Floats, scale: float, out: _Floats) -> None:
+    def add_penalty(self, vector: Floats, scale: float, out: Floats) -> None:
         """Add `scale` times the stiffness of the penalty, if there is one, times a vector."""
         if self.ghost is not None:
             out += scale * (self.ghost.matrix @ vector)
 
-    def _add_force(self, F: _Floats, share: float, scale: float, out: _Floats) -> float:
+    def _add_force(self, F: Floats, share: float, scale: float, out: Floats) -> float:
         corner_force = np.zeros_like(self.phantom.corners.node_points)
         energy = add_force(self.elements, self.rotations, F, share, scale, corner_force)
         out += self.phantom.restrict(corner_force)
         return float(energy)
 
-    def _check(self, **arrays: _Floats) -> None:
+    def _check(self, **arrays: Floats) -> None:
         for name, values in arrays.items():
             check_floats(name, values, self._shape)
 
-    def _check_blocks(self, pattern: BlockPattern, blocks: _Floats) -> None:
+    def _check_blocks(self, pattern: BlockPattern, blocks: Floats) -> None:
         space = self._shape[1]
         check_floats("blocks", blocks, (len(pattern.columns), space, space))
         if pattern.node_count != self._shape[0] or len(pattern.targets) < len(self.phantom.cells):
@@ -184,10 +182,10 @@ class InternalForce:
     def add_stiffness(
         self,
         pattern: BlockPattern,
-        blocks: _Floats,
+        blocks: Floats,
         scale: float = 1.0,
         kind: TangentKind = "rotation-fixed",
-        displacement: _Floats | None = None,
+        displacement: Floats | None = None,
         least: float = 0.0,
     ) -> None:
         """Add `scale` times a tangent at the last evaluation to the nodal blocks.
@@ -223,9 +221,9 @@ class InternalForce:
             add_rotation_fixed(self.elements, self.rotations, scale, targets, added)
         if kind == "tension" or (kind == "geometric" and self.is_membrane):
             assert displacement is not None
-            stiffness, n = self._tension(displacement, least)
-            across = (scale * n)[:, :, None] * n[:, None, :]
-            add_blocks(targets, stiffness[..., None, None] * across[:, None, None], added)
+            tension, n = self._tension(displacement, least)
+            moduli = np.einsum("pk,pl,pnm->pknlm", n, n, tension)
+            add_moduli(self.elements, moduli, scale, targets, added)
         if kind == "consistent":
             assert displacement is not None
             F, R, self.left_out = self.deformation(displacement), self.rotations, 0
@@ -240,7 +238,7 @@ class InternalForce:
             self.ghost.add_stiffness(pattern, blocks, scale)
 
     def add_tension_product(
-        self, displacement: _Floats, vector: _Floats, scale: float, out: _Floats
+        self, displacement: Floats, vector: Floats, scale: float, out: Floats
     ) -> None:
         """Add `scale` times the geometric stiffness of a membrane times a vector (N, 3) to `out`.
 
@@ -250,32 +248,33 @@ class InternalForce:
             If the body is no membrane, or an array not of it.
         """
         self._check(vector=vector, force=out)
-        stiffness, n = self._tension(displacement, 0.0)
-        moved = self.phantom.extend(vector)[self.phantom.cells]
-        across = np.einsum("pjk,pk->pj", moved, scale * n)
-        out += self.nodal_force((stiffness @ across[:, :, None]) * n[:, None, :])
+        tension, n = self._tension(displacement, 0.0)
+        b, w = self.elements.gradients[self.elements.parent], scale * self.elements.volumes
+        across = self.phantom.extend(vector)[self.phantom.cells] @ n[:, :, None]
+        pull = b @ tension @ (b.transpose(0, 2, 1) @ across)
+        out += self.nodal_force(w[:, None, None] * pull * n[:, None, :])
 
-    def nodal_force(self, forces: _Floats) -> _Floats:
+    def nodal_force(self, forces: Floats) -> Floats:
         """Sum (N, d) of forces (p, c, d) at the corners of cells."""
         v = self.phantom
         nodes, count = v.cells.ravel(), len(v.corners.node_points)
         columns = forces.reshape(-1, forces.shape[2]).T
         return v.restrict(np.stack([np.bincount(nodes, f, count) for f in columns], axis=1))
 
-    def _tension(self, displacement: _Floats, least: float) -> tuple[_Floats, _Floats]:
-        """Stiffness between corners (p, 3, 3) of displacements along turned normals (p, 3)."""
+    def _tension(self, displacement: Floats, least: float) -> tuple[Floats, Floats]:
+        """Positive tension (p, 3, 3) of a membrane, and its turned normals (p, 3)."""
         if not self.is_membrane:
             raise XfemError("geometric stiffness of a solid; expected a membrane in space")
         R, elements = self.rotations, self.elements
-        stiffness = geometric_stiffness(elements, R, self.deformation(displacement), least)
-        return stiffness, np.einsum("pkl,pl->pk", R, elements.normals[elements.parent])
+        tension = positive_tension(elements, R, self.deformation(displacement), least)
+        return tension, np.einsum("pkl,pl->pk", R, elements.normals[elements.parent])
 
     def stiffness(
         self,
         pattern: BlockPattern,
-        displacement: _Floats | None = None,
+        displacement: Floats | None = None,
         kind: TangentKind = "consistent",
-    ) -> _Floats:
+    ) -> Floats:
         """(B, d, d) nodal blocks of a tangent in N/m, at a displacement or at rest."""
         at = np.zeros(self._shape) if displacement is None else displacement
         self.evaluate(at)
@@ -297,12 +296,12 @@ class InternalForce:
     def linearise(
         self,
         pattern: BlockPattern,
-        displacement: _Floats,
-        velocity: _Floats,
+        displacement: Floats,
+        velocity: Floats,
         implicit: float,
         scale: float,
-        force: _Floats,
-        blocks: _Floats,
+        force: Floats,
+        blocks: Floats,
         whole: bool = True,
         rotational: float = 0.0,
     ) -> None:
@@ -350,12 +349,12 @@ class InternalForce:
     def linearise_average(
         self,
         pattern: BlockPattern,
-        start: _Floats,
-        end: _Floats,
-        substituted: NDArray[np.bool_],
+        start: Floats,
+        end: Floats,
+        substituted: Bools,
         scale: float,
-        force: _Floats,
-        blocks: _Floats,
+        force: Floats,
+        blocks: Floats,
         whole: bool = True,
         rotational: float = 0.0,
     ) -> None:
@@ -381,7 +380,7 @@ class InternalForce:
             self.ghost.add_stiffness(pattern, blocks, scale)
 
 
-def inverted_cells(force: InternalForce, displacement: _Floats) -> NDArray[np.int64]:
+def inverted_cells(force: InternalForce, displacement: Floats) -> Ints:
     """Cells whose deformation gradient has a negative determinant (solids only)."""
     if force.is_membrane:
         raise XfemError("inversion of a membrane in space is not defined")

@@ -12,18 +12,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition, staircase, staircase_entries
-from verify.xfem.mesh import SimplexMesh, facets_of
+from verify.xfem.mesh import SimplexMesh, connected, facets_of
 from verify.xfem.zero_points import ZeroPoints
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
-_Sides = NDArray[np.int8]
 
 
 @dataclass(frozen=True)
@@ -41,12 +34,12 @@ class PatchNodes:
         Class of each local node, numbered in the order of their first ones.
     """
 
-    cells: _Ints
-    piece_cell: _Ints
-    group: _Ints
+    cells: Ints
+    piece_cell: Ints
+    group: Ints
 
 
-def join_parts(mesh: SimplexMesh, partition: Partition, solid: _Bools) -> PatchNodes:
+def join_parts(mesh: SimplexMesh, partition: Partition, solid: Bools) -> PatchNodes:
     """Join the local nodes of tied pieces, and of all that touch, around the nodes of split cells.
 
     Parameters
@@ -91,13 +84,11 @@ def join_parts(mesh: SimplexMesh, partition: Partition, solid: _Bools) -> PatchN
     tied = partition.tied[:, :, None] * corners + np.arange(corners)
     one = np.concatenate([(first[:, None] * corners + local).ravel(), tied[:, 0].ravel()])
     two = np.concatenate([(second[:, None] * corners + other_local).ravel(), tied[:, 1].ravel()])
-    size = len(piece_cell) * corners
-    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(size, size))
-    group = connected_components(graph, directed=False)[1].astype(np.int64)
-    return PatchNodes(patch, piece_cell, group.reshape(-1, corners))
+    group = connected(len(piece_cell) * corners, one, two).reshape(-1, corners)
+    return PatchNodes(patch, piece_cell, group)
 
 
-def _regions(nodes: _Ints, dividing: _Bools, points: ZeroPoints) -> tuple[_Ints, _Sides]:
+def _regions(nodes: Ints, dividing: Bools, points: ZeroPoints) -> tuple[Ints, Sides]:
     """Face (q,) and sides (q, cuts) of the regions into which cuts divide faces.
 
     Parameters
@@ -137,12 +128,12 @@ def _regions(nodes: _Ints, dividing: _Bools, points: ZeroPoints) -> tuple[_Ints,
 class _Pieces:
     """Pieces by their cells."""
 
-    def __init__(self, piece_cell: _Ints, label: _Sides, cells: int) -> None:
+    def __init__(self, piece_cell: Ints, label: Sides, cells: int) -> None:
         self.order, self.label = np.argsort(piece_cell, kind="stable"), label
         self.count = np.bincount(piece_cell, minlength=cells)
         self.start = np.cumsum(self.count) - self.count
 
-    def fitting(self, cells: _Ints, side: _Sides) -> _Ints:
+    def fitting(self, cells: Ints, side: Sides) -> Ints:
         """Return the piece (q,) of each cell that has a region of its face with sides (q, cuts)."""
         count = self.count[cells]
         of = np.repeat(np.arange(len(cells)), count)
@@ -156,8 +147,8 @@ class _Pieces:
 
 
 def number_nodes(
-    mesh: SimplexMesh, partition: Partition, joined: PatchNodes, solid: _Bools
-) -> tuple[_Ints, _Ints]:
+    mesh: SimplexMesh, partition: Partition, joined: PatchNodes, solid: Bools
+) -> tuple[Ints, Ints]:
     """Mesh node (N,) of each dof node, and the dof node of each class of local nodes.
 
     The first dof nodes are the nodes of the mesh, each with the material in which it lies.
@@ -215,18 +206,18 @@ class PieceSides(NamedTuple):
         Volume over that of the cell.
     """
 
-    rows: _Ints
-    side: NDArray[np.int8]
-    share: _Floats
+    rows: Ints
+    side: Sides
+    share: Floats
 
 
 def node_sides(
-    level_sets: _Floats,
-    node_parent: _Ints,
-    cells: _Ints,
-    label: NDArray[np.int8],
+    level_sets: Floats,
+    node_parent: Ints,
+    cells: Ints,
+    label: Sides,
     pieces: PieceSides,
-) -> NDArray[np.int8]:
+) -> Sides:
     """Side (N, cuts) of each cut on which the material of each unknown lies.
 
     It is that of its labelled pieces if they agree. Where no cut has split them, or they lie
@@ -263,12 +254,12 @@ def node_sides(
 
 
 def piece_sides(
-    level_sets: _Floats,
-    corners: _Ints,
-    label: NDArray[np.int8],
-    sub_piece: _Ints,
-    sub_barycentric: _Floats,
-    sub_fraction: _Floats,
+    level_sets: Floats,
+    corners: Ints,
+    label: Sides,
+    sub_piece: Ints,
+    sub_barycentric: Floats,
+    sub_fraction: Floats,
 ) -> PieceSides:
     """Sides of the pieces that consist of sub-simplices.
 

@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, SuperLU, cg, splu
 
+from verify.xfem.arrays import Bools, Floats, check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.element import Elements
-from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError, check_floats
+from verify.xfem.errors import NotConvergedError, SingularStiffnessError, XfemError
 
-_Floats = NDArray[np.float64]
-_Bools = NDArray[np.bool_]
 _ROUND_OFF = 1e-14  # of the diagonal entry from which a pivot comes
 _SMALL = 1500  # nodes of a solid, up to which a factorisation is quicker than iterations
 _IN_ITS_ORDER = {"SymmetricMode": True}
@@ -41,7 +40,7 @@ class LinearSolver(Protocol):
     reads_half: bool = False
     tolerance: float = 0.0
 
-    def factorize(self, blocks: _Floats) -> None:
+    def factorize(self, blocks: Floats) -> None:
         """Take the matrix with these nodal blocks (B, d, d), kept by reference.
 
         Raises
@@ -53,7 +52,7 @@ class LinearSolver(Protocol):
         """
         ...
 
-    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solution (N, d) for a right-hand side (N, d).
 
         Parameters
@@ -95,9 +94,9 @@ class SparseLU(LinearSolver):
     def __init__(self, pattern: BlockPattern, block: int, definite: bool = False) -> None:
         self._pattern, self._block, self._definite = pattern, block, definite
         self._factor: SuperLU | None = None
-        self._scale: _Floats | None = None
+        self._scale: Floats | None = None
 
-    def factorize(self, blocks: _Floats) -> None:
+    def factorize(self, blocks: Floats) -> None:
         """Factorise; see `LinearSolver`."""
         check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
         matrix = self._pattern.matrix(blocks)
@@ -121,7 +120,7 @@ class SparseLU(LinearSolver):
             raise SingularStiffnessError(int(np.argmax(factor.perm_c == place)) // self._block)
         self._factor = factor
 
-    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`."""
         if self._factor is None or self._scale is None:
             raise RuntimeError("solve before factorize")
@@ -154,9 +153,9 @@ class BlockJacobiCG(LinearSolver):
         if not 0.0 < tolerance < 1.0 or limit < 1:
             raise XfemError(f"tolerance {tolerance:g}, limit {limit}; expected in (0, 1) and ≥ 1")
         self._pattern, self._block, self.tolerance, self._limit = pattern, block, tolerance, limit
-        self._blocks: _Floats | None = None
+        self._blocks: Floats | None = None
 
-    def factorize(self, blocks: _Floats) -> None:
+    def factorize(self, blocks: Floats) -> None:
         """Take the matrix and invert its diagonal blocks; see `LinearSolver`."""
         check_floats("blocks", blocks, (len(self._pattern.columns), self._block, self._block))
         own = blocks[self._pattern.diagonal]
@@ -166,7 +165,7 @@ class BlockJacobiCG(LinearSolver):
             raise SingularStiffnessError(int(np.argmin(positive)))
         self._blocks, self._inverse = blocks, np.linalg.inv(own)
 
-    def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
+    def solve(self, load: Floats, x: Floats | None = None) -> Floats:
         """Solve; see `LinearSolver`."""
         if self._blocks is None:
             raise RuntimeError("solve before factorize")
@@ -176,13 +175,13 @@ class BlockJacobiCG(LinearSolver):
         start = nodal_vector(x, "first guess", nodes, self._block)
         matrix = self._pattern.matrix(self._blocks)
 
-        def product(vector: _Floats) -> _Floats:
+        def product(vector: Floats) -> Floats:
             image = matrix @ vector
             if vector.any() and not vector @ image > 0.0:
                 raise SingularStiffnessError(None)
             return image
 
-        def precondition(residual: _Floats) -> _Floats:
+        def precondition(residual: Floats) -> Floats:
             return np.einsum("nij,nj->ni", self._inverse, residual.reshape(load.shape)).ravel()
 
         found, failed = cg(
@@ -200,7 +199,7 @@ class BlockJacobiCG(LinearSolver):
         return x
 
 
-def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> _Floats:
+def nodal_vector(values: ArrayLike, name: str, nodes: int, size: int) -> Floats:
     """Right-hand side or first guess as a float array (N, d) without gaps.
 
     Raises
@@ -228,12 +227,12 @@ class OnePass(Protocol):
 
     def __call__(
         self,
-        displacement: _Floats,
-        velocity: _Floats,
+        displacement: Floats,
+        velocity: Floats,
         implicit: float,
         scale: float,
-        force: _Floats,
-        blocks: _Floats,
+        force: Floats,
+        blocks: Floats,
         whole: bool = True,
         rotational: float = 0.0,
     ) -> int:
@@ -242,19 +241,19 @@ class OnePass(Protocol):
 
     def average(
         self,
-        start: _Floats,
-        end: _Floats,
+        start: Floats,
+        end: Floats,
         scale: float,
         rotational: float,
-        substituted: _Bools,
-        force: _Floats,
-        blocks: _Floats,
+        substituted: Bools,
+        force: Floats,
+        blocks: Floats,
         whole: bool = True,
     ) -> int:
         """Overwrite the force averaged over a step, and the stiffness at its end."""
         ...
 
-    def write_rotations(self, rotations: _Floats) -> None:
+    def write_rotations(self, rotations: Floats) -> None:
         """Write the rotations (p, 3, 3) of the last pass."""
         ...
 
@@ -280,19 +279,19 @@ class Kernels:
         after the other.
     """
 
-    direct: Callable[[BlockPattern, int, _Bools | None], LinearSolver]
+    direct: Callable[[BlockPattern, int, Bools | None], LinearSolver]
     iterative: Callable[[BlockPattern, int, float, int], LinearSolver]
-    step: Callable[[BlockPattern, int, _Bools, bool, float], LinearSolver]
+    step: Callable[[BlockPattern, int, Bools, bool, float], LinearSolver]
     general: Callable[[BlockPattern, int], LinearSolver]
     one_pass: Callable[[Elements, BlockPattern, bool], OnePass] | None = None
 
 
-def _direct(pattern: BlockPattern, block: int, held: _Bools | None) -> LinearSolver:
+def _direct(pattern: BlockPattern, block: int, held: Bools | None) -> LinearSolver:
     return SparseLU(pattern, block, definite=True)
 
 
 def _step(
-    pattern: BlockPattern, block: int, held: _Bools, solid: bool, tolerance: float
+    pattern: BlockPattern, block: int, held: Bools, solid: bool, tolerance: float
 ) -> LinearSolver:
     if solid and pattern.node_count > _SMALL:
         return BlockJacobiCG(pattern, block, tolerance)

@@ -9,18 +9,16 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import roots_jacobi
 
-from verify.xfem.errors import XfemError, finite_array, index_array
+from verify.xfem.arrays import Floats, Ints, Sides, finite_array, index_array
+from verify.xfem.errors import XfemError
 from verify.xfem.phantom import PhantomMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 @cache
-def simplex_rule(dim: int, degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     """Points and weights exact for polynomials up to a degree.
 
     Parameters
@@ -50,10 +48,10 @@ def simplex_rule(dim: int, degree: int) -> tuple[NDArray[np.float64], NDArray[np
 
 
 # points (q, d) and sides of every cut (q, cuts) to force densities (q, d)
-Density = Callable[[_Floats, NDArray[np.int8]], _Floats]
+Density = Callable[[Floats, Sides], Floats]
 
 
-def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int = 4) -> _Floats:
+def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int = 4) -> Floats:
     """Nodal forces (N, d) of a force per volume, in newtons (per metre of thickness in 2D).
 
     Parameters
@@ -67,14 +65,13 @@ def body_force(phantom: PhantomMesh, density: ArrayLike | Density, degree: int =
         piece, if `density` is a function.
     """
     load = np.zeros_like(phantom.corners.node_points)
+    piece, barycentric, share = phantom.solid_simplices
+    cell = phantom.parent[piece]
     if not callable(density):
         shapes = load.shape[1:], (len(phantom.mesh.cells), load.shape[1])
-        force = finite_array(density, "load density", *shapes)
-        force = force if force.ndim == 1 else force[phantom.parent][:, None, :]
-        np.add.at(load, phantom.cells, phantom.shape_integrals[:, :, None] * force)
-        return phantom.restrict(load)
-    piece, barycentric, share = phantom.solid_simplices
-    volume = share * phantom.mesh.measures[phantom.parent[piece]]
+        density = finite_array(density, "load density", *shapes)
+        density = density if density.ndim == 1 else density[cell]
+    volume = share * phantom.mesh.measures[cell]
     _integrate(phantom, load, piece, barycentric, volume, density, degree)
     return phantom.restrict(load)
 
@@ -84,7 +81,7 @@ def traction(
     facets: ArrayLike,
     density: ArrayLike | Density,
     degree: int = 4,
-) -> _Floats:
+) -> Floats:
     """Nodal forces (N, d) of a traction on boundary facets, in newtons (per metre in 2D).
 
     Parameters
@@ -114,19 +111,16 @@ def traction(
     ):
         raise XfemError("a loaded facet is not a pair (cell, local node) of the mesh")
     load = np.zeros_like(phantom.corners.node_points)
-    if callable(density):
-        function: Density = density
-    else:
-        force = finite_array(density, "load density", load.shape[1:])
-        function = lambda points, _: np.broadcast_to(force, points.shape)  # noqa: E731
+    if not callable(density):
+        density = finite_array(density, "load density", load.shape[1:])
     for local in range(mesh.dim + 1):
         cells = chosen[chosen[:, 1] == local, 0]
         piece, corners, area = _facet_parts(phantom, cells, local)
-        _integrate(phantom, load, piece, corners, area, function, degree)
+        _integrate(phantom, load, piece, corners, area, density, degree)
     return phantom.restrict(load)
 
 
-def _facet_parts(phantom: PhantomMesh, cells: _Ints, local: int) -> tuple[_Ints, _Floats, _Floats]:
+def _facet_parts(phantom: PhantomMesh, cells: Ints, local: int) -> tuple[Ints, Floats, Floats]:
     """Simplices of the facets opposite to a corner: piece, barycentric corners, measure."""
     mesh = phantom.mesh
     others = [k for k in range(mesh.dim + 1) if k != local]
@@ -151,24 +145,29 @@ def _facet_parts(phantom: PhantomMesh, cells: _Ints, local: int) -> tuple[_Ints,
 
 def _integrate(
     phantom: PhantomMesh,
-    load: _Floats,
-    piece: _Ints,
-    corners: _Floats,
-    measure: _Floats,
-    density: Density,
+    load: Floats,
+    piece: Ints,
+    corners: Floats,
+    measure: Floats,
+    density: Floats | Density,
     degree: int,
 ) -> None:
-    """Add ∫ N_i f over simplices given by barycentric corners (q, k, d + 1) to the load."""
+    """Add ∫ N_i f over simplices given by barycentric corners (q, k, d + 1) to the load.
+
+    The density is constant, in each simplex or in all of them, or a function.
+    """
     if len(piece) == 0:
         return
     if not isinstance(degree, int | np.integer) or degree < 0:
         raise XfemError(f"quadrature of degree {degree!r}; expected an integer, 0 or more")
-    rule, weights = simplex_rule(corners.shape[1] - 1, degree)
+    rule, weights = simplex_rule(corners.shape[1] - 1, degree if callable(density) else 1)
     nodes = phantom.mesh.points[phantom.mesh.cells[phantom.parent[piece]]]
     sides = phantom.piece_side[piece]
     for point, weight in zip(rule, weights, strict=True):
         shape = np.einsum("k,qki->qi", point, corners)
-        given = density(np.einsum("qi,qij->qj", shape, nodes), sides)
-        force = finite_array(given, "load density", (len(piece), load.shape[1]))
+        force = density
+        if callable(density):
+            given = density(np.einsum("qi,qij->qj", shape, nodes), sides)
+            force = finite_array(given, "load density", (len(piece), load.shape[1]))
         share = (weight * measure)[:, None] * shape
-        np.add.at(load, phantom.cells[piece], share[:, :, None] * force[:, None, :])
+        np.add.at(load, phantom.cells[piece], share[:, :, None] * np.atleast_2d(force)[:, None])

@@ -10,17 +10,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.linalg import splu
 
+from verify.xfem.arrays import Bools, Floats, Ints, finite_array
 from verify.xfem.block_pattern import BlockPattern, body_pattern, find_places, pattern_places
-from verify.xfem.errors import XfemError, finite_array
+from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.phantom import Aggregation, PhantomMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -40,10 +38,10 @@ class Mass:
 
     matrix: csr_array
     root: csr_array | None
-    weights: _Floats
+    weights: Floats
 
     @cached_property
-    def diagonal(self) -> _Floats | None:
+    def diagonal(self) -> Floats | None:
         """(N,) the diagonal if the matrix is one, else None."""
         rows, columns, _ = self.entries
         return None if (rows != columns).any() else np.asarray(self.matrix.diagonal())
@@ -54,19 +52,19 @@ class Mass:
         return self.diagonal is not None
 
     @cached_property
-    def entries(self) -> tuple[_Ints, _Ints, _Floats]:
+    def entries(self) -> tuple[Ints, Ints, Floats]:
         """(rows, columns, values) of the non-zeros."""
         starts, columns = self.matrix.indptr, self.matrix.indices
         rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         return rows, columns.astype(np.int64), self.matrix.data
 
-    def apply(self, vectors: _Floats) -> _Floats:
+    def apply(self, vectors: Floats) -> Floats:
         """M times (N, d) vectors."""
         if self.diagonal is not None:
             return self.diagonal[:, None] * vectors
         return self.matrix @ vectors
 
-    def solve(self, forces: _Floats) -> _Floats:
+    def solve(self, forces: Floats) -> Floats:
         """M⁻¹ times (N, d) forces."""
         if self.diagonal is not None:
             return forces / self.diagonal[:, None]
@@ -78,7 +76,7 @@ class Mass:
     def _factor(self):
         return splu(csc_array(self.matrix))
 
-    def weight(self, gravity: ArrayLike) -> _Floats:
+    def weight(self, gravity: ArrayLike) -> Floats:
         """(N, d) dead weight of the unknowns in a field of gravity (d,), in newtons.
 
         Raises
@@ -88,7 +86,7 @@ class Mass:
         """
         return self.weights[:, None] * finite_array(gravity, "vector of gravity", (None,))
 
-    def pattern(self, phantom: PhantomMesh, couplings: _Ints | None = None) -> BlockPattern:
+    def pattern(self, phantom: PhantomMesh, couplings: Ints | None = None) -> BlockPattern:
         """Sparsity of stiffness and mass together; its first cells are those of the body.
 
         The lumpings of the thesis couple the unknowns of one node, and the mass of a ghost
@@ -109,7 +107,7 @@ class Mass:
             own = np.concatenate([own, pairs[~found]])
         return body_pattern(phantom, own)
 
-    def places(self, pattern: BlockPattern) -> _Ints:
+    def places(self, pattern: BlockPattern) -> Ints:
         """Block of each of the `entries` in a pattern.
 
         Raises
@@ -153,7 +151,7 @@ class AggregatedMass(Mass):
         """Whether no cut makes the explicit step smaller than that of the smallest element."""
         return self.of_corners.keeps_element_steps
 
-    def solve(self, forces: _Floats) -> _Floats:
+    def solve(self, forces: Floats) -> Floats:
         """M⁻¹ times (N, d) forces: blocks of coupled unknowns are factorised once."""
         coupled, factor = self._coupled
         found = forces / self.matrix.diagonal()[:, None]
@@ -170,7 +168,7 @@ class AggregatedMass(Mass):
             return coupled, None
         return coupled, splu(csc_array(self.matrix[coupled][:, coupled]))
 
-    def project(self, corner_values: _Floats, held: NDArray[np.bool_], values: _Floats) -> _Floats:
+    def project(self, corner_values: Floats, held: Bools, values: Floats) -> Floats:
         """Values (N, d) nearest to those at the corners in the mass, given where held (N, d).
 
         Of a velocity: linear and angular momentum of every part without a support stay.
@@ -186,7 +184,7 @@ class AggregatedMass(Mass):
         return found
 
 
-def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> _Floats:
+def cell_densities(mesh: SimplexMesh, density: ArrayLike) -> Floats:
     """(m,) density of the uncut cells.
 
     Raises
@@ -219,12 +217,12 @@ def side_wise_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     return Mass(matrix=_diagonal_matrix(weights), root=root, weights=weights)
 
 
-def _diagonal_matrix(values: _Floats) -> csr_array:
+def _diagonal_matrix(values: Floats) -> csr_array:
     rows = np.arange(len(values) + 1)
     return csr_array((values, rows[:-1], rows), shape=(len(values), len(values)))
 
 
-def second_moments(phantom: PhantomMesh) -> _Floats:
+def second_moments(phantom: PhantomMesh) -> Floats:
     """(p, d + 1, d + 1) exact integrals of N_i N_j over each piece, in m^d."""
     corners = phantom.cells.shape[1]
     whole = (np.ones((corners, corners)) + np.eye(corners)) / (corners * (corners + 1))
@@ -250,7 +248,7 @@ def consistent_mass(phantom: PhantomMesh, density: ArrayLike) -> Mass:
     return assembled_mass(phantom, density, second_moments(phantom))
 
 
-def assembled_mass(phantom: PhantomMesh, density: ArrayLike, moments: _Floats) -> Mass:
+def assembled_mass(phantom: PhantomMesh, density: ArrayLike, moments: Floats) -> Mass:
     """Mass whose share of each piece is its density times `moments` (p, d + 1, d + 1)."""
     moments = moments * cell_densities(phantom.mesh, density)[phantom.parent][:, None, None]
     rows = np.broadcast_to(phantom.cells[:, :, None], moments.shape)

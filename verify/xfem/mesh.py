@@ -11,8 +11,11 @@ from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from verify.xfem.errors import XfemError, finite_array, index_array
+from verify.xfem.arrays import Floats, Ints, finite_array, index_array
+from verify.xfem.errors import XfemError
 
 # A cell whose volume is below this fraction of (longest edge)^dim is called degenerate: its
 # gradients would lose all digits.
@@ -38,14 +41,12 @@ class SimplexMesh:
         two cells or a cell is given twice.
     """
 
-    points: NDArray[np.float64]
-    cells: NDArray[np.int64]
+    points: Floats
+    cells: Ints
 
     def __init__(self, points: ArrayLike, cells: ArrayLike) -> None:
-        coordinates = np.ascontiguousarray(
-            finite_array(points, "mesh points", (None, 2), (None, 3))
-        )
-        nodes = np.ascontiguousarray(index_array(cells, "cells"))
+        coordinates = finite_array(points, "mesh points", (None, 2), (None, 3))
+        nodes = index_array(cells, "cells")
         _check(coordinates, nodes)
         object.__setattr__(self, "points", coordinates)
         object.__setattr__(self, "cells", nodes)
@@ -69,12 +70,12 @@ class SimplexMesh:
         return self.points.shape[1]
 
     @property
-    def edge_vectors(self) -> NDArray[np.float64]:
+    def edge_vectors(self) -> Floats:
         """(m, dim, space) vectors from the first node of a cell to the others."""
         corners = self.points[self.cells]
         return corners[:, 1:] - corners[:, :1]
 
-    def longest_edges(self, chosen: NDArray[np.int64]) -> NDArray[np.float64]:
+    def longest_edges(self, chosen: Ints) -> Floats:
         """Length (q,) of the longest edge of some cells (q,), in metres."""
         corners = self.points[self.cells[chosen]]
         squared = np.zeros(len(chosen))
@@ -84,7 +85,7 @@ class SimplexMesh:
         return np.sqrt(squared)
 
     @cached_property
-    def measures(self) -> NDArray[np.float64]:
+    def measures(self) -> Floats:
         """(m,) areas or volumes, positive whatever the orientation."""
         edges = self.edge_vectors
         if self.dim == self.space:
@@ -92,7 +93,7 @@ class SimplexMesh:
         return 0.5 * np.linalg.norm(self._across, axis=1)
 
     @cached_property
-    def _across(self) -> NDArray[np.float64]:
+    def _across(self) -> Floats:
         """(m, 3) vectors normal to triangles in space, twice their area long.
 
         The product of the two shorter edges has the least cancellation. Gram's determinant is the
@@ -106,7 +107,7 @@ class SimplexMesh:
         return np.cross(after - at, before - at)
 
     @cached_property
-    def gradients(self) -> NDArray[np.float64]:
+    def gradients(self) -> Floats:
         """(m, dim + 1, space) gradients of the linear shape functions, in 1/m."""
         edges = self.edge_vectors
         if self.dim == self.space:
@@ -119,17 +120,17 @@ class SimplexMesh:
         return np.concatenate([-others.sum(axis=1, keepdims=True), others], axis=1)
 
     @cached_property
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Ints:
         """(m, dim + 1) cell across the facet opposite to each node, -1 on the boundary."""
         return neighbours_across(self.cells)
 
     @cached_property
-    def boundary_facets(self) -> NDArray[np.int64]:
+    def boundary_facets(self) -> Ints:
         """(b, 2) pairs (cell, local node opposite to the facet) of all boundary facets."""
         return np.argwhere(self.neighbours < 0)
 
     @cached_property
-    def node_cells(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def node_cells(self) -> tuple[Ints, Ints]:
         """Cells around each node, as (starts (n + 1,), cells): a compressed list."""
         order = np.argsort(self.cells.ravel(), kind="stable")
         counts = np.bincount(self.cells.ravel(), minlength=len(self.points))
@@ -142,7 +143,7 @@ class SimplexMesh:
         return float(max(np.abs(self.points).max(), box.max()))
 
 
-def _check(points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
+def _check(points: Floats, cells: Ints) -> None:
     if cells.ndim != 2 or not 3 <= cells.shape[1] <= points.shape[1] + 1:
         raise XfemError(
             f"cells of shape {cells.shape} on points in {points.shape[1]}D; expected (m, 3) "
@@ -164,14 +165,20 @@ def facets_of(cells: NDArray) -> NDArray:
     return cells[:, others].reshape(-1, corners - 1)
 
 
-def equal_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def equal_rows(rows: Ints) -> tuple[Ints, Ints]:
     """Pairs (q,), (q,) of equal rows, of those in ascending order the one and the next."""
     order = np.lexsort(rows.T[::-1])
     same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
     return order[:-1][same], order[1:][same]
 
 
-def neighbours_across(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+def connected(count: int, first: Ints, second: Ints) -> Ints:
+    """(count,) number of the connected component of each of so many things, joined in pairs."""
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def neighbours_across(cells: Ints) -> Ints:
     """(m, d + 1) cell across the facet opposite to each node, -1 on the boundary."""
     corners = cells.shape[1]
     facets = np.sort(facets_of(cells), axis=1)

@@ -10,20 +10,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_array
 
+from verify.xfem.arrays import Bools, Floats, Ints, Sides
 from verify.xfem.clip import Partition
 from verify.xfem.crossing import TipRule
 from verify.xfem.cuts import Cut
 from verify.xfem.join import PatchNodes, join_parts, node_sides, number_nodes, piece_sides
-from verify.xfem.mesh import SimplexMesh
+from verify.xfem.mesh import SimplexMesh, connected
 from verify.xfem.pieces import split_cells
 from verify.xfem.zero_points import ZeroPoints
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -44,10 +40,10 @@ class SubCells:
         Positions of all numbered points, and the edges on which the new ones lie.
     """
 
-    piece: _Ints
-    points: _Ints
-    barycentric: _Floats
-    fraction: _Floats
+    piece: Ints
+    points: Ints
+    barycentric: Floats
+    fraction: Floats
     zero_points: ZeroPoints
 
 
@@ -67,7 +63,7 @@ class Aggregation:
 
     corners: "PhantomMesh"
     extension: csr_array
-    node: _Ints
+    node: Ints
 
     @cached_property
     def restriction(self) -> csr_array:
@@ -114,13 +110,13 @@ class PhantomMesh:
     """
 
     mesh: SimplexMesh
-    cells: _Ints
-    parent: _Ints
-    fraction: _Floats
-    label: NDArray[np.int8]
-    node_parent: _Ints
-    level_sets: _Floats
-    node_side: NDArray[np.int8]
+    cells: Ints
+    parent: Ints
+    fraction: Floats
+    label: Sides
+    node_parent: Ints
+    level_sets: Floats
+    node_side: Sides
     sub_cells: SubCells
     snapped: int
     dropped: int
@@ -137,21 +133,21 @@ class PhantomMesh:
         return self if self.aggregation is None else self.aggregation.corners
 
     @cached_property
-    def corner_node(self) -> _Ints:
+    def corner_node(self) -> Ints:
         """(N_corners,) the dof node of each corner; −1 for those that have none."""
         if self.aggregation is None:
             return np.arange(self.node_count)
         return self.aggregation.node
 
     @cached_property
-    def node_corner(self) -> _Ints:
+    def node_corner(self) -> Ints:
         """(N,) the corner that each dof node is."""
         own = np.flatnonzero(self.corner_node >= 0)
         corner = np.empty(self.node_count, dtype=np.int64)
         corner[self.corner_node[own]] = own
         return corner
 
-    def following(self, aggregation: "Aggregation", old_of_new: _Ints) -> "PhantomMesh":
+    def following(self, aggregation: "Aggregation", old_of_new: Ints) -> "PhantomMesh":
         """Leave the dof nodes `old_of_new` (N,) alone, which the other corners follow."""
         return replace(
             self,
@@ -160,26 +156,26 @@ class PhantomMesh:
             aggregation=aggregation,
         )
 
-    def extend(self, values: _Floats) -> _Floats:
+    def extend(self, values: Floats) -> Floats:
         """Corner values (N_corners, d) of nodal values (N, d)."""
         return values if self.aggregation is None else self.aggregation.extension @ values
 
-    def restrict(self, forces: _Floats) -> _Floats:
+    def restrict(self, forces: Floats) -> Floats:
         """Nodal forces (N, d) that do the same work as forces at the corners (N_corners, d)."""
         return forces if self.aggregation is None else self.aggregation.restriction @ forces
 
     @cached_property
-    def node_points(self) -> _Floats:
+    def node_points(self) -> Floats:
         """(N, space) material position of the dof nodes, in metres."""
         return self.mesh.points[self.node_parent]
 
     @cached_property
-    def split(self) -> NDArray[np.bool_]:
+    def split(self) -> Bools:
         """(p,) whether a piece is described by sub-simplices: it is not just its whole cell."""
         return np.bincount(self.sub_cells.piece, minlength=len(self.cells)) > 0
 
     @cached_property
-    def part(self) -> _Ints:
+    def part(self) -> Ints:
         """(p,) first of the pieces of a cell that have all unknowns in common: together one part.
 
         Where cuts end on one another they leave pieces that none keeps apart.
@@ -192,13 +188,13 @@ class PhantomMesh:
         return part
 
     @cached_property
-    def part_fraction(self) -> _Floats:
+    def part_fraction(self) -> Floats:
         """(p,) share of the part of each piece in the volume of its cell."""
         total = np.bincount(self.part, self.fraction, minlength=len(self.part))
         return np.asarray(total[self.part])
 
     @cached_property
-    def piece_side(self) -> NDArray[np.int8]:
+    def piece_side(self) -> Sides:
         """(p, cuts) side of each cut on which a piece lies, whether split by it or not."""
         corners, sub = self.mesh.cells[self.parent], self.sub_cells
         mean = self.level_sets[corners].sum(axis=1)
@@ -210,17 +206,17 @@ class PhantomMesh:
         return side
 
     @cached_property
-    def volumes(self) -> _Floats:
+    def volumes(self) -> Floats:
         """(p,) volume of each piece, in m^d."""
         return self.fraction * self.mesh.measures[self.parent]
 
     @cached_property
-    def enriched_nodes(self) -> _Ints:
+    def enriched_nodes(self) -> Ints:
         """Nodes of the uncut mesh that have more than one dof node."""
         return np.flatnonzero(np.bincount(self.node_parent) > 1)
 
     @cached_property
-    def shape_integrals(self) -> _Floats:
+    def shape_integrals(self) -> Floats:
         """(p, d + 1) exact integrals of the shape functions over the pieces, in m^d."""
         corners = self.cells.shape[1]
         integrals = np.repeat(self.volumes[:, None] / corners, corners, axis=1)
@@ -231,13 +227,13 @@ class PhantomMesh:
         return integrals
 
     @cached_property
-    def piece_centroids(self) -> _Floats:
+    def piece_centroids(self) -> Floats:
         """(p, space) centroid of each piece, in metres."""
         weights = self.shape_integrals / self.volumes[:, None]
         return np.einsum("pi,pij->pj", weights, self.mesh.points[self.mesh.cells[self.parent]])
 
     @cached_property
-    def node_piece_points(self) -> _Floats:
+    def node_piece_points(self) -> Floats:
         """(N, space) a point inside the material of each unknown: centroid of its largest piece."""
         if self.aggregation is not None:
             return self.corners.node_piece_points[self.node_corner]
@@ -248,7 +244,7 @@ class PhantomMesh:
         return self.piece_centroids[piece[order[last]]]
 
     @cached_property
-    def solid_simplices(self) -> tuple[_Ints, _Floats, _Floats]:
+    def solid_simplices(self) -> tuple[Ints, Floats, Floats]:
         """The material as simplices: piece (q,), barycentric corners (q, d + 1, d + 1), share.
 
         Whole cells and the sub-simplices of split ones; what integrals over the body run over.
@@ -264,22 +260,20 @@ class PhantomMesh:
         )
 
     @cached_property
-    def bodies(self) -> _Ints:
+    def bodies(self) -> Ints:
         """(N,) number of the free body to which each dof node belongs."""
         if self.aggregation is not None:
             return self.corners.bodies[self.node_corner]
         first, others = self.cells[:, :1], self.cells[:, 1:]
         row = np.broadcast_to(first, others.shape).ravel()
-        size = self.node_count
-        graph = coo_array((np.ones(row.size, np.int8), (row, others.ravel())), shape=(size, size))
-        return connected_components(graph, directed=False)[1].astype(np.int64)
+        return connected(self.node_count, row, others.ravel())
 
 
 def cut_mesh(
     mesh: SimplexMesh,
     cuts: Sequence[Cut],
     tip: TipRule = "inside",
-    opened: NDArray[np.bool_] | None = None,
+    opened: Bools | None = None,
 ) -> PhantomMesh:
     """Cut a mesh.
 
@@ -317,10 +311,10 @@ def _phantom_mesh(
     mesh: SimplexMesh,
     partition: Partition,
     joined: PatchNodes,
-    solid: NDArray[np.bool_],
-    fraction: _Floats,
-    node_parent: _Ints,
-    numbering: _Ints,
+    solid: Bools,
+    fraction: Floats,
+    node_parent: Ints,
+    numbering: Ints,
 ) -> PhantomMesh:
     pieces, cuts = partition.label.shape
     untouched = np.ones(len(mesh.cells), dtype=bool)

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, Ints, Sides, check_choice, finite_array
 from verify.xfem.clip import Partition, bisected, divided
 from verify.xfem.crossing import (
     Crossing,
@@ -27,15 +27,11 @@ from verify.xfem.crossing import (
     without_specks,
 )
 from verify.xfem.cuts import Cut
-from verify.xfem.errors import XfemError, check_choice, finite_array
+from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 from verify.xfem.zero_points import ZeroPoints
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
-
-Held = Callable[[_Ints, NDArray[np.int8], int], _Bools]
+Held = Callable[[Ints, Sides, int], Bools]
 
 ROUND_OFF = 8.0 * np.finfo(float).eps
 
@@ -44,11 +40,11 @@ class _Rules(NamedTuple):
     """How cuts divide: what `split_cells` was given, and sizes of the cells."""
 
     cuts: Sequence[Cut]
-    sizes: _Floats
+    sizes: Floats
     tip: TipRule
     held: Held | None
-    opened: _Bools | None
-    through: _Bools | None = None  # (m, cuts) cells in which a cut has no end
+    opened: Bools | None
+    through: Bools | None = None  # (m, cuts) cells in which a cut has no end
 
 
 def split_cells(
@@ -56,8 +52,8 @@ def split_cells(
     cuts: Sequence[Cut],
     tip: TipRule = "inside",
     held: Held | None = None,
-    opened: _Bools | None = None,
-    joint: _Bools | None = None,
+    opened: Bools | None = None,
+    joint: Bools | None = None,
 ) -> Partition:
     """Split every cell that a cut goes through, or that several part together.
 
@@ -100,7 +96,7 @@ def split_cells(
     sizes = np.zeros(len(mesh.cells))
     sizes[crossed] = mesh.longest_edges(crossed)
 
-    def parted(cells: _Ints, rules: _Rules) -> tuple[Partition, list[_Ints]]:
+    def parted(cells: Ints, rules: _Rules) -> tuple[Partition, list[Ints]]:
         points = ZeroPoints(mesh.points, values, ROUND_OFF * mesh.extent)
         return _parted(Partition.whole(mesh.cells, cells, points, snapped), rules)
 
@@ -125,7 +121,7 @@ def split_cells(
     return replace(partition, tied=tied_pieces(partition, cuts, sizes, cells))
 
 
-def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
+def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[Floats, int]:
     """Level sets (n, cuts) at the nodes, zero within round-off; how many were made zero.
 
     Raises
@@ -148,7 +144,7 @@ def nodal_values(mesh: SimplexMesh, cuts: Sequence[Cut]) -> tuple[_Floats, int]:
     return values, int(tiny.sum())
 
 
-def _parted(partition: Partition, rules: _Rules) -> tuple[Partition, list[_Ints]]:
+def _parted(partition: Partition, rules: _Rules) -> tuple[Partition, list[Ints]]:
     """Divide pieces by all cuts; also the cells in pieces of which each cut ends."""
     ends = [np.empty(0, dtype=np.int64)] * len(rules.cuts)
     # a branch given before its stem can split only once the stem has: hence more than one pass
@@ -161,7 +157,7 @@ def _parted(partition: Partition, rules: _Rules) -> tuple[Partition, list[_Ints]
     return partition, ends
 
 
-def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partition, _Ints]:
+def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partition, Ints]:
     """Divide pieces by one cut; also the cells in pieces of which it ends."""
     points, parent, cut = partition.points, partition.parent, rules.cuts[index]
     edges, piece = partition.crossed_edges(index)
@@ -176,7 +172,7 @@ def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partitio
     further = None
     if rules.tip == "inside" and len(rules.cuts) > 1:
 
-        def further(past: _Ints, size: _Floats) -> _Bools:
+        def further(past: Ints, size: Floats) -> Bools:
             return reached(rules.cuts, index, points, past, size)
 
     active, ending = crossed_through(cut, points.positions, crossing, rules.tip, further)
@@ -195,7 +191,7 @@ def _split_by(partition: Partition, index: int, rules: _Rules) -> tuple[Partitio
     return (partition if len(rules.cuts) == 1 else _bisect_beside(partition, index)), ends
 
 
-def _divide(partition: Partition, index: int, active: _Bools) -> Partition:
+def _divide(partition: Partition, index: int, active: Bools) -> Partition:
     """Replace each active piece by its part above (same place) and below (appended)."""
     below = np.where(active, len(active) - 1 + np.cumsum(active), -1)
     label = np.concatenate([partition.label, partition.label[active]])

@@ -10,17 +10,19 @@ the form (a Jacobi iteration, which cannot fail) is taken instead.
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-_Floats = NDArray[np.float64]
+from verify.xfem.arrays import Floats
 
 _NEWTON_STEPS = 12
 _PIVOT = 1e-4  # of the norm of F: a Hessian nearer to singular goes to the eigenvector
 _SMALL_ANGLE = 1e-16  # square of the last rotation: Newton squares it once more, to round-off
 _JACOBI_SWEEPS = 12
+# skew matrices (turns, d, d) of infinitesimal rotations, by d
+SPINS = {2: np.array([[[0.0, -1.0], [1.0, 0.0]]]), 3: np.cross(np.eye(3)[:, None], np.eye(3))}
+SPINS[3] = SPINS[3].transpose(0, 2, 1)
 
 
-def nearest_rotations(F: _Floats) -> _Floats:
+def nearest_rotations(F: Floats) -> Floats:
     """Rotations nearest to deformation gradients (p, d, d), any, also singular or inverted."""
     R = np.empty(F.shape)
     if F.shape[1] == 2:
@@ -30,13 +32,13 @@ def nearest_rotations(F: _Floats) -> _Floats:
     return R
 
 
-def adjugate(A: _Floats) -> tuple[_Floats, _Floats]:
+def adjugate(A: Floats) -> tuple[Floats, Floats]:
     """Adjugates and determinants of symmetric matrices (p, 3, 3)."""
     cofactors = np.cross(A[:, [1, 2, 0]], A[:, [2, 0, 1]])
     return cofactors, np.einsum("pk,pk->p", A[:, 0], cofactors[:, 0])
 
 
-def rotations_in_plane(F: _Floats, R: _Floats) -> None:
+def rotations_in_plane(F: Floats, R: Floats) -> None:
     """Write the rotations nearest to F (p, 2, 2) to R; the identity where none is nearest."""
     with np.errstate(invalid="ignore", over="ignore"):
         along, across = F[:, 0, 0] + F[:, 1, 1], F[:, 1, 0] - F[:, 0, 1]

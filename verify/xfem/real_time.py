@@ -5,9 +5,9 @@ the geometric stiffness: symmetric positive definite, so that the step always ha
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from verify.xfem.block_pattern import add_mass, constrain, held_entries, symmetric_product
+from verify.xfem.arrays import Floats
+from verify.xfem.block_pattern import add_mass, constrain, held_entries
 from verify.xfem.body import (
     DynamicBody,
     MotionState,
@@ -19,8 +19,6 @@ from verify.xfem.body import (
 from verify.xfem.errors import XfemError
 from verify.xfem.linear_solvers import LinearSolver
 from verify.xfem.supports import Supports
-
-_Floats = NDArray[np.float64]
 
 _EXACT = 1e-10  # residual that conjugate gradients leave of the right-hand side of a step
 
@@ -52,12 +50,7 @@ class RealTimeEuler:
         self._change = np.zeros(body.shape)  # of the velocity, in this step
         self._changes = [np.zeros(body.shape) for _ in range(3)]  # in the last ones, the last first
         self._supported = np.flatnonzero(body.fixed.any(axis=1))
-        pattern = body.pattern
-        self._held = held_entries(pattern, body.fixed)
-        row = np.repeat(np.arange(len(body.fixed)), np.diff(pattern.starts))
-        self._held_above = self._held[(pattern.columns >= row)[self._held // space**2]]
-        self._driven = np.zeros(body.shape)
-        self._resisted = np.empty_like(self._driven)
+        self._held = held_entries(body.pattern, body.fixed)
 
     def step(self, state: MotionState) -> StepForces:
         """Advance by one step."""
@@ -83,9 +76,9 @@ class RealTimeEuler:
             If the solver fails or the result is not finite; the state is left as it was.
         """
         check_state(state, self.body.shape)
-        self.linearise(state)
-        if len(self._supported):
-            self._support(state)
+        driven = self._driven(state)
+        self.linearise(state, bool(driven.any()) or not self.solver.reads_half)
+        self._support(driven)
         try:
             self.solver.factorize(self.blocks)
             self._solve()
@@ -115,14 +108,14 @@ class RealTimeEuler:
         self._changes.insert(0, self._changes.pop())
         self._changes[0][:] = self._change
 
-    def linearise(self, state: MotionState) -> None:
-        """Write M + hC + h²K into `blocks` and the right-hand side into `load`."""
+    def linearise(self, state: MotionState, whole: bool = True) -> None:
+        """Write M + hC + h²K, or its upper half, into `blocks`, the right-hand side into `load`."""
         body, h = self.body, self.step_size
         damping = body.damping
         implicit = h + damping.stiffness
         body.force.linearise(
             body.pattern, state.displacement, state.velocity, implicit, h * implicit,
-            self._internal, self.blocks, not self.solver.reads_half,
+            self._internal, self.blocks, whole,
         )  # fmt: skip
         if body.force.is_membrane:
             # what tension holds it with across its plane is as stiff as it is thin: implicit too
@@ -135,21 +128,24 @@ class RealTimeEuler:
             self.load -= damping.mass * body.mass.apply(state.velocity)
         self.load *= h
 
-    def _support(self, state: MotionState) -> None:
-        """Let fixed components move as prescribed; what that does to the others goes right."""
+    def _driven(self, state: MotionState) -> Floats:
+        """Change of velocity (k, d) with which supported nodes go where they are prescribed."""
         body, nodes = self.body, self._supported
         if isinstance(body.supports, Supports):
             where = body.supports.values
         else:
             where, _ = body.prescribed(state.time + self.step_size)
         change = (where[nodes] - state.displacement[nodes]) / self.step_size - state.velocity[nodes]
-        self._driven[nodes] = np.where(body.fixed[nodes], change, 0.0)
-        if self._driven.any():
-            lists = body.pattern.starts, body.pattern.columns, body.pattern.diagonal
-            symmetric_product(*lists, self.blocks, self._driven, self._resisted)
-            self.load -= self._resisted
-        held = self._held_above if self.solver.reads_half else self._held
-        constrain(body.pattern, body.fixed, self.blocks, held)
-        diagonal = np.einsum("nkk->nk", self.blocks[body.pattern.diagonal[nodes]])
-        own = diagonal * self._driven[nodes]
+        return np.where(body.fixed[nodes], change, 0.0)
+
+    def _support(self, driven: Floats) -> None:
+        """Let fixed components move as prescribed; what that does to the others goes right."""
+        body, nodes = self.body, self._supported
+        if driven.any():
+            whole = np.zeros(body.shape)
+            whole[nodes] = driven
+            resisted = body.pattern.matrix(self.blocks) @ whole.ravel()
+            self.load -= resisted.reshape(body.shape)
+        constrain(body.pattern, body.fixed, self.blocks, self._held)
+        own = np.einsum("nkk->nk", self.blocks[body.pattern.diagonal[nodes]]) * driven
         self.load[nodes] = np.where(body.fixed[nodes], own, self.load[nodes])

@@ -8,12 +8,11 @@ the linear response to the whole of it would stretch the body by its arm times t
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.phantom import PhantomMesh
-
-_Floats = NDArray[np.float64]
+from verify.xfem.polar import nearest_rotations
 
 _UNDETERMINED = 1e-9  # of the spread of the points: turns that they do not determine stay near 1
 _SMALL = 1e-2  # change of a vector of length one: smaller turns are the linear response's
@@ -30,7 +29,7 @@ class RigidMotions:
         without such a node stays where it is.
     """
 
-    def __init__(self, phantom: PhantomMesh, fixed: NDArray[np.bool_]) -> None:
+    def __init__(self, phantom: PhantomMesh, fixed: Bools) -> None:
         self._points = phantom.node_points
         whole = fixed.all(axis=1)
         bodies = phantom.bodies
@@ -40,7 +39,7 @@ class RigidMotions:
         # corners that follow others have number −1: not held
         self._edges = _edges_within(phantom.corner_node[phantom.cells], np.append(whole, False))
 
-    def follow(self, displacement: _Floats, change: _Floats) -> _Floats:
+    def follow(self, displacement: Floats, change: Floats) -> Floats:
         """Displacement (N, d) after each body has followed the `change` (N, d) of its supports.
 
         It is the least-squares motion of the nodes that are held in all components.
@@ -51,7 +50,7 @@ class RigidMotions:
             moved[nodes] = (here - centre) @ turn.T + wanted - self._points[nodes]
         return moved
 
-    def turned_path(self, displacement: _Floats) -> Callable[[float], _Floats] | None:
+    def turned_path(self, displacement: Floats) -> Callable[[float], Floats] | None:
         """Path to a prescribed displacement (N, d) along rotations; None if no body turns.
 
         Each body turns by a share of its angle, so that it does not shrink on the way as on the
@@ -61,7 +60,7 @@ class RigidMotions:
         if not turns:
             return None
 
-        def at(share: float) -> _Floats:
+        def at(share: float) -> Floats:
             values = share * displacement
             for nodes, turn, centre, wanted in turns:
                 arm = self._points[nodes] - centre
@@ -73,8 +72,8 @@ class RigidMotions:
         return at
 
     def _turns(
-        self, displacement: _Floats, change: _Floats
-    ) -> Iterator[tuple[NDArray[np.int64], _Floats, _Floats, _Floats]]:
+        self, displacement: Floats, change: Floats
+    ) -> Iterator[tuple[Ints, Floats, Floats, Floats]]:
         """Nodes of each body that turns, its rotation, and the centre of what holds it: two places.
 
         Bodies that turn by little are left to the linear response.
@@ -91,7 +90,7 @@ class RigidMotions:
             if np.linalg.norm(turn - np.eye(len(turn))) >= _SMALL:
                 yield nodes, turn, centre, wanted
 
-    def strain(self, displacement: _Floats, change: _Floats) -> float:
+    def strain(self, displacement: Floats, change: Floats) -> float:
         """Root mean square by which edges of held nodes change beyond the motion of their body.
 
         Parts that turn against one another by an angle θ make it 2 sin(θ/4) or less.
@@ -110,11 +109,11 @@ class RigidMotions:
         return float(np.sqrt(np.mean(ratio**2))) if len(ratio) else 0.0
 
 
-def nearest_rotation(before: _Floats, after: _Floats) -> _Floats:
+def nearest_rotation(before: Floats, after: Floats) -> Floats:
     """Rotation (d, d) that takes centred points (k, d) nearest to others, by least squares.
 
-    What the points leave open (one point, points on a line) is turned as little as possible.
-    Source: W. Kabsch, Acta Cryst. A 32, 1976; S. Umeyama, IEEE PAMI 13, 1991, for the sign.
+    It is that nearest to their covariance (W. Kabsch, Acta Cryst. A 32, 1976). What the points
+    leave open (one point, points on a line) is turned as little as possible.
     """
     d = before.shape[1]
     covariance = after.T @ before
@@ -123,24 +122,21 @@ def nearest_rotation(before: _Floats, after: _Floats) -> _Floats:
         return np.eye(d)
     turn = np.eye(d)
     for _ in range(2):  # the second time what is determined is not pulled back any more
-        left, _, right = np.linalg.svd(covariance / scale + _UNDETERMINED * turn)
-        sign = np.ones(d)
-        sign[-1] = np.sign(np.linalg.det(left) * np.linalg.det(right))
-        turn = (left * sign) @ right
+        turn = nearest_rotations(covariance[None] / scale + _UNDETERMINED * turn)[0]
     return turn
 
 
-def part_of_rotation(turn: _Floats, share: float) -> _Floats:
+def part_of_rotation(turn: Floats, share: float) -> Floats:
     """Rotation (d, d) about the same axis by a share of the angle, which is at most half a turn."""
     d = len(turn)
     in_space = np.eye(3)
     in_space[:d, :d] = turn
     part = Rotation.from_rotvec(share * Rotation.from_matrix(in_space).as_rotvec())
-    rotation: _Floats = part.as_matrix()[:d, :d]
+    rotation: Floats = part.as_matrix()[:d, :d]
     return rotation
 
 
-def _edges_within(cells: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _edges_within(cells: Ints, chosen: Bools) -> Ints:
     """Edges (e, 2) of cells both ends of which are chosen."""
     corners = cells.shape[1]
     pairs = [(i, j) for i in range(corners) for j in range(i + 1, corners)]

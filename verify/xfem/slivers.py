@@ -26,13 +26,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, identity
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_array, identity
 
 from verify.xfem.aggregation import aggregate
+from verify.xfem.arrays import Bools, Ints, check_choice
 from verify.xfem.contacts import absorb, face_contacts, sibling_contacts
-from verify.xfem.errors import XfemError, check_choice
+from verify.xfem.errors import XfemError
+from verify.xfem.mesh import connected
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, loose_bodies
 
@@ -44,10 +44,6 @@ DEFAULT_THRESHOLD = 0.1
 # Size across over that of an element, below which a loose part is a speck. Its volume is below the
 # power d of this, which changes the energy of a body by less than a solution is accurate to.
 _ACROSS = 1e-3
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
-_Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -87,14 +83,14 @@ class SliverReport:
     largest: float
     volume_share: float
     extension: csr_array
-    node: _Ints
+    node: Ints
 
 
 def treat_slivers(
     phantom: PhantomMesh,
     policy: SliverPolicy = DEFAULT_POLICY,
     threshold: float = DEFAULT_THRESHOLD,
-    held: _Bools | None = None,
+    held: Bools | None = None,
 ) -> tuple[PhantomMesh, SliverReport]:
     """Apply a sliver policy to a cut mesh.
 
@@ -153,13 +149,13 @@ def treat_slivers(
     )
 
 
-def _bridges(phantom: PhantomMesh, small: _Bools) -> _Bools:
+def _bridges(phantom: PhantomMesh, small: Bools) -> Bools:
     """Which small pieces hold parts of the body together; the whole body only if need be."""
     suspects = _torn(face_contacts(phantom, near=True), small)
     return _torn(face_contacts(phantom), small) if suspects.any() else suspects
 
 
-def _torn(contacts: tuple[_Ints, _Ints], removed: _Bools) -> _Bools:
+def _torn(contacts: tuple[Ints, Ints], removed: Bools) -> Bools:
     """Which of the removed pieces (p,) hold together several remaining parts, across faces.
 
     Removed pieces in contact count as one, and parts that touch in a node or an edge only as
@@ -167,27 +163,25 @@ def _torn(contacts: tuple[_Ints, _Ints], removed: _Bools) -> _Bools:
     """
     first, second = contacts
     same = removed[first] == removed[second]
-    ones = np.ones(int(same.sum()), dtype=np.int8)
-    graph = coo_array((ones, (first[same], second[same])), shape=(len(removed), len(removed)))
-    part = connected_components(graph, directed=False)[1]
+    part = connected(len(removed), first[same], second[same])
     inner = np.where(removed[first], first, second)[~same]
     outer = np.where(removed[first], second, first)[~same]
     touched = np.unique(np.stack([part[inner], part[outer]]), axis=1)[0]
     several = np.bincount(touched, minlength=part.max(initial=0) + 1) > 1
-    torn: _Bools = removed & several[part]
+    torn: Bools = removed & several[part]
     return torn
 
 
-def _largest_siblings(phantom: PhantomMesh) -> _Ints:
+def _largest_siblings(phantom: PhantomMesh) -> Ints:
     """Return the largest piece of each cell."""
     parent, fraction = phantom.parent, phantom.part_fraction
     most = np.maximum.reduceat(fraction, np.flatnonzero(np.diff(parent, prepend=-1)))
     candidates = np.flatnonzero(fraction == most[parent])
-    largest: _Ints = candidates[np.diff(parent[candidates], append=-1) != 0]
+    largest: Ints = candidates[np.diff(parent[candidates], append=-1) != 0]
     return largest
 
 
-def _siblings(phantom: PhantomMesh, small: _Bools) -> _Ints:
+def _siblings(phantom: PhantomMesh, small: Bools) -> Ints:
     """(p,) the sibling that absorbs each small piece: among the larger ones, most in contact."""
     largest = np.full(len(phantom.mesh.cells), -1)
     best = _largest_siblings(phantom)
@@ -207,7 +201,7 @@ def _siblings(phantom: PhantomMesh, small: _Bools) -> _Ints:
     return _followed_to_the_end(into)
 
 
-def _followed_to_the_end(into: _Ints) -> _Ints:
+def _followed_to_the_end(into: Ints) -> Ints:
     while True:
         further = into[into]
         if np.array_equal(further, into):

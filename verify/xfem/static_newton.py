@@ -3,14 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.block_pattern import body_pattern, constrain, held_entries
 from verify.xfem.errors import SingularStiffnessError
 from verify.xfem.internal_force import InternalForce
 from verify.xfem.statics import StaticSolver, is_large
-
-_Floats = NDArray[np.float64]
 
 _HALVINGS = 12
 _ROUND_OFF = 256.0 * np.finfo(float).eps
@@ -34,8 +32,8 @@ class NotInEquilibriumError(RuntimeError):
 class Place(NamedTuple):
     """Displacement (N, d), its residual (N, d) and what both are judged by."""
 
-    displacement: _Floats
-    residual: _Floats
+    displacement: Floats
+    residual: Floats
     norm: float
     scale: float  # to which the norm compares, N
     energy: float  # potential, J
@@ -55,7 +53,7 @@ class Newton:
     """
 
     def __init__(
-        self, force: InternalForce, fixed: NDArray[np.bool_], tolerance: float, iterations: int
+        self, force: InternalForce, fixed: Bools, tolerance: float, iterations: int
     ) -> None:
         self._force, self._fixed = force, fixed
         self._tolerance, self._iterations = tolerance, iterations
@@ -77,7 +75,7 @@ class Newton:
         """Largest entry of the stiffness that was assembled last."""
         return float(np.abs(self._blocks).max(initial=0.0))
 
-    def solve(self, displacement: _Floats, change: _Floats, load: _Floats) -> tuple[_Floats, int]:
+    def solve(self, displacement: Floats, change: Floats, load: Floats) -> tuple[Floats, int]:
         """Equilibrium after a change of the fixed components, and the solves that it took."""
         start = self.place(displacement, load)
         place = self.place(displacement + self._spread(start, change), load)
@@ -104,7 +102,7 @@ class Newton:
             "at a stretch of 1 + 1/ν), so that there may be no equilibrium"
         )
 
-    def place(self, displacement: _Floats, load: _Floats) -> Place:
+    def place(self, displacement: Floats, load: Floats) -> Place:
         """Judge a displacement (N, d) under a load (N, d)."""
         internal, energy = self._force.evaluate(displacement)
         scale = max(float(np.linalg.norm(internal)), float(np.linalg.norm(load)))
@@ -112,7 +110,7 @@ class Newton:
         residual = np.where(self._fixed, 0.0, load - internal)
         return Place(displacement, residual, float(np.linalg.norm(residual)), scale, potential)
 
-    def is_stable(self, displacement: _Floats) -> bool:
+    def is_stable(self, displacement: Floats) -> bool:
         """Whether the consistent tangent at a displacement (N, d) is positive definite.
 
         A factorisation without pivoting exists only then; conjugate gradients, from forces in all
@@ -126,7 +124,7 @@ class Newton:
             return False
         return True
 
-    def way_out(self, place: Place, load: _Floats) -> Place | None:
+    def way_out(self, place: Place, load: Floats) -> Place | None:
         """Place of less potential energy along the softest mode of an unstable equilibrium.
 
         None if the curvature is not negative there: the stiffness is then singular, not indefinite.
@@ -143,7 +141,7 @@ class Newton:
                 return best
         return None
 
-    def _softest_mode(self, displacement: _Floats) -> _Floats | None:
+    def _softest_mode(self, displacement: Floats) -> Floats | None:
         """Mode (N, d) of negative curvature, its largest entry one; None if there is none."""
         for rotational in _SHARES[1:]:
             self._assemble(displacement, rotational)
@@ -162,15 +160,15 @@ class Newton:
                 return mode
         return None
 
-    def _random_force(self) -> _Floats:
+    def _random_force(self) -> Floats:
         forces = np.random.default_rng(0).standard_normal(self._fixed.shape)
         return np.where(self._fixed, 0.0, forces)
 
-    def _spread(self, start: Place, change: _Floats) -> _Floats:
+    def _spread(self, start: Place, change: Floats) -> Floats:
         """Spread the prescribed change with the stiffness before it."""
         return self._correct(start.displacement, start.residual, change)
 
-    def _next(self, place: Place, load: _Floats) -> Place:
+    def _next(self, place: Place, load: Floats) -> Place:
         """Place with a smaller residual; if that is not a correction away, one further down."""
         leap = place
         for rotational in _SHARES:
@@ -190,7 +188,7 @@ class Newton:
                 return self.place(place.displacement + share * correction, load)
         return leap  # beside a cell whose force jumps, or in round-off
 
-    def _share_downhill(self, place: Place, correction: _Floats, load: _Floats) -> float:
+    def _share_downhill(self, place: Place, correction: Floats, load: Floats) -> float:
         """Share of a correction that lowers the potential energy as its slope says; 0 if none."""
         fall = float(np.vdot(place.residual, correction))
         for halving in range(_HALVINGS):
@@ -209,7 +207,7 @@ class Newton:
         round_off = _ROUND_OFF * self.largest_stiffness * reach
         return place.norm <= max(self._tolerance * place.scale, round_off)
 
-    def _correct(self, displacement: _Floats, residual: _Floats, change: _Floats | None) -> _Floats:
+    def _correct(self, displacement: Floats, residual: Floats, change: Floats | None) -> Floats:
         try:
             return self._solve(displacement, residual, change, 1.0)
         except SingularStiffnessError:
@@ -217,12 +215,12 @@ class Newton:
 
     def _solve(
         self,
-        displacement: _Floats,
-        residual: _Floats,
-        change: _Floats | None,
+        displacement: Floats,
+        residual: Floats,
+        change: Floats | None,
         rotational: float,
         least: float = 0.0,
-    ) -> _Floats:
+    ) -> Floats:
         """Solve for a change of the fixed components, or for the residual; see `_assemble`."""
         pattern, blocks = self._pattern, self._blocks
         self._assemble(displacement, rotational, least)
@@ -234,7 +232,7 @@ class Newton:
         correction = self._solved(load)
         return correction if change is None else correction + change
 
-    def _assemble(self, displacement: _Floats, rotational: float, least: float = 0.0) -> None:
+    def _assemble(self, displacement: Floats, rotational: float, least: float = 0.0) -> None:
         """Fill the blocks with the tangent at a displacement.
 
         `rotational` is the share of what the consistent tangent has beyond the rotation-fixed one.
@@ -246,7 +244,7 @@ class Newton:
         if rotational == 0.0 and force.is_membrane:
             force.add_stiffness(pattern, blocks, 1.0, "tension", displacement, least)
 
-    def _solved(self, load: _Floats) -> _Floats:
+    def _solved(self, load: Floats) -> Floats:
         """Solve with the blocks.
 
         Raises
@@ -267,12 +265,12 @@ class Descent(Newton):
 
     _least = _TAUT
 
-    def _spread(self, start: Place, change: _Floats) -> _Floats:
+    def _spread(self, start: Place, change: Floats) -> Floats:
         """Let what is prescribed happen; how far the rest goes with it, the energy says later."""
         self._least = _TAUT
         return self._solve(start.displacement, start.residual, change, 0.0, least=self._least)
 
-    def _next(self, place: Place, load: _Floats) -> Place:
+    def _next(self, place: Place, load: Floats) -> Place:
         """Place further down; the same one with more tension if no way leads there."""
         correction = self._downhill(place.displacement, place.residual, self._least)
         share = self._share_downhill(place, correction, load)
@@ -282,7 +280,7 @@ class Descent(Newton):
         self._least *= _FALL if share == 1.0 else 1.0
         return self.place(place.displacement + share * correction, load)
 
-    def _downhill(self, displacement: _Floats, residual: _Floats, least: float) -> _Floats:
+    def _downhill(self, displacement: Floats, residual: Floats, least: float) -> Floats:
         """Correction along which the energy falls."""
         if least < _SLACK:
             try:
@@ -292,7 +290,7 @@ class Descent(Newton):
         return self._solve(displacement, residual, None, 0.0, least=max(least, _LEAST))
 
 
-def collapsed_cells(force: InternalForce, displacement: _Floats, ratio: float) -> NDArray[np.int64]:
+def collapsed_cells(force: InternalForce, displacement: Floats, ratio: float) -> Ints:
     """Cells whose rotation, and with it the force, is not unique, or nearly so.
 
     That is where the two principal stretches of a plane cell cancel (of an inverted cell the

@@ -1,22 +1,22 @@
 """Linear statics of a cut body."""
 
 from dataclasses import dataclass
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from verify.xfem.arrays import Bools, Floats, check_choice, finite_array
 from verify.xfem.block_pattern import BlockPattern, body_pattern, constrain
 from verify.xfem.elasticity import Material
-from verify.xfem.errors import NotConvergedError, check_choice, finite_array
+from verify.xfem.errors import NotConvergedError
 from verify.xfem.ghost_penalty import GhostPenalty
 from verify.xfem.internal_force import InternalForce
-from verify.xfem.linear_solvers import PLAIN, Kernels
+from verify.xfem.linear_solvers import PLAIN, Kernels, LinearSolver
 from verify.xfem.phantom import PhantomMesh
 from verify.xfem.supports import Supports, check_bodies
 
-_Floats = NDArray[np.float64]
 Method = Literal["auto", "direct", "iterative"]
 
 ITERATE_FROM = 2000  # nodes in space, from which iterations are faster (measured)
@@ -48,9 +48,9 @@ class StaticSolution:
         What has solved it.
     """
 
-    displacement: _Floats
+    displacement: Floats
     strain_energy: float
-    reaction: _Floats
+    reaction: Floats
     residual: float
     timings: dict[str, float]
     penalty_energy: float = 0.0
@@ -61,7 +61,7 @@ def solve_static(
     phantom: PhantomMesh,
     material: Material,
     supports: Supports,
-    load: _Floats | None = None,
+    load: Floats | None = None,
     solver: Method = "auto",
     ghost: GhostPenalty | None = None,
     kernels: Kernels = PLAIN,
@@ -157,27 +157,26 @@ class StaticSolver:
         self,
         force: InternalForce,
         pattern: BlockPattern,
-        fixed: NDArray[np.bool_],
+        fixed: Bools,
         tolerance: float,
         limit: int,
     ) -> None:
-        kernels, self._block = force.kernels, fixed.shape[1]
-        self._pattern, self._held, self._kernels = pattern, fixed.all(axis=1), kernels
-        self._iterative = self._direct = None
-        if limit > 0:
-            self._iterative = kernels.iterative(pattern, self._block, tolerance, limit)
-        else:
-            self._direct = kernels.direct(pattern, self._block, self._held)
+        kernels, block = force.kernels, fixed.shape[1]
+        self._made = partial(kernels.direct, pattern, block, fixed.all(axis=1))
+        self._iterative = kernels.iterative(pattern, block, tolerance, limit) if limit else None
+        self._first = self._iterative or self._direct
         self.used: set[str] = set()
 
-    def factorize(self, blocks: _Floats) -> None:
+    @cached_property
+    def _direct(self) -> LinearSolver:
+        return self._made()
+
+    def factorize(self, blocks: Floats) -> None:
         """Take the matrix with these nodal blocks; see `LinearSolver`."""
         self._blocks = blocks
-        first = self._iterative or self._direct
-        assert first is not None
-        first.factorize(blocks)
+        self._first.factorize(blocks)
 
-    def solve(self, load: _Floats, insists: bool = False) -> _Floats:
+    def solve(self, load: Floats, insists: bool = False) -> Floats:
         """Solve, by a factorisation if the iterations do not converge and none insists on them."""
         if self._iterative is not None:
             try:
@@ -187,9 +186,6 @@ class StaticSolver:
             except NotConvergedError:
                 if insists:
                     raise
-            if self._direct is None:
-                self._direct = self._kernels.direct(self._pattern, self._block, self._held)
             self._direct.factorize(self._blocks)
-        assert self._direct is not None
         self.used.add("direct")
         return self._direct.solve(load)

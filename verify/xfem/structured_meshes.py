@@ -5,8 +5,9 @@ from itertools import permutations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.errors import XfemError
 from verify.xfem.mesh import SimplexMesh
 
@@ -87,9 +88,7 @@ def box_mesh(
     return SimplexMesh(points, np.stack(cells, 3).reshape(-1, 4))
 
 
-def _grid(
-    divisions: Sequence[int], lower: ArrayLike, upper: ArrayLike
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _grid(divisions: Sequence[int], lower: ArrayLike, upper: ArrayLike) -> tuple[Ints, Floats]:
     """Node numbers by grid index (first axis slowest in x), and their coordinates."""
     low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
     counts = np.asarray(divisions)

@@ -9,15 +9,12 @@ field itself, not an interpolation of it.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from verify.xfem.arrays import Floats, Ints
 from verify.xfem.clip import Simplices, bisected
 from verify.xfem.mesh import equal_rows, facets_of
 from verify.xfem.phantom import PhantomMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -40,12 +37,12 @@ class Subdivision:
         The cut as realised: segments or triangles by their corners (second axis), in metres.
     """
 
-    points: _Floats
-    cells: _Ints
-    cell_piece: _Ints
-    cell_parent: _Ints
+    points: Floats
+    cells: Ints
+    cell_piece: Ints
+    cell_parent: Ints
     interpolation: csr_array
-    cut_facets: _Floats
+    cut_facets: Floats
 
 
 def subdivide(phantom: PhantomMesh) -> Subdivision:
@@ -108,7 +105,7 @@ def _conforming(phantom: PhantomMesh) -> Simplices:
     return bisected(simplices, sub.zero_points, hanging)
 
 
-def _oriented(points: _Floats, cells: _Ints) -> _Ints:
+def _oriented(points: Floats, cells: Ints) -> Ints:
     """Positive orientation, where points and simplices have the same dimension."""
     if points.shape[1] != cells.shape[1] - 1:
         return cells
@@ -119,7 +116,7 @@ def _oriented(points: _Floats, cells: _Ints) -> _Ints:
     return turned
 
 
-def _cut_facets(points: _Floats, cells: _Ints, ids: _Ints) -> _Floats:
+def _cut_facets(points: Floats, cells: Ints, ids: Ints) -> Floats:
     """Facets where two cells meet in space but do not share their nodes."""
     # a point is doubled when it has several nodes: its first one is not the only one
     some = np.zeros(ids.max() + 1, dtype=np.int64)

@@ -4,16 +4,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from verify.xfem.errors import XfemError, finite_array, index_array
+from verify.xfem.arrays import Bools, Floats, Ints, Sides, finite_array, index_array
+from verify.xfem.errors import XfemError
 from verify.xfem.phantom import PhantomMesh
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.polar import SPINS
 
 # points (k, d) and sides (k, cuts) to displacements (k, d)
-PrescribedField = Callable[[_Floats, NDArray[np.int8]], _Floats]
+PrescribedField = Callable[[Floats, Sides], Floats]
 
 
 class UnsupportedBodyError(XfemError):
@@ -31,8 +30,8 @@ class Supports:
         Prescribed displacement in metres; zero where not fixed.
     """
 
-    fixed: NDArray[np.bool_]
-    values: _Floats
+    fixed: Bools
+    values: Floats
 
     @staticmethod
     def none(phantom: PhantomMesh) -> "Supports":
@@ -106,7 +105,7 @@ class Supports:
         return Supports(fixed, prescribed)
 
 
-def check_fixed(fixed: NDArray[np.bool_], shape: tuple[int, int]) -> None:
+def check_fixed(fixed: Bools, shape: tuple[int, int]) -> None:
     """Check that fixed components are of a body with unknowns of a shape (N, d).
 
     Raises
@@ -143,7 +142,7 @@ def check_bodies(phantom: PhantomMesh, supports: Supports) -> None:
         )
 
 
-def loose_bodies(phantom: PhantomMesh, supports: Supports, bodies: _Ints) -> _Ints:
+def loose_bodies(phantom: PhantomMesh, supports: Supports, bodies: Ints) -> Ints:
     """Those of the given free bodies, by number (k,), that can move rigidly."""
     points, scale = phantom.node_points, phantom.mesh.extent
     found = []
@@ -158,13 +157,8 @@ def loose_bodies(phantom: PhantomMesh, supports: Supports, bodies: _Ints) -> _In
     return np.array(found, dtype=np.int64)
 
 
-def _rigid_modes(points: _Floats) -> _Floats:
+def _rigid_modes(points: Floats) -> Floats:
     """(k, d, modes) translations and infinitesimal rotations at points (k, d)."""
-    dim = points.shape[1]
-    modes = [np.broadcast_to(np.eye(dim)[axis], points.shape) for axis in range(dim)]
-    for first in range(dim):
-        for second in range(first + 1, dim):
-            turn = np.zeros_like(points)
-            turn[:, first], turn[:, second] = -points[:, second], points[:, first]
-            modes.append(turn)
-    return np.stack(modes, axis=-1)
+    count, dim = points.shape
+    shifts = np.broadcast_to(np.eye(dim), (count, dim, dim))
+    return np.concatenate([shifts, np.einsum("aij,kj->kia", SPINS[dim], points)], axis=2)

@@ -11,14 +11,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from verify.xfem.errors import XfemError, finite_array, places
+from verify.xfem.arrays import Floats, Ints, finite_array
+from verify.xfem.errors import XfemError
 from verify.xfem.faceted_cuts import FacetArrays, FacetCut, Polyline, facet_arrays
 from verify.xfem.mesh import neighbours_across
-
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 _FLAT = 1e-12  # area over squared edge below which a swept triangle counts as not swept
 _STILL = 1e-14  # of the length of the path: shorter moves are none
@@ -28,8 +26,8 @@ _TURNED_BACK = -1.0 + 1e-9  # cosine between the normals of neighbouring facets
 class SweepSurface(NamedTuple):
     """Vertices (v, s), facets (t, k), and the arrays for kernels."""
 
-    points: _Floats
-    facets: _Ints
+    points: Floats
+    facets: Ints
     arrays: FacetArrays
 
 
@@ -51,8 +49,8 @@ class ToolPath:
         on its path, or a path in the plane intersects itself (begin a new stroke instead).
     """
 
-    blades: _Floats
-    times: _Floats
+    blades: Floats
+    times: Floats
 
     def __init__(self, blades: ArrayLike, times: ArrayLike) -> None:
         positions = finite_array(blades, "blades", (None, None, 2), (None, None, 3))
@@ -88,7 +86,7 @@ class ToolPath:
         return cls(np.stack([points, points + vector], axis=1), times)
 
     @cached_property
-    def travel(self) -> _Floats:
+    def travel(self) -> Floats:
         """(k,) length of the path up to each position, in metres."""
         steps = np.linalg.norm(np.diff(self.blades, axis=0), axis=2).max(axis=1, initial=0.0)
         return np.concatenate([[0.0], np.cumsum(steps)])
@@ -119,7 +117,7 @@ class ToolPath:
             return -1.0
         return float(np.interp(time, self.times, self.travel))
 
-    def time_at(self, travel: ArrayLike) -> _Floats:
+    def time_at(self, travel: ArrayLike) -> Floats:
         """When the blade first comes that far, in seconds."""
         wanted = np.clip(np.asarray(travel, dtype=float), 0.0, self.length)
         # 'left': a blade that waits has been there since it arrived
@@ -153,7 +151,7 @@ class Sweep(FacetCut):
         """Its facets, as kernels take them."""
         return self.path.surface.arrays
 
-    def travel(self, points: _Floats) -> _Floats:
+    def travel(self, points: Floats) -> Floats:
         """How far (n,) the blade has come when it passes a point of the sweep, in metres."""
         return self._probe(points)[:, 2]
 
@@ -161,12 +159,12 @@ class Sweep(FacetCut):
         """Keep the part that is swept when the blade has come so far."""
         return PartOfSweep(self, travel)
 
-    def _probe(self, points: _Floats) -> _Floats:
+    def _probe(self, points: Floats) -> Floats:
         if self.path.sweeps:
             return super()._probe(points)
         # nothing is swept: one side everywhere, and no point of the cut anywhere
-        count = len(places(points, self.path.blades.shape[2], self._name))
-        return np.tile([1.0, -np.inf, 0.0], (count, 1))
+        at = finite_array(points, "sweep: points", (None, self.path.blades.shape[2]))
+        return np.tile([1.0, -np.inf, 0.0], (len(at), 1))
 
 
 @dataclass(frozen=True)
@@ -176,17 +174,17 @@ class PartOfSweep:
     sweep: Sweep
     front: float
 
-    def level_set(self, points: _Floats) -> _Floats:
+    def level_set(self, points: Floats) -> Floats:
         """`Sweep.level_set` of the whole path: what is cut does not move as the cut grows."""
         return self.sweep.level_set(points)
 
-    def depth(self, points: _Floats) -> _Floats:
+    def depth(self, points: Floats) -> Floats:
         """Distance to the rim or, along the path, to the blade; negative past either."""
         probed = self.sweep._probe(points)
         return np.minimum(probed[:, 1], self.front - probed[:, 2])
 
 
-def _check(blades: _Floats, times: _Floats) -> None:
+def _check(blades: Floats, times: Floats) -> None:
     if len(blades) == 0:
         raise XfemError(f"blades of shape {blades.shape}; expected one position or more")
     if blades.shape[2] == 2 and blades.shape[1] != 1:
@@ -199,7 +197,7 @@ def _check(blades: _Floats, times: _Floats) -> None:
         raise XfemError("blade with two neighbouring points in one place; expected a length")
 
 
-def _sweep_surface(blades: _Floats, travel: _Floats) -> SweepSurface:
+def _sweep_surface(blades: Floats, travel: Floats) -> SweepSurface:
     """Triangulate the sweep of blades (k, b, s) with the travel (k,) of each position."""
     points, lengths, facets = _facets(blades, travel)
     arrays = facet_arrays(points, facets, lengths)
@@ -213,7 +211,7 @@ def _sweep_surface(blades: _Floats, travel: _Floats) -> SweepSurface:
     return SweepSurface(points, facets, arrays)
 
 
-def _facets(blades: _Floats, travel: _Floats) -> tuple[_Floats, _Floats, _Ints]:
+def _facets(blades: Floats, travel: Floats) -> tuple[Floats, Floats, Ints]:
     """Vertices, their travel, and the facets that have a length or an area."""
     count, width, space = blades.shape
     ids = np.arange(count * width).reshape(count, width)

@@ -6,10 +6,8 @@ position, and on the sign of every other cut there, to the last bit.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-_Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
+from verify.xfem.arrays import Floats, Ints
 
 _NONE = np.zeros(0, dtype=np.int64)
 _NEVER = np.iinfo(np.int64).max
@@ -41,7 +39,7 @@ class ZeroPoints:
         When a division of cells first used each zero point, counting `divided`.
     """
 
-    def __init__(self, positions: _Floats, values: _Floats, snap: float) -> None:
+    def __init__(self, positions: Floats, values: Floats, snap: float) -> None:
         self.positions = positions
         self.values = values
         self.nodes = len(positions)
@@ -50,14 +48,14 @@ class ZeroPoints:
         self._turns = 0
         self._snap = snap
         # per cut: edges (plus << 32 | minus), ascending, and the point of each
-        self._known: dict[int, tuple[_Ints, _Ints]] = {}
+        self._known: dict[int, tuple[Ints, Ints]] = {}
 
-    def shares(self, cut: int | _Ints, plus: _Ints, minus: _Ints) -> tuple[_Floats, _Floats]:
+    def shares(self, cut: int | Ints, plus: Ints, minus: Ints) -> tuple[Floats, Floats]:
         """(r, s) of the zero points z = s·plus + r·minus on edges from φ ≥ 0 to φ < 0."""
         above, below = self.values[plus, cut], self.values[minus, cut]
         return above / (above - below), -below / (above - below)
 
-    def find(self, cut: int, plus: _Ints, minus: _Ints) -> _Ints:
+    def find(self, cut: int, plus: Ints, minus: Ints) -> Ints:
         """Numbers of the zero points of `cut` on edges (plus, minus).
 
         Where φ is exactly zero at the plus end, the zero point is that end. New points are
@@ -75,7 +73,7 @@ class ZeroPoints:
             known, point = self._known[cut] = known[order], point[order]
         return point[np.searchsorted(known, edge)]
 
-    def on_edges(self, cut: int, points: _Ints) -> _Ints:
+    def on_edges(self, cut: int, points: Ints) -> Ints:
         """Numbers (q, c, c) of the points of `cut` on the edges of simplices with points (q, c).
 
         Entry ab is the point between corner a, where φ ≥ 0, and b, where φ < 0; if a = b it is
@@ -89,13 +87,13 @@ class ZeroPoints:
         number[:, corner, corner] = points
         return number
 
-    def divided(self, numbers: _Ints) -> None:
+    def divided(self, numbers: Ints) -> None:
         """Note that cells were divided at points, of which mesh nodes do not count."""
         used = numbers[numbers >= self.nodes] - self.nodes
         self.turn[used] = np.minimum(self.turn[used], self._turns)
         self._turns += 1
 
-    def in_order(self, numbers: _Ints) -> _Ints:
+    def in_order(self, numbers: Ints) -> Ints:
         """Places (k,) of zero points in `ends`, as divisions used them, last ends first.
 
         Bisecting edges in this order gives the diagonals of the staircase on faces.
@@ -104,7 +102,7 @@ class ZeroPoints:
         turn = self.turn if len(self.turn) == len(self.cut) else self.cut
         return numbers[np.lexsort([-ends[:, 1], -ends[:, 0], turn[numbers]])]
 
-    def _append(self, cut: int, plus: _Ints, minus: _Ints) -> _Ints:
+    def _append(self, cut: int, plus: Ints, minus: Ints) -> Ints:
         """Points on edges that had none."""
         r, s = self.shares(cut, plus, minus)
         new = r > 0.0

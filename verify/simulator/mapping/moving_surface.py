@@ -13,7 +13,8 @@ from scipy.sparse import csr_array
 
 from verify.simulator.arrays.growing_array import GrowingArray
 from verify.simulator.arrays.row_numbers import RowNumbers, first_of_new, number_of_row
-from verify.xfem.errors import XfemError, check_floats
+from verify.xfem.arrays import check_floats
+from verify.xfem.errors import XfemError
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]

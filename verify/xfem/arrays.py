@@ -1,0 +1,100 @@
+"""Types of arrays, and checks of the arrays and words that a user gives."""
+
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from verify.xfem.errors import XfemError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Sides = NDArray[np.int8]  # of cuts: +1 or −1, in labels also 0 where a cut does not divide
+
+
+def check_choice(given: str, choices: Any, what: str) -> None:
+    """Check that a word is one of those that a Literal type lists.
+
+    Raises
+    ------
+    XfemError
+        If it is another.
+    """
+    if given not in get_args(choices):
+        raise XfemError(f"{what} '{given}'; expected one of {', '.join(get_args(choices))}")
+
+
+def real_array(given: ArrayLike, what: str) -> Floats:
+    """Real numbers of any shape: a copy, so that what is made of them stays when they change.
+
+    Raises
+    ------
+    XfemError
+        If there is text, None or a complex number among them, or rows differ in length.
+    """
+    try:
+        raw = np.asarray(given)
+        if not np.iscomplexobj(raw):
+            return np.array(raw, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        pass
+    raise XfemError(f"{what} {_shown(given)}; expected real numbers, in rows of one length")
+
+
+def finite_array(given: ArrayLike, what: str, *shapes: tuple[int | None, ...]) -> Floats:
+    """Finite real numbers in one of some shapes, a copy; None stands for any length.
+
+    Raises
+    ------
+    XfemError
+        If they are no real numbers, one is not finite, or the shape is another.
+    """
+    found = real_array(given, what)
+    fits = (
+        len(shape) == found.ndim
+        and all(n in (None, m) for n, m in zip(shape, found.shape, strict=True))
+        for shape in shapes
+    )
+    if not any(fits):
+        expected = " or ".join(str(shape).replace("None", "n") for shape in shapes)
+        raise XfemError(f"{what} of shape {found.shape}; expected {expected}")
+    if not np.isfinite(found).all():
+        first = np.argwhere(~np.isfinite(found))[0].tolist()
+        raise XfemError(f"{what}: number {first} is not finite")
+    return found
+
+
+def index_array(given: ArrayLike, what: str) -> Ints:
+    """Whole numbers of any shape, a copy; an empty list has none, and so may be of any type.
+
+    Raises
+    ------
+    XfemError
+        If they are not of an integer type: 0.7 is not taken as 0.
+    """
+    try:
+        raw = np.asarray(given)
+    except ValueError:
+        raw = np.array(None)
+    if raw.size and not np.issubdtype(raw.dtype, np.integer):
+        raise XfemError(f"{what} {_shown(given)}; expected integers, in rows of one length")
+    return np.array(raw, dtype=np.int64, order="C")
+
+
+def check_floats(name: str, values: Floats, shape: tuple[int, ...]) -> None:
+    """Check an array that a compiled loop reads or writes as it is: loops check no bounds.
+
+    Raises
+    ------
+    XfemError
+        If it has another shape, or is not of 64-bit floats.
+    """
+    kind = getattr(values, "dtype", type(values).__name__)
+    if kind != np.float64 or values.shape != shape:
+        raise XfemError(f"{name} of shape {np.shape(values)}, {kind}; expected {shape}, float64")
+
+
+def _shown(given: ArrayLike) -> str:
+    text = " ".join(repr(given).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
