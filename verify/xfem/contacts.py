@@ -7,10 +7,11 @@ to the faces of the cell. The result is a cut mesh like any other.
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, triu
 
 from verify.xfem.arrays import Bools, Floats, Ints
 from verify.xfem.clip import facets_between
+from verify.xfem.mesh import connected, equal_rows, facets_of
 from verify.xfem.phantom import PhantomMesh
 
 
@@ -23,40 +24,20 @@ def face_contacts(phantom: PhantomMesh, near: bool = False) -> tuple[Ints, Ints]
     near : bool
         Leave out cells that have no node in common with a split one.
     """
-    mesh = phantom.mesh
-    chosen = np.ones(len(mesh.cells), dtype=bool)
+    mesh, parent = phantom.mesh, phantom.parent
+    pieces = np.arange(len(parent))
     if near:
         around = np.zeros(len(mesh.points), dtype=bool)
-        around[mesh.cells[phantom.parent[phantom.split]]] = True
-        chosen = around[mesh.cells].any(axis=1)
-    cells = np.flatnonzero(chosen)
-    across = mesh.neighbours[cells]
-    row, local = np.nonzero((across > cells[:, None]) & chosen[across])
-    cell, across = cells[row], across[row, local]
-    count = np.bincount(phantom.parent, minlength=len(mesh.cells))
-    start = np.cumsum(count) - count
-    pairs = count[cell] * count[across]
-    face = np.repeat(np.arange(len(cell)), pairs)
-    within = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
-    first = start[cell[face]] + within // count[across[face]]
-    second = start[across[face]] + within % count[across[face]]
-    # the unknowns of mesh nodes are shared wherever both pieces have them; a cut along a face
-    # separates cells that have one piece each, so that counting pieces would not do
-    plain = (phantom.cells < len(mesh.points)).all(axis=1)
-    check = np.flatnonzero(~(plain[first] & plain[second]))
-    mine = _face_unknowns(phantom, first[check], local[face[check]])
-    other_local = (mesh.neighbours[across[face[check]]] == cell[face[check], None]).argmax(axis=1)
-    theirs = _face_unknowns(phantom, second[check], other_local)
-    shared = np.ones(len(face), dtype=bool)
-    shared[check] = (mine == theirs).all(axis=1)
-    return first[shared], second[shared]
-
-
-def _face_unknowns(phantom: PhantomMesh, piece: Ints, local: Ints) -> Ints:
-    """Unknowns (q, d) of the pieces on the face opposite to a corner, ascending."""
-    corners = phantom.cells.shape[1]
-    on_face = np.arange(corners) != local[:, None]
-    return np.sort(phantom.cells[piece][on_face].reshape(-1, corners - 1), axis=1)
+        around[mesh.cells[parent[phantom.split]]] = True
+        pieces = np.flatnonzero(around[mesh.cells[parent]].any(axis=1))
+    facets = np.sort(facets_of(phantom.cells[pieces]), axis=1)
+    facet = connected(len(facets), *equal_rows(facets))
+    starts = np.arange(len(pieces) + 1) * phantom.cells.shape[1]
+    has = csr_array((np.ones(len(facet)), facet, starts), shape=(len(pieces), len(facets)))
+    both = triu(has @ has.T, 1).tocoo()
+    first, second = pieces[both.row], pieces[both.col]
+    apart = parent[first] != parent[second]
+    return first[apart], second[apart]
 
 
 def sibling_contacts(phantom: PhantomMesh, cells: Ints) -> tuple[Ints, Ints, Floats]:
