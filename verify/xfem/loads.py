@@ -165,9 +165,10 @@ def _integrate(
     sides = phantom.piece_side[piece]
     for point, weight in zip(rule, weights, strict=True):
         shape = np.einsum("k,qki->qi", point, corners)
-        force = density
         if callable(density):
             given = density(np.einsum("qi,qij->qj", shape, nodes), sides)
             force = finite_array(given, "load density", (len(piece), load.shape[1]))
+        else:
+            force = np.atleast_2d(density)
         share = (weight * measure)[:, None] * shape
-        np.add.at(load, phantom.cells[piece], share[:, :, None] * np.atleast_2d(force)[:, None])
+        np.add.at(load, phantom.cells[piece], share[:, :, None] * force[:, None])

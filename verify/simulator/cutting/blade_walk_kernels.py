@@ -2,7 +2,7 @@
 
 For a cell the kernel asks where the zero set of the level set crosses its edges, and of each such
 point whether it lies on the sweep and whether the blade has passed it. The tolerances are those of
-`verify.xfem.pieces`, so that a cell that the walk calls crossed through is one that is split.
+`verify.xfem.crossing`, so that a cell that the walk calls crossed through is one that is split.
 A sweep comes as its `arrays`, `verify.xfem.faceted_cuts.FacetArrays`.
 """
 
