@@ -5,7 +5,7 @@ import pytest
 from cut_meshes import grid, quadratic, solution
 from solid_meshes import cube_grid
 
-from verify.compare.energy_error import energy_error
+from verify.compare.error_norm import energy_error
 from verify.compare.hooke import corotated, hooke
 from verify.compare.locate import SolutionField
 from verify.compare.simplex_rule import points_in

@@ -3,8 +3,7 @@ import pytest
 from cut_meshes import grid, quadratic, scene, solution
 
 from verify.compare.body import body_of
-from verify.compare.displacement_error import displacement_error
-from verify.compare.energy_error import energy_error
+from verify.compare.error_norm import displacement_error, energy_error
 from verify.compare.hooke import hooke
 from verify.compare.integration import integrate_norm, rules
 from verify.compare.locate import SolutionField

@@ -7,9 +7,12 @@ from halves_in_space import Sheet
 from membrane_meshes import bowl, flat, halved, layers, membrane, roof, upright
 
 from verify.compare.body_rule import body_rule
-from verify.compare.displacement_error import displacement_error
-from verify.compare.energy_error import energy_error
-from verify.compare.jump_error import displacement_jump, jump_error
+from verify.compare.error_norm import (
+    displacement_error,
+    displacement_jump,
+    energy_error,
+    jump_error,
+)
 from verify.compare.membrane_body import cut_membrane
 from verify.compare.membrane_cut_rule import membrane_cut_rule
 from verify.compare.membrane_field import MembraneField

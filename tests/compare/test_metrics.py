@@ -4,9 +4,8 @@ from cut_meshes import STRAIGHT, grid, layered, quadratic, scene, solution
 
 from verify.compare.body import body_of
 from verify.compare.cut_line import cut_rule
-from verify.compare.displacement_error import displacement_error
+from verify.compare.error_norm import displacement_error, jump_error
 from verify.compare.hooke import hooke
-from verify.compare.jump_error import jump_error
 from verify.compare.locate import SolutionField
 from verify.compare.opening import opening
 from verify.compare.slabs import area_rule

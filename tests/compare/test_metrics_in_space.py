@@ -6,13 +6,16 @@ from halves_in_space import Cube, Sheet
 from membrane_meshes import flat, roof
 
 from verify.compare.body_rule import body_rule
-from verify.compare.displacement_error import displacement_error
-from verify.compare.energy_error import energy_error
+from verify.compare.error_norm import (
+    displacement_error,
+    energy_error,
+    jump_error,
+    maximum_error,
+    opening_error,
+    opening_maximum_error,
+)
 from verify.compare.integration import integrate_norm, rules
-from verify.compare.jump_error import jump_error
-from verify.compare.maximum_error import maximum_error
 from verify.compare.opening import opening
-from verify.compare.opening_error import opening_error, opening_maximum_error
 from verify.compare.simplex_rule import points_in
 
 SLOPE = np.array([[0.1, 0.2, 0.05], [-0.3, 0.05, 0.1], [0.02, 0.15, -0.2]])

@@ -10,8 +10,7 @@ from verify.compare.body_rule import body_rule
 from verify.compare.curves import Arc
 from verify.compare.cut_line import cut_rule
 from verify.compare.cut_profile import profile_lines
-from verify.compare.displacement_error import displacement_error
-from verify.compare.jump_error import displacement_jump, jump_error
+from verify.compare.error_norm import displacement_error, displacement_jump, jump_error
 from verify.compare.locate import SolutionField
 from verify.compare.realised import SidedField, cut_deviation, field_of
 from verify.compare.slabs import area_rule

@@ -10,8 +10,8 @@ from verify.compare.motion import ExactMotion
 from verify.result import Verdict
 from verify.scene import load_scene
 from verify.solvers import find_solver
-from verify.study.budget import Candidate, cheapest_adequate, error_budget
-from verify.study.budget.budget import Answer
+from verify.study.budget.budget import Answer, error_budget
+from verify.study.budget.candidates import Candidate, cheapest_adequate
 from verify.study.budget.crossing_delay import mean_wait
 
 

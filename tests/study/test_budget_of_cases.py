@@ -8,7 +8,8 @@ from verify.reference_record import ReferenceRecord
 from verify.result import CaseResult, SolveRecord, Status
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver
-from verify.study.budget import Solved, budget_study
+from verify.study.budget.links import Solved
+from verify.study.budget.study import budget_study
 
 
 def solve(scenes, place, solvers, parameters=None, timed=False):

@@ -8,10 +8,8 @@ from verify.assess.quantities import Measured
 from verify.assess.reference import conforming_reference, exact_reference
 from verify.compare.body import body_of
 from verify.compare.cut_line import cut_rule
-from verify.compare.displacement_error import displacement_error
-from verify.compare.energy_error import energy_error
+from verify.compare.error_norm import displacement_error, energy_error, jump_error
 from verify.compare.hooke import hooke
-from verify.compare.jump_error import jump_error
 from verify.compare.slabs import area_rule
 from verify.scene import Scene, load_scene
 from verify.solvers import find_solver

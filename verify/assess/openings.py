@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from verify.assess.richardson import place_uncertainty
 from verify.compare.body import AnyBody
 from verify.compare.cut_profile import ProfileLine, profile_lines
-from verify.compare.jump_error import displacement_jump
+from verify.compare.error_norm import displacement_jump
 from verify.compare.motion import Motion
 from verify.errors import InputError
 from verify.result import OpeningCurve, OpeningProfile

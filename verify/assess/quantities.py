@@ -10,8 +10,7 @@ from verify.compare.hooke import Law
 from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.motion import SolutionMotion
-from verify.compare.opening import opening
-from verify.compare.point_displacement import point_displacement
+from verify.compare.opening import opening, point_displacement
 from verify.compare.simplices import simplices
 from verify.compare.strain_energy import strain_energy
 from verify.errors import UnsupportedSceneError

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from verify.result import CaseResult
     from verify.scene import Scene
     from verify.solution import Solution
-    from verify.study.budget import BudgetStudy, Solved
+    from verify.study.budget.links import Solved
+    from verify.study.budget.study import BudgetStudy
     from verify.study.cost import CostStudy
     from verify.study.iterations import IterationsStudy
     from verify.study.thesis import ThesisStudy
@@ -42,7 +43,7 @@ def cost(arguments: argparse.Namespace, announce: Announce) -> "CostStudy":
 def budget(arguments: argparse.Namespace, announce: Announce) -> "BudgetStudy":
     """Solve the links of the chain, and take the error apart."""
     from verify.scene import load_scene
-    from verify.study.budget import budget_study
+    from verify.study.budget.study import budget_study
 
     scene = load_scene(arguments.case)
     repetitions = arguments.repetitions or (2 if arguments.quick else 5)
@@ -142,7 +143,7 @@ def _solved(
     """Run scenes by some solvers and no reference beside them, and read the solutions back."""
     from verify.runner.directory import RunDirectory
     from verify.solution import read_solution
-    from verify.study.budget import Solved
+    from verify.study.budget.links import Solved
 
     place = RunDirectory(folder)
     found = []

@@ -7,16 +7,20 @@ from typing import Any, Literal
 import numpy as np
 
 from verify.compare.body import AnyBody
-from verify.compare.displacement_error import displacement_squares
-from verify.compare.energy_error import energy_squares
-from verify.compare.error_norm import ErrorNorm, Squares
+from verify.compare.error_norm import (
+    ErrorNorm,
+    Squares,
+    displacement_squares,
+    energy_squares,
+    jump_error,
+    maximum_error,
+    opening_error,
+    opening_maximum_error,
+)
 from verify.compare.hooke import Law
 from verify.compare.integration import cut_rules, rules
-from verify.compare.jump_error import jump_error
 from verify.compare.locate import Field
-from verify.compare.maximum_error import maximum_error
 from verify.compare.near_tip import near_radius, near_tip
-from verify.compare.opening_error import opening_error, opening_maximum_error
 from verify.compare.slabs import Rule
 
 Measure = Callable[[Field, Field, Any, Law], ErrorNorm | Squares]

@@ -1,4 +1,4 @@
-"""Opening of a cut at a point of it."""
+"""Quantities at a point: displacement of the body, opening of a cut."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from verify.compare.body import AnyBody, Body
 from verify.compare.cut_line import CutRule, place_on_cut
-from verify.compare.jump_error import displacement_jump
+from verify.compare.error_norm import displacement_jump
 from verify.compare.locate import Field
 from verify.compare.membrane_body import MembraneBody
 from verify.compare.membrane_cut_rule import nearest_on_membrane_cut
@@ -41,3 +41,9 @@ def cut_place(body: AnyBody, cut: str, place: float | Sequence[float]) -> CutRul
     if isinstance(body, MembraneBody):
         return nearest_on_membrane_cut(body, cut, point)
     return nearest_on_cut(body, cut, point)
+
+
+def point_displacement(field: Field, point: Sequence[float], component: str) -> float:
+    """Displacement in m of `point` in direction ``x``, ``y`` or ``z``."""
+    at = np.array([point], dtype=float)
+    return float(field.displacement(at, at)[0, "xyz".index(component)])

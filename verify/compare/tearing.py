@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from verify.compare.body import AnyBody
 from verify.compare.cut_line import CutRule
-from verify.compare.jump_error import displacement_jump
+from verify.compare.error_norm import displacement_jump
 from verify.compare.locate import Field
 from verify.compare.opening import cut_place
 from verify.scene import Material

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from verify.printable import words_of
 from verify.report.blocks import Drawing, Figure, Table
 from verify.report.curves import Curve, error_curves, limits, metric_names
-from verify.report.figures.colour_bar import colour_bar
+from verify.report.drawn_bodies import colour_bar
 from verify.report.figures.convergence import error_panel, error_range
 from verify.report.figures.sketch import sketch
 from verify.report.figures.style import Palette

@@ -6,17 +6,17 @@ from verify.printable import words_of
 from verify.report.blocks import Table
 from verify.report.case_view import CaseView
 from verify.report.family_view import FamilyView, family_views
-from verify.report.figures.solver_profiles import profiles_figure
 from verify.report.figures.style import Palette
 from verify.report.overview import origin_facts, overview
 from verify.report.ranking_tables import (
     compared,
     conformance_table,
     left_out_table,
+    profiles_figure,
     stability_table,
+    strengths_table,
 )
 from verify.report.run_directory import Run
-from verify.report.strength_view import strengths_table
 
 _QUESTIONS = (("accuracy", "Accuracy"), ("energy", "Energy"), ("cost", "Cost"))
 

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from verify.report.bodies import Body
+from verify.report.bodies import Body, View
 from verify.report.notation import solver_title
 from verify.report.turntable import packed
-from verify.report.view import View
 
 
 @dataclass

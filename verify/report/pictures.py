@@ -7,12 +7,11 @@ import numpy as np
 
 from verify.applied_checks import REFERENCE
 from verify.errors import InputError
-from verify.report.bodies import deformed_body, read_stored
+from verify.report.bodies import common_view, deformed_body, read_stored
 from verify.report.error_maps import add_error_maps
 from verify.report.notation import number_text, solver_title
 from verify.report.picture import CasePictures, Picture
 from verify.report.run_directory import CaseEntry
-from verify.report.view import common_view
 from verify.result import CaseResult, SolveRecord, Status
 from verify.solution import Solution
 

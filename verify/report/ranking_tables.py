@@ -1,9 +1,10 @@
-"""The rankings of a run as tables: one per question, and what was left out."""
+"""The rankings of a run: tables, strengths in words, profiles, and what was left out."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from verify.report.blocks import Cell, Table, plain_table
+from verify.report.blocks import Cell, Figure, Table, plain_table
+from verify.report.figures.style import Palette, drawing, legend, log_axis, log_range, panel
 from verify.report.notation import metric_title, number, solver_title, with_interval
 
 _STATES = ("pass", "fail", "error", "refused")
@@ -137,3 +138,104 @@ def _grouped(comparisons: Sequence[Mapping[str, Any]]) -> list[list[str]]:
         [case, solver_title(solver) if solver else "all", ", ".join(dict.fromkeys(metrics)), reason]
         for (case, solver, reason), metrics in rows.items()
     ]
+
+
+_TIME = "time at equal error"
+_WORDS = {
+    "displacement_l2": "L² error",
+    "energy_norm": "energy-norm error",
+    "jump_l2": "L² error of the jump",
+    _TIME: "time at equal L² error",
+}
+_HEADS = ["solver", "best at", "clearest of these cases", "within 5 % of the best, cases"]
+
+
+def strengths_table(ranking: Mapping[str, Any]) -> Table | None:
+    """Return a row per solver; None for a ranking from before there were such."""
+    found = ranking.get("strengths") or []
+    if not found:
+        return None
+    rows = []
+    for solver in ranking["solvers"]:
+        own = [one for one in found if one["solver"] == solver]
+        rows.append([solver_title(solver), _sentence(own), _row(own), _near(own)])
+    return plain_table("What each solver is best at", _HEADS, rows, "prose")
+
+
+def _order(one: Mapping[str, Any]) -> tuple[float, float]:
+    return one["alone"] / one["items"], one["best"] / one["items"]
+
+
+def _sentence(own: Sequence[Mapping[str, Any]]) -> str:
+    if not own:
+        return "No case in which it and another have a number to compare."
+    good = [one for one in own if one["best"]]
+    if not good:
+        return "Best at nothing here: in every case another is certainly better."
+    said = [
+        f"{_WORDS[one['question']]} ({one['best']} of {one['items']} cases"
+        + (f", alone in {one['alone']})" if one["alone"] else ")")
+        for one in sorted(good, key=_order, reverse=True)
+    ]
+    never = [_WORDS[one["question"]] for one in own if not one["best"]]
+    rest = f" Never in {', '.join(never)}." if never else ""
+    return f"Nobody is better in {', '.join(said)}.{rest}"
+
+
+def _row(own: Sequence[Mapping[str, Any]]) -> str:
+    clear = [one for one in own if one["case"]]
+    if not clear:
+        return "–"
+    one = max(clear, key=_order)
+    return (
+        f"{one['case']}: {_WORDS[one['question']]} {_written(one, one['value'])}, next "
+        f"{solver_title(one['next_solver'])} with {_written(one, one['next_value'])}"
+    )
+
+
+def _near(own: Sequence[Mapping[str, Any]]) -> str:
+    said = [f"{_WORDS[one['question']]} {one['near']} of {one['items']}" for one in own]
+    return "; ".join(said) or "–"
+
+
+def _written(one: Mapping[str, Any], value: float) -> str:
+    return f"{number(value, 3)}{' s' if one['question'] == _TIME else ''}"
+
+
+def profiles_figure(profiles: Sequence[Mapping[str, Any]]) -> Figure | None:
+    """Return a panel for each profile of a ranking; None if no item was compared."""
+    palette, panels = Palette(), []
+    for one in profiles:
+        steps: Mapping[str, Sequence[float]] = one["steps"]
+        most = one.get("most") or float("inf")
+        every = [value for own in steps.values() for value in own if 0.0 < value <= most]
+        if one["items"] < 2 or not every:
+            continue
+        ends = log_range(every)
+        with panel(one["quantity"], 5.6, 3.0) as (figure, axes):
+            for solver, own in steps.items():
+                label, shares = (
+                    solver_title(solver),
+                    [k / one["items"] for k in range(len(own) + 1)],
+                )
+                style = palette[label]
+                axes.step(
+                    [ends[0], *own, ends[1]], [*shares, shares[-1]], where="post", label=label,
+                    color=style.colour, linestyle=style.dashes,
+                )  # fmt: skip
+            log_axis(axes, "x", ends)
+            axes.set_ylim(0.0, 1.03)
+            axes.set_xlabel(one["quantity"].partition(",")[0])
+            axes.set_ylabel(f"share of {one['items']} cases")
+            legend(axes)
+            said = "; ".join(f"{name}: {len(own)}" for name, own in steps.items())
+            panels.append(
+                drawing(figure, f"{one['quantity']}, cases done of {one['items']}. {said}")
+            )
+    if not panels:
+        return None
+    said = (
+        "Profiles: the share of the cases in which a solver stays within the number on the axis. "
+        "Refused, failed and uncompared cases are never reached."
+    )
+    return Figure(panels, said)

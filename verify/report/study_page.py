@@ -1,17 +1,21 @@
 """The page of a study: findings as sentences, then tables and curves, then where it comes from."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from verify.errors import InputError
 from verify.json_files import read_json
 from verify.printable import shown
-from verify.report.blocks import Cell, Table, plain_table
+from verify.report.blocks import Cell, Drawing, Table, plain_table
+from verify.report.figures.profiles import profile_panel
+from verify.report.figures.studies import Bar, Series, bars, loglog, scatter
+from verify.report.figures.style import Palette
+from verify.report.notation import metric_title, number, solver_title
 from verify.report.overview import origin_facts
 from verify.report.printing import print_page
-from verify.report.study_views import study_view
+from verify.report.sliver_view import listed, sliver_families
 from verify.report.template_sets import as_html, as_markdown
 from verify.whole_files import write_whole
 
@@ -85,3 +89,185 @@ def _findings(record: Mapping[str, Any]) -> list[tuple[Table, bool]]:
         folds = title in ("Passed", "Without a limit")
         tables.append((plain_table(title, head, rows, "verdicts"), folds))
     return [(table, folds) for table, folds in tables if table.rows]
+
+
+_NORMS = ("displacement_l2", "energy_norm", "jump_l2")
+
+
+def study_view(kind: str, record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the template of a study shows beside its record."""
+    views: dict[str, Callable[[], dict[str, Any]]] = {
+        "slivers": lambda: {"families": sliver_families(record)},
+        "energy": lambda: {"tables": _energy_tables(record["measurements"])},
+        "cost": lambda: {"running": _running(record), "precision": _precision(record)},
+        "budget": lambda: {"bars": [_bars(budget) for budget in record["budgets"]]},
+        "calibration": lambda: {"scatters": _scatters(record["trials"])},
+        "thesis": lambda: _thesis(record),
+        "iterations": lambda: _iterations(record),
+    }
+    return views[kind]()
+
+
+def _energy_tables(measurements: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """Return a table per family: solvers and sizes against the relative quantities."""
+    tables = []
+    for family in dict.fromkeys(m["family"] for m in measurements):
+        own = listed(measurements, family=family)
+        names = list(dict.fromkeys(m["quantity"] for m in own if m["unit"] == "" and m["value"]))
+        found = {(m["solver"], m["size"], m["quantity"]): m["value"] for m in own}
+        rows = [
+            [solver_title(solver), "–" if size is None else f"{size:g}",
+             *(number(found.get((solver, size, name)), 3) for name in names)]
+            for solver, size in dict.fromkeys((m["solver"], m["size"]) for m in own)
+        ]  # fmt: skip
+        head = ["solver", "ε", *map(metric_title, names)]
+        tables.append(plain_table(family, head, rows, named=True))
+    return tables
+
+
+def _iterations(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row per setting, and both errors over the time."""
+    settings, palette, panels = record["settings"], Palette(), []
+    names = list(dict.fromkeys(name for one in settings for name in one["quantities"]))
+    rows = [
+        ["–" if one["time_step"] is None else f"{one['time_step']:.4g}",
+         "solved" if one["iterations"] is None else str(one["iterations"]),
+         *(number(one[key], 3) for key in ("iteration_error", "whole_error", "energy_drift")),
+         *(number(one["quantities"].get(name), 5) for name in names),
+         number(one["seconds"], 3), one["reason"]]
+        for one in settings
+    ]  # fmt: skip
+    head = ["time step, s", "iterations", "error of the iterations", "error of the whole"]
+    head += [metric_title("energy_drift"), *map(metric_title, names), "seconds", "why not"]
+    for key, title in (
+        ("iteration_error", "error of the iterations"),
+        ("whole_error", "error of the whole"),
+    ):
+        series = []
+        for substeps in dict.fromkeys(one["substeps"] for one in settings):
+            own = [one for one in settings if one["substeps"] == substeps and one["iterations"]]
+            places = [(one["seconds"], one[key]) for one in own if one["seconds"] and one[key]]
+            series.append(Series(f"{substeps} per step", places))
+        panels.append(loglog(title, "seconds", series, palette))
+    tables = [plain_table(f"{record['solver']} on {record['case']}", head, rows, named=True)]
+    return {"tables": tables, "panels": [panel for panel in panels if panel is not None]}
+
+
+def _running(record: Mapping[str, Any]) -> list[Drawing]:
+    steps = [0.0, *(float(step["step"]) for step in record["steps"])]
+    curves = [
+        (solver_title(name), [0.0, *(float("nan") if at is None else at[0] for at in sums)])
+        for name, sums in record["running"].items()
+    ]
+    return [profile_panel("time so far, s", steps, curves, Palette(), x_title="step of the cut")]
+
+
+def _precision(record: Mapping[str, Any]) -> list[Drawing]:
+    """Return the error over time and over unknowns; what no other solve beats is ringed."""
+    points = [p for p in record["points"] if p["error"] > 0 and p["seconds"] > 0]
+    front = {(solver, level) for solver, level in record["front"]}
+    palette, panels = Palette(), []
+    for x_title, key in (("wall time (s), median", "seconds"), ("unknowns", "unknowns")):
+        series = []
+        for name in record["running"]:
+            own = sorted((p for p in points if p["solver"] == name), key=lambda p: p["level"])
+            places = [(p[key], p["error"]) for p in own]
+            ringed = [(p[key], p["error"]) for p in own if (name, p["level"]) in front and p[key]]
+            series.append(Series(solver_title(name), places, ringed=ringed))
+        panels.append(loglog(metric_title(record["metric"]), x_title, series, palette))
+    return [panel for panel in panels if panel is not None]
+
+
+def _bars(budget: Mapping[str, Any]) -> Drawing:
+    """Return a bar for each source of an error, and one for the whole."""
+    parts = [
+        Bar(part["source"], part["value"], part["uncertainty"],
+            "round-off" if part.get("round_off") else f"{number(100 * part['value'], 3)} %",
+            total=part is budget["total"])
+        for part in [*budget["parts"], budget["total"]]
+    ]  # fmt: skip
+    title = metric_title(budget["metric"])
+    title = title if title.startswith("relative") else f"{title}, relative"
+    said = "; ".join(f"{bar.name} {bar.value:.3g} ± {bar.half:.2g}" for bar in parts)
+    return bars(title, parts, f"{title}: {said}.")
+
+
+def _scatters(trials: Sequence[Mapping[str, Any]]) -> list[tuple[int, Drawing | None]]:
+    """Return the stated uncertainty over the true error for each degree; norms are filled."""
+    counted = [t for t in trials if not t["left_out"]]
+    palette, found = Palette(), []
+    for name in dict.fromkeys(t["family"] for t in trials):
+        palette[name]  # the same style in every panel
+    for degree in sorted({t["degree"] for t in counted}):
+        own = [t for t in counted if t["degree"] == degree]
+        shown = [t for t in own if t["stated"] > 0.0 and t["true"] > 0.0]
+        marks = [(t["family"], t["true"], t["stated"], t["quantity"] in _NORMS) for t in shown]
+        missed = sum(not t["covered"] for t in shown)
+        title = f"P{degree}: stated uncertainty, relative"
+        said = f"{title}, over the true error: {len(shown)} marks, {missed} not covered."
+        found.append((degree, scatter(title, "true error, relative", marks, (1.0, 10.0), palette,
+                                      said) if shown else None))  # fmt: skip
+    return found
+
+
+def _thesis(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the figures of the thesis with those of here beside them."""
+    face, steps, delays = record["face"], record["steps"], record["delays"]
+    cuts = [0.0, *(float(row["asked"]) for row in face)]
+    added = {
+        "thesis, XFEM": ("thesis", "xfem"),
+        "thesis, S + S": ("thesis", "snapping_subdivision"),
+        "XFEM": ("added", "xfem"),
+        "S + S, 0.02": ("added", "snapping_subdivision 0.02"),
+        "S + S, 0.2": ("added", "snapping_subdivision 0.2"),
+    }
+    nodes = [
+        (name, [0.0, *(row[part][method] for row in face)])
+        for name, (part, method) in added.items()
+    ]
+    asked = [float(cut) for cut in dict.fromkeys(row["asked_cuts"] for row in steps)]
+    sizes = [float(size) for size in dict.fromkeys(row["tetrahedra"] for row in delays)]
+
+    def grouped(rows: Any, by: str, key: str, factor: float = 1.0) -> list[Any]:
+        return [
+            (f"{name} tets" if isinstance(name, int) else name,
+             [factor * row[key] for row in rows if row[by] == name])
+            for name in dict.fromkeys(row[by] for row in rows)
+        ]  # fmt: skip
+
+    def over_cuts(title: str, key: str, factor: float = 1.0) -> Drawing:
+        curves = grouped(steps, "asked_tetrahedra", key, factor)
+        return profile_panel(title, asked, curves, x_title="cuts")
+
+    def over_sizes(title: str, key: str) -> Drawing:
+        return profile_panel(title, sizes, grouped(delays, "speed_name", key), x_title="tetrahedra")
+
+    return {
+        "unknowns": [profile_panel("nodes added", cuts, nodes, x_title="cut elements")],
+        "times": [
+            over_cuts("thesis: s per simulated s", "thesis_per_second"),
+            over_cuts("here: ms per simulated s", "per_second", 1e3),
+            over_cuts("here: nodes", "nodes"),
+            over_cuts("thesis: nodes", "thesis_nodes"),
+        ],
+        "delays": [
+            over_sizes("thesis: delay, s", "thesis"),
+            over_sizes("size over speed: delay, s", "delay"),
+        ],
+        "slivers": _thesis_slivers(record["slivers"]),
+    }
+
+
+def _thesis_slivers(slivers: Sequence[Mapping[str, Any]]) -> list[Drawing]:
+    palette, panels = Palette(), []
+    for dimension in dict.fromkeys(row["dimension"] for row in slivers):
+        own = listed(slivers, dimension=dimension)
+        series = [
+            Series(
+                solver_title(name), [(r["size"], r["ratio"]) for r in own if r["method"] == name]
+            )
+            for name in dict.fromkeys(row["method"] for row in own)
+        ]
+        title = f"critical step over uncut, {dimension}D"
+        panels.append(loglog(title, "distance of cut and nodes, element sizes", series, palette))
+    return [panel for panel in panels if panel is not None]

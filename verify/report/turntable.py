@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib import colormaps
 from numpy.typing import NDArray
 
-from verify.report.bodies import Body
-from verify.report.view import View
+from verify.report.bodies import Body, View
 
 _TRIANGLES = 120_000  # of a surface beyond which only the still is shown
 _STEPS = 65535

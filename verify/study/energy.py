@@ -7,7 +7,6 @@ from typing import Any
 from verify.errors import InputError
 from verify.result import Verdict
 from verify.scene import Scene, scene_content
-from verify.study.finding import Finding
 from verify.study.measured_scenes import (
     MeasuredStudy,
     Measurement,
@@ -15,6 +14,7 @@ from verify.study.measured_scenes import (
     measured_scenes,
     missing_solutions,
 )
+from verify.study.record import Finding
 from verify.study.variants import Variant
 
 _DRIFT = 1e-2  # of the energy in play: what a spectator would not see

@@ -18,8 +18,7 @@ from verify.errors import InputError
 from verify.result import SolveRecord, Status
 from verify.scene import Scene
 from verify.solution import Solution, handed_over
-from verify.study.finding import Finding
-from verify.study.record import Study
+from verify.study.record import Finding, Study
 from verify.study.variants import Variant
 
 Array = NDArray[np.float64]

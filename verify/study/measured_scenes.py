@@ -15,9 +15,8 @@ from verify.scene import Scene, ValueCheck, restore_scene
 from verify.solution import handed_over
 from verify.solvers import Solver
 from verify.solvers.interface import checked_refusal
-from verify.study.finding import Finding
 from verify.study.in_processes import in_processes
-from verify.study.record import Study
+from verify.study.record import Finding, Study
 from verify.study.variants import Variant
 
 # quantity, unit, value, reason and, if the case states one, limit

@@ -1,4 +1,4 @@
-"""Files of a study: a versioned JSON record and the same numbers as CSV."""
+"""What a study found: findings, a versioned JSON record, and the same numbers as CSV."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -9,8 +9,31 @@ from verify.csv_files import csv_text
 from verify.errors import InputError
 from verify.json_files import write_json
 from verify.provenance import provenance
-from verify.study.finding import Finding
+from verify.result import Verdict
 from verify.whole_files import write_whole
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a study has to say.
+
+    Attributes
+    ----------
+    topic : str
+    sentence : str
+        With the numbers.
+    expected : str
+        The stated limit or the known result against which it is held.
+    verdict : Verdict or None
+        PASS if it came out as expected, FAIL if not, UNDECIDED if the numbers do not tell or there
+        are none; None for what is only shown.
+    """
+
+    topic: str
+    sentence: str
+    expected: str
+    verdict: Verdict | None
+
 
 SCHEMA = 1
 

@@ -27,9 +27,17 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.study.budget.crossing_delay import mean_wait
-from verify.study.budget.links import Chain, Missing, is_realised_as_asked, link
-from verify.study.budget.references import OUTSIDE, References
-from verify.study.budget.solved import CONFORMING, JUDGED, Solve
+from verify.study.budget.links import (
+    CONFORMING,
+    JUDGED,
+    OUTSIDE,
+    Chain,
+    Missing,
+    References,
+    Solve,
+    is_realised_as_asked,
+    link,
+)
 
 _FINER = 4  # an exact solution has no time step: the own one over this
 

@@ -1,19 +1,72 @@
-"""Links of a budget, and when the cut needs none of its own."""
+"""Scenes that were run, references of them, and the links of a budget that are made of these."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
+from verify.assess.changed_scenes import with_kinematics
 from verify.assess.quantities import Measured
-from verify.assess.reference import Reference
+from verify.assess.reference import Reference, conforming_reference
 from verify.compare.body import AnyBody, Body, body_of
 from verify.compare.hooke import law_of
 from verify.compare.realised import cut_deviation
-from verify.errors import UnsupportedSceneError
+from verify.errors import InputError, UnsupportedSceneError
+from verify.result import CaseResult
 from verify.scene import Scene
 from verify.solution import Solution
 from verify.study.budget.budget import Answer
-from verify.study.budget.solved import Solved
+
+REFERENCE, JUDGED, CONFORMING = "reference", "xfem", "conforming"
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A scene that was run: its result, and the solutions by solver and level."""
+
+    scene: Scene
+    result: CaseResult
+    solutions: Mapping[str, Mapping[int, Solution]]
+
+    def solution(self, solver: str, level: int) -> Solution:
+        """Return one solution.
+
+        Raises
+        ------
+        InputError
+            If there is none, with the reason.
+        """
+        try:
+            return self.solutions[solver][level]
+        except KeyError:
+            reason = self.reason(solver) or "not run"
+            text = f"'{self.scene.name}' was not solved by {solver} on level {level}: {reason}"
+            raise InputError(text) from None
+
+    def reason(self, solver: str) -> str:
+        """Why a solver has not solved all that it was to solve; empty if it has."""
+        reasons = {r.reason for r in self.result.solves if r.solver == solver and r.reason}
+        return "; ".join(sorted(reasons))
+
+
+class Solve(Protocol):
+    """Runs scenes."""
+
+    def __call__(
+        self,
+        scenes: Sequence[Scene],
+        place: str,
+        solvers: tuple[str, ...],
+        parameters: Mapping[str, Mapping[str, Any]] | None = None,
+        timed: bool = False,
+    ) -> list[Solved]:
+        """Solve all levels of `scenes` by `solvers` with `parameters`, and by no others.
+
+        `place` names what is kept of it for later; `timed` runs are repeated.
+        """
+        ...
+
 
 _SAME = 1e-9  # of the body's size
 
@@ -94,3 +147,81 @@ def link(chain: Chain, name: str, change: str, what: Solution | Reference) -> An
         except UnsupportedSceneError:
             continue
     return Answer(name, change, one.motion, quantities, {})
+
+
+OUTSIDE = "not part of the total"
+
+
+class References:
+    """Conforming references of a scene, and of scenes that differ from it in one thing.
+
+    Parameters
+    ----------
+    scene : Scene
+    body : Body or SolidBody
+        On which all are measured: with the cuts as asked.
+    size : float
+        Element size of the judged solution, m.
+    solve : Solve
+
+    Attributes
+    ----------
+    finest : int or None
+        Finest level of the reference of the problem, once it is made.
+    steps : int
+        Time steps of that level.
+    """
+
+    def __init__(self, scene: Scene, body: AnyBody, size: float, solve: Solve) -> None:
+        self._scene, self._body, self._size, self._solve = scene, body, size, solve
+        self.finest: int | None = None
+        self.steps = 0
+
+    def problem(self, first: str, own: str, missing: list[Missing]) -> tuple[Reference, str, str]:
+        """Make the reference of the problem in kinematics `first`, or else in its `own`.
+
+        Returns
+        -------
+        reference, title, kinematics
+        """
+        titles = {
+            "corotational": "the problem: finite rotations, cut as asked",
+            "linear": "the problem: linear kinematics, cut as asked",
+        }
+        try:
+            return self._as_asked(first), titles[first], first
+        except InputError as problem:
+            if first == own:
+                raise
+            missing.append(Missing("finite rotations → linear", str(problem), OUTSIDE))
+        return self._as_asked(own), titles[own], own
+
+    def _as_asked(self, kinematics: str) -> Reference:
+        scene, place = with_kinematics(self._scene, kinematics), f"reference-{kinematics}"
+        (solved,) = self._solve([scene], place, (REFERENCE,))
+        found = self._measured(solved)
+        self.finest = max(solved.solutions[REFERENCE])
+        self.steps = solved.solutions[REFERENCE][self.finest].iterations.get("steps", 0)
+        return found
+
+    def of(self, scene: Scene, place: str, **parameters: Any) -> Reference:
+        """Solve a scene, with parameters of the reference; measure it as if it were the problem.
+
+        Raises
+        ------
+        InputError
+            If there is no reference, with the reason.
+        """
+        (solved,) = self._solve([scene], place, (REFERENCE,), {REFERENCE: parameters})
+        return self._measured(solved)
+
+    def _measured(self, solved: Solved) -> Reference:
+        levels = solved.solutions.get(REFERENCE, {})
+        law = law_of(solved.scene)
+        try:
+            return conforming_reference(self._scene, levels, self._body, law, self._size)
+        except InputError as problem:
+            reason = solved.reason(REFERENCE)
+            kind = solved.scene.analysis.kinematics
+            text = f"the {kind} reference of '{solved.scene.name}': {problem}"
+            raise InputError(f"{text} ({reason})" if reason else text) from None

@@ -13,16 +13,12 @@ from verify.errors import InputError, UnsupportedSceneError
 from verify.result import Verdict
 from verify.scene import Scene
 from verify.solvers.body_of_scene import background_mesh
-from verify.study.budget.budget import Budget, Part, error_budget
-from verify.study.budget.candidates import find_candidates
+from verify.study.budget.budget import Budget, Part, Times, error_budget, norm_names
+from verify.study.budget.candidates import Candidate, cheapest_adequate, find_candidates
 from verify.study.budget.chain import make_chain
-from verify.study.budget.cheapest import Candidate, cheapest_adequate
 from verify.study.budget.cut_ends import CutEnd, cut_ends
-from verify.study.budget.distances import Times, norm_names
-from verify.study.budget.links import Chain, Missing
-from verify.study.budget.solved import JUDGED, Solve
-from verify.study.finding import Finding
-from verify.study.record import Study
+from verify.study.budget.links import JUDGED, Chain, Missing, Solve
+from verify.study.record import Finding, Study
 
 _QUICK_LEVELS = 2
 

@@ -7,9 +7,16 @@ from typing import Any
 import numpy as np
 
 from verify.scene import Scene
-from verify.study.calibration.curved_scenes import arc_through, curved_crack, ring_and_disc
+from verify.study.calibration.plane_scenes import (
+    airy,
+    arc_through,
+    curved_crack,
+    griffith,
+    ring_and_disc,
+    smooth,
+    tip,
+)
 from verify.study.calibration.solid_scenes import ball_and_shell, solid_smooth
-from verify.study.calibration.straight_scenes import airy, griffith, smooth, tip
 
 Content = dict[str, Any]
 

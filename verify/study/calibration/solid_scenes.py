@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from verify.study.calibration.scene_parts import Content, Random
+from verify.study.calibration.plane_scenes import Content, Random
 
 
 def solid_smooth(random: Random) -> Content:

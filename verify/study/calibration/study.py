@@ -9,8 +9,7 @@ from typing import Any
 from verify.result import Verdict
 from verify.study.calibration.families import families
 from verify.study.calibration.trial import NORMS, Trial, trials
-from verify.study.finding import Finding
-from verify.study.record import Study
+from verify.study.record import Finding, Study
 
 COVERED, COVERED_IN_EACH, NOT_WASTED = 0.95, 0.90, 0.85  # shares that are asked for
 WASTED = 10.0  # an error bar that is so many times the error judges little

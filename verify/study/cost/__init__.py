@@ -1,6 +1,5 @@
 """Cost of accuracy, once and over a cut that grows."""
 
-from verify.study.cost.sequence import growing_scenes
-from verify.study.cost.study import CostStudy, cost_study
+from verify.study.cost.study import CostStudy, cost_study, growing_scenes
 
 __all__ = ["CostStudy", "cost_study", "growing_scenes"]

@@ -6,8 +6,14 @@ from verify.assess.energy_account import ACCOUNT
 from verify.assess.intervals import ERROR_METRICS
 from verify.ranking import Comparison, LeftOut
 from verify.result import CaseResult
-from verify.study.ranking.finest import interval_of, item_on_finest
-from verify.study.ranking.standing import Item, compared_by_mean, compared_by_worst, is_exact
+from verify.study.ranking.standing import (
+    Item,
+    compared_by_mean,
+    compared_by_worst,
+    interval_of,
+    is_exact,
+    item_on_finest,
+)
 
 EQUAL_SIZE, FINEST = "equal size", "finest level"
 EXACT = "where a solver is exact"

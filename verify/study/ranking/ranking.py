@@ -6,13 +6,13 @@ from typing import Any
 
 from verify.assess.energy_account import ACCOUNT
 from verify.assess.intervals import ERROR_METRICS
-from verify.ranking import LeftOut, Ranking, ranked_solvers
+from verify.ranking import Comparison, LeftOut, Ranking, ranked_solvers
 from verify.result import CaseResult, Status, Verdict
 from verify.study.ranking.accuracy import accuracy_comparisons
 from verify.study.ranking.cost import cost_comparisons, why_times_are_no_sample
-from verify.study.ranking.energy import energy_comparisons
 from verify.study.ranking.profiles import data_profiles, performance_profile
 from verify.study.ranking.stability import stability_standings
+from verify.study.ranking.standing import compared_by_worst, item_on_finest
 from verify.study.ranking.strengths import strengths
 
 _REFERENCE = "reference"
@@ -83,3 +83,25 @@ def _uncompared(result: CaseResult) -> str:
         return ""
     said = next((s.notes["comparison"] for s in solved if "comparison" in s.notes), "")
     return f"no error is measured: {said or 'no reason given'}"
+
+
+def energy_comparisons(results: Sequence[CaseResult], solvers: Sequence[str]) -> list[Comparison]:
+    """Compare what is kept on the finest level of each case; the worst case counts.
+
+    Momenta count only where nothing acts from outside: elsewhere they have to change.
+    """
+    comparisons = []
+    for metric in ACCOUNT:
+        items = [
+            item_on_finest(result, metric, solvers, result.case)
+            for result in results
+            if any(s.metric(metric) for s in result.solves if s.solver in solvers)
+            and not ("momentum" in metric and _acted_on(result))
+        ]
+        if (found := compared_by_worst(metric, "finest level", solvers, items)) is not None:
+            comparisons.append(found)
+    return comparisons
+
+
+def _acted_on(result: CaseResult) -> bool:
+    return bool(result.scene.get("supports") or result.scene.get("loads"))

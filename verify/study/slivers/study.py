@@ -26,8 +26,7 @@ from verify.study.measured_scenes import (
     measured_families,
     measured_scenes,
 )
-from verify.study.slivers.findings import findings
-from verify.study.slivers.growth import growth
+from verify.study.slivers.findings import findings, growth
 from verify.study.slivers.step_by_running import step_by_running
 from verify.study.uncut_twin import with_uncut_twin
 from verify.study.variants import Variant

@@ -7,7 +7,7 @@ from verify.simulator.thesis.added_nodes import FaceCount, StripCount
 from verify.simulator.thesis.delays import SPEEDS, Delay, Frames
 from verify.simulator.thesis.real_time import LIMITS, RealTime
 from verify.simulator.thesis.step_times import StepTime
-from verify.study.finding import Finding
+from verify.study.record import Finding
 from verify.study.thesis.measured import Measured
 
 _NEAR = 0.2  # of the thesis' increments: another face, other strokes, two nodes less for each end

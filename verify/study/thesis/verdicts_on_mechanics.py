@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from verify.result import Verdict
 from verify.simulator.thesis.added_nodes import FaceCount
-from verify.study.finding import Finding
+from verify.study.record import Finding
 from verify.study.thesis.measured import Measured
 from verify.study.thesis.methods_compared import MethodOnCase
 from verify.study.thesis.sliver_systems import SliverSystem, exponent

@@ -1,0 +1,212 @@
+"""Random plane scenes with one cut: straight or along an arc, with no tip, one or two."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Content = dict[str, Any]
+Random = np.random.Generator
+
+
+def plane_scene(
+    random: Random, geometry: Content, exact: tuple[str, Content], cut: Content, at: float
+) -> Content:
+    """Return the content of a plane scene, its boundary held as the exact solution says.
+
+    Parameters
+    ----------
+    random : numpy.random.Generator
+    geometry : dict
+        A rectangle.
+    exact : (str, dict)
+        Name of the exact solution and its parameters.
+    cut : dict
+        One cut.
+    at : float
+        Where the opening is asked for, as a fraction of the cut's length.
+    """
+    place = {"kind": "displacement", "point": random_point(random, geometry, cut)}
+    return {
+        "title": exact[0],
+        "requirement": "The stated uncertainty of the reference shall cover its true error.",
+        "geometry": geometry,
+        "mesh": {"cells": [[8, 8]]},
+        "material": {
+            "young": 1.0,
+            "poisson": float(random.uniform(0.0, 0.45)),
+            "plane": str(random.choice(["strain", "stress"])),
+        },
+        "supports": [{"where": "boundary", "displacement": "exact"}],
+        "cuts": [cut],
+        "quantities": [
+            {"kind": "strain_energy"},
+            {"kind": "opening", "name": "opening", "at": at},
+            {**place, "name": "u_x", "component": "x"},
+            {**place, "name": "u_y", "component": "y"},
+        ],
+        "exact": {"solution": exact[0], "parameters": exact[1]},
+    }
+
+
+def intensities(ends: tuple[str, ...]) -> list[Content]:
+    """Return both stress-intensity factors at each end of the cut, as quantities."""
+    return [
+        {"kind": "stress_intensity", "name": f"K_{mode} at the {end}", "end": end, "mode": mode}
+        for end in ends
+        for mode in ("I", "II")
+    ]
+
+
+def random_point(random: Random, geometry: Content, cut: Content) -> list[float]:
+    """Return a point of the body, off its boundary and its cut by a twentieth of its size."""
+    lower, upper = np.array(geometry["lower"]), np.array(geometry["upper"])
+    size = float((upper - lower).max())
+    while True:
+        point = random.uniform(lower + 0.1 * size, upper - 0.1 * size)
+        if _distance(point, cut) > 0.05 * size:
+            return [float(x) for x in point]
+
+
+def around(centre: Array, half: float) -> Content:
+    """Return a square around a point."""
+    return {
+        "kind": "rectangle",
+        "lower": [float(x) for x in centre - half],
+        "upper": [float(x) for x in centre + half],
+    }
+
+
+def _distance(point: Array, cut: Content) -> float:
+    if cut["kind"] == "arc":
+        return abs(float(np.linalg.norm(point - cut["centre"])) - float(cut["radius"]))
+    start, end = np.array(cut["points"])
+    along = (end - start) / np.linalg.norm(end - start)
+    return abs(float(along[0] * (point - start)[1] - along[1] * (point - start)[0]))
+
+
+_UNIT = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
+_LONG = 3.0  # of a cut that goes on beyond a unit square
+
+
+def airy(random: Random) -> Content:
+    """Return fields without body force on both sides of a cut through a square."""
+    above, below = (
+        [*random.uniform(-0.3, 0.3, 2).tolist(), float(random.uniform(1.0, 3.5))] for _ in "ab"
+    )
+    return _through(random, "airy", {"above": above, "below": below})
+
+
+def smooth(random: Random) -> Content:
+    """Return sinusoids with a body force on both sides of a cut through a square."""
+    above, below = (
+        np.column_stack([
+            random.uniform(0.03, 0.1, 2) * random.choice([-1.0, 1.0], 2),
+            random.uniform(2.0, 6.0, 2),
+            random.uniform(-180.0, 180.0, 2),
+        ]).tolist()
+        for _ in "ab"
+    )  # fmt: skip
+    scene = _through(random, "smooth", {"above": above, "below": below})
+    return {**scene, "loads": [{"kind": "body_force", "force": "exact"}]}
+
+
+def tip(random: Random) -> Content:
+    """Return a cut from the boundary of a square to a tip in it, in any mixed mode."""
+    at, angle = random.uniform(-0.3, 0.3, 2), float(random.uniform(-180.0, 180.0))
+    intensity = [float(random.uniform(0.3, 1.0)), float(random.uniform(-1.0, 1.0))]
+    along = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    cut = {"kind": "polyline", "points": [(at - _LONG * along).tolist(), at.tolist()]}
+    parameters = {"tip": at.tolist(), "angle": angle, "intensity": intensity}
+    opened = 1.0 - float(random.uniform(0.15, 0.5)) / _LONG
+    scene = plane_scene(random, around(np.zeros(2), 1.0), ("tip", parameters), cut, opened)
+    return {**scene, "quantities": scene["quantities"] + intensities(("end",))}
+
+
+def griffith(random: Random) -> Content:
+    """Return a crack inside a square, under a remote stress that opens it."""
+    centre, angle = random.uniform(-0.3, 0.3, 2), float(random.uniform(-90.0, 90.0))
+    a, along = (
+        float(random.uniform(0.6, 1.1)),
+        np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))]),
+    )
+    axes = np.array([along, [-along[1], along[0]]])
+    shear = float(random.uniform(-0.7, 0.7))
+    local = np.array([[float(random.uniform(-0.5, 1.0)), shear], [shear, 1.0]])
+    stress = axes.T @ local @ axes
+    parameters = {
+        "centre": centre.tolist(), "a": a, "angle": angle,
+        "stress": [float(stress[0, 0]), float(stress[1, 1]), float(stress[0, 1])],
+    }  # fmt: skip
+    ends = [(centre - a * along).tolist(), (centre + a * along).tolist()]
+    cut, at = {"kind": "polyline", "points": ends}, float(random.uniform(0.2, 0.8))
+    scene = plane_scene(random, around(np.zeros(2), 2.0), ("griffith", parameters), cut, at)
+    return {**scene, "quantities": scene["quantities"] + intensities(("start", "end"))}
+
+
+def _through(random: Random, name: str, sides: Content) -> Content:
+    """Return a cut through the unit square at any angle."""
+    point, angle = random.uniform(0.35, 0.65, 2), float(random.uniform(-90.0, 90.0))
+    along = np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    reach = 0.5 * _LONG * along
+    cut = {"kind": "polyline", "points": [(point - reach).tolist(), (point + reach).tolist()]}
+    parameters = {"point": point.tolist(), "angle": angle, **sides}
+    at = 0.5 + float(random.uniform(-0.25, 0.25)) / _LONG
+    return plane_scene(random, _UNIT, (name, parameters), cut, at)
+
+
+def ring_and_disc(random: Random) -> Content:
+    """Return a disc at rest in a ring that is drawn off it, at a corner or at an edge.
+
+    Both reach the boundary of the square, which holds them; or the outermost edge is loaded.
+    """
+    radius = float(random.uniform(0.4, 0.7))
+    beside = bool(random.integers(2))
+    centre = random.uniform([0.4, -0.1], [0.6, 0.1]) if beside else random.uniform(-0.2, 0.1, 2)
+    if beside:
+        radius *= 0.6
+    place = {"centre": centre.tolist(), "radius": radius}
+    parameters = {**place, "outward": float(random.uniform(0.05, 0.15)), "at": 1.0}
+    middle, sweep = (90.0, 300.0) if beside else (45.0, 200.0)
+    cut = {"kind": "arc", **place, "start": middle - 0.5 * sweep, "sweep": sweep}
+    geometry = {"kind": "rectangle", "lower": [0.0, 0.0], "upper": [1.0, 1.0]}
+    at = 0.5 + float(random.uniform(-10.0, 10.0)) / sweep
+    scene = plane_scene(random, geometry, ("circular_cut", parameters), cut, at)
+    if random.integers(2):
+        held = [{"where": side, "displacement": "exact"} for side in ("left", "right", "bottom")]
+        scene["supports"] = held
+        scene["loads"] = [{"kind": "traction", "where": "top", "traction": "exact"}]
+    return scene
+
+
+def arc_through(random: Random) -> Content:
+    """Return a square that an arc cuts through, whose ends lie outside."""
+    scene, middle, radius = _arc(random, (70.0, 85.0), (0.8, 2.5))
+    # the tips are at least 0.9 radii from the middle of the arc, the corners 0.71 at most
+    geometry = around(middle, 0.5 * min(radius, 1.0))
+    at = 0.5 + float(random.uniform(-0.1, 0.1))
+    return plane_scene(random, geometry, scene[0], scene[1], at)
+
+
+def curved_crack(random: Random) -> Content:
+    """Return a crack along an arc inside a square, under a remote stress that opens it."""
+    scene, middle, radius = _arc(random, (30.0, 65.0), (0.8, 1.3))
+    geometry = around(middle + random.uniform(-0.2, 0.2, 2), 2.0 * radius)
+    made = plane_scene(random, geometry, scene[0], scene[1], float(random.uniform(0.2, 0.8)))
+    return {**made, "quantities": made["quantities"] + intensities(("start", "end"))}
+
+
+def _arc(
+    random: Random, half_angles: tuple[float, float], radii: tuple[float, float]
+) -> tuple[tuple[tuple[str, Content], Content], np.ndarray, float]:
+    """Return an arc crack and its cut, the middle of the arc and its radius."""
+    radius, half = float(random.uniform(*radii)), float(random.uniform(*half_angles))
+    turn = float(random.uniform(-180.0, 180.0))
+    centre = random.uniform(-0.2, 0.2, 2)
+    stress = [*random.uniform(0.7, 1.0, 2).tolist(), float(random.uniform(-0.2, 0.2))]
+    place = {"centre": centre.tolist(), "radius": radius}
+    parameters = {**place, "angle": turn, "half_angle": half, "stress": stress}
+    cut = {"kind": "arc", **place, "start": turn - half, "sweep": 2 * half}
+    away = np.array([np.cos(np.deg2rad(turn)), np.sin(np.deg2rad(turn))])
+    return (("arc_crack", parameters), cut), centre + radius * away, radius
