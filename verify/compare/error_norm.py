@@ -13,6 +13,9 @@ from verify.compare.slabs import Rule
 
 Array = NDArray[np.float64]
 
+# Strain over gradient below which a reference is a rigid motion, solved to round-off.
+_NO_STRAIN = 1e-10
+
 
 @dataclass(frozen=True)
 class ErrorNorm:
@@ -59,23 +62,20 @@ class Squares:
             float(np.sqrt(weights @ self.difference)), float(np.sqrt(of_scale @ self.expected))
         )
 
+    def largest(self) -> ErrorNorm:
+        """Largest values at the points.
+
+        The points lie close to everything but do not hit the maximum: the difference between
+        rules, taken as the integration error, says how much that matters.
+        """
+        return ErrorNorm(
+            *(float(s.max(initial=0.0)) ** 0.5 for s in (self.difference, self.expected))
+        )
+
 
 def displacement_error(field: Field, reference: Field, rule: Rule) -> ErrorNorm:
     """‖u − u_ref‖ and ‖u_ref‖ in L2 of the body; units m·m (2D), m·m^1.5 (3D)."""
     return displacement_squares(field, reference, rule).norm(rule.weights)
-
-
-def displacement_squares(field: Field, reference: Field, rule: Rule) -> Squares:
-    """|u − u_ref|² and |u_ref|² at the points of a rule, m²."""
-    expected = reference.displacement(rule.points, rule.points)
-    difference = field.displacement(rule.points, rule.points) - expected
-    return Squares(
-        np.einsum("ni,ni->n", difference, difference), np.einsum("ni,ni->n", expected, expected)
-    )
-
-
-# Strain over gradient below which a reference is a rigid motion, solved to round-off.
-_NO_STRAIN = 1e-10
 
 
 def energy_error(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorNorm:
@@ -85,6 +85,19 @@ def energy_error(field: Field, reference: Field, rule: Rule, law: Law) -> ErrorN
     A reference that moves rigidly but for round-off has the norm 0.
     """
     return energy_squares(field, reference, rule, law).norm(rule.weights)
+
+
+def jump_error(field: Field, reference: Field, rule: CutRule) -> ErrorNorm:
+    """‖[u] − [u_ref]‖ and ‖[u_ref]‖ in L2 of the cuts as asked."""
+    return jump_squares(field, reference, rule).norm(rule.weights)
+
+
+def displacement_squares(
+    field: Field, reference: Field, rule: Rule, law: Law | None = None
+) -> Squares:
+    """|u − u_ref|² and |u_ref|² at the points of a rule, m²."""
+    expected = reference.displacement(rule.points, rule.points)
+    return _squares(field.displacement(rule.points, rule.points), expected)
 
 
 def energy_squares(field: Field, reference: Field, rule: Rule, law: Law) -> Squares:
@@ -99,53 +112,27 @@ def energy_squares(field: Field, reference: Field, rule: Rule, law: Law) -> Squa
     return Squares(2 * law.error_density(difference, expected), scale)
 
 
-def maximum_error(field: Field, reference: Field, rule: Rule) -> ErrorNorm:
-    """Largest |u − u_ref| and |u_ref| over the points of a rule, m.
+def jump_squares(field: Field, reference: Field, rule: CutRule, law: Law | None = None) -> Squares:
+    """|[u] − [u_ref]|² and |[u_ref]|² at the points of a rule of the cuts as asked, m²."""
+    return _squares(displacement_jump(field, rule), displacement_jump(reference, rule))
 
-    The points lie close to everything but do not hit the maximum: the difference between
-    rules, taken as the integration error, says how much that matters.
-    """
-    expected = reference.displacement(rule.points, rule.points)
-    difference = field.displacement(rule.points, rule.points) - expected
-    return ErrorNorm(
-        float(np.linalg.norm(difference, axis=1).max()),
-        float(np.linalg.norm(expected, axis=1).max()),
+
+def opening_squares(
+    field: Field, reference: Field, rule: CutRule, law: Law | None = None
+) -> Squares:
+    """|[u_n] − [u_ref,n]|² and |[u_ref,n]|² of the jump along the normal of the cuts, m²."""
+    found, expected = (
+        np.einsum("ni,ni->n", displacement_jump(one, rule), rule.normals)[:, None]
+        for one in (field, reference)
     )
+    return _squares(found, expected)
 
 
-def displacement_jump(field: Field, rule: CutRule) -> NDArray[np.float64]:
+def displacement_jump(field: Field, rule: CutRule) -> Array:
     """Displacement (n, d) of the positive side minus that of the negative side, m."""
     above = field.displacement(rule.points, rule.positive)
     return above - field.displacement(rule.points, rule.negative)
 
 
-def jump_error(field: Field, reference: Field, rule: CutRule) -> ErrorNorm:
-    """‖[u] − [u_ref]‖ and ‖[u_ref]‖ in L2 of the cuts as asked."""
-    expected = displacement_jump(reference, rule)
-    difference = displacement_jump(field, rule) - expected
-    return ErrorNorm(
-        float(np.sqrt(rule.weights @ np.sum(difference**2, axis=1))),
-        float(np.sqrt(rule.weights @ np.sum(expected**2, axis=1))),
-    )
-
-
-def opening_error(field: Field, reference: Field, rule: CutRule) -> ErrorNorm:
-    """‖[u_n] − [u_ref,n]‖ and ‖[u_ref,n]‖ in L2 of the cuts as asked."""
-    difference, expected = _profiles(field, reference, rule)
-    return ErrorNorm(
-        float(np.sqrt(rule.weights @ difference**2)), float(np.sqrt(rule.weights @ expected**2))
-    )
-
-
-def opening_maximum_error(field: Field, reference: Field, rule: CutRule) -> ErrorNorm:
-    """Largest |[u_n] − [u_ref,n]| and |[u_ref,n]| along the cuts as asked, m."""
-    difference, expected = _profiles(field, reference, rule)
-    return ErrorNorm(
-        float(np.abs(difference).max(initial=0.0)), float(np.abs(expected).max(initial=0.0))
-    )
-
-
-def _profiles(field: Field, reference: Field, rule: CutRule) -> tuple[np.ndarray, np.ndarray]:
-    expected = np.sum(displacement_jump(reference, rule) * rule.normals, axis=1)
-    found = np.sum(displacement_jump(field, rule) * rule.normals, axis=1)
-    return found - expected, expected
+def _squares(found: Array, expected: Array) -> Squares:
+    return Squares(*(np.einsum("ni,ni->n", v, v) for v in (found - expected, expected)))
