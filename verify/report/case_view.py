@@ -18,16 +18,14 @@ from verify.report.run_directory import CaseEntry
 from verify.report.tables import (
     MANY,
     checks_table,
-    failures_table,
     numbers_table,
-    orders_table,
     reasons_table,
     reference_facts,
     reference_tables,
     regularisations_table,
     times_table,
 )
-from verify.result import CaseResult, NoticeKind, Verdict, worst
+from verify.result import CaseResult, SolveRecord, Verdict, worst
 
 
 @dataclass(frozen=True)
@@ -56,40 +54,36 @@ class CaseView:
         Titles of the solvers that fail.
     by_solver : dict of str to str
         Worst verdict of each solver, by its title.
+    result : CaseResult or None
     defect : str
         Why it cannot be shown; empty if it can.
-    unfinished : int or None
-        Solves that had finished where it was not judged.
+    unjudged : list of SolveRecord
+        Those of a case that was not judged.
     """
 
     anchor: str
     name: str
     title: str
     verdict: Verdict
-    requirement: str = ""
+    result: CaseResult | None = None
     failing: list[str] = field(default_factory=list)
     by_solver: dict[str, str] = field(default_factory=dict)
     defect: str = ""
-    unfinished: int | None = None
+    unjudged: list[SolveRecord] = field(default_factory=list)
     warnings: list[tuple[str, str]] = field(default_factory=list)
-    adequacy: list[str] = field(default_factory=list)
     facts: list[tuple[str, list[str]]] = field(default_factory=list)
     sketch: Drawing | None = None
     checks: Table | None = None
-    failures: Table | None = None
+    pictures: CasePictures = field(default_factory=CasePictures)
     rows: list[PictureRow] = field(default_factory=list)
-    tip_at: str = ""
-    film: list[tuple[str, list[Picture]]] = field(default_factory=list)
-    scale: str = ""
     turnable: bool = False
-    picture_notes: list[str] = field(default_factory=list)
+    metrics: list[str] = field(default_factory=list)
     convergence: list[Figure] = field(default_factory=list)
     convergence_notes: list[str] = field(default_factory=list)
     cost: Figure | None = None
     cost_notes: list[str] = field(default_factory=list)
     openings: list[Figure] = field(default_factory=list)
     motion: MotionView | None = None
-    orders: Table | None = None
     has_order: bool = False
     many: bool = False  # more solvers than a table of them has room for beside the figures
     reasons: Table | None = None
@@ -103,60 +97,49 @@ class CaseView:
 
 def case_view(index: int, entry: CaseEntry, pictures: CasePictures, palette: Palette) -> CaseView:
     """Return what is shown of case number `index`; what cannot be shown is said."""
-    verdict = entry.result.verdict if entry.result else Verdict.ERROR
-    view = CaseView(f"case-{index + 1}", entry.name, entry.name, verdict)
+    anchor, result = f"case-{index + 1}", entry.result
+    if result is None:
+        return CaseView(anchor, entry.name, entry.name, Verdict.ERROR,
+                        defect=f"Not judged: {entry.defect}.", unjudged=entry.unjudged)  # fmt: skip
+    view = CaseView(anchor, entry.name, result.title, result.verdict, result, pictures=pictures)
     try:
-        if entry.result is None:
-            view.defect = f"Not judged: {entry.defect}."
-            if entry.unjudged:
-                view.unfinished = sum(solve.status == "solved" for solve in entry.unjudged)
-            view.failures = failures_table(entry.unjudged)
-        else:
-            _fill(view, entry.result, palette)
-            show_pictures(view, pictures)
+        _fill(view, result, palette)
+        show_pictures(view)
     except Exception as error:
         said = f"This case cannot be shown: {words_of(error)}. Its numbers are in results.json."
-        return CaseView(view.anchor, view.name, view.title, view.verdict, defect=said)
+        return CaseView(anchor, entry.name, result.title, view.verdict, defect=said)
     return view
 
 
 def _fill(view: CaseView, result: CaseResult, palette: Palette) -> None:
-    view.title, view.requirement = result.title, result.requirement
     view.failing = [solver_title(name) for name in result.failing]
     of_solver: dict[str, list[Verdict]] = {}
     for record in result.verdicts:
         of_solver.setdefault(solver_title(record.solver or "nobody"), []).append(record.verdict)
     view.by_solver = {name: str(worst(own)) for name, own in of_solver.items()}
-    for notice in result.notices:
+    for notice in result.warnings:
         whose = f"{solver_title(notice.solver)}, " if notice.solver else ""
-        if notice.kind is NoticeKind.WARNING:
-            view.warnings.append((f"{whose}{notice.about}", notice.text))
-        elif notice.kind is NoticeKind.ADEQUACY:
-            view.adequacy.append(notice.text)
+        view.warnings.append((f"{whose}{notice.about}", notice.text))
     try:
         view.facts, view.sketch = problem_facts(result.scene), sketch(result.scene)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         view.facts.append(("Sketch", [f"cannot be drawn ({words_of(error)})"]))
-    view.checks, view.failures = checks_table(result), failures_table(result.solves)
+    view.checks, view.metrics = checks_table(result), metric_names(result)
     _convergence(view, result, palette)
     view.openings = opening_figures(result, palette)
     view.motion = motion_view(result, palette)
     view.many = len({solve.solver for solve in result.solves}) > MANY
-    view.orders, view.numbers = orders_table(result), numbers_table(result)
+    view.numbers, view.reasons = numbers_table(result), reasons_table(result)
     few = len({rate.solver for rate in result.rates}) <= MANY
     view.has_order = few and any(rate.order is not None for rate in result.rates)
-    view.reasons = reasons_table(result)
     view.times, view.regularisations = times_table(result), regularisations_table(result)
     view.reference = reference_facts(result.reference)
     view.reference_tables = reference_tables(result.reference)
 
 
-def show_pictures(view: CaseView, pictures: CasePictures) -> None:
-    """Put the pictures of a case into its view, in place of those that are there."""
-    view.rows, view.turnable = [], False
-    view.scale = "" if pictures.scale == 1 else f"× {number(pictures.scale, 1)}"
-    view.picture_notes, view.tip_at = pictures.notes, pictures.tip_at
-    view.film = [(own[0].description.partition(" at t")[0], own) for own in pictures.film]
+def show_pictures(view: CaseView) -> None:
+    """Take the rows of pictures from those of the case, in place of what is there."""
+    view.rows, view.turnable, pictures = [], False, view.pictures
     for kind, group, bar in (("deformed", pictures.deformed, "displacement |u|"),
                              ("error", pictures.error, "error"),
                              ("tip", pictures.tip, "error")):  # fmt: skip
@@ -170,7 +153,7 @@ def _convergence(view: CaseView, result: CaseResult, palette: Palette) -> None:
     """Draw each metric over the element size, and what the first of them costs."""
     lead = _lead_metric(result)
     drawn: list[Curve] = []
-    for metric in metric_names(result):
+    for metric in view.metrics:
         curves, said = _above_round_off(error_curves(result, metric), metric)
         view.convergence_notes += said
         slope = required_slope(result, metric)

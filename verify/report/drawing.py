@@ -25,10 +25,9 @@ from verify.whole_files import write_whole
 
 @dataclass(frozen=True)
 class Drawn:
-    """A case as the page shows it, its pictures, and the styles that its figures give labels."""
+    """A case as the page shows it, and the styles that its figures give labels."""
 
     view: CaseView
-    pictures: CasePictures
     styles: dict[str, Style]
 
 
@@ -56,8 +55,7 @@ def drawn_case(root: Path, index: int, entry: CaseEntry, palette: Palette) -> Dr
             picture.image = draw(picture.body, picture.view)
     except Exception as error:
         pictures = CasePictures(notes=[f"The pictures of this case failed: {words_of(error)}."])
-    view = case_view(index, entry, pictures, palette)
-    return Drawn(view, pictures, dict(palette))
+    return Drawn(case_view(index, entry, pictures, palette), dict(palette))
 
 
 def drawn_before(file: Path, palette: Palette) -> Drawn | None:

@@ -1,24 +1,33 @@
 """Families of scenes: each error against the parameter, a curve per solver."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from verify.report.blocks import Figure, Table, plain_table
+from verify.report.blocks import Drawing
 from verify.report.curves import Point, error_curves, metric_names
 from verify.report.figures.studies import Series, loglog
 from verify.report.figures.style import Palette
-from verify.report.notation import error_title, number
+from verify.report.notation import error_title
 from verify.report.run_directory import Run
 from verify.result import CaseResult
 
 
+@dataclass(frozen=True)
+class FamilyPart:
+    """An error over the rows of a family: the finest point of each solver, by value and name."""
+
+    title: str
+    solvers: list[str]
+    found: dict[float, dict[str, Point]]
+    panel: Drawing | None
+
+
 @dataclass
 class FamilyView:
-    """A family of scenes with tables and figures, on the finest level of each row."""
+    """A family of scenes with a table and a figure for each error."""
 
     name: str
     parameter: str
-    parts: list[tuple[Table, Figure | None]] = field(default_factory=list)
+    parts: list[FamilyPart] = field(default_factory=list)
 
 
 def family_views(run: Run, palette: Palette) -> list[FamilyView]:
@@ -37,21 +46,16 @@ def _family(name: str, results: list[CaseResult], palette: Palette) -> FamilyVie
     for metric in dict.fromkeys(metric for row in rows for metric in metric_names(row)):
         found = {_value(row): _finest(row, metric) for row in rows}
         solvers = list(dict.fromkeys(label for one in found.values() for label in one))
-        if not solvers:
-            continue
-        title = error_title(metric)
-        table = _table(title, view.parameter, solvers, found)
-        series = [
-            Series(label, [(x, one[label].value if label in one else None)
-                           for x, one in sorted(found.items())])
-            for label in solvers
-        ]  # fmt: skip
-        panel = (
-            loglog(title, view.parameter, series, palette)
-            if sum(x > 0 for x in found) > 1
-            else None
-        )
-        view.parts.append((table, Figure([panel]) if panel else None))
+        title, panel = error_title(metric), None
+        if sum(x > 0 for x in found) > 1:
+            series = [
+                Series(label, [(x, one[label].value if label in one else None)
+                               for x, one in sorted(found.items())])
+                for label in solvers
+            ]  # fmt: skip
+            panel = loglog(title, view.parameter, series, palette)
+        if solvers:
+            view.parts.append(FamilyPart(title, solvers, found, panel))
     return view
 
 
@@ -63,13 +67,3 @@ def _value(result: CaseResult) -> float:
 def _finest(result: CaseResult, metric: str) -> dict[str, Point]:
     """Return the last point of each curve of a row by its label."""
     return {curve.label: curve.points[-1] for curve in error_curves(result, metric)}
-
-
-def _table(
-    title: str, parameter: str, solvers: Sequence[str], found: dict[float, dict[str, Point]]
-) -> Table:
-    rows = [
-        [f"{value:g}", *(number(one[s].value) if s in one else "–" for s in solvers)]
-        for value, one in found.items()
-    ]
-    return plain_table(title, [f"{parameter} =", *solvers], rows, named=True)

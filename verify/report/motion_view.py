@@ -41,7 +41,7 @@ class MotionView:
     unresolved: str
     released: Table | None
     drifts: Table | None
-    parts: Table | None
+    solves: list[SolveRecord]
 
 
 def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
@@ -60,7 +60,7 @@ def motion_view(result: CaseResult, palette: Palette) -> MotionView | None:
     unresolved = "; ".join(f"{metric_title(name)}: {', '.join(map(solver_title, whose))}"
                            for name, whose in hidden.items() if whose)  # fmt: skip
     return MotionView(panels, shown, unresolved, released_table(moving),
-                      _drifts_table(result, moving), _parts_table(moving))  # fmt: skip
+                      _drifts_table(result, moving), moving)  # fmt: skip
 
 
 def _finest(solves: Sequence[SolveRecord]) -> list[SolveRecord]:
@@ -144,33 +144,6 @@ def _drifts_table(result: CaseResult, solves: Sequence[SolveRecord]) -> Table | 
     head = ["solver", "level", *(metric_title(name) for name in names)]
     caption = "Drifts of energy and momenta, with the verdicts of the case"
     return plain_table(caption, head, rows, "prose")
-
-
-def _parts_table(solves: Sequence[SolveRecord]) -> Table | None:
-    """Return the separated parts of every solver, with the drifts of each once it is free."""
-    rows = []
-    for solve in solves:
-        for k, part in enumerate(solve.parts):
-            kinetic, strain = part.series.get("kinetic", []), part.series.get("strain", [])
-            rows.append([
-                solver_title(solve.solver), str(k + 1), number(part.mass), _numbers(part.centre),
-                _numbers(part.inertia),
-                number(kinetic[-1]) if kinetic else "–", number(strain[-1]) if strain else "–",
-                f"{part.free_from:.4g}" if part.free_from is not None else "held",
-                *(number(part.drift[name]) if name in part.drift else "–"
-                  for name in ("linear_momentum", "angular_momentum")),
-            ])  # fmt: skip
-    head = [
-        "solver", "part", "mass, kg", "centre, m", "inertia about its own centre, kg m²",
-        "kinetic energy at the end, J", "strain energy at the end, J", "free from, s",
-        "drift of its momentum", "drift of its spin",
-    ]  # fmt: skip
-    caption = "Separated parts, from the top down (plane scenes: per metre)"
-    return plain_table(caption, head, rows, "prose") if rows else None
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return ", ".join(number(value) for value in values)
 
 
 _PARTS = {

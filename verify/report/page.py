@@ -3,17 +3,13 @@
 from typing import Any
 
 from verify.printable import words_of
-from verify.report.blocks import Table
 from verify.report.case_view import CaseView
 from verify.report.family_view import FamilyView, family_views
 from verify.report.figures.style import Palette
 from verify.report.overview import origin_facts, overview
 from verify.report.ranking_tables import (
     compared,
-    conformance_table,
-    left_out_table,
     profiles_figure,
-    stability_table,
     strengths_table,
 )
 from verify.report.run_directory import Run
@@ -66,17 +62,6 @@ def _ranking(ranking: dict[str, Any] | None) -> dict[str, Any] | None:
     """Return the tables of the ranking; None for a run of one solver or from before rankings."""
     if not ranking or len(ranking.get("solvers", [])) < 2:
         return None
-    tables: dict[str, list[Table]] = {
-        question: compared(ranking, question, title) for question, title in _QUESTIONS
-    }
-    return {
-        "solvers": len(ranking["solvers"]),
-        "cases": len(ranking["cases"]),
-        "profiles": profiles_figure(ranking.get("profiles") or []),
-        "strengths": strengths_table(ranking),
-        "conformance": conformance_table(ranking),
-        "stability": stability_table(ranking),
-        "contended": "; ".join(ranking.get("contended") or []),
-        "left_out": left_out_table(ranking),
-        "tables": tables,
-    }
+    tables = {question: compared(ranking, question, title) for question, title in _QUESTIONS}
+    figure = profiles_figure(ranking.get("profiles") or [])
+    return {**ranking, "figure": figure, "best": strengths_table(ranking), "tables": tables}

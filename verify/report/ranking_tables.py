@@ -7,39 +7,6 @@ from verify.report.blocks import Cell, Figure, Table, plain_table
 from verify.report.figures.style import Palette, drawing, legend, log_axis, log_range, panel
 from verify.report.notation import metric_title, number, solver_title, with_interval
 
-_STATES = ("pass", "fail", "error", "refused")
-_ENDS = (
-    ("failed", "failed"),
-    ("timeout", "out of time"),
-    ("memory", "out of memory"),
-    ("blown_up", "blown up"),
-    ("inside_out", "with elements inside out"),
-)
-
-
-def conformance_table(ranking: Mapping[str, Any]) -> Table | None:
-    """Return how many conformance checks each solver passes; None if nobody was asked."""
-    found = ranking["conformance"]
-    if not any(own.get("checks") for own in found.values()):
-        return None
-    rows = []
-    for solver in ranking["solvers"]:
-        own = found.get(solver, {})
-        checks = own.get("checks")
-        if checks is None:
-            rows.append([solver_title(solver), "–", "–", "–", own.get("unchecked", "not checked")])
-            continue
-        named = {state: [c for c in checks if c["state"] == state] for state in _STATES}
-        bad = [
-            f"{c['name']}: {c['claim']}" + (f" ({c['reason']})" if c["reason"] else "")
-            for c in (*named["fail"], *named["error"])
-        ]
-        counts = [len(named[state]) for state in _STATES]
-        rows.append([solver_title(solver), str(counts[0]), str(counts[1] + counts[2]),
-                     str(counts[3]), "; ".join(bad) or "–"])  # fmt: skip
-    head = ["solver", "passed", "failed", "refused", "what fails"]
-    return plain_table("Conformance: claims that hold for every right solver", head, rows, "prose")
-
 
 def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Table]:
     """Return the table of a question, a row per solver, and that of what was left out."""
@@ -49,7 +16,7 @@ def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Tabl
     if shown:
         first = [s["solver"] for s in shown[0]["standings"]]
         order = first + [solver for solver in ranking["solvers"] if solver not in first]
-        rows = [[_marked(s, ranking), *(_standing(one, s) for one in shown)] for s in order]
+        rows = [[marked(s, ranking), *(_standing(one, s) for one in shown)] for s in order]
         head = [Cell("solver"), *(_column(one) for one in shown)]
         tables.append(Table(f"{title}: rank, number [interval]", head, rows))
     if rest := _grouped(comparisons):
@@ -58,34 +25,7 @@ def compared(ranking: Mapping[str, Any], question: str, title: str) -> list[Tabl
     return tables
 
 
-def stability_table(ranking: Mapping[str, Any]) -> Table:
-    """Return how the solves of each solver ended."""
-    rows: list[list[str | Cell]] = []
-    for own in ranking["stability"]:
-        ended = [f"{own[name]} {word}" for name, word in _ENDS if own[name]]
-        done = [f"{kind}: {number(count)}" for kind, count in own["regularisations"].items()]
-        rows.append(
-            [_marked(own["solver"], ranking), Cell(_rank(own), strong=True),
-             f"{own['solved']} of {own['asked']}", str(own["refused"]), ", ".join(ended) or "–",
-             "; ".join(done) or "–"]
-        )  # fmt: skip
-    head = ["solver", "rank", "solved", "refused", "lost or suspect", "regularised, how often"]
-    return plain_table("Robustness", head, rows, "prose")
-
-
-def left_out_table(ranking: Mapping[str, Any]) -> Table | None:
-    """Return what is in no ranking."""
-    rows = [
-        [e["case"], solver_title(e["solver"]) if e["solver"] else "all", e["reason"]]
-        for e in ranking["left_out"]
-    ]
-    caption = "In no ranking: solves without an answer, undecided checks"
-    return (
-        plain_table(caption, ["case", "solver", "what happened"], rows, "prose") if rows else None
-    )
-
-
-def _marked(solver: str, ranking: Mapping[str, Any]) -> Cell:
+def marked(solver: str, ranking: Mapping[str, Any]) -> Cell:
     """Return a solver's name, with a mark if it fails a conformance check."""
     checks = ranking["conformance"].get(solver, {}).get("checks") or []
     wrong = any(c["state"] in ("fail", "error") for c in checks)
@@ -120,10 +60,11 @@ def _standing(one: Mapping[str, Any], solver: str) -> Cell:
     few = f"{own['count']} of {one['items']}" if own["count"] < one["items"] else ""
     note = few + (f" ({own['where']})" if own["where"] else "")
     value = with_interval(own["value"], own["low"], own["high"])
-    return Cell(f"{_rank(own)}: {value}", note)
+    return Cell(f"{rank(own)}: {value}", note)
 
 
-def _rank(own: Mapping[str, Any]) -> str:
+def rank(own: Mapping[str, Any]) -> str:
+    """Return the rank of a standing, with a sign if it is shared."""
     return "–" if own["rank"] is None else f"{own['rank']}{'=' if own['tied'] else ''}"
 
 

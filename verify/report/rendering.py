@@ -66,17 +66,17 @@ def _written(
     palette, cases = run_palette(run.record), []
     for index, entry in enumerate(run.entries):
         made = drawn_before(drawings / f"{entry.folder.name}.pickle", palette) if drawings else None
-        cases.append(made or drawn_case(run.root, index, entry, palette))
+        cases.append((made or drawn_case(run.root, index, entry, palette)).view)
     pictures = [case.pictures for case in cases]
     notes: list[str] = []
-    view = page_view(run, [case.view for case in cases], palette, notes)
+    view = page_view(run, cases, palette, notes)
     text = as_html("report.j2", **view, turnable=_turnable(pictures))
     excess = len(text.encode("utf-8")) - _PAGE_BYTES
     if excess > 0:
         notes.append(_left_out(pictures, excess))
         for case in cases:
-            show_pictures(case.view, case.pictures)
-        view = page_view(run, [case.view for case in cases], palette, notes)
+            show_pictures(case)
+        view = page_view(run, cases, palette, notes)
         text = as_html("report.j2", **view, turnable=_turnable(pictures))
     write_whole(directory / "results.json", json_document(run))
     write_whole(directory / "results.csv", csv_rows(run))

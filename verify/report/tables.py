@@ -152,24 +152,6 @@ def times_table(result: CaseResult) -> Table | None:
     return plain_table("Wall times: median (smallest to largest repetition)", head, rows)
 
 
-def orders_table(result: CaseResult) -> Table | None:
-    """Return the observed orders of the metrics that are shown, or why there is none."""
-    shown = metric_names(result)
-    rows = [
-        [
-            solver_title(rate.solver),
-            error_title(rate.metric),
-            f"{rate.order:.3f} ± {rate.uncertainty:.3f}" if rate.order is not None else "–",
-            ", ".join(f"{slope:.2f}" for slope in rate.pairwise) or "–",
-            rate.reason or "–",
-        ]
-        for rate in result.rates
-        if rate.metric in shown or not shown
-    ]
-    head = ["solver", "error", "order", "between successive levels", "reservation"]
-    return plain_table("Observed orders of convergence", head, rows, "prose") if rows else None
-
-
 def regularisations_table(result: CaseResult) -> Table | None:
     """Return all that the solvers dropped, snapped, clamped, scaled or floored."""
     groups: dict[tuple[str, str], list[tuple[int, Regularisation]]] = {}
@@ -184,23 +166,6 @@ def regularisations_table(result: CaseResult) -> Table | None:
         rows.append([solver_title(solver), kind, counts, largest])
     head = ["solver", "what was done", "how often", "largest contribution"]
     return plain_table("Regularisations", head, rows, "prose") if rows else None
-
-
-def failures_table(solves: Sequence[SolveRecord]) -> Table | None:
-    """Return the solves that did not end well, with their reasons."""
-    rows = [
-        [
-            solver_title(solve.solver),
-            str(solve.level),
-            str(solve.status),
-            solve.reason or "no reason given",
-            seconds_text(solve.wall),
-        ]
-        for solve in solves
-        if solve.status is not Status.SOLVED
-    ]
-    head = ["solver", "level", "ended", "reason", "after"]
-    return plain_table("Solves that did not end well", head, rows, "prose") if rows else None
 
 
 def reference_facts(reference: ReferenceRecord) -> list[tuple[str, str]]:

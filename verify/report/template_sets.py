@@ -18,6 +18,7 @@ from PIL import Image
 
 from verify.report.blocks import Cell, Drawing, plain_table
 from verify.report.notation import (
+    error_title,
     metric_title,
     number,
     printable,
@@ -26,6 +27,7 @@ from verify.report.notation import (
     solver_title,
     spread_text,
 )
+from verify.report.ranking_tables import marked, rank
 from verify.whole_files import write_whole
 
 PICTURES = "report-pictures"
@@ -86,6 +88,10 @@ def _environment(kind: str) -> Environment:
         "number": number,
         "seconds": seconds_text,
         "metric": metric_title,
+        "error": error_title,
+        "form": format,
+        "marked": marked,
+        "rank": rank,
         "solver": solver_title,
         "signed": signed,
         "spread": spread_text,
