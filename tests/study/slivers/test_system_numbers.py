@@ -17,8 +17,7 @@ from verify.scene import load_scene
 from verify.solvers import find_solver
 from verify.solvers.xfem import XfemSolver
 from verify.study.measured_scenes import Measurement
-from verify.study.slivers.findings import findings
-from verify.study.slivers.growth import growth
+from verify.study.slivers.findings import findings, growth
 from verify.study.slivers.step_by_running import step_by_running
 from verify.system import System, checked_system
 
