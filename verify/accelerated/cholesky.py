@@ -8,20 +8,16 @@ scaling, so slivers do not hurt it (Higham 2002, section 10.1).
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from verify.accelerated.cholesky_kernels import BAND, factorise_fronts, solve_fronts
-from verify.accelerated.front_plan_kernels import assembly_lists, front_rows
-from verify.accelerated.front_tree import levels, merge_and_order
-from verify.accelerated.minimum_degree import minimum_degree
+from verify.accelerated.front_plan import plan_fronts, stack_depths
 from verify.xfem.arrays import check_floats
 from verify.xfem.block_pattern import BlockPattern
 from verify.xfem.errors import SingularStiffnessError, XfemError
 from verify.xfem.linear_solvers import LinearSolver, nodal_vector
 
 _Floats = NDArray[np.float64]
-_Ints = NDArray[np.int64]
 
 
 class Cholesky(LinearSolver):
@@ -54,30 +50,16 @@ class Cholesky(LinearSolver):
             )
         self._block, self._block_count = block, len(pattern.columns)
         self._is_factorised = False
-        starts, columns, _ = coupled = _coupled(pattern.starts, pattern.columns, held)
-        order, bounds = minimum_degree(starts, columns)
-        row_start, _, parent = front_rows(starts, columns, order, bounds)
-        order, bounds = merge_and_order(order, bounds, parent, np.diff(row_start))
-        self._plan(coupled, order, bounds)
-
-    def _plan(self, coupled: tuple[_Ints, _Ints, _Ints], order: _Ints, bounds: _Ints) -> None:
-        """Find fronts and room for an order, and where each block goes."""
-        starts, columns, blocks = coupled
-        row_start, rows, parent = front_rows(starts, columns, order, bounds)
-        lists = assembly_lists(starts, columns, order, bounds, row_start, rows, parent)
-        self._order, self._bounds = order, bounds
-        self._row_start, self._rows, self._parent = row_start, rows, parent
-        self._relative, self._entry_start, self._entry_block, self._entry_row = lists
-        self._entry_block = blocks.take(self._entry_block)
-        width = np.diff(bounds) * self._block
-        below = np.diff(row_start) * self._block
+        plan = self._plan = plan_fronts(pattern.starts, pattern.columns, held)
+        width, below = np.diff(plan.bounds) * block, np.diff(plan.row_start) * block
         self._work = float(width @ (width + below) ** 2)
         self._entries = int((width * (width + below) - width * (width - 1) // 2).sum())
         height = width + below
         self._offset = np.concatenate([[0], np.cumsum(width * height)])
-        self._level, depths = levels(parent, below**2)
+        depths = stack_depths(plan.parent, plan.level, below**2)
         self._factor = np.empty(int(self._offset[-1]))
-        self._stacks = (np.empty(depths[0]), np.empty(depths[1]))
+        self._stack, self._tops = np.empty(sum(depths)), np.array([0, depths[0]])
+        self._waiting = np.empty_like(plan.parent)
         most = int(height.max(initial=0))
         self._diagonal, self._gathered = np.empty(most), np.empty(most)
         self._place = np.empty(most, dtype=np.uint64)
@@ -85,7 +67,7 @@ class Cholesky(LinearSolver):
             width * below, BAND * (width + height) + (width - BAND) * (height - BAND)
         )
         self._products = np.empty(int(products.max(initial=0)))
-        self._permuted = np.empty((len(order), self._block))
+        self._permuted = np.empty((nodes, block))
 
     @property
     def factor_entries(self) -> int:
@@ -103,57 +85,34 @@ class Cholesky(LinearSolver):
         self._is_factorised = False
         failed = factorise_fronts(
             np.ascontiguousarray(blocks),
-            self._bounds,
-            self._row_start,
-            self._relative,
-            self._parent,
-            self._level,
-            self._entry_start,
-            self._entry_block,
-            self._entry_row,
+            self._plan,
             self._offset,
             self._factor,
-            self._stacks,
+            self._stack,
+            self._tops.copy(),
+            self._waiting,
             self._place,
             self._diagonal,
             self._products,
         )
         if failed >= 0:
-            raise SingularStiffnessError(int(self._order[failed // self._block]))
+            raise SingularStiffnessError(int(self._plan.order[failed // self._block]))
         self._is_factorised = True
 
     def solve(self, load: _Floats, x: _Floats | None = None) -> _Floats:
         """Solve; see `LinearSolver`."""
         if not self._is_factorised:
             raise RuntimeError("solve before factorize")
-        load = nodal_vector(load, "right-hand side", len(self._order), self._block)
+        load = nodal_vector(load, "right-hand side", len(self._plan.order), self._block)
         solution = np.empty(load.shape) if x is None else x
-        np.take(load, self._order, axis=0, out=self._permuted, mode="clip")
+        np.take(load, self._plan.order, axis=0, out=self._permuted, mode="clip")
         solve_fronts(
-            self._bounds,
-            self._row_start,
-            self._rows,
+            self._plan,
             self._offset,
             self._factor,
             self._block,
             self._gathered,
             self._permuted.reshape(-1),
         )
-        solution[self._order] = self._permuted
+        solution[self._plan.order] = self._permuted
         return solution
-
-
-@njit(cache=True)
-def _coupled(starts, columns, held):
-    """Rows without what couples held nodes: starts, columns, and which blocks are left."""
-    fewer = np.empty_like(starts)
-    left, blocks = np.empty_like(columns), np.empty(len(columns), dtype=np.int64)
-    count = 0
-    fewer[0] = 0
-    for i in range(len(starts) - 1):
-        for k in range(starts[i], starts[i + 1]):
-            if columns[k] == i or not (held[i] or held[columns[k]]):
-                left[count], blocks[count] = columns[k], k
-                count += 1
-        fewer[i + 1] = count
-    return fewer, left[:count], blocks[:count]

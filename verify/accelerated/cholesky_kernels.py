@@ -16,51 +16,53 @@ _FUSED = {"contract"}  # multiply and add in one, rounded once
 _SUMS = {"contract", "reassoc", "nsz"}  # and sums in any order
 
 
-@njit(cache=True)
-def _write_entries(blocks, begin, end, entry_start, entry_block, entry_row, panel):
+@njit(inline="always")
+def _write_entries(blocks, begin, end, plan, panel):
     """Write the blocks of the columns of a front, nodes `begin` to `end` in the order."""
     size = blocks.shape[1]
     for k in range(end - begin):
-        for entry in range(entry_start[begin + k], entry_start[begin + k + 1]):
-            block, row = blocks[entry_block[entry]], entry_row[entry] * size
+        for entry in range(plan.entry_start[begin + k], plan.entry_start[begin + k + 1]):
+            block, row = plan.entry_block[entry], plan.entry_row[entry] * size
             for a in range(size):
                 for b in range(size):
-                    panel[k * size + a, row + b] = block[a, b]
+                    panel[k * size + a, row + b] = blocks[block, a, b]
 
 
-@njit(cache=True)
-def _places(relative, size, width, place):
-    """Write where the rows of a child are in this front; return how many are columns here."""
-    split = 0
-    for k in range(len(relative)):
-        if relative[k] * size < width:
+@njit(inline="always")
+def _places(child, plan, size, width, place):
+    """Write where the rows of a child are in this front; how many there are, and are columns."""
+    split = count = 0
+    for k in range(plan.row_start[child], plan.row_start[child + 1]):
+        first = plan.relative[k] * size
+        if first < width:
             split += size
         for a in range(size):
-            place[k * size + a] = relative[k] * size + a
-    return split
+            place[count] = first + a
+            count += 1
+    return count, split
 
 
-@njit(cache=True)
-def _take_columns(child, split, place, panel):
-    """Take what a child leaves of the columns of this front."""
+@njit(inline="always")
+def _take_columns(left, first, count, split, place, panel):
+    """Take what a child leaves, from `first` on, of the columns of this front."""
     for j in range(split):
-        own, left = panel[place[j]], child[j]
-        for i in range(j, len(child)):
-            own[place[i]] -= left[i]
+        own, at = panel[place[j]], first + j * count
+        for i in range(j, count):
+            own[place[i]] -= left[at + i]
 
 
-@njit(cache=True)
-def _pass_on(child, split, place, width, update):
+@njit(inline="always")
+def _pass_on(left, first, count, split, place, width, update):
     """Add what a child leaves of the rows of this front to what this front leaves of them."""
-    for j in range(split, len(child)):
+    for j in range(split, count):
         place[j] -= np.uint64(width)
-    for j in range(split, len(child)):
-        own, left = update[place[j]], child[j]
-        for i in range(j, len(child)):
-            own[place[i]] += left[i]
+    for j in range(split, count):
+        own, at = update[place[j]], first + j * count
+        for i in range(j, count):
+            own[place[i]] += left[at + i]
 
 
-@njit(cache=True, fastmath=_FUSED)
+@njit(inline="always")
 def _eliminate_band(panel, begin, end, diagonal):
     """Factorise columns `begin` to `end` of a panel in place; the failing one or -1."""
     for j in range(begin, end):
@@ -85,7 +87,7 @@ def _eliminate_band(panel, begin, end, diagonal):
     return -1
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _numbers(panel, begin, end, first, room):
     """Columns `begin` to `end` of a panel, rows from `first` on, without gaps."""
     depth, rows = end - begin, panel.shape[1] - first
@@ -96,7 +98,7 @@ def _numbers(panel, begin, end, first, room):
     return numbers
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _subtract_product(panel, begin, end, room):
     """Take the product of columns `begin` to `end` of a panel from those after them."""
     numbers, columns = _numbers(panel, begin, end, end, room), len(panel) - end
@@ -115,7 +117,7 @@ def _subtract_product(panel, begin, end, room):
             own[i] -= taken[i]
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_FUSED)
 def _eliminate(panel, diagonal, room):
     """Factorise the columns of a panel in place; the failing one or -1."""
     width = len(panel)
@@ -129,71 +131,47 @@ def _eliminate(panel, diagonal, room):
     return -1
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=_FUSED)
 def factorise_fronts(
-    blocks,
-    bounds,
-    row_start,
-    relative,
-    parent,
-    level,
-    entry_start,
-    entry_block,
-    entry_row,
-    offset,
-    factor,
-    stacks,
-    place,
-    diagonal,
-    room,
+    blocks, plan, offset, factor, stack, tops, waiting_front, place, diagonal, room
 ):
     """Factorise; return the scalar column (in the order) whose pivot failed, or -1.
 
     What a front leaves of its rows, to be taken from its parent, is the product of its own columns
     plus what its children leave of them. It waits on one of two stacks, by the parity of the level:
-    fronts are in postorder, so what the children leave is last on the other.
+    fronts are in postorder, so what the children leave is last on the other. Both are in `stack`,
+    from the two `tops` on; `waiting_front` (F,) has room for the fronts on them.
     """
-    size = blocks.shape[1]
-    waiting_front, waiting = np.empty(len(parent), dtype=np.int64), 0
-    none = np.int64(0)  # as a constant it would have a loop compiled once more
-    tops = np.zeros(2, dtype=np.int64)
+    bounds, row_start, parent = plan.bounds, plan.row_start, plan.parent
+    size, waiting = blocks.shape[1], 0
     for s in range(len(parent)):
-        columns = bounds[s + 1] - bounds[s]
-        width, below = columns * size, (row_start[s + 1] - row_start[s]) * size
+        width = (bounds[s + 1] - bounds[s]) * size
+        below = (row_start[s + 1] - row_start[s]) * size
         panel = factor[offset[s] : offset[s + 1]].reshape(width, width + below)
-        mine = level[s] & 1
-        theirs = stacks[1 - mine]
+        mine = plan.level[s] & 1
         panel[:] = 0.0
-        _write_entries(
-            blocks, bounds[s], bounds[s + 1], entry_start, entry_block, entry_row, panel
-        )  # fmt: skip
+        _write_entries(blocks, bounds[s], bounds[s + 1], plan, panel)
         for j in range(width):
             diagonal[j] = panel[j, j]
         first, top = waiting, tops[1 - mine]
         while first > 0 and parent[waiting_front[first - 1]] == s:
             first -= 1
-            child = waiting_front[first]
-            places = relative[row_start[child] : row_start[child + 1]]
-            count = len(places) * size
+            count, split = _places(waiting_front[first], plan, size, width, place)
             top -= count * count
-            left = theirs[top : top + count * count].reshape(count, count)
-            _take_columns(left, _places(places, size, width, place), place, panel)
+            _take_columns(stack, top, count, split, place, panel)
         failed = _eliminate(panel, diagonal, room)
         if failed >= 0:
             return bounds[s] * size + failed
         if below > 0:
             end = tops[mine] + below * below
-            update = stacks[mine][tops[mine] : end].reshape(below, below)
-            numbers = _numbers(panel, none, width, width, room)
+            update = stack[tops[mine] : end].reshape(below, below)
+            numbers = _numbers(panel, 0, width, width, room)
             np.dot(numbers.T, numbers, update)
             top = tops[1 - mine]
             for at in range(waiting - 1, first - 1, -1):
-                child = waiting_front[at]
-                places = relative[row_start[child] : row_start[child + 1]]
-                count = len(places) * size
+                count, split = _places(waiting_front[at], plan, size, width, place)
                 top -= count * count
-                left = theirs[top : top + count * count].reshape(count, count)
-                _pass_on(left, _places(places, size, width, place), place, width, update)
+                _pass_on(stack, top, count, split, place, width, update)
             tops[mine] = end
         tops[1 - mine], waiting = top, first
         if below > 0:
@@ -202,7 +180,7 @@ def factorise_fronts(
     return -1
 
 
-@njit(cache=True, fastmath=_SUMS)
+@njit(inline="always")
 def _solve_front(panel, x, own, rows, size, gathered):
     """Find a front's values, forwards and in place, and what they leave of its rows."""
     width, height = panel.shape
@@ -221,7 +199,7 @@ def _solve_front(panel, x, own, rows, size, gathered):
             x[rows[k] * size + a] += gathered[width + k * size + a]
 
 
-@njit(cache=True, fastmath=_SUMS)
+@njit(inline="always")
 def _solve_front_back(panel, x, own, rows, size, gathered):
     """Find a front's values, backwards and in place, from those of its rows."""
     width, height = panel.shape
@@ -236,12 +214,13 @@ def _solve_front_back(panel, x, own, rows, size, gathered):
         gathered[j] = x[own + j] = (x[own + j] - total) / panel[j, j]
 
 
-@njit(cache=True)
-def solve_fronts(bounds, row_start, rows, offset, factor, size, gathered, x):
+@njit(cache=True, fastmath=_SUMS)
+def solve_fronts(plan, offset, factor, size, gathered, x):
     """Solve L Lᵀ x = b in place; x (N·size,) is in the order of elimination.
 
     `gathered` has room for the columns and rows of any front.
     """
+    bounds, row_start, rows = plan.bounds, plan.row_start, plan.rows
     fronts = len(bounds) - 1
     for step in range(2 * fronts):
         s = step if step < fronts else 2 * fronts - 1 - step

@@ -14,7 +14,7 @@ _ZEROS = 0.1
 
 def merge_and_order(
     order: _Ints, bounds: _Ints, parent: _Ints, below: _Ints
-) -> tuple[_Ints, _Ints]:
+) -> tuple[_Ints, _Ints, _Ints, _Ints]:
     """Merge fronts, and reorder so that the subtree of each comes directly before it.
 
     Parameters
@@ -28,45 +28,31 @@ def merge_and_order(
 
     Returns
     -------
-    order, bounds
+    order, bounds : int arrays
         The same for the merged fronts; update matrices can then wait on a stack.
-    """
-    group = _merge(np.diff(bounds), parent, below)
-    position, ends = _postorder(np.diff(bounds), parent, group)
-    new = np.empty_like(order)
-    columns = np.arange(len(order)) - np.repeat(bounds[:-1], np.diff(bounds))
-    new[np.repeat(position, np.diff(bounds)) + columns] = order
-    return new, ends
-
-
-def levels(parent: _Ints, entries: _Ints) -> tuple[_Ints, tuple[int, int]]:
-    """Levels of fronts in postorder, and how deep two stacks of update matrices become.
-
-    Parameters
-    ----------
-    parent : (S,) int array
-    entries : (S,) int array
-        Of the update matrix of each front. It waits on the stack of even levels or on that of odd
-        ones, where its parent, which then takes it, does not write its own.
-
-    Returns
-    -------
-    level : (S,) int array
+    tops : (F,) int array
+        The front into which those of a merged one went: its rows are those of this one.
+    level : (F,) int array
         0 at a root.
-    depths : (int, int)
     """
-    level, even, odd = _levels(parent, entries)
-    return level, (int(even), int(odd))
+    count, width = len(parent), np.diff(bounds)
+    position, group, tops, level, ends = np.zeros((5, count + 1), dtype=np.int64)
+    fronts = _merge(width.copy(), parent, below, group, np.zeros(count, dtype=np.int64))
+    linked, stack = np.full((4, count + 1), -1), np.full(count + 1, count)
+    _postorder(width, parent, group, linked, stack, position, tops, level, ends)
+    new = np.empty_like(order)
+    columns = np.arange(len(order)) - np.repeat(bounds[:-1], width)
+    new[np.repeat(position[:count], width) + columns] = order
+    return new, ends[: fronts + 1], tops[:fronts], level[:fronts]
 
 
 @njit(cache=True)
-def _merge(width, parent, below):
-    """Front into which each front goes in the end (itself if it stays)."""
+def _merge(columns, parent, below, group, zeros):
+    """Write the front into which each goes in the end (itself if it stays); how many stay."""
     count = len(parent)
-    group, zeros = np.empty(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    columns = width.copy()
     for front in range(count):
         group[front] = front
+    left = count
     for front in range(count):
         above = parent[front]
         if above < 0:
@@ -79,19 +65,18 @@ def _merge(width, parent, below):
             group[front] = above
             columns[above] = merged
             zeros[above] = added
+            left -= 1
     for front in range(count - 1, -1, -1):
         group[front] = group[group[front]]
-    return group
+    return left
 
 
 @njit(cache=True)
-def _postorder(width, parent, group):
-    """First place of each front's columns, and the ends of the merged fronts (from 0)."""
+def _postorder(width, parent, group, linked, stack, position, tops, level, ends):
+    """Write the first place of each front's columns, and of merged fronts what is returned."""
+    # children of merged fronts, last: roots; and fronts merged into one, ascending
+    head, following, member, next_member = linked[0], linked[1], linked[2], linked[3]
     count = len(parent)
-    head = np.full(count + 1, -1, dtype=np.int64)  # children of merged fronts; last: roots
-    following = np.full(count, -1, dtype=np.int64)
-    member = np.full(count, -1, dtype=np.int64)  # fronts merged into one, ascending
-    next_member = np.full(count, -1, dtype=np.int64)
     for front in range(count - 1, -1, -1):
         next_member[front] = member[group[front]]
         member[group[front]] = front
@@ -99,10 +84,6 @@ def _postorder(width, parent, group):
             above = group[parent[front]] if parent[front] >= 0 else count
             following[front] = head[above]
             head[above] = front
-    position = np.empty(count, dtype=np.int64)
-    ends = np.zeros(count + 1, dtype=np.int64)
-    stack = np.empty(count + 1, dtype=np.int64)
-    stack[0] = count
     depth, used, fronts = 1, 0, 0
     while depth > 0:
         front = stack[depth - 1]
@@ -120,25 +101,6 @@ def _postorder(width, parent, group):
             position[part] = used
             used += width[part]
             part = next_member[part]
+        tops[fronts], level[fronts] = front, depth - 1
         fronts += 1
         ends[fronts] = used
-    return position, ends[: fronts + 1]
-
-
-@njit(cache=True)
-def _levels(parent, entries):
-    count = len(parent)
-    level = np.zeros(count, dtype=np.int64)
-    for front in range(count - 1, -1, -1):
-        if parent[front] >= 0:
-            level[front] = level[parent[front]] + 1
-    freed = np.zeros(count, dtype=np.int64)  # by each front, of the other stack
-    waiting, deepest = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
-    for front in range(count):
-        mine = level[front] & 1
-        waiting[mine] += entries[front]
-        deepest[mine] = max(deepest[mine], waiting[mine])
-        waiting[1 - mine] -= freed[front]
-        if parent[front] >= 0:
-            freed[parent[front]] += entries[front]
-    return level, deepest[0], deepest[1]

@@ -3,7 +3,7 @@
 The quotient-graph method of Amestoy, Davis & Duff (1996), on nodes instead of scalar unknowns.
 Eliminated sets become *elements*; a node's degree is bounded from the elements and nodes that it
 still sees. Nodes that see nothing but the newest element go with it, so the order comes with its
-fundamental supernodes.
+fundamental supernodes, and the nodes of an element are the rows of its front.
 """
 
 import numpy as np
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 _Ints = NDArray[np.int64]
 
 
-def minimum_degree(starts: NDArray[np.int32], columns: NDArray[np.int32]) -> tuple[_Ints, _Ints]:
+def minimum_degree(
+    starts: NDArray[np.int64], columns: NDArray[np.int64]
+) -> tuple[_Ints, _Ints, _Ints, _Ints]:
     """Order nodes for elimination.
 
     Parameters
@@ -27,12 +29,20 @@ def minimum_degree(starts: NDArray[np.int32], columns: NDArray[np.int32]) -> tup
         The nodes, first to be eliminated first.
     bounds : (S + 1,) int array
         Supernode s is ``order[bounds[s]:bounds[s + 1]]``.
+    row_start : (S + 1,) int array
+        Rows of supernode s are entries row_start[s] to row_start[s + 1] of `rows`.
+    rows : (R,) int array
+        Nodes that the elimination of a supernode couples to each other.
     """
-    order, bounds = _eliminate_all(starts, columns)
-    return order, bounds
+    count = len(starts) - 1
+    zeros, none = np.zeros((11, count + 1), dtype=np.int64), np.full((5, count + 1), -1)
+    room = np.empty(2 * len(columns) + count, dtype=np.int64)
+    sets, rows = _eliminate_all(starts, columns, np.empty_like(columns), zeros, none, room)
+    order, bounds, row_start = zeros[:3]
+    return order[:count], bounds[: sets + 1], row_start[: sets + 1], rows[: row_start[sets]]
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _unlink(node, degree, head, after, before):
     if before[node] >= 0:
         after[before[node]] = after[node]
@@ -42,7 +52,7 @@ def _unlink(node, degree, head, after, before):
         before[after[node]] = before[node]
 
 
-@njit(cache=True)
+@njit(inline="always")
 def _link(node, degree, head, after, before):
     first = head[degree[node]]
     after[node] = first
@@ -52,138 +62,62 @@ def _link(node, degree, head, after, before):
     head[degree[node]] = node
 
 
-@njit(cache=True)
-def _gather(pivot, start, elements, variables, sees, begin, size, members, alive, mark, found):
-    """Nodes of the new element: what the pivot sees, directly or through its elements."""
-    count = 0
-    mark[pivot] = pivot
-    for k in range(elements[pivot]):
-        element = sees[start[pivot] + k]
-        if not alive[element]:
-            continue
-        alive[element] = False
-        for at in range(begin[element], begin[element] + size[element]):
-            node = members[at]
-            if mark[node] != pivot:
-                mark[node] = pivot
-                found[count] = node
-                count += 1
-    for k in range(elements[pivot], elements[pivot] + variables[pivot]):
-        node = sees[start[pivot] + k]
-        if mark[node] != pivot:
-            mark[node] = pivot
-            found[count] = node
-            count += 1
-    return count
-
-
-@njit(cache=True)
+@njit(inline="always")
 def _see_neighbours(starts, columns, sees, variables):
     """Let every node see its neighbours, not itself."""
-    for node in range(len(variables)):
+    for node in range(len(starts) - 1):
         for at in range(starts[node], starts[node + 1]):
             if columns[at] != node:
                 sees[starts[node] + variables[node]] = columns[at]
                 variables[node] += 1
 
 
-@njit(cache=True)
-def _count_outside(pivot, found, start, elements, sees, alive, size, seen_by, outside):
+@njit(inline="always")
+def _gather(pivot, start, elements, variables, sees, begin, size, members, dead, mark, found):
+    """Nodes of the new element: what the pivot sees, directly or through its elements."""
+    count = 0
+    mark[pivot] = pivot
+    for at in range(start[pivot], start[pivot] + elements[pivot] + variables[pivot]):
+        # a node that is seen directly is a list of its own
+        other, first, last = sees[at], at, at + 1
+        direct = at >= start[pivot] + elements[pivot]
+        if not direct:
+            first, last = begin[other], begin[other] + (0 if dead[other] else size[other])
+            dead[other] = 1
+        for k in range(first, last):
+            node = sees[k] if direct else members[k]
+            if mark[node] != pivot:
+                mark[node] = pivot
+                found[count] = node
+                count += 1
+    return count
+
+
+@njit(inline="always")
+def _count_outside(pivot, found, number, start, elements, sees, dead, size, seen_by, outside):
     """Nodes of each older element that the new one does not have."""
-    for node in found:
-        for k in range(elements[node]):
-            element = sees[start[node] + k]
-            if alive[element]:
+    for index in range(number):
+        node = found[index]
+        for at in range(start[node], start[node] + elements[node]):
+            element = sees[at]
+            if not dead[element]:
                 if seen_by[element] != pivot:
                     seen_by[element] = pivot
                     outside[element] = size[element]
                 outside[element] -= 1
 
 
-@njit(cache=True)
-def _eliminate_all(starts, columns):
-    count = len(starts) - 1
-    start = starts[:-1].astype(np.int64)
-    sees = columns.astype(np.int64)  # of each node: its elements, then its nodes
-    elements = np.zeros(count, dtype=np.int64)
-    variables = np.zeros(count, dtype=np.int64)
-    degree = np.zeros(count, dtype=np.int64)
-    head = np.full(count + 1, -1, dtype=np.int64)
-    after = np.full(count, -1, dtype=np.int64)
-    before = np.full(count, -1, dtype=np.int64)
-    _see_neighbours(starts, columns, sees, variables)
-    for node in range(count):
-        degree[node] = variables[node]
-        _link(node, degree, head, after, before)
-    mark = np.full(count, -1, dtype=np.int64)
-    gone = np.zeros(count, dtype=np.bool_)
-    alive = np.ones(count, dtype=np.bool_)  # as elements
-    begin = np.zeros(count, dtype=np.int64)
-    size = np.zeros(count, dtype=np.int64)
-    members = np.empty(2 * len(columns) + count, dtype=np.int64)
-    filled = 0
-    outside = np.zeros(count, dtype=np.int64)
-    seen_by = np.full(count, -1, dtype=np.int64)
-    space = np.empty(count, dtype=np.int64)
-    order = np.empty(count, dtype=np.int64)
-    bounds = np.zeros(count + 1, dtype=np.int64)
-    done = 0
-    sets = 0
-    least = 0
-    while done < count:
-        while head[least] < 0:
-            least += 1
-        pivot = head[least]
-        _unlink(pivot, degree, head, after, before)
-        gone[pivot] = True
-        order[done] = pivot
-        done += 1
-        number = _gather(
-            pivot, start, elements, variables, sees, begin, size, members, alive, mark, space
-        )
-        found = space[:number]
-        _count_outside(pivot, found, start, elements, sees, alive, size, seen_by, outside)
-        if filled + number > len(members):
-            grown = np.empty(2 * len(members) + number, dtype=np.int64)
-            for at in range(filled):
-                grown[at] = members[at]
-            members = grown
-        begin[pivot] = filled
-        for node in found:
-            _unlink(node, degree, head, after, before)
-            bound = _shorten(
-                node, pivot, start, elements, variables, sees, alive, outside, gone, mark
-            )
-            if elements[node] == 1 and variables[node] == 0:
-                gone[node] = True
-                order[done] = node
-                done += 1
-            else:
-                members[filled] = node
-                filled += 1
-                degree[node] = min(bound, degree[node]) + number - 1
-        size[pivot] = filled - begin[pivot]
-        for at in range(begin[pivot], filled):
-            node = members[at]
-            degree[node] = max(0, min(degree[node], count - done - 1))
-            _link(node, degree, head, after, before)
-            least = min(least, degree[node])
-        sets += 1
-        bounds[sets] = done
-    return order, bounds[: sets + 1]
-
-
-@njit(cache=True)
-def _shorten(node, pivot, start, elements, variables, sees, alive, outside, gone, mark):
+@njit(inline="always")
+def _shorten(node, pivot, start, elements, variables, sees, dead, outside, gone, mark):
     """Replace what the new element covers by the element; bound the degree of the rest."""
     begin = start[node]
     write = begin
     bound = 0
     for at in range(begin, begin + elements[node]):
         element = sees[at]
-        if alive[element]:
+        if not dead[element]:
             if outside[element] == 0:
-                alive[element] = False
+                dead[element] = 1
             else:
                 bound += outside[element]
                 sees[write] = element
@@ -200,3 +134,63 @@ def _shorten(node, pivot, start, elements, variables, sees, alive, outside, gone
     elements[node] = middle - begin + 1
     variables[node] = write - middle
     return bound + variables[node]
+
+
+@njit(cache=True)
+def _eliminate_all(starts, columns, sees, zeros, none, members):
+    """Write order, bounds and ends of rows into the first of `zeros`; the sets, and the rows.
+
+    `sees` has of each node its elements, then its nodes.
+    """
+    order, bounds, ends = zeros[0], zeros[1], zeros[2]
+    elements, variables, degree, begin = zeros[3], zeros[4], zeros[5], zeros[6]
+    size, outside, gone, dead = zeros[7], zeros[8], zeros[9], zeros[10]
+    head, after, before, mark, seen_by = none[0], none[1], none[2], none[3], none[4]
+    count = len(starts) - 1
+    _see_neighbours(starts, columns, sees, variables)
+    for node in range(count):
+        degree[node] = variables[node]
+        _link(node, degree, head, after, before)
+    filled = done = sets = least = 0
+    while done < count:
+        while head[least] < 0:
+            least += 1
+        pivot = head[least]
+        _unlink(pivot, degree, head, after, before)
+        gone[pivot] = 1
+        order[done] = pivot
+        done += 1
+        if filled + count > len(members):
+            grown = np.empty(2 * len(members) + count, dtype=np.int64)
+            for at in range(filled):
+                grown[at] = members[at]
+            members = grown
+        found = members[filled:]  # of which those that stay move to the front
+        number = _gather(
+            pivot, starts, elements, variables, sees, begin, size, members, dead, mark, found
+        )
+        _count_outside(pivot, found, number, starts, elements, sees, dead, size, seen_by, outside)
+        begin[pivot] = filled
+        for index in range(number):
+            node = found[index]
+            _unlink(node, degree, head, after, before)
+            bound = _shorten(
+                node, pivot, starts, elements, variables, sees, dead, outside, gone, mark
+            )
+            if elements[node] == 1 and variables[node] == 0:
+                gone[node] = 1
+                order[done] = node
+                done += 1
+            else:
+                members[filled] = node
+                filled += 1
+                degree[node] = min(bound, degree[node]) + number - 1
+        size[pivot] = filled - begin[pivot]
+        for at in range(begin[pivot], filled):
+            node = members[at]
+            degree[node] = max(0, min(degree[node], count - done - 1))
+            _link(node, degree, head, after, before)
+            least = min(least, degree[node])
+        sets += 1
+        bounds[sets], ends[sets] = done, filled
+    return sets, members
